@@ -1,0 +1,1 @@
+"""The bench: reads a recorded session, holds truth and estimate side by side, and reports."""

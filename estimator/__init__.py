@@ -1,0 +1,1 @@
+"""The torque estimator of Solomon and Hartmann (2008). Knows no image."""
