@@ -2,4 +2,4 @@
 
 
 class BadInput(Exception):
-    """One clear line: file, row or frame, what was found, what is allowed. Ends a command with exit code 2."""
+    """One clear line: file, row or frame, what was found, what is allowed. Ends with exit code 2."""

@@ -1,4 +1,4 @@
-"""Fixtures common to all tests: where the recorded-like sessions and the real recordings are, if they are there."""
+"""Fixtures common to all tests: the recorded-like sessions and the real recordings, where they are there."""
 
 import os
 from pathlib import Path
