@@ -1,0 +1,86 @@
+"""What every equation asks of its arguments, and how a result leaves the house.
+
+Measured arguments outside an equation's domain give NaN; settings that no measurement can excuse raise
+ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
+"""
+
+from functools import wraps
+
+import numpy as np
+
+RIGHT_ANGLE = np.pi / 2
+
+
+def elementwise(function):
+    """Let a formula on float64 arrays take anything array-like, broadcast, and return floats for scalars.
+
+    Overflow, division by zero and NaN stay silent inside: the formula's own domain decides what they mean.
+    """
+
+    @wraps(function)
+    def wrapper(*args, **kwargs):
+        arrays = [np.asarray(a, dtype=float) for a in args]
+        named = {name: np.asarray(a, dtype=float) for name, a in kwargs.items()}
+        with np.errstate(all="ignore"):
+            return _plain(function(*arrays, **named))
+
+    return wrapper
+
+
+def _plain(result):
+    if isinstance(result, tuple):
+        return tuple(_plain(part) for part in result)
+    return result.item() if np.ndim(result) == 0 else result
+
+
+def quotient(numerator, denominator):
+    """Product of `numerator`'s factors over that of `denominator`'s, without overflow or underflow on the
+    way.
+
+    Significands and exponents go separate ways, so only the result itself can leave the range of float64.
+    """
+    value, exponent = 1.0, 0
+    for factor in numerator:
+        significand, power = np.frexp(factor)
+        value, exponent = value * significand, exponent + power
+    for factor in denominator:
+        significand, power = np.frexp(factor)
+        value, exponent = value / significand, exponent - power
+    return np.ldexp(value, exponent)
+
+
+def require_positive(name: str, value, unit: str) -> None:
+    """Raise ValueError unless every `value` is positive and finite."""
+    array = np.asarray(value, dtype=float)
+    if not np.all((array > 0) & np.isfinite(array)):
+        raise ValueError(f"{name} = {value} {unit}: must be positive and finite")
+
+
+def require_friction_angle(name: str, value) -> None:
+    """Raise ValueError unless every `value` [rad] lies in [0°, 90°)."""
+    array = np.asarray(value, dtype=float)
+    if not np.all((array >= 0) & (array < RIGHT_ANGLE)):
+        raise ValueError(f"{name} = {value} rad: must lie in [0, pi/2), that is from 0 to below 90 degrees")
+
+
+def require_sigma(name: str, value) -> None:
+    """Raise ValueError unless every `value` is a standard deviation: zero or positive, and finite."""
+    array = np.asarray(value, dtype=float)
+    if not np.all((array >= 0) & np.isfinite(array)):
+        raise ValueError(f"{name} = {value}: a standard deviation must be zero or positive, and finite")
+
+
+def first_failure(conditions, shape):
+    """Text of the first failing condition, element by element; empty where all hold.
+
+    `conditions` are pairs (text, mask of failures). Returns a str for shape (), else an array of str.
+    """
+    reasons = np.full(shape, "", dtype=object)
+    for text, failed in conditions:
+        reasons[np.broadcast_to(failed, shape) & (reasons == "")] = text
+    return reasons.item() if shape == () else reasons.astype(str)
+
+
+def outside(conditions):
+    """Mask of the elements for which any of the `conditions` fails."""
+    return np.logical_or.reduce(np.broadcast_arrays(*(failed for _, failed in conditions)))

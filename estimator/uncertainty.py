@@ -1,0 +1,136 @@
+"""Standard deviation of d_x from those of the pushing angle, the moments and α_est, by analytic derivatives.
+
+Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4. Angles in rad, moments in
+N·mm, C in N·mm², lengths in mm. Where the distance is NaN, so is its sigma.
+
+C = 3EI has no place in the sum: where the gauge factors were found with the same C, it drops out of d_x.
+"""
+
+import numpy as np
+
+from estimator import distance
+from estimator.domain import elementwise, require_sigma
+
+
+def gradient_no_slip(theta, m_z, C):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of (2): d_x (1/θ, 0, −1/m_z, 0)."""
+    d_x = distance.no_slip(theta, m_z, C)
+    return _stack(d_x, _inverse(theta), 0.0, -_inverse(m_z), 0.0)
+
+
+def gradient_known_slope(theta, m_y, m_z, beta, C):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of (6), the slope taken as exact."""
+    d_x = distance.known_slope(theta, m_y, m_z, beta, C)
+    share = _inverse(np.multiply(m_z, np.cos(beta)) + np.multiply(m_y, np.sin(beta)))
+    return _stack(d_x, _inverse(theta), -np.sin(beta) * share, -np.cos(beta) * share, 0.0)
+
+
+def gradient_with_friction(theta, m_y, m_z, alpha_est, C):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of (10).
+
+    ∂ln d_x/∂α_est = −tan(φ + α_est) + tan α_est. At m_y = 0, where |m_y| has a kink, the derivative of
+    the side m_y > 0.
+    """
+    d_x = distance.with_friction(theta, m_y, m_z, alpha_est, C)
+    return _stack(d_x, *_log_gradient(theta, m_y, m_z, alpha_est))
+
+
+def gradient_frictionless(theta, m_y, m_z, C):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of (11) and (12); the last one is 0."""
+    d_x = distance.frictionless(theta, m_y, m_z, C)
+    return _stack(d_x, *_log_gradient(theta, m_y, m_z, 0.0)[:3], 0.0)
+
+
+def gradient_cone(theta, m_y, m_z, alpha_est, C, length):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's d_x)²."""
+    cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
+    shrink = (distance.cone(theta, m_y, m_z, alpha_est, C, length) / cylinder) ** 2
+    return np.asarray(shrink)[..., None] * gradient_with_friction(theta, m_y, m_z, alpha_est, C)
+
+
+def sigma(
+    gradient,
+    *,
+    theta_sigma=0.0,
+    touch_sigma=0.0,
+    covariance=None,
+    alpha_est_sigma=0.0,
+    theta_moment_covariance=None,
+):
+    """Standard deviation of d_x, in mm, for one of the gradients above.
+
+    theta_sigma: of the motor angle, touch_sigma: of the touch, both in rad; covariance (..., 2, 2) of
+    (m_y, m_z) in (N·mm)²; alpha_est_sigma in rad; theta_moment_covariance (..., 2) of the pushing angle
+    with (m_y, m_z). A negative or infinite sigma raises ValueError.
+
+    >>> gradient = gradient_no_slip(0.05, 9.0, 9000.0)
+    >>> sigma(gradient, theta_sigma=0.0005)
+    0.5
+    """
+    for name, value in (
+        ("theta_sigma", theta_sigma),
+        ("touch_sigma", touch_sigma),
+        ("alpha_est_sigma", alpha_est_sigma),
+    ):
+        require_sigma(name, value)
+    covariance = np.zeros((2, 2)) if covariance is None else np.asarray(covariance, dtype=float)
+    mixed = (
+        np.zeros(2) if theta_moment_covariance is None else np.asarray(theta_moment_covariance, dtype=float)
+    )
+    theta, moment, alpha = gradient[..., 0], gradient[..., 1:3], gradient[..., 3]
+    variance = theta**2 * (np.square(theta_sigma) + np.square(touch_sigma)) + (alpha * alpha_est_sigma) ** 2
+    variance = variance + np.einsum("...i,...ij,...j->...", moment, covariance, moment)
+    variance = variance + 2 * theta * np.einsum("...i,...i->...", moment, mixed)
+    return _root(variance)
+
+
+def sigma_no_slip(theta, m_z, C, **sigmas):
+    """Standard deviation of (2), in mm; `sigmas` as of `sigma`."""
+    return sigma(gradient_no_slip(theta, m_z, C), **sigmas)
+
+
+def sigma_known_slope(theta, m_y, m_z, beta, C, **sigmas):
+    """Standard deviation of (6), in mm; `sigmas` as of `sigma`."""
+    return sigma(gradient_known_slope(theta, m_y, m_z, beta, C), **sigmas)
+
+
+def sigma_with_friction(theta, m_y, m_z, alpha_est, C, **sigmas):
+    """Standard deviation of (10), in mm; `sigmas` as of `sigma`."""
+    return sigma(gradient_with_friction(theta, m_y, m_z, alpha_est, C), **sigmas)
+
+
+def sigma_frictionless(theta, m_y, m_z, C, **sigmas):
+    """Standard deviation of (11) and (12), in mm; `sigmas` as of `sigma`."""
+    return sigma(gradient_frictionless(theta, m_y, m_z, C), **sigmas)
+
+
+def sigma_cone(theta, m_y, m_z, alpha_est, C, length, **sigmas):
+    """Standard deviation of the cone's distance, in mm; `sigmas` as of `sigma`."""
+    return sigma(gradient_cone(theta, m_y, m_z, alpha_est, C, length), **sigmas)
+
+
+@elementwise
+def _inverse(x):
+    return 1 / x
+
+
+@elementwise
+def _root(variance):
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+@elementwise
+def _log_gradient(theta, m_y, m_z, alpha_est):
+    mu = np.copysign(np.tan(alpha_est), m_y)
+    share = m_z - mu * m_y
+    square = m_z * m_z + m_y * m_y
+    by_y = -mu / share - 2 * m_y / square
+    by_z = 1 / share - 2 * m_z / square
+    by_alpha = -np.abs(m_y) / (share * np.cos(alpha_est) ** 2)
+    return 1 / theta, by_y, by_z, by_alpha
+
+
+def _stack(d_x, *logarithmic):
+    with np.errstate(all="ignore"):
+        parts = np.broadcast_arrays(*(np.multiply(d_x, part) for part in logarithmic))
+    return np.stack(parts, axis=-1)
