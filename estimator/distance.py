@@ -2,8 +2,8 @@
 
 Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the arguments are no push against a
 surface the distance is NaN, never negative and never infinite, and `why_not` says which condition failed.
-β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0 and α_est outside [0°, 90°)
-raise ValueError.
+β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0 and α_est outside [0°, 90°) raise
+ValueError.
 """
 
 import numpy as np
@@ -19,27 +19,35 @@ from estimator.domain import (
 )
 
 
+@elementwise
 def rotational_compliance(theta, m_z):
     """k_θ of (1), in rad/(N·mm): how far the base turns per moment, from two angles or a whole stroke.
 
-    theta and m_z have the samples along their last axis, two at least. The slope of the least-squares
-    line of the moment over the angle is used, so the angle of touch drops out. NaN where the moment does
-    not rise with the angle.
+    theta and m_z have the samples along their last axis, two at least (ValueError otherwise). It is one over
+    the slope of the least-squares line of the moment over the angle, so the angle of touch drops out. NaN
+    where the moment does not rise with the angle.
 
-    >>> rotational_compliance([0.01, 0.03], [2.0, 6.0])
+    >>> round(rotational_compliance([0.01, 0.03], [2.0, 6.0]), 9)
     0.005
     """
-    if np.shape(theta)[-1:] in ((), (1,)) or np.shape(m_z)[-1:] in ((), (1,)):
+    if min(theta.ndim, m_z.ndim) < 1 or min(theta.shape[-1], m_z.shape[-1]) < 2:
         raise ValueError("rotational_compliance needs two samples or more along the last axis")
-    return _rotational_compliance(theta, m_z)
+    (angle, turned), (moment, bent) = _centred(theta), _centred(m_z)
+    per_moment = (angle**2).sum(axis=-1) / (angle * moment).sum(axis=-1)
+    compliance = quotient((per_moment, turned), (bent,))
+    return np.where((compliance > 0) & np.isfinite(compliance), compliance, np.nan)
 
 
+@elementwise
 def from_compliance(compliance, C):
     """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
-    return _from_compliance(compliance, C)
+    return _distance(
+        quotient((C, compliance), ()), (("the compliance is missing", ~np.isfinite(compliance)),)
+    )
 
 
+@elementwise
 def no_slip(theta, m_z, C):
     """d_x of (2), in mm: Cθ / m_z, exact where the whisker does not slip sideways.
 
@@ -47,34 +55,40 @@ def no_slip(theta, m_z, C):
     50.0
     """
     require_positive("C", C, "N·mm²")
-    return _no_slip(theta, m_z, C)
+    return _distance(quotient((C, theta), (m_z,)), _conditions(theta, 0.0, m_z))
 
 
+@elementwise
 def known_slope(theta, m_y, m_z, beta, C):
     """d_x of (6), in mm, for a surface of known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
     require_positive("C", C, "N·mm²")
-    return _known_slope(theta, m_y, m_z, beta, C)
+    return _distance(_by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
 
 
+@elementwise
 def friction_angle(mu):
     """α of (7), in rad: atan μ. A negative or infinite coefficient raises ValueError."""
-    mu = np.asarray(mu, dtype=float)
     if not np.all((mu >= 0) & np.isfinite(mu)):
         raise ValueError(f"mu = {mu}: a friction coefficient must be zero or positive, and finite")
-    return _friction_angle(mu)
+    return np.arctan(mu)
 
 
+@elementwise
 def felt_slip_angle(m_y, m_z):
     """φ of (8), in rad: atan2(m_y, m_z). NaN unless m_z > 0, since the whisker pushes towards +y."""
-    return _felt_slip_angle(m_y, m_z)
+    return np.where((m_z > 0) & np.isfinite(m_y) & np.isfinite(m_z), np.arctan2(m_y, m_z), np.nan)
 
 
+@elementwise
 def estimated_slope(m_y, m_z, alpha_est):
     """β_est of (9), in rad: φ ± α_est on the side of φ; NaN where it reaches 90°, and for m_z ≤ 0."""
     require_friction_angle("alpha_est", alpha_est)
-    return _estimated_slope(m_y, m_z, alpha_est)
+    steep = np.arctan2(np.abs(m_y), m_z) + alpha_est
+    failed = outside(_conditions(1.0, m_y, m_z, alpha_est)) | ~(steep < RIGHT_ANGLE)
+    return np.where(failed, np.nan, np.copysign(steep, m_y))
 
 
+@elementwise
 def with_friction(theta, m_y, m_z, alpha_est, C):
     """d_x of (10), in mm, for an assumed friction cone angle: Cθ (m_z − μ |m_y|) / (m_z² + m_y²), μ = tan
     α_est.
@@ -82,35 +96,33 @@ def with_friction(theta, m_y, m_z, alpha_est, C):
     The printed form with β_est = φ + α_est is the same number; this one is exact to the last digit.
     """
     _require_settings(alpha_est, C)
-    return _with_friction(theta, m_y, m_z, alpha_est, C)
+    return _distance(_by_friction(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est))
 
 
+@elementwise
 def frictionless_sum(theta, m_y, m_z, C):
-    """d_x of (11), in mm: Cθ / (m_z + m_y² / m_z), (10) for a surface without friction."""
-    require_positive("C", C, "N·mm²")
-    return _frictionless_sum(theta, m_y, m_z, C)
+    """d_x of (11), in mm: Cθ / (m_z + m_y²/m_z), (10) without friction; computed as (12), which it equals."""
+    return frictionless(theta, m_y, m_z, C)
 
 
+@elementwise
 def frictionless(theta, m_y, m_z, C):
-    """d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²), equal to (11)."""
+    """d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²)."""
     require_positive("C", C, "N·mm²")
-    return _with_friction(theta, m_y, m_z, 0.0, C)
+    return _distance(_by_friction(theta, m_y, m_z, 0.0, C), _conditions(theta, m_y, m_z))
 
 
-def cone_no_slip(theta, m, C, length):
-    """ν(θ, |m|) of a cone that comes to a point at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
-    _require_settings(0.0, C, length)
-    return _cone_no_slip(theta, m, C, length)
-
-
+@elementwise
 def general_printed(theta, m_y, m_z, nu):
     """d_x of (16) as printed, in mm: ν(θ, |m|) cos φ, for a no-slip extraction `nu(theta, magnitude)`.
 
     Exact only where ν is proportional to θ/|m|, that is for a cylinder; use `general`.
     """
-    return _general_printed(nu)(theta, m_y, m_z)
+    magnitude = np.hypot(m_y, m_z)
+    return _distance(nu(theta, magnitude) * (m_z / magnitude), _conditions(theta, m_y, m_z))
 
 
+@elementwise
 def general(theta, m_y, m_z, alpha_est, nu):
     """d_x of (16) with the angle scaled in place of the distance, in mm; for any no-slip extraction ν.
 
@@ -118,78 +130,105 @@ def general(theta, m_y, m_z, alpha_est, nu):
     `nu(theta, magnitude)` takes and returns arrays.
     """
     require_friction_angle("alpha_est", alpha_est)
-    return _general(nu)(theta, m_y, m_z, alpha_est)
+    share, exponent = _friction_share(m_y, m_z, alpha_est)
+    magnitude = np.hypot(m_y, m_z)
+    scaled_theta = np.ldexp(quotient((theta, share), (magnitude,)), exponent)
+    return _distance(nu(scaled_theta, magnitude), _conditions(theta, m_y, m_z, alpha_est))
 
 
+@elementwise
+def cone_no_slip(theta, m, C, length):
+    """ν(θ, |m|) of a cone that comes to a point at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
+    _require_settings(0.0, C, length)
+    return _distance(_harmonic(quotient((C, theta), (m,)), length), _conditions(theta, 0.0, m))
+
+
+@elementwise
 def cone_printed(theta, m_y, m_z, C, length):
     """d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ. Far off under slip; use `cone`."""
     _require_settings(0.0, C, length)
-    return _cone_printed(theta, m_y, m_z, C, length)
+    magnitude = np.hypot(m_y, m_z)
+    d_x = _harmonic(quotient((C, theta), (magnitude,)), length) * (m_z / magnitude)
+    return _distance(d_x, _conditions(theta, m_y, m_z))
 
 
+@elementwise
 def cone(theta, m_y, m_z, alpha_est, C, length):
-    """d_x of a cone, in mm, with (17) at the scaled angle: 1 / (1/L + 1/d), d being (10) of the base's
+    """d_x of a cone, in mm, by (17) at the scaled angle: 1 / (1/L + 1/d) with d from (10) for the base's
     cylinder.
     """
     _require_settings(alpha_est, C, length)
-    return _cone(theta, m_y, m_z, alpha_est, C, length)
+    d_x = _harmonic(_by_friction(theta, m_y, m_z, alpha_est, C), length)
+    return _distance(d_x, _conditions(theta, m_y, m_z, alpha_est))
 
 
+@elementwise
 def taper(d_x, length):
-    """Distance along a cone from that which its base's cylinder would give: 1 / (1/d_x + 1/L), in mm."""
+    """Distance along a cone from that which its base's cylinder would give, in mm: 1 / (1/d_x + 1/L)."""
     require_positive("length", length, "mm")
-    return _taper(d_x, length)
+    return np.where((d_x > 0) & np.isfinite(d_x), _harmonic(d_x, length), np.nan)
 
 
+@elementwise
 def clamp_to_length(d_x, length):
-    """(d_x no longer than the whisker, mask of those that were), section VII: a distance past the tip is
-    a tip contact.
+    """(d_x no longer than the whisker, mask of those that were): past the tip means tip contact, section VII.
 
     >>> clamp_to_length(120.0, 100.0)
     (100.0, True)
     """
     require_positive("length", length, "mm")
-    return _clamp_to_length(d_x, length)
+    d_x = np.where(d_x > 0, d_x, np.nan)
+    return np.where(d_x > length, length, d_x), d_x > length
 
 
+@elementwise
 def contact_point(d_x, touch, z_c=0.0):
     """(r_c, θ_c, z_c) of section II: cylindrical coordinates of the contact, in mm, rad, mm.
 
-    `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation.
-    All three are NaN where the distance is not positive and finite.
+    `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All
+    three are NaN where the distance is not positive and finite.
     """
-    return _contact_point(d_x, touch, z_c)
+    good = np.isfinite(d_x) & (d_x > 0) & np.isfinite(touch) & np.isfinite(z_c)
+    return tuple(np.where(good, value, np.nan) for value in (d_x, touch, z_c))
 
 
+@elementwise
 def cartesian(r_c, theta_c, z_c):
     """(x, y, z) in mm of a contact in cylindrical coordinates, as of `contact_point`."""
-    return _cartesian(r_c, theta_c, z_c)
+    return r_c * np.cos(theta_c), r_c * np.sin(theta_c), z_c + 0 * r_c
 
 
-def why_not(theta, m_y, m_z, *, alpha_est=0.0, beta=0.0):
-    """Why there is no distance for these arguments: a sentence, empty inside the domain; str or array of str.
+def why_not(theta, m_y, m_z, *, alpha_est=0.0, beta=None, C=None):
+    """Why there is no distance for these arguments: a sentence, empty where there is one; str or array of
+    str.
 
-    Leave out `beta` for all equations but (6), `alpha_est` for all but (9), (10) and their cones.
+    Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C a distance too large or too
+    small for a float is told as well.
     """
-    require_friction_angle("alpha_est", alpha_est)
-    measured = (np.asarray(a, dtype=float) for a in (theta, m_y, m_z, alpha_est, beta))
-    theta, m_y, m_z, alpha_est, beta = np.broadcast_arrays(*measured)
+    _require_settings(alpha_est, 1.0 if C is None else C)
+    by_slope = beta is not None
+    measured = (theta, m_y, m_z, alpha_est, beta if by_slope else 0.0, 1.0 if C is None else C)
+    arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in measured))
+    theta, m_y, m_z, alpha_est, beta, C_or_one = arrays
     with np.errstate(all="ignore"):
-        return first_failure(_conditions(theta, m_y, m_z, alpha_est, beta), theta.shape)
+        conditions = _conditions(theta, m_y, m_z, alpha_est, beta)
+        if C is not None:
+            d_x = known_slope(theta, m_y, m_z, beta, C_or_one)
+            d_x = d_x if by_slope else with_friction(theta, m_y, m_z, alpha_est, C_or_one)
+            conditions += (("the distance is beyond the range of a float", np.isnan(d_x)),)
+        return first_failure(conditions, theta.shape)
 
 
 def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
+    uphill = _across_slope(m_y, m_z, beta)[0] <= 0
     return (
         ("a measured value is missing or infinite", ~finite),
         ("the pushing angle is not positive", ~(theta > 0)),
         ("the pushing angle is 90 degrees or more", ~(theta < RIGHT_ANGLE)),
         ("m_z is not positive: the whisker does not push towards the object", ~(m_z > 0)),
         ("the slope beta is 90 degrees or more", ~(np.abs(beta) < RIGHT_ANGLE)),
-        (
-            "m_y points up the slope beta, and too strongly for a distance",
-            _scaled_sum(m_y, m_z, beta)[0] <= 0,
-        ),
+        ("m_y points up the slope beta, too strongly for a contact there", uphill),
         ("phi + alpha_est is 90 degrees or more", _friction_share(m_y, m_z, alpha_est)[0] <= 0),
     )
 
@@ -205,6 +244,13 @@ def _distance(value, conditions):
     return np.where(outside(conditions) | ~(value > 0) | np.isinf(value), np.nan, value)
 
 
+def _centred(samples):
+    """Samples less their mean, over their largest distance from it, and that distance."""
+    deviation = samples - samples.mean(axis=-1, keepdims=True)
+    largest = np.abs(deviation).max(axis=-1, keepdims=True)
+    return deviation / largest, largest[..., 0]
+
+
 def _scaled(m_y, m_z):
     """m_y, m_z over a common power of two that brings the larger near one, and its exponent."""
     exponent = np.maximum(np.frexp(m_y)[1], np.frexp(m_z)[1])
@@ -212,141 +258,30 @@ def _scaled(m_y, m_z):
 
 
 def _friction_share(m_y, m_z, alpha_est):
-    """(m_z − μ|m_y|) as significand and exponent of two."""
-    drag = quotient((np.tan(alpha_est), np.abs(m_y)), ())
-    drag, m_z, exponent = _scaled(drag, m_z)
+    """(m_z − μ|m_y|) as a number near one and an exponent of two."""
+    drag, m_z, exponent = _scaled(np.tan(alpha_est) * np.abs(m_y), m_z)
     return m_z - drag, exponent
 
 
-def _scaled_sum(m_y, m_z, beta):
-    """(m_z cos β + m_y sin β) as significand and exponent of two."""
+def _across_slope(m_y, m_z, beta):
+    """(m_z cos β + m_y sin β) as a number near one and an exponent of two."""
     m_y, m_z, exponent = _scaled(m_y, m_z)
     return m_z * np.cos(beta) + m_y * np.sin(beta), exponent
 
 
-@elementwise
-def _rotational_compliance(theta, m_z):
-    theta, m_z = np.broadcast_arrays(theta, m_z)
-    angle = theta - theta.mean(axis=-1, keepdims=True)
-    moment = m_z - m_z.mean(axis=-1, keepdims=True)
-    compliance = (angle**2).sum(axis=-1) / (angle * moment).sum(axis=-1)
-    return np.where((compliance > 0) & np.isfinite(compliance), compliance, np.nan)
+def _by_slope(theta, m_y, m_z, beta, C):
+    across, exponent = _across_slope(m_y, m_z, beta)
+    return np.ldexp(quotient((C, theta, np.cos(beta)), (across,)), -exponent)
 
 
-@elementwise
-def _from_compliance(compliance, C):
-    return _distance(quotient((C, compliance), ()), (("not a compliance", ~np.isfinite(compliance)),))
-
-
-@elementwise
-def _no_slip(theta, m_z, C):
-    return _distance(quotient((C, theta), (m_z,)), _conditions(theta, 0.0, m_z))
-
-
-@elementwise
-def _known_slope(theta, m_y, m_z, beta, C):
-    total, exponent = _scaled_sum(m_y, m_z, beta)
-    d_x = np.ldexp(quotient((C, theta, np.cos(beta)), (total,)), -exponent)
-    return _distance(d_x, _conditions(theta, m_y, m_z, beta=beta))
-
-
-@elementwise
-def _friction_angle(mu):
-    return np.arctan(mu)
-
-
-@elementwise
-def _felt_slip_angle(m_y, m_z):
-    return np.where((m_z > 0) & np.isfinite(m_y) & np.isfinite(m_z), np.arctan2(m_y, m_z), np.nan)
-
-
-@elementwise
-def _estimated_slope(m_y, m_z, alpha_est):
-    phi = np.arctan2(np.abs(m_y), m_z)
-    slope = np.copysign(phi + alpha_est, m_y)
-    failed = outside(_conditions(1.0, m_y, m_z, alpha_est)) | ~(np.abs(slope) < RIGHT_ANGLE)
-    return np.where(failed, np.nan, slope)
-
-
-@elementwise
-def _with_friction(theta, m_y, m_z, alpha_est, C):
-    return _distance(_unchecked(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est))
-
-
-def _unchecked(theta, m_y, m_z, alpha_est, C):
+def _by_friction(theta, m_y, m_z, alpha_est, C):
     share, share_exponent = _friction_share(m_y, m_z, alpha_est)
     m_y, m_z, exponent = _scaled(m_y, m_z)
     square = m_z * m_z + m_y * m_y
     return np.ldexp(quotient((C, theta, share), (square,)), share_exponent - 2 * exponent)
 
 
-@elementwise
-def _frictionless_sum(theta, m_y, m_z, C):
-    ratio = m_y / m_z
-    return _distance(quotient((C, theta), (m_z, 1 + ratio * ratio)), _conditions(theta, m_y, m_z))
-
-
-@elementwise
-def _cone_no_slip(theta, m, C, length):
-    d_x = _harmonic(quotient((C, theta), (m,)), length)
-    return _distance(d_x, _conditions(theta, 0.0, m))
-
-
 def _harmonic(d_x, length):
     """1 / (1/d_x + 1/L) without leaving the range of float64, even where d_x does."""
     short, long = np.minimum(d_x, length), np.maximum(d_x, length)
     return short / (1 + short / long)
-
-
-def _general_printed(nu):
-    @elementwise
-    def formula(theta, m_y, m_z):
-        magnitude = np.hypot(m_y, m_z)
-        return _distance(nu(theta, magnitude) * (m_z / magnitude), _conditions(theta, m_y, m_z))
-
-    return formula
-
-
-def _general(nu):
-    @elementwise
-    def formula(theta, m_y, m_z, alpha_est):
-        magnitude = np.hypot(m_y, m_z)
-        share, exponent = _friction_share(m_y, m_z, alpha_est)
-        scaled_theta = theta * np.ldexp(share / np.ldexp(magnitude, -exponent), 0)
-        return _distance(nu(scaled_theta, magnitude), _conditions(theta, m_y, m_z, alpha_est))
-
-    return formula
-
-
-@elementwise
-def _cone_printed(theta, m_y, m_z, C, length):
-    magnitude = np.hypot(m_y, m_z)
-    d_x = _harmonic(quotient((C, theta), (magnitude,)), length) * (m_z / magnitude)
-    return _distance(d_x, _conditions(theta, m_y, m_z))
-
-
-@elementwise
-def _cone(theta, m_y, m_z, alpha_est, C, length):
-    d_x = _harmonic(_unchecked(theta, m_y, m_z, alpha_est, C), length)
-    return _distance(d_x, _conditions(theta, m_y, m_z, alpha_est))
-
-
-@elementwise
-def _taper(d_x, length):
-    return _distance(_harmonic(d_x, length), (("not a distance", ~(np.isfinite(d_x) & (d_x > 0))),))
-
-
-@elementwise
-def _clamp_to_length(d_x, length):
-    return np.where(d_x > length, length, d_x), d_x > length
-
-
-@elementwise
-def _contact_point(d_x, touch, z_c):
-    good = np.isfinite(d_x) & (d_x > 0) & np.isfinite(touch) & np.isfinite(z_c)
-    return tuple(np.where(good, value, np.nan) for value in (d_x, touch, z_c))
-
-
-@elementwise
-def _cartesian(r_c, theta_c, z_c):
-    return r_c * np.cos(theta_c), r_c * np.sin(theta_c), z_c + 0 * r_c

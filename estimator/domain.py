@@ -14,23 +14,29 @@ RIGHT_ANGLE = np.pi / 2
 def elementwise(function):
     """Let a formula on float64 arrays take anything array-like, broadcast, and return floats for scalars.
 
+    Functions among the arguments pass through.
+
     Overflow, division by zero and NaN stay silent inside: the formula's own domain decides what they mean.
     """
 
     @wraps(function)
     def wrapper(*args, **kwargs):
-        arrays = [np.asarray(a, dtype=float) for a in args]
-        named = {name: np.asarray(a, dtype=float) for name, a in kwargs.items()}
+        arrays = [_array(a) for a in args]
+        named = {name: _array(a) for name, a in kwargs.items()}
         with np.errstate(all="ignore"):
             return _plain(function(*arrays, **named))
 
     return wrapper
 
 
+def _array(argument):
+    return argument if callable(argument) else np.asarray(argument, dtype=float)
+
+
 def _plain(result):
     if isinstance(result, tuple):
         return tuple(_plain(part) for part in result)
-    return result.item() if np.ndim(result) == 0 else result
+    return np.asarray(result).item() if np.ndim(result) == 0 else result
 
 
 def quotient(numerator, denominator):

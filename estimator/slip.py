@@ -22,6 +22,7 @@ from estimator.domain import (
 )
 
 
+@elementwise
 def slip_angle(beta, alpha):
     """φ of (4), in rad: zero while the friction cone holds the whisker, |β| − α beyond.
 
@@ -31,9 +32,11 @@ def slip_angle(beta, alpha):
     0.0
     """
     require_friction_angle("alpha", alpha)
-    return _slip_angle(beta, alpha)
+    phi = np.copysign(np.maximum(0.0, np.abs(beta) - alpha), beta)
+    return np.where(np.abs(beta) < RIGHT_ANGLE, phi + 0.0, np.nan)
 
 
+@elementwise
 def moments(d_x, theta, beta, alpha, C):
     """(m_y, m_z) of (14) and (13), in N·mm, at the pushing angle θ against a flat surface of slope β.
 
@@ -43,21 +46,30 @@ def moments(d_x, theta, beta, alpha, C):
     (0.0, 9.0)
     """
     _require_settings(alpha, C)
-    return _moments(d_x, theta, beta, alpha, C)
+    phi = slip_angle(beta, alpha)
+    below = (d_x, np.cos(_held_angle(beta, alpha)))
+    m_y = quotient((C, theta, np.cos(beta), np.sin(phi)), below)
+    m_z = quotient((C, theta, np.cos(beta), np.cos(phi)), below)
+    return _inside(d_x, theta, beta, m_y), _inside(d_x, theta, beta, m_z)
 
 
+@elementwise
 def moment_magnitude(d_x, theta, beta, alpha, C):
     """|m| of (13) and (14), in N·mm: (Cθ/d_x) cos β / cos(β − φ)."""
     _require_settings(alpha, C)
-    return _moment_magnitude(d_x, theta, beta, alpha, C)
+    magnitude = quotient((C, theta, np.cos(beta)), (d_x, np.cos(_held_angle(beta, alpha))))
+    return _inside(d_x, theta, beta, magnitude)
 
 
+@elementwise
 def slip_distance(d_x, theta, beta, alpha):
     """σ of (5), in mm: how far the contact has slid along the surface. σ = d_x θ sin φ / cos(β − φ)."""
     require_friction_angle("alpha", alpha)
-    return _slip_distance(d_x, theta, beta, alpha)
+    slip = quotient((d_x, theta, np.sin(slip_angle(beta, alpha))), (np.cos(_held_angle(beta, alpha)),))
+    return _inside(d_x, theta, beta, slip)
 
 
+@elementwise
 def moment_from_deflection(d_x, d_y, d_z, C):
     """(m_y, m_z) of (19) and (18), in N·mm, from the deflections d_y, d_z in mm.
 
@@ -68,16 +80,24 @@ def moment_from_deflection(d_x, d_y, d_z, C):
     (1.8, 9.0)
     """
     require_positive("C", C, "N·mm²")
-    return _moment_from_deflection(d_x, d_y, d_z, C)
+    d_x = np.where(np.isfinite(d_x) & (d_x > 0), d_x, np.nan)
+    return quotient((C, d_z), (d_x, d_x)), quotient((C, d_y), (d_x, d_x))
 
 
+@elementwise
 def slope_from_deflection(d_x, theta, d_y, d_z):
     """(β, φ) of (20) and (21), in rad, from the deflections d_y, d_z in mm.
 
     tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no trace: β is
     NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
     """
-    return _slope_from_deflection(d_x, theta, d_y, d_z)
+    obstructed = d_x * theta - d_y
+    possible = (
+        (d_x > 0) & (theta >= 0) & (theta < RIGHT_ANGLE) & (d_y > 0) & (obstructed >= 0) & np.isfinite(d_z)
+    )
+    beta = np.copysign(np.arctan2(obstructed, np.abs(d_z)), d_z)
+    phi = np.where(possible, np.arctan2(d_z, d_y), np.nan)
+    return np.where(possible & (d_z != 0), beta, np.nan), phi
 
 
 def why_not(d_x, theta, beta):
@@ -105,53 +125,9 @@ def _require_settings(alpha, C):
 
 
 def _inside(d_x, theta, beta, value):
-    return np.where(outside(_conditions(d_x, theta, beta)), np.nan, value)
+    return np.where(outside(_conditions(d_x, theta, beta)) | np.isinf(value), np.nan, value)
 
 
 def _held_angle(beta, alpha):
     """|β| − φ, which is min(|β|, α) to the last bit."""
     return np.minimum(np.abs(beta), alpha)
-
-
-@elementwise
-def _slip_angle(beta, alpha):
-    phi = np.copysign(np.maximum(0.0, np.abs(beta) - alpha), beta)
-    return np.where(np.abs(beta) < RIGHT_ANGLE, phi + 0.0, np.nan)
-
-
-@elementwise
-def _moments(d_x, theta, beta, alpha, C):
-    phi = _slip_angle(beta, alpha)
-    below = (d_x, np.cos(_held_angle(beta, alpha)))
-    m_y = quotient((C, theta, np.cos(beta), np.sin(phi)), below)
-    m_z = quotient((C, theta, np.cos(beta), np.cos(phi)), below)
-    return _inside(d_x, theta, beta, m_y), _inside(d_x, theta, beta, m_z)
-
-
-@elementwise
-def _moment_magnitude(d_x, theta, beta, alpha, C):
-    magnitude = quotient((C, theta, np.cos(beta)), (d_x, np.cos(_held_angle(beta, alpha))))
-    return _inside(d_x, theta, beta, magnitude)
-
-
-@elementwise
-def _slip_distance(d_x, theta, beta, alpha):
-    slip = quotient((d_x, theta, np.sin(_slip_angle(beta, alpha))), (np.cos(_held_angle(beta, alpha)),))
-    return _inside(d_x, theta, beta, slip)
-
-
-@elementwise
-def _moment_from_deflection(d_x, d_y, d_z, C):
-    d_x = np.where(np.isfinite(d_x) & (d_x > 0), d_x, np.nan)
-    return quotient((C, d_z), (d_x, d_x)), quotient((C, d_y), (d_x, d_x))
-
-
-@elementwise
-def _slope_from_deflection(d_x, theta, d_y, d_z):
-    obstructed = d_x * theta - d_y
-    possible = (
-        (d_x > 0) & (theta >= 0) & (theta < RIGHT_ANGLE) & (d_y > 0) & (obstructed >= 0) & np.isfinite(d_z)
-    )
-    beta = np.copysign(np.arctan2(obstructed, np.abs(d_z)), d_z)
-    phi = np.where(possible, np.arctan2(d_z, d_y), np.nan)
-    return np.where(possible & (d_z != 0), beta, np.nan), phi

@@ -1,0 +1,133 @@
+"""Appendix B: the whisker against a surface of constant lateral curvature. Equations (15), (22)–(32).
+
+Lengths are over the contact distance d_x, moments over C/d_x: r_n = r_κ/d_x, and at r_n = ∞ the surface
+is flat. β_0 is the slope at first touch, θ the pushing angle, α the friction cone angle, all in rad.
+
+Each function exists twice where the paper's (24) matters: as printed, φ = max(0, ζ − α) with ζ taken at
+the virtual point, and exact, where the force leaves the normal at the contact point by α. The printed
+form is right for α = 0 only.
+
+Both are written with q = θ/r_n so that nothing cancels for large r_n: from p² = r_n² − 2 y_c θ + θ²,
+
+    d = θ (2 cos β_0 − q) / (√(1 − (p/r_n)² sin² u) + (p/r_n) cos u),   u = ζ − φ.
+
+Domain: r_n > 0, 0 ≤ θ < 2 y_c and below 90°, |β_0| < 90°, |φ| < 90°; beyond it the whisker has passed the
+object and the result is NaN; `why_not` says why. β_0 < 0 mirrors β_0 > 0. α outside [0°, 90°) raises
+ValueError.
+"""
+
+import numpy as np
+
+from estimator import circle
+from estimator.domain import elementwise, first_failure, require_friction_angle
+from estimator.threshold import distance_error, slope_threshold
+
+__all__ = [
+    "deflection",
+    "deflection_printed",
+    "distance_error",
+    "initial_contact",
+    "moments",
+    "moments_printed",
+    "normalized_curvature",
+    "normalized_radius",
+    "slip_angle",
+    "slip_angle_printed",
+    "slope_threshold",
+    "virtual_angle",
+    "virtual_radius",
+    "why_not",
+]
+
+
+def normalized_curvature(d_x, r_kappa):
+    """κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both are positive.
+
+    >>> normalized_curvature(50.0, 100.0)
+    0.5
+    """
+    return _positive_ratio(d_x, r_kappa)
+
+
+def normalized_radius(d_x, r_kappa):
+    """r_n = 1/κ_n, both arguments in mm; NaN unless both are positive."""
+    return _positive_ratio(r_kappa, d_x)
+
+
+@elementwise
+def initial_contact(r_n, beta_0):
+    """(y_c, z_c) of (26)–(28): the first contact as seen from the centre of curvature, r_n (cos β_0, sin
+    β_0).
+    """
+    return circle.inside(r_n, 0.0, beta_0, r_n * np.cos(beta_0), r_n * np.sin(beta_0))
+
+
+@elementwise
+def virtual_angle(r_n, theta, beta_0):
+    """ζ of (25) and (29), in rad: direction of the virtual point from the centre, β_0 and what the push
+    adds.
+    """
+    return circle.inside(r_n, theta, beta_0, beta_0 + circle.turn(theta / r_n, beta_0))[0]
+
+
+@elementwise
+def virtual_radius(r_n, theta, beta_0):
+    """p of (32): distance of the virtual point from the centre, over d_x."""
+    return circle.inside(r_n, theta, beta_0, r_n * circle.relative_virtual_radius(theta / r_n, beta_0))[0]
+
+
+def slip_angle(r_n, theta, beta_0, alpha):
+    """φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α / p)."""
+    require_friction_angle("alpha", alpha)
+    return circle.exact(r_n, theta, beta_0, alpha)[0]
+
+
+def slip_angle_printed(r_n, theta, beta_0, alpha):
+    """φ of (24) as printed, in rad: max(0, ζ − α) with ζ at the virtual point."""
+    require_friction_angle("alpha", alpha)
+    return circle.printed(r_n, theta, beta_0, alpha)[0]
+
+
+def deflection(r_n, theta, beta_0, alpha):
+    """d of (31) with the exact φ: how far the whisker is bent in the sensing plane, over d_x."""
+    require_friction_angle("alpha", alpha)
+    return circle.exact(r_n, theta, beta_0, alpha)[1]
+
+
+def deflection_printed(r_n, theta, beta_0, alpha):
+    """d of (31) with φ of (24) as printed, over d_x."""
+    require_friction_angle("alpha", alpha)
+    return circle.printed(r_n, theta, beta_0, alpha)[1]
+
+
+def moments(r_n, theta, beta_0, alpha):
+    """(m_y, m_z) of (22) with the exact φ, over C/d_x: d sin φ, d cos φ."""
+    require_friction_angle("alpha", alpha)
+    return _components(*circle.exact(r_n, theta, beta_0, alpha))
+
+
+def moments_printed(r_n, theta, beta_0, alpha):
+    """(m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
+    require_friction_angle("alpha", alpha)
+    return _components(*circle.printed(r_n, theta, beta_0, alpha))
+
+
+def why_not(r_n, theta, beta_0, alpha=0.0):
+    """Why this module's functions give NaN for these arguments: a sentence, empty inside the domain."""
+    require_friction_angle("alpha", alpha)
+    arguments = (np.asarray(a, dtype=float) for a in (r_n, theta, beta_0, alpha))
+    r_n, theta, beta_0, alpha = np.broadcast_arrays(*arguments)
+    with np.errstate(all="ignore"):
+        passed = ("the slip angle reaches 90 degrees", np.isnan(circle.exact(r_n, theta, beta_0, alpha)[0]))
+        return first_failure((*circle.conditions(r_n, theta, beta_0), passed), r_n.shape)
+
+
+@elementwise
+def _positive_ratio(above, below):
+    ratio = above / below
+    return np.where((above > 0) & (below > 0) & np.isfinite(ratio), ratio, np.nan)
+
+
+@elementwise
+def _components(phi, d):
+    return d * np.sin(phi), d * np.cos(phi)

@@ -1,0 +1,108 @@
+"""How steep a surface may be before a distance is wrong by a given share: the curves of Figs 5 and 6.
+
+All angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed forms; a curved one is
+searched.
+"""
+
+import numpy as np
+
+from estimator import circle
+from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive
+
+EQUATIONS = ("no_slip", "with_friction")
+SEARCH_STEP = np.radians(0.1)
+HALVINGS = 50
+
+
+def distance_error(
+    beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False
+):
+    """Relative error of (2) or (10), estimate over truth minus one, where the surface has slope β_0 at
+    first touch.
+
+    α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature (15).
+    `printed` takes Appendix B as printed. −1 where (10) gives no distance because φ + α_est reaches 90°;
+    NaN outside the domain.
+    """
+    _require(alpha, alpha_est, equation)
+    if np.all(np.isinf(r_n)):
+        return _flat_error(beta_0, alpha, alpha_est, equation == "no_slip")
+    return _curved_error(beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", printed)
+
+
+def slope_threshold(
+    error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False
+):
+    """β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN
+    where never.
+
+    Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0.
+
+    >>> round(slope_threshold(0.05, 0.0, 0.0, r_n=1.0, theta=0.0524) * 180 / 3.14159, 1)
+    62.9
+    """
+    _require(alpha, alpha_est, equation)
+    require_positive("error", error, "(a share)")
+    if np.all(np.isinf(r_n)):
+        return _flat_threshold(error, alpha, alpha_est, equation == "no_slip")
+    require_positive("theta", theta, "rad")
+    return _curved_threshold(error, alpha, alpha_est, r_n, theta, equation == "no_slip", printed)
+
+
+def _require(alpha, alpha_est, equation):
+    require_friction_angle("alpha", alpha)
+    require_friction_angle("alpha_est", alpha_est)
+    if equation not in EQUATIONS:
+        raise ValueError(f"equation = {equation!r}: must be one of {', '.join(EQUATIONS)}")
+
+
+@elementwise
+def _flat_error(beta_0, alpha, alpha_est, no_slip):
+    """tan β tan φ for (2); −sin(α_est − α) (tan β − tan α) cos α / cos α_est for (10); both zero up to β
+    = α.
+    """
+    slope = np.abs(beta_0)
+    phi = np.maximum(0.0, slope - alpha)
+    excess = np.sin(phi) / (np.cos(slope) * np.cos(alpha))
+    of_10 = -np.sin(alpha_est - alpha) * excess * np.cos(alpha) / np.cos(alpha_est)
+    error = np.where(no_slip, np.tan(slope) * np.tan(phi), np.maximum(of_10, -1.0))
+    return np.where(slope < RIGHT_ANGLE, error, np.nan)
+
+
+@elementwise
+def _flat_threshold(error, alpha, alpha_est, no_slip):
+    """The formulas of `_flat_error`, solved for tan β."""
+    mu, detour = np.tan(alpha), np.sin(np.abs(alpha_est - alpha))
+    of_10 = np.where(detour > 0, mu + error * np.cos(alpha_est) / (detour * np.cos(alpha)), np.nan)
+    never = (alpha_est > alpha) & (error > 1)
+    halfway = mu * (1 + error) / 2
+    of_2 = halfway + np.sqrt(halfway**2 + error)
+    return np.arctan(np.where(no_slip, of_2, np.where(never, np.nan, of_10)))
+
+
+@elementwise
+def _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, printed):
+    as_printed = circle.printed(r_n, theta, beta_0, alpha)
+    exact = circle.exact(r_n, theta, beta_0, alpha)
+    phi, d = (np.where(printed, *pair) for pair in zip(as_printed, exact))
+    angle, assumed = np.abs(phi), np.where(no_slip, 0.0, alpha_est)
+    of_2 = theta / (d * np.cos(angle)) - 1
+    of_10 = theta * np.maximum(0.0, np.cos(angle + assumed)) / (d * np.cos(assumed)) - 1
+    return np.where(no_slip, of_2, of_10)
+
+
+@elementwise
+def _curved_threshold(error, alpha, alpha_est, r_n, theta, no_slip, printed):
+    """First slope on a fine grid at which the error is reached, then bisection back to the crossing."""
+    fixed = np.broadcast_arrays(alpha, alpha_est, r_n, theta, no_slip, printed, error)
+    *fixed, error = (a[..., None] for a in fixed)
+    slopes = np.arange(0.0, RIGHT_ANGLE, SEARCH_STEP)
+    reached = np.abs(_curved_error(slopes, *fixed)) >= error
+    first = np.argmax(reached, axis=-1)
+    high, low = slopes[first], slopes[np.maximum(first - 1, 0)]
+    fixed, error = [a[..., 0] for a in fixed], error[..., 0]
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        beyond = np.abs(_curved_error(middle, *fixed)) >= error
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.where(reached.any(axis=-1), high, np.nan)
