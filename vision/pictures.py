@@ -1,8 +1,9 @@
-"""Frames of one camera in order: a folder of pictures or a video file. Reads forward only and keeps every index.
+"""Frames of one camera in order, from a folder of pictures or a video; read forward only, every index kept.
 
-A frame that cannot be read stays in its place as None, so that a series is never shortened and its times never
-shift. Grey is what the file holds at full depth; of a colour video it is the Y plane as stored (16 to 235 for most
-codecs), because the other ways from H.264 to grey differ from it, and from each other, by up to 16 levels.
+A frame that cannot be read stays in its place as None, so that a series is never shortened and its times
+never shift. Grey is what the file holds at full depth; of a colour video it is the Y plane as stored (16 to
+235 for most codecs), because the other ways from H.264 to grey differ from it, and from each other, by up to
+16 levels.
 """
 
 import os
@@ -116,7 +117,10 @@ class Video(Frames):
     def __init__(self, path: Path):
         self.path = path
         with self._opened() as capture:
-            self.size_px = _whole(capture, cv2.CAP_PROP_FRAME_WIDTH), _whole(capture, cv2.CAP_PROP_FRAME_HEIGHT)
+            self.size_px = (
+                _whole(capture, cv2.CAP_PROP_FRAME_WIDTH),
+                _whole(capture, cv2.CAP_PROP_FRAME_HEIGHT),
+            )
             self.count = max(0, _whole(capture, cv2.CAP_PROP_FRAME_COUNT))
 
     @contextmanager
@@ -161,7 +165,9 @@ def pictures_in(folder: Path) -> list[Path]:
 
 def natural_order(path: Path) -> list[tuple[int, int | str]]:
     """Sort key under which `img_2` comes before `img_10`."""
-    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"([0-9]+)", path.name) if part]
+    return [
+        (0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"([0-9]+)", path.name) if part
+    ]
 
 
 def read_picture(path: Path) -> np.ndarray | None:
@@ -180,7 +186,7 @@ def _is_cut_jpeg(data: np.ndarray) -> bool:
 
 
 def _grey_reader(capture: cv2.VideoCapture):
-    """How to fetch the grabbed frame as grey: its first plane where that is grey, else converted from colour."""
+    """How to fetch the grabbed frame as grey: its first plane where that is grey, else from colour."""
     pixel_format = _whole(capture, cv2.CAP_PROP_CODEC_PIXEL_FORMAT).to_bytes(4, "little", signed=True)
     planar = pixel_format in _PLANAR_GREY
     capture.set(cv2.CAP_PROP_CONVERT_RGB, 0 if planar else 1)

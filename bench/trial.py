@@ -1,0 +1,104 @@
+"""One trial of a session: its settings and where its files are. The files themselves are read elsewhere."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench import manifest
+from bench.errors import BadInput
+from bench.footage import camera_sources
+
+MANIFEST = "trial.toml"
+SIGNALS = "signals.csv"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Settings of one recording; nominal values are None where not given, sigmas 0 where taken as exact.
+
+    purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
+    the follicle was turned about the whisker. camera_sources: camera to folder of pictures or video, empty
+    where the trial has none.
+    """
+
+    name: str
+    folder: Path
+    surface: str
+    speed_deg_s: float | None
+    beta_deg: float | None
+    d_x_mm: float | None
+    bar_diameter_mm: float
+    bar_diameter_sigma_mm: float
+    purpose: str
+    follicle_roll_deg: float
+    follicle_roll_sigma_deg: float
+    force_N: float | None
+    force_sigma_N: float
+    at_mm: float | None
+    at_sigma_mm: float
+    frame_rate_Hz: float | None
+    first_frame_s: float | None
+    camera_sources: dict[str, Path]
+    signals_path: Path
+
+    def shown(self, file: str) -> str:
+        """How messages name one of its files: by the path inside the session."""
+        return f"trials/{self.name}/{file}"
+
+
+def load_trial(folder: Path, session: manifest.SessionKeys) -> Trial:
+    """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput."""
+    shown = f"trials/{folder.name}"
+    keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}")
+    _check_weight(keys, f"{shown}/{MANIFEST}")
+    signals_path = folder / SIGNALS
+    if not signals_path.is_file():
+        raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{SIGNALS}")
+    return Trial(
+        name=folder.name,
+        folder=folder,
+        surface=keys.surface,
+        speed_deg_s=keys.speed_deg_s,
+        beta_deg=keys.beta_deg,
+        d_x_mm=keys.d_x_mm,
+        purpose=keys.purpose,
+        follicle_roll_deg=keys.follicle_roll_deg,
+        follicle_roll_sigma_deg=keys.follicle_roll_sigma_deg,
+        force_N=keys.force_N,
+        force_sigma_N=keys.force_sigma_N,
+        at_mm=keys.at_mm,
+        at_sigma_mm=keys.at_sigma_mm,
+        frame_rate_Hz=keys.frame_rate_Hz,
+        first_frame_s=keys.first_frame_s,
+        camera_sources=camera_sources(folder, shown),
+        signals_path=signals_path,
+        **_bar(keys, session.bar),
+    )
+
+
+def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str) -> manifest.TrialKeys:
+    """trial.toml, absent keys from the session's [trial]; a sigma comes from where its value comes from."""
+    file = folder / MANIFEST
+    if not file.is_file():
+        return defaults
+    given = manifest.read_toml(file, shown)
+    own = manifest.as_keys(given, manifest.TrialKeys, shown)
+    decided = set(given) | {manifest.sigma_key(key) for key in given}
+    return manifest.TrialKeys(
+        **{name: value for name, value in manifest.values(own).items() if name in decided}
+        | {name: value for name, value in manifest.values(defaults).items() if name not in decided}
+    )
+
+
+def _check_weight(keys: manifest.TrialKeys, shown: str) -> None:
+    if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
+        raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
+
+
+def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:
+    """The trial's own bar diameter with its sigma, else the session's."""
+    if keys.bar_diameter_mm is not None:
+        return {"bar_diameter_mm": keys.bar_diameter_mm, "bar_diameter_sigma_mm": keys.bar_diameter_sigma_mm}
+    return {
+        "bar_diameter_mm": bar and bar.diameter_mm,
+        "bar_diameter_sigma_mm": bar.diameter_sigma_mm if bar else 0.0,
+    }
