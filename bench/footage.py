@@ -67,7 +67,7 @@ def _holds_frames(entry: Path) -> bool:
 
 
 def read_frames(source: Path, indices: Iterable[int]) -> dict[int, np.ndarray | None]:
-    """The pictures of one camera with these indices; None where one is damaged, or the video cannot be opened.
+    """The pictures of one camera with these indices; None where it is damaged or the video does not open.
 
     Raises Refused where a picture has another size than the first.
     """

@@ -214,7 +214,7 @@ def _check_trial_cameras(trial: Trial, names: tuple[str, ...]) -> None:
     missing = [name for name in names if name not in trial.camera_sources]
     if trial.camera_sources and missing:
         raise BadInput(
-            f"camera {missing[0]} has no frames here, {_listed(trial.camera_sources)} has; add them, or leave "
+            f"camera {missing[0]} has no frames here, {_listed(trial.camera_sources)} has; add them or leave "
             f"camera {missing[0]} out of the whole session (boards/ and all trials)",
             file=f"trials/{trial.name}",
         )
