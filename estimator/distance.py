@@ -84,8 +84,8 @@ def estimated_slope(m_y, m_z, alpha_est):
     """β_est of (9), in rad: φ ± α_est on the side of φ; NaN where it reaches 90°, and for m_z ≤ 0."""
     require_friction_angle("alpha_est", alpha_est)
     steep = np.arctan2(np.abs(m_y), m_z) + alpha_est
-    failed = outside(_conditions(1.0, m_y, m_z, alpha_est)) | ~(steep < RIGHT_ANGLE)
-    return np.where(failed, np.nan, np.copysign(steep, m_y))
+    failed = outside(_conditions(np.float64(1.0), m_y, m_z, alpha_est))
+    return np.where(failed, np.nan, np.copysign(np.minimum(steep, RIGHT_ANGLE), m_y))
 
 
 @elementwise
@@ -241,7 +241,8 @@ def _require_settings(alpha_est, C, length=1.0):
 
 def _distance(value, conditions):
     """`value` where it is a distance: conditions hold, positive, and inside the range of float64."""
-    return np.where(outside(conditions) | ~(value > 0) | np.isinf(value), np.nan, value)
+    lost = np.logical_not(np.greater(value, 0)) | np.isinf(value)
+    return np.where(outside(conditions) | lost, np.nan, value)
 
 
 def _centred(samples):

@@ -1,0 +1,68 @@
+"""Distance and stiffness of a yielding object, from two whisks at two distances (section VII, Kaneko 1998).
+
+An object of stiffness k gives way by F/k under the contact force F = m/d_x, so that without lateral slip
+
+    k_θ = θ/m = d_x/C + 1/(k d_x²).
+
+Two whisks from bases a known shift apart give two such equations. Lengths in mm, k in N/mm, C = 3EI in N·mm².
+"""
+
+import numpy as np
+
+from estimator.domain import elementwise, require_positive, require_sigma
+
+
+@elementwise
+def compliance_on_soft_object(d_x, stiffness, C):
+    """k_θ in rad/(N·mm) of a whisker that touches an object of the given stiffness [N/mm] at d_x [mm]."""
+    require_positive("C", C, "N·mm²")
+    inside = (d_x > 0) & (stiffness > 0)
+    return np.where(inside, d_x / C + 1 / (stiffness * d_x * d_x), np.nan)
+
+
+@elementwise
+def two_distances(compliance_near, compliance_far, shift, C):
+    """(d_x, k): distance of the nearer whisk in mm, stiffness of the object in N/mm.
+
+    compliance_near and compliance_far are k_θ of (1) in rad/(N·mm), as of
+    `distance.rotational_compliance`; the second whisk is made `shift` mm farther away. The stiffness is
+    infinite where the object does not yield beyond the rounding; both are NaN where no distance explains
+    the two compliances. shift ≤ 0 or C ≤ 0 raises ValueError.
+
+    With K = C k_θ the cubic terms of (K_1 − d) d² = (K_2 − d − s)(d + s)² cancel, and a quadratic remains.
+    """
+    require_positive("C", C, "N·mm²")
+    require_positive("shift", shift, "mm")
+    near, far = C * compliance_near, C * compliance_far
+    square = 3 * shift + near - far
+    linear = shift * (2 * far - 3 * shift)
+    constant = shift * shift * (far - shift)
+    d_x = _positive_root(square, linear, constant)
+    give = near - d_x
+    possible = (d_x > 0) & np.isfinite(d_x) & (give >= -8 * np.finfo(float).eps * near)
+    stiffness = C / (np.maximum(give, 0.0) * d_x * d_x)
+    return np.where(possible, d_x, np.nan), np.where(possible, stiffness, np.nan)
+
+
+def _positive_root(square, linear, constant):
+    """Larger root of square · d² = linear · d + constant, by whichever form does not cancel."""
+    root = np.sqrt(linear * linear + 4 * square * constant)
+    return np.where(linear >= 0, (linear + root) / (2 * square), 2 * constant / (root - linear))
+
+
+@elementwise
+def two_distances_sigma(d_x, stiffness, shift, C, near_sigma, far_sigma):
+    """(sigma of d_x in mm, sigma of k in N/mm) of `two_distances` from those of the two compliances.
+
+    With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg.
+    """
+    require_positive("C", C, "N·mm²")
+    require_sigma("near_sigma", near_sigma)
+    require_sigma("far_sigma", far_sigma)
+    give, far = 1 / stiffness, d_x + shift
+    near_by_d, near_by_give = 1 / C - 2 * give / d_x**3, 1 / d_x**2
+    far_by_d, far_by_give = 1 / C - 2 * give / far**3, 1 / far**2
+    determinant = near_by_d * far_by_give - far_by_d * near_by_give
+    d_sigma = np.hypot(far_by_give * near_sigma, near_by_give * far_sigma) / np.abs(determinant)
+    give_sigma = np.hypot(far_by_d * near_sigma, near_by_d * far_sigma) / np.abs(determinant)
+    return d_sigma, give_sigma * stiffness**2

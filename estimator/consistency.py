@@ -1,0 +1,165 @@
+"""Friction from consistency (section VII, way 2): the α whose contact points make the smoothest object.
+
+With a wrong α the distances are off by a factor that depends on the slip angle, so contacts of one object
+scatter unless all have the same slip angle: then any α fits alike, and the answer says so.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimator import distance
+from estimator.domain import require_positive
+
+CURVES = ("line", "spline")
+ONE_SLOPE = "the contacts do not span two slopes, so any friction angle fits alike"
+TOO_FEW = "too few contacts for the curve"
+AT_BOUND = "at the bound of the search"
+STEEPEST_SHARE = 0.99
+GRID_SIZE = 121
+SMALL_SPREAD = 0.05
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Whisks against one object, a row each, arrays (n,).
+
+    theta [rad], m_y, m_z [N·mm] at the pushing angle, C = 3EI [N·mm²], touch [rad] the motor angle of
+    first touch, z_c [mm] the height of the plane of rotation, poses (n, 3, 4) from each whisker's rig
+    frame to the object's frame (none: all alike), weights. Raises ValueError where shapes disagree.
+    """
+
+    theta: np.ndarray
+    m_y: np.ndarray
+    m_z: np.ndarray
+    C: float
+    touch: np.ndarray
+    z_c: np.ndarray
+    poses: np.ndarray | None = None
+    weights: np.ndarray | None = field(default=None)
+
+    def __post_init__(self):
+        require_positive("C", self.C, "N·mm²")
+        shape = np.shape(self.theta)
+        if len(shape) != 1 or any(np.shape(a) != shape for a in (self.m_y, self.m_z, self.touch, self.z_c)):
+            raise ValueError("theta, m_y, m_z, touch and z_c must be arrays (n,) of one length")
+        if self.poses is not None and np.shape(self.poses) != (*shape, 3, 4):
+            raise ValueError(f"poses has shape {np.shape(self.poses)}: must be {(*shape, 3, 4)}")
+
+    @property
+    def phi(self):
+        """Slip angles (n,), rad."""
+        return distance.felt_slip_angle(self.m_y, self.m_z)
+
+    def distances(self, alpha):
+        """d_x (n,) in mm for an assumed friction angle."""
+        return distance.with_friction(self.theta, self.m_y, self.m_z, alpha, self.C)
+
+    def points(self, alpha):
+        """Contact points (n, 3) in mm, in the object's frame."""
+        r_c, theta_c, z_c = distance.contact_point(self.distances(alpha), self.touch, self.z_c)
+        points = np.stack(distance.cartesian(r_c, theta_c, z_c), axis=-1)
+        if self.poses is None:
+            return points
+        poses = np.asarray(self.poses, dtype=float)
+        return np.einsum("nij,nj->ni", poses[:, :, :3], points) + poses[:, :, 3]
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """The α of the most consistent contacts, its sigma, the rms distance [mm] from the curve, and what is
+    doubtful.
+    """
+
+    alpha_rad: float
+    sigma_rad: float
+    rms_mm: float
+    status: str = ""
+
+
+def most_consistent_alpha(contacts, *, curve="line", stiffness=1e-3) -> Consistency:
+    """α that minimises the weighted distance of the contact points to their best line or smoothing spline.
+
+    Distances count as shares of d_x, so that a larger α, which shrinks all of them, is not preferred for
+    that. `stiffness` is the spline's: curvature against distance, over the cube of the object's extent. α
+    is NaN where the contacts do not span two slip angles.
+    """
+    if curve not in CURVES:
+        raise ValueError(f"curve = {curve!r}: must be one of {', '.join(CURVES)}")
+    phi = contacts.phi
+    if len(phi) < 5:
+        return Consistency(np.nan, np.nan, np.nan, TOO_FEW)
+    if not np.ptp(np.abs(np.tan(phi))) > SMALL_SPREAD:
+        return Consistency(np.nan, np.nan, np.nan, ONE_SLOPE)
+
+    def residuals(alpha):
+        return _residuals(contacts, alpha, curve, stiffness)
+
+    grid = np.linspace(0.0, STEEPEST_SHARE * (np.pi / 2 - np.abs(phi).max()), GRID_SIZE)
+    best = int(np.argmin([np.square(residuals(alpha)).sum() for alpha in grid]))
+    alpha = _refined(residuals, grid, best)
+    status = AT_BOUND if best in (0, len(grid) - 1) else ""
+    sigma = _sigma(residuals, alpha, grid[1] / 10)
+    rms = np.sqrt(np.mean(np.sum(_from_curve(contacts.points(alpha), curve, stiffness, None) ** 2, axis=1)))
+    return Consistency(float(alpha), sigma, float(rms), status)
+
+
+def _residuals(contacts, alpha, curve, stiffness):
+    """Weighted distances (n, 2 or 3) from the curve, as shares of d_x."""
+    weights = np.ones(len(contacts.theta)) if contacts.weights is None else np.asarray(contacts.weights)
+    off = _from_curve(contacts.points(alpha), curve, stiffness, weights)
+    return off * (np.sqrt(weights / weights.mean()) / contacts.distances(alpha))[:, None]
+
+
+def _from_curve(points, curve, stiffness, weights):
+    """Offsets (n, 3) of points from their best line, or (n, 2) from their smoothing spline along that
+    line.
+    """
+    weights = np.ones(len(points)) if weights is None else weights
+    centred = points - np.average(points, axis=0, weights=weights)
+    axes = np.linalg.svd(np.sqrt(weights)[:, None] * centred, full_matrices=False)[2]
+    along, across = centred @ axes[0], centred @ axes[1:].T
+    if curve == "line":
+        return across
+    order = np.argsort(along, kind="stable")
+    smooth = np.empty_like(across)
+    smooth[order] = _spline(along[order], across[order], weights[order], stiffness * np.ptp(along) ** 3)
+    return across - smooth
+
+
+def _spline(x, y, weights, stiffness):
+    """Values at x of the smoothing splines of y (n, k); contacts at one place are averaged."""
+    from scipy.interpolate import make_smoothing_spline
+
+    _, member = np.unique(np.round(x / np.ptp(x), 6), return_inverse=True)
+    total = np.bincount(member, weights)
+    centres = np.bincount(member, weights * x) / total
+    columns = []
+    for column in y.T:
+        mean = np.bincount(member, weights * column) / total
+        columns.append(make_smoothing_spline(centres, mean, w=total, lam=stiffness)(centres)[member])
+    return np.stack(columns, axis=-1)
+
+
+def _refined(residuals, grid, best):
+    from scipy.optimize import minimize_scalar
+
+    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    cost = minimize_scalar(
+        lambda alpha: np.square(residuals(alpha)).sum(),
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
+    return cost.x
+
+
+def _sigma(residuals, alpha, step):
+    """Sigma of α from each contact's own offset and how fast it changes with α, so steep contacts may
+    scatter more.
+    """
+    here = residuals(alpha)
+    change = (residuals(alpha + step) - residuals(max(alpha - step, 0.0))) / (step + min(alpha, step))
+    pull = (change * here).sum(axis=1)
+    contacts = len(pull)
+    return float(np.sqrt(contacts / (contacts - 3) * (pull**2).sum()) / np.square(change).sum())
