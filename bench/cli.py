@@ -1,0 +1,162 @@
+"""whisker-bench: parsing only. Heavy modules are imported inside the commands, so that --help takes 0.1 s."""
+
+import argparse
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from bench.errors import BadInput
+from vision.errors import Refused
+
+DONE, DOUBTFUL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
+
+Run = Callable[[argparse.Namespace], int]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command. Returns 0 done, 1 done but doubtful, 2 bad input or usage, 130 interrupted."""
+    options = make_parser().parse_args(arguments)
+    logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, format="%(message)s")
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        return options.run(options)
+    except (BadInput, Refused) as bad:
+        return _complain(str(bad), BAD_INPUT)
+    except KeyboardInterrupt:
+        return _complain("interrupted; what was finished is kept", INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads on: end quietly
+        return DONE
+    except OSError as problem:
+        return _complain(f"{problem.filename or 'file system'}: {problem.strerror or problem}", BAD_INPUT)
+    except Exception as fault:
+        logging.getLogger(__name__).info("", exc_info=fault)
+        found = f"{type(fault).__name__}: {fault}"
+        return _complain(f"a fault of ours, please report it ({found}); -v shows where", FAULT_OF_OURS)
+
+
+def _interrupt(*_) -> None:
+    """A polite kill (SIGTERM) ends a run as Ctrl-C does."""
+    raise KeyboardInterrupt
+
+
+def _complain(line: str, code: int) -> int:
+    print(f"whisker-bench: {' '.join(line.split())}", file=sys.stderr)
+    return code
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """All verbs; each sets `run`, a function of the parsed options that returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="whisker-bench",
+        description="How wrong is the distance that a robotic whisker feels? Recorded sessions in, truth, "
+        "estimates and their errors out.",
+        epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
+    )
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+    for add_verb in (_add_evaluate, _add_check, _add_info):
+        add_verb(verbs)
+    return parser
+
+
+def _add(verbs, name: str, run: Run, summary: str, example: str) -> argparse.ArgumentParser:
+    verb = verbs.add_parser(
+        name,
+        help=summary,
+        description=summary[0].upper() + summary[1:] + ".",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verb.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+    verb.set_defaults(run=run)
+    return verb
+
+
+def _add_session(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("session", type=Path, metavar="SESSION", help="folder of the recorded session")
+
+
+def _add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
+    verb.add_argument("--out", type=Path, required=True, metavar=metavar, help=what)
+
+
+def _add_workers(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("--workers", type=_count, default=1, metavar="N", help="processes to use (default 1)")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
+    return int(text)
+
+
+def _add_evaluate(verbs) -> None:
+    verb = _add(
+        verbs,
+        "evaluate",
+        _evaluate,
+        "true distance and slip of every whisk, the estimates beside them, and their errors",
+        "whisker-bench evaluate fixtures/small-session --out demo-out --workers 2",
+    )
+    _add_session(verb)
+    _add_out(verb, "OUT", "folder for tables, figures and the summary")
+    verb.add_argument(
+        "--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)"
+    )
+    verb.add_argument(
+        "--alpha-est-deg", type=float, metavar="X", help="friction angle that estimators assume (default 10)"
+    )
+    verb.add_argument("--cutoff-Hz", type=float, metavar="X", help="of the low-pass (default: by speed)")
+    _add_workers(verb)
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    from bench.environment import check_environment
+    from bench.evaluate import evaluate
+    from bench.settings import Settings
+
+    check_environment()
+    given = {name: getattr(options, name) for name in ("theta_deg", "alpha_est_deg", "cutoff_Hz")}
+    settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    progress = sys.stderr.isatty()
+    return evaluate(options.session, options.out, settings, workers=options.workers, progress=progress)
+
+
+def _add_check(verbs) -> None:
+    verb = _add(
+        verbs,
+        "check",
+        _check,
+        "list everything that is wrong or doubtful in a session, without evaluating it",
+        "whisker-bench check fixtures/small-session",
+    )
+    _add_session(verb)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from bench.check import report_doubts
+
+    return report_doubts(options.session, progress=sys.stderr.isatty())
+
+
+def _add_info(verbs) -> None:
+    _add(
+        verbs, "info", _info, "versions of what results depend on, and whether they fit", "whisker-bench info"
+    )
+
+
+def _info(_: argparse.Namespace) -> int:
+    from bench.environment import check_environment, versions
+
+    for name, version in versions().items():
+        print(f"{name} {version}")
+    check_environment()
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())
