@@ -1,0 +1,153 @@
+"""The bar in space: found where the pictures differ from their background, then measured by its outline."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+from scipy.optimize import minimize
+
+from vision.contact import BarAxis
+from vision.errors import Refused
+from vision.line import LinePoints, Noise
+from vision.scene import Cameras
+from vision.silhouette import outline
+from vision.wire import rotation_z
+
+_ALONG_MM = np.arange(-24.0, 24.1, 6.0)
+_INSIDE = np.array([-0.75, 0.0, 0.75])
+_OUTSIDE = np.array([-1.5, 1.5])
+
+
+def changed(grey, background, noise: Noise) -> np.ndarray:
+    """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 5 × 5 pixels.
+
+    The scale is the median of the differences themselves: most of the picture has not changed, and a picture of
+    the background may be noisier than the frames.
+    """
+    difference = uniform_filter(grey - background, 5) / noise.sigma(0.5 * (grey + background))
+    z = np.abs(difference) / max(float(np.median(np.abs(difference))) / 0.6745, 1e-6)
+    return np.clip((z - 3.0) / 6.0, 0.0, 1.0)
+
+
+def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
+    """The bar that a straight whisker first touches at distance x, at motor angle touch, with these slopes.
+
+    All arguments (n,); reach_mm: bar radius + whisker radius.
+    """
+    turn = rotation_z(np.asarray(touch_rad, dtype=float))
+    zero = np.zeros_like(turn[..., 0, 0])
+    a = np.stack(np.broadcast_arrays(np.sin(psi_rad) + zero, np.cos(psi_rad) * np.sin(beta_rad) + zero,
+                                     np.cos(psi_rad) * np.cos(beta_rad) + zero), axis=-1)
+    n = np.stack([zero, np.cos(beta_rad) + zero, -np.sin(beta_rad) + zero], axis=-1)
+    p = np.stack([x_mm + zero, zero, zero], axis=-1) + reach_mm * n
+    rotate = lambda v: np.einsum("...ij,...j->...i", turn, v)  # noqa: E731
+    return BarAxis(rotate(p), rotate(a))
+
+
+def find_bar(changes: Mapping[str, np.ndarray], cameras: Cameras, radius_mm: float, reach_mm: float,
+             motor_rad: tuple[float, float], length_mm: float) -> BarAxis:
+    """Coarse axis of the bar: the cylinder whose outline is filled with change, with no change beside it.
+
+    changes: per camera, see `changed`; motor_rad: lowest and highest motor angle, between which it touches.
+    Raises Refused where nothing like a bar is seen.
+    """
+    x = np.arange(10.0, length_mm, 0.7 * radius_mm)
+    beta = np.radians(np.arange(-84.0, 85.0, 6.0))
+    touch = np.linspace(*motor_rad, 3)
+    psi = np.radians([-8.0, 0.0, 8.0])
+    grid = np.stack(np.meshgrid(x, touch, beta, psi, indexing="ij"), axis=-1).reshape(-1, 4)
+    scores = _score(grid, changes, cameras, radius_mm, reach_mm)
+    best = grid[np.argsort(scores)[-6:]]
+    refined = [minimize(lambda q: -_score(q[None] * _UNITS, changes, cameras, radius_mm, reach_mm)[0],
+                        start / _UNITS, method="Nelder-Mead",
+                        options={"xatol": 0.02, "fatol": 1e-3, "maxfev": 160, "initial_simplex": _simplex(start)})
+               for start in best]
+    winner = min(refined, key=lambda result: result.fun)
+    if -winner.fun < 0.25:
+        raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
+                      f"{-winner.fun:.2f}, needed 0.25); record with the bar in view of every camera")
+    return axis_from_angles(*(winner.x * _UNITS), reach_mm)
+
+
+_UNITS = np.array([1.0, 0.02, 0.02, 0.02])
+
+
+def _simplex(start) -> np.ndarray:
+    q = start / _UNITS
+    return np.concatenate([q[None], q + np.diag([1.0, 1.0, 1.5, 1.5])])
+
+
+def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float) -> np.ndarray:
+    """Mean over cameras of (change inside the outline) - (change beside it), (n,) for hypotheses (n, 4)."""
+    axis = axis_from_angles(*angles.T, reach_mm)
+    total = np.zeros(len(angles))
+    for camera in cameras:
+        along, sideways = _axis_frame(axis, camera)
+        inside = _sample(changes[camera.name], camera, along, sideways, radius_mm * _INSIDE)
+        outside = _sample(changes[camera.name], camera, along, sideways, radius_mm * _OUTSIDE)
+        total += np.nanmean(inside, axis=(1, 2)) - np.nanmean(outside, axis=(1, 2))
+    return total / len(cameras)
+
+
+def _axis_frame(axis: BarAxis, camera):
+    """Points (n, t, 3) along each axis and the direction (n, 3) in which the camera sees its width."""
+    along = axis.point_mm[:, None] + _ALONG_MM[:, None] * axis.direction[:, None]
+    sideways = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
+    return along, sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
+
+
+def _sample(picture, camera, along, sideways, offsets_mm) -> np.ndarray:
+    """Values (n, t, k) of a picture at points beside each axis; 0 outside the picture."""
+    points = along[:, :, None] + offsets_mm[:, None] * sideways[:, None, None]
+    px = camera.project(points.reshape(-1, 3))
+    column, row = np.round(np.nan_to_num(px, nan=-9.0)).astype(int).T
+    inside = (row >= 0) & (row < picture.shape[0]) & (column >= 0) & (column < picture.shape[1])
+    values = np.where(inside, picture[np.where(inside, row, 0), np.where(inside, column, 0)], 0.0)
+    return values.reshape(points.shape[:-1])
+
+
+def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints], radius_mm: float,
+                rounds: int = 5) -> BarAxis:
+    """The axis whose outline passes through line points in each camera; `place` is mm along the axis given.
+
+    Where the cameras see the bar from nearly the same side, what they cannot tell stays as it was.
+    """
+    across = axis_frame(axis.direction)
+    step = np.array([1e-3, 1e-3, 1e-5, 1e-5])
+    vector = np.zeros(4)
+    for _ in range(rounds):
+        rows = [_axis_rows(axis, across, vector, cameras[name], points, radius_mm, step)
+                for name, points in lines.items() if len(points)]
+        rows.append((-vector / [5.0, 5.0, 0.5, 0.5], np.diag(1.0 / np.array([5.0, 5.0, 0.5, 0.5]))))
+        vector = vector + np.linalg.lstsq(np.concatenate([r[1] for r in rows]),
+                                          np.concatenate([r[0] for r in rows]), rcond=None)[0]
+    return shifted_axis(axis, across, vector)
+
+
+def axis_frame(direction) -> np.ndarray:
+    """Two unit vectors (2, 3) at right angles to a direction and to each other."""
+    e1 = np.cross(direction, [1.0, 0.0, 0.0])
+    e1 = e1 / np.linalg.norm(e1)
+    return np.stack([e1, np.cross(direction, e1)])
+
+
+def shifted_axis(axis: BarAxis, across, vector) -> BarAxis:
+    """An axis (batch of vectors (…, ≥ 4) allowed) moved by two shifts in mm and two tilts across itself."""
+    direction = axis.direction + vector[..., 2:4] @ across
+    return BarAxis(axis.point_mm + vector[..., 0:2] @ across,
+                   direction / np.linalg.norm(direction, axis=-1, keepdims=True))
+
+
+def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm, step):
+    """What is left between line points and outline over sigma, robustly weighted, and its Jacobian (n, 4)."""
+    def middle(v):
+        moved = shifted_axis(axis, across, v)
+        on_axis = moved.point_mm + points.place[:, None] * moved.direction
+        return outline(camera, on_axis, np.broadcast_to(moved.direction, on_axis.shape), radius_mm)[0]
+
+    here = middle(vector)
+    left = np.sum(points.normal * (points.px - here), axis=1) / points.sigma_px
+    weight = 1.0 / np.sqrt(1.0 + (left / 5.0) ** 2)
+    columns = [np.sum(points.normal * (middle(vector + step[k] * np.eye(4)[k]) - here), axis=1) / step[k]
+               for k in range(4)]
+    return left * weight, np.stack(columns, axis=1) / points.sigma_px[:, None] * weight[:, None]

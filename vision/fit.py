@@ -1,0 +1,259 @@
+"""One reprojection fit over all cameras and frames of a whisk: bar, rest shape, and the bend in each frame.
+
+Shared by all frames: the bar's axis and the whisker's rest shape. Each touching frame adds the two components of
+its bend and one observation, that axis and centreline are bar radius + whisker radius apart. What the pictures may
+be wrong in as a whole (a shift of the seen line from the rod's axis, by light and lens) enters as an offset and a
+tilt per camera with a prior, and so ends up in the stated uncertainty.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.bar import axis_frame, shifted_axis
+from vision.contact import BarAxis, clearance, closest_arc
+from vision.line import LinePoints
+from vision.scene import Cameras, Wire
+from vision.silhouette import outline
+from vision.wire import REST_POWERS, Curves, centrelines
+
+BAR, REST = 4, 2 * REST_POWERS
+# One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
+# set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
+REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
+BEND_PRIOR_RAD = 0.3
+# How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
+WIRE_OFFSET_PX, WIRE_TILT_PX = 0.06, 0.06
+BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.07
+BAR_TILT_ARM_MM = 20.0
+CONTACT_SIGMA_MM = 0.002
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Line points of one camera in one frame (frame is -1 for the bar, which stands still)."""
+
+    frame: int
+    camera: int
+    points: LinePoints
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is known and seen of one whisk.
+
+    motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
+    axis: where the bar's four parameters are counted from.
+    """
+
+    cameras: Cameras
+    wire: Wire
+    reach_mm: float
+    reach_sigma_mm: float
+    axis: BarAxis
+    motor_rad: np.ndarray
+    touching: np.ndarray
+    bent: np.ndarray
+    seen: Sequence[Observed]
+
+    @property
+    def size(self) -> int:
+        """Number of parameters: bar, rest shape, reach, two offsets and two tilts a camera, bends."""
+        return self.first_bend + 2 * int(np.sum(self.bent))
+
+    @property
+    def first_bend(self) -> int:
+        """Index of the first bend."""
+        return BAR + REST + 1 + 4 * len(self.cameras)
+
+
+@dataclass(frozen=True)
+class State:
+    """Parameters in one vector, with the contact arcs (f,) from which the next evaluation starts."""
+
+    vector: np.ndarray
+    arcs_mm: np.ndarray
+
+
+def bar_axis(problem: Problem, vector) -> BarAxis:
+    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start."""
+    return shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
+
+
+def rest_shape(vector) -> np.ndarray:
+    """Rest polynomials (…, 2, 4) in mm."""
+    return vector[..., BAR:BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
+
+
+def bends(problem: Problem, vector) -> np.ndarray:
+    """Tangent angles at the contact (…, f, 2); zero in frames that may not bend."""
+    angles = np.zeros((*vector.shape[:-1], len(problem.motor_rad), 2))
+    angles[..., problem.bent, :] = vector[..., problem.first_bend:].reshape(*vector.shape[:-1], -1, 2)
+    return angles
+
+
+def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 2) -> tuple[Curves, np.ndarray]:
+    """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
+    rest = rest_shape(vector)[..., None, :, :]
+    axis = bar_axis(problem, vector)
+    axis = BarAxis(axis.point_mm[..., None, :], axis.direction[..., None, :])
+    angles = bends(problem, vector)
+    shape = angles.shape[:-1]
+    arcs = np.broadcast_to(arcs_mm, shape)
+    motor = np.broadcast_to(problem.motor_rad, shape)
+    rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
+    for _ in range(rounds):
+        curves = centrelines(rest, angles, arcs, motor, problem.wire)
+        arcs = np.clip(closest_arc(curves, axis), 1.0, problem.wire.length_mm)
+    return centrelines(rest, angles, arcs, motor, problem.wire), arcs
+
+
+def _steps(problem: Problem) -> np.ndarray:
+    """Finite-difference step of each geometric parameter: about 1e-5 of its size."""
+    step = np.full(problem.size, 1e-5)
+    step[0:2], step[2:4], step[BAR:BAR + REST] = 1e-4, 1e-6, 1e-4
+    return step
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Residuals (n,) over their sigma, their Jacobian (n, size), and which are line points (robust weights)."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    is_point: np.ndarray
+
+
+def linearise(problem: Problem, state: State) -> tuple[Linear, State]:
+    """Residuals and Jacobian at a state; the state comes back with its contact arcs brought up to date."""
+    moved, columns = _perturbed(problem, state.vector)
+    curves, arcs = curves_of(problem, moved, state.arcs_mm)
+    blocks = [_wire_block(problem, seen, curves, columns, state.vector) if seen.frame >= 0
+              else _bar_block(problem, seen, state.vector) for seen in problem.seen]
+    count = sum(len(block[0]) for block in blocks)
+    blocks += [_contact_block(problem, moved, curves, columns, state.vector), _prior_block(problem, state.vector)]
+    residual = np.concatenate([block[0] for block in blocks])
+    jacobian = np.concatenate([block[1] for block in blocks])
+    return (Linear(residual, jacobian, np.arange(len(residual)) < count),
+            replace(state, arcs_mm=arcs[0]))
+
+
+def _perturbed(problem: Problem, vector):
+    """The vector itself and one copy per geometric degree: bar and rest each alone, all frames' bends at once.
+
+    columns: for each copy after the first, a function of the frame that names the parameter it moved.
+    """
+    step = _steps(problem)
+    rows, columns = [vector], []
+    for k in range(BAR + REST):
+        rows.append(vector + step[k] * (np.arange(problem.size) == k))
+        columns.append((step[k], np.full(len(problem.motor_rad), k)))
+    order = np.cumsum(problem.bent) - 1
+    for part in range(2):
+        row = vector.copy()
+        row[problem.first_bend + part::2] += step[-1] if np.any(problem.bent) else 0.0
+        rows.append(row)
+        columns.append((1e-5, np.where(problem.bent, problem.first_bend + 2 * order + part, -1)))
+    return np.stack(rows), columns
+
+
+def _wire_block(problem: Problem, seen: Observed, curves: Curves, columns, vector):
+    f, points = seen.frame, seen.points
+    one = Curves(curves.arc_mm, curves.points_mm[:, f], curves.tangents[:, f])
+    positions, _ = one.at(points.place)
+    camera = problem.cameras.cameras[seen.camera]
+    px, by_point, _ = camera.project_with_jacobians(positions[0])
+    along_normal = np.einsum("ni,nij->nj", points.normal, by_point)
+    jacobian = np.zeros((len(points), problem.size))
+    for (step, names), position in zip(columns, positions[1:]):
+        if names[f] >= 0:
+            jacobian[:, names[f]] = np.sum(along_normal * (position - positions[0]), axis=1) / step
+    first = BAR + REST + 1 + 4 * seen.camera
+    lever = points.place / problem.wire.length_mm - 0.5
+    jacobian[:, first], jacobian[:, first + 1] = 1.0, 2.0 * lever
+    residual = np.sum(points.normal * (px - points.px), axis=1)
+    residual = residual + vector[first] + vector[first + 1] * 2.0 * lever
+    return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
+
+
+def bar_outline(problem: Problem, camera, vector, place_mm) -> np.ndarray:
+    """Middle (n, 2) of the bar's outline at places along its axis, in one camera."""
+    axis = bar_axis(problem, vector)
+    points = axis.point_mm + np.asarray(place_mm)[:, None] * axis.direction
+    directions = np.broadcast_to(axis.direction, points.shape)
+    return outline(camera, points, directions, problem.reach_mm - problem.wire.diameter_mm / 2)[0]
+
+
+def _bar_block(problem: Problem, seen: Observed, vector):
+    points, camera = seen.points, problem.cameras.cameras[seen.camera]
+    px = bar_outline(problem, camera, vector, points.place)
+    step = _steps(problem)
+    jacobian = np.zeros((len(points), problem.size))
+    for k in range(BAR):
+        moved = vector + step[k] * (np.arange(problem.size) == k)
+        jacobian[:, k] = np.sum(points.normal * (bar_outline(problem, camera, moved, points.place) - px),
+                                axis=1) / step[k]
+    first = BAR + REST + 1 + 4 * seen.camera + 2
+    lever = points.place / BAR_TILT_ARM_MM
+    jacobian[:, first], jacobian[:, first + 1] = 1.0, lever
+    residual = np.sum(points.normal * (px - points.px), axis=1) + vector[first] + vector[first + 1] * lever
+    return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
+
+
+def _contact_block(problem: Problem, moved, curves: Curves, columns, vector):
+    """Touching frames: signed distance from axis to centreline is reach + its error."""
+    axis = bar_axis(problem, moved)
+    axis = BarAxis(axis.point_mm[:, None], axis.direction[:, None])
+    distance = clearance(curves, axis)[0]
+    frames = np.flatnonzero(problem.touching)
+    jacobian = np.zeros((len(frames), problem.size))
+    for (step, names), row in zip(columns, distance[1:]):
+        for i, f in enumerate(frames):
+            if names[f] >= 0:
+                jacobian[i, names[f]] = (row[f] - distance[0, f]) / step
+    jacobian[:, BAR + REST] = -1.0
+    residual = distance[0, frames] - problem.reach_mm - vector[BAR + REST]
+    return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
+
+
+def _prior_block(problem: Problem, vector):
+    per_camera = [WIRE_OFFSET_PX, WIRE_TILT_PX, BAR_OFFSET_PX, BAR_TILT_PX]
+    sigma = np.concatenate([[50.0, 50.0, 1.0, 1.0], REST_PRIOR_MM, REST_PRIOR_MM,
+                            [max(problem.reach_sigma_mm, 1e-6)], np.tile(per_camera, len(problem.cameras)),
+                            np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
+    return vector / sigma, np.diag(1.0 / sigma)
+
+
+def start(problem: Problem, contact_arc_mm: float) -> State:
+    """No bend, straight whisker, the bar where the problem counts it from."""
+    return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
+
+
+def _weights(linear: Linear, scale: float) -> np.ndarray:
+    """Cauchy weights of line points; observations of touch and priors keep theirs."""
+    return np.where(linear.is_point, 1.0 / (1.0 + (linear.residual / scale) ** 2), 1.0)
+
+
+def solve(problem: Problem, state: State, *, scales: Sequence[float] = (30.0, 10.0, 4.0, 4.0, 4.0, 4.0),
+          tolerance: float = 1e-7) -> tuple[State, np.ndarray, float]:
+    """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say.
+
+    Returns the state, its covariance (size, size) from noise and priors alone, and the scale of the residuals
+    (1 where the line points' sigmas are right).
+    """
+    for scale in scales:
+        linear, state = linearise(problem, state)
+        root = np.sqrt(_weights(linear, scale))
+        jacobian = linear.jacobian * root[:, None]
+        step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
+        step = step * min(1.0, 0.3 / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
+        state = replace(state, vector=state.vector + step)
+        if np.max(np.abs(step)) < tolerance:
+            break
+    linear, state = linearise(problem, state)
+    root = np.sqrt(_weights(linear, scales[-1]))
+    jacobian = linear.jacobian * root[:, None]
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    spread = np.median(np.abs(linear.residual[linear.is_point])) / 0.6745
+    return state, covariance, float(spread)

@@ -1,0 +1,236 @@
+"""The whole truth of one trial, from its pictures alone.
+
+    pictures → coarse bar → bar's line ┐
+                                       ├→ one fit over cameras and frames → touch, contact, slip, with sigma
+    pictures → coarse bends → wire's line points ┘
+
+Nothing here knows of a gauge.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.bar import changed, find_bar, settle_axis
+from vision.bar_line import measure_bar
+from vision.contact import BarAxis
+from vision.effort import VisionSettings
+from vision.errors import Refused
+from vision.fit import Observed, Problem, State, bar_axis, bends, curves_of, rest_shape, solve
+from vision.line import Noise, measure_noise, shading_terms
+from vision.quantities import calibration_share, jacobians
+from vision.report import to_whisk
+from vision.scene import Bar, Cameras, Wire
+from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
+from vision.touch import first_touch, frames_by_touch, frames_that_touch
+from vision.trace import View, find_blur, observed, to_points, trace, wire_pieces
+from vision.truth import TrialTruth, WhiskTruth
+from vision.wire import Curves
+
+_WIRE_KNOT_MM = 12.0
+_NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
+_BESIDE_BAR_PX = 4.0
+_SEARCH_PX = 1.5
+
+
+@dataclass(frozen=True)
+class _Rods:
+    """What stands in front of the cameras."""
+
+    wire: Wire
+    bar: Bar
+
+    @property
+    def reach_mm(self) -> float:
+        """Distance between the two axes while they touch, for a uniform wire."""
+        return self.bar.radius_mm + 0.5 * self.wire.diameter_mm
+
+    @property
+    def reach_sigma_mm(self) -> float:
+        return 0.5 * float(np.hypot(self.bar.diameter_sigma_mm, self.wire.diameter_sigma_mm))
+
+
+def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_rad, whisks: Sequence[slice],
+                  cameras: Cameras, wire: Wire, bar: Bar, background: Mapping[str, np.ndarray | None],
+                  settings: VisionSettings = VisionSettings()) -> TrialTruth:
+    """Truth of a trial: bar, first touch, contact and slip in each whisk.
+
+    frames: per camera the grey pictures by frame index (a missing index is a lost frame); time_s, motor_rad (n,)
+    at each frame; whisks: slices of frame indices, one a forward stroke; background: the scene without whisker and
+    bar, or None. What keeps a whisk from having a truth is its status; raises Refused only for input that no
+    trial could be seen with.
+    """
+    time_s, motor_rad = np.asarray(time_s, dtype=float), np.asarray(motor_rad, dtype=float)
+    rods = _Rods(wire, bar)
+    try:
+        views = _views(frames, cameras, background)
+        used = cameras.subset([view.camera.name for view in views])
+        axis = _see_bar(views, used, rods, motor_rad, settings)
+    except Refused as reason:
+        return _nothing(whisks, str(reason))
+    rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, axis, time_s, motor_rad,
+                       settings) for number, where in enumerate(whisks)]
+    return TrialTruth(axis.point_mm, axis.direction, np.full((4, 4), np.nan), tuple(rows))
+
+
+def _nothing(whisks, reason: str) -> TrialTruth:
+    rows = tuple(WhiskTruth(number, None, status=reason) for number in range(len(whisks)))
+    return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), np.full((4, 4), np.nan), rows)
+
+
+def _views(frames, cameras: Cameras, background) -> list[View]:
+    views = []
+    for camera in cameras:
+        pictures = frames.get(camera.name, {})
+        if len(pictures) < 3:
+            continue
+        first, second = list(pictures.values())[:2]
+        known = background.get(camera.name)
+        known = np.zeros(first.shape) if known is None else np.asarray(known, dtype=float)
+        views.append(View(camera, pictures, known, measure_noise(first, second)))
+    if not views:
+        raise Refused("no camera has three frames or more")
+    return views
+
+
+def _mean_picture(view: View) -> np.ndarray:
+    return np.mean([picture.astype(np.float32) for picture in view.frames.values()], axis=0)
+
+
+def _quieter(noise: Noise, count: int) -> Noise:
+    """Noise of a mean of `count` frames beside one picture of the background."""
+    share = 1.0 / count + 1.0
+    return Noise(noise.floor * share, noise.gain * share)
+
+
+def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSettings) -> BarAxis:
+    """The bar's axis from the pictures of all frames, before any wire is known."""
+    changes = {view.camera.name: changed(np.median(list(view.frames.values()), axis=0), view.background, view.noise)
+               for view in views}
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
+    for _ in range(2):
+        lines = _bar_lines(views, axis, rods, {}, settings, coarse=True)
+        axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
+    return axis
+
+
+def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, coarse: bool):
+    """The bar's line in each camera that shows enough of it."""
+    found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, len(view.frames))),
+                                           _mean_picture(view), axis, rods.bar.radius_mm,
+                                           wires.get(view.camera.name, []), settings, coarse)
+             for view in views}
+    return {name: line for name, line in found.items() if line is not None}
+
+
+def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis, time_s, motor_rad,
+               settings: VisionSettings) -> WhiskTruth:
+    """Truth of one whisk; its status where there is none."""
+    seen = [f for f in indices if all(f in view.frames for view in views)]
+    if len(seen) < 4:
+        return WhiskTruth(number, None, status=f"{len(seen)} frames seen by all cameras, 4 are needed")
+    motor = {f: float(motor_rad[f]) for f in seen}
+    try:
+        problem, state, scale, covariance = _fit_whisk(views, cameras, rods, axis, motor, settings)
+    except Refused as reason:
+        return WhiskTruth(number, None, status=str(reason))
+    if problem is None:
+        return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
+                          status="the whisker never touches" if state is None else state)
+    measured, by_parameter = jacobians(problem, state)
+    lens = calibration_share(problem, state, covariance / scale**2)
+    return to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
+                    lens, views, rods.bar.radius_mm, settings)
+
+
+def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], settings: VisionSettings):
+    """Problem and state after the last round, the residuals' scale and the parameters' covariance.
+
+    (None, reason, …) where there is no touch to fit.
+    """
+    angles = np.array(list(motor.values()))
+    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, _early(motor))
+    coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
+    bend = np.array(list(coarse.values()))
+    touching, free = frames_that_touch(angles, bend)
+    if not np.any(touching):
+        return None, None, 1.0, None
+    if np.sum(~touching) < 2:
+        return None, "touches from the start: fewer than two frames of free stroke", 1.0, None
+    state = None
+    arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
+    light = {}
+    for round_number in range(settings.rounds + 1):
+        curves = _curves(state, rods, rest, bend, arcs, angles, motor) if state is None else _fitted(*state, motor)
+        axis = axis if state is None else bar_axis(state[0], state[1].vector)
+        seen = _trace_all(views, rods, axis, curves, light, settings)
+        problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
+        begin = _begin(problem, rest, bend, arcs)
+        fitted, covariance, scale = solve(problem, begin)
+        state = (problem, fitted)
+        rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
+        touch = float(first_touch(problem, fitted.vector).motor_rad)
+        if round_number < settings.rounds:
+            touching, free = frames_by_touch(angles, touch, np.radians(0.02))
+    scale = max(scale, 1.0)
+    return problem, fitted, scale, covariance * scale**2
+
+
+def _early(motor: Mapping[int, float]) -> dict[int, float]:
+    """The frames of the first seventh of the stroke, two at least: taken as free for a first look."""
+    angles = list(motor.values())
+    limit = angles[0] + (angles[-1] - angles[0]) / 7.0
+    count = max(2, sum(1 for angle in angles if angle <= limit))
+    return dict(list(motor.items())[:count])
+
+
+def _curves(_, rods: _Rods, rest, bend, arcs, angles, motor) -> dict[int, Curves]:
+    return {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
+
+
+def _fitted(problem: Problem, state: State, motor) -> dict[int, Curves]:
+    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
+    return {f: Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k]) for k, f in enumerate(motor)}
+
+
+def _begin(problem: Problem, rest, bend, arcs) -> State:
+    vector = np.zeros(problem.size)
+    vector[4:12] = np.ravel(rest)
+    vector[problem.first_bend:] = bend[problem.bent].ravel()
+    return State(vector, np.asarray(arcs, dtype=float))
+
+
+def _trace_all(views, rods: _Rods, axis: BarAxis, curves, light: dict, settings: VisionSettings) -> list[Observed]:
+    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time."""
+    wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in curves.values()] for view in views}
+    lines = _bar_lines(views, axis, rods, wires, settings, coarse=False)
+    seen = []
+    for number, view in enumerate(views):
+        name = view.camera.name
+        seen += _trace_wire(number, view, rods, axis, curves, light, settings)
+        if name in lines:
+            seen.append(Observed(-1, number, lines[name].points))
+    return seen
+
+
+def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, light: dict,
+                settings: VisionSettings) -> list[Observed]:
+    pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
+    from vision.trace import clear_of_bar
+
+    pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
+    if len(pieces) == 0:
+        raise Refused(f"camera {view.camera.name} shows no wire clear of the bar")
+    knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
+    radius = float(np.median(pieces.radius_px))
+    first = view.camera.name not in light
+    if first:
+        light[view.camera.name] = find_blur(pieces, 4, knots)
+    blur = light[view.camera.name]
+    pieces, found, misfit = trace(pieces, blur, shading_terms(radius, blur), knots,
+                                  search_px=_SEARCH_PX if first else 0.0)
+    points, source = to_points(pieces, found, misfit)
+    return observed(points, source, number, list(curves))

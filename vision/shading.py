@@ -1,0 +1,130 @@
+"""The rod's own shading, shared by all pieces of a camera, and the position of each piece under it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.line import LinePoints, Pieces, shading_basis
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Radiance round the rod, linear in place between knots.
+
+    knots_mm (m,), waves (m, terms): coefficients of 1, sin t, cos t, … in grey levels; blur_px.
+    """
+
+    knots_mm: np.ndarray
+    waves: np.ndarray
+    blur_px: float
+
+    def at(self, place_mm) -> np.ndarray:
+        """Coefficients (s, terms) at places (s,) along the rod."""
+        return _hats(place_mm, self.knots_mm) @ self.waves
+
+
+def _hats(place_mm, knots_mm) -> np.ndarray:
+    """Weights (s, m) of linear interpolation between knots, constant outside."""
+    if len(knots_mm) == 1:
+        return np.ones((len(place_mm), 1))
+    position = np.clip(np.interp(place_mm, knots_mm, np.arange(len(knots_mm))), 0, len(knots_mm) - 1)
+    return np.clip(1.0 - np.abs(position[:, None] - np.arange(len(knots_mm))), 0.0, None)
+
+
+def _surround(pieces: Pieces, cover) -> np.ndarray:
+    """The two columns (s, p, 2) of the visible background: the known picture and a constant, where not hidden."""
+    return np.stack([(1.0 - cover) * pieces.background, 1.0 - cover], axis=-1) * pieces.weight[..., None]
+
+
+def _project_out(columns, *targets):
+    """Parts of the targets (s, p, k) that the columns (s, p, 2) cannot explain, piece by piece.
+
+    A weak pull keeps the background at 1 × the known picture + 0 where a piece cannot tell.
+    """
+    normal = np.einsum("spi,spj->sij", columns, columns) + np.diag([1e-6, 1e-6])
+    found = [np.linalg.solve(normal, np.einsum("spi,spk->sik", columns, target)) for target in targets]
+    return [target - columns @ x for target, x in zip(targets, found)]
+
+
+def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots_mm, robust=None) -> tuple[Shading, float]:
+    """Least-squares radiance over all pieces with their positions as they stand; also chi² per pixel.
+
+    Each piece has its own gain and offset of the background (shadow, drifting light). robust (s,): weight of
+    each piece.
+    """
+    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
+    seen = (pieces.grey * pieces.weight)[..., None]
+    model, rest = _project_out(_surround(pieces, basis[..., 0]), basis * pieces.weight[..., None], seen)
+    robust = np.ones(len(pieces)) if robust is None else robust
+    hats = _hats(pieces.place, knots_mm)
+    gram = np.einsum("spi,spj,s->sij", model, model, robust)
+    moment = np.einsum("spi,spk,s->si", model, rest, robust)
+    size = len(knots_mm) * terms
+    left = np.einsum("sm,sn,sij->minj", hats, hats, gram).reshape(size, size)
+    right = np.einsum("sm,si->mi", hats, moment).reshape(size)
+    ridge = 1e-6 * np.trace(left) / size * np.eye(size)
+    waves = np.linalg.solve(left + ridge, right).reshape(len(knots_mm), terms)
+    shading = Shading(np.asarray(knots_mm, dtype=float), waves, blur_px)
+    residual = rest[..., 0] - np.einsum("spi,si->sp", model, shading.at(pieces.place))
+    chi2 = np.sum(residual**2, axis=1) * robust
+    return shading, float(np.sum(chi2) / max(1.0, np.sum((pieces.weight > 0).sum(axis=1) * robust)))
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where each piece lies: shift_px, sigma_px (s,) along the normal; chi2 (s,) per pixel; contrast (s,).
+
+    contrast: signal of the rod against its background over the noise, over the whole piece.
+    """
+
+    shift_px: np.ndarray
+    sigma_px: np.ndarray
+    chi2: np.ndarray
+    contrast: np.ndarray
+
+
+def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
+    """Gauss–Newton on the position of each piece with the rod's shading known, background gain and offset free."""
+    waves = shading.at(pieces.place)
+    shift = np.zeros(len(pieces))
+    for _ in range(rounds):
+        residual, slope, _ = _linearise(pieces, shading, waves, shift)
+        power = np.sum(slope * slope, axis=1)
+        step = np.sum(slope * residual, axis=1) / np.maximum(power, 1e-9)
+        shift = np.clip(shift + np.clip(step, -0.7, 0.7), -limit_px, limit_px)
+    residual, slope, contrast = _linearise(pieces, shading, waves, shift)
+    power = np.sum(slope * slope, axis=1)
+    free = np.maximum((pieces.weight > 0).sum(axis=1) - 3, 1)
+    chi2 = np.sum(residual**2, axis=1) / free
+    sigma = np.sqrt(np.maximum(chi2, 1.0) / np.maximum(power, 1e-9))
+    return Located(shift, sigma, chi2, contrast)
+
+
+def _linearise(pieces: Pieces, shading: Shading, waves, shift, delta_px: float = 0.05):
+    """Residual, its slope by position (both s, p; free of the background's gain and offset), and the contrast."""
+    radius = pieces.radius_px[:, None]
+    ahead, behind = (shading_basis(pieces.offset_px - (shift + d)[:, None], radius, shading.blur_px,
+                                   waves.shape[1]) for d in (delta_px, -delta_px))
+    cover = 0.5 * (ahead + behind)[..., 0]
+    columns = _surround(pieces, cover)
+    rod = np.einsum("spk,sk->sp", 0.5 * (ahead + behind), waves) * pieces.weight
+    seen = np.stack([pieces.grey * pieces.weight, rod], axis=-1)
+    (rest,) = _project_out(columns, seen)
+    normal = np.einsum("spi,spj->sij", columns, columns) + np.diag([1e-6, 1e-6])
+    around = np.linalg.solve(normal, np.einsum("spi,sp->si", columns, seen[..., 0] - rod)[..., None])[..., 0]
+    by_cover = -(around[:, :1] * pieces.background + around[:, 1:])
+    change = (ahead - behind) / (2 * delta_px)
+    slope = (np.einsum("spk,sk->sp", change, waves) + change[..., 0] * by_cover) * pieces.weight
+    (slope,) = _project_out(columns, slope[..., None])
+    contrast = np.sqrt(np.sum((rod + cover * by_cover * pieces.weight) ** 2, axis=1))
+    return rest[..., 0] - rest[..., 1], slope[..., 0], contrast
+
+
+def line_points(pieces: Pieces, located: Located, *, worst_chi2: float, worst_sigma_px: float,
+                worst_shift_px: float = 1.45) -> tuple[LinePoints, np.ndarray]:
+    """The pieces that can be trusted as points of the axis, and which band each came from."""
+    good = ((located.chi2 < worst_chi2) & (located.sigma_px < worst_sigma_px)
+            & (np.abs(located.shift_px) < worst_shift_px))
+    px = pieces.foot_px + located.shift_px[:, None] * pieces.normal
+    points = LinePoints(px, pieces.normal, located.sigma_px, pieces.place).select(good)
+    return points, pieces.source[good]

@@ -1,0 +1,118 @@
+"""First look at a whisk: the whisker's rest shape from its free stroke, then its bend frame by frame.
+
+Coarse: to a pixel or two, enough for the bands that `trace` reads.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from vision.contact import BarAxis, closest_arc
+from vision.errors import Refused
+from vision.fit import BAR, REST, Observed, Problem, solve, start
+from vision.line import LinePoints, strongest_shift
+from vision.scene import Cameras, Wire
+from vision.silhouette import outline
+from vision.trace import View, clear_of_bar, wire_pieces
+from vision.wire import REST_POWERS, Curves, centrelines
+
+_PIECE_PX = 16
+_REACH_PX = 26
+_SIGMA_PX = 1.0
+_SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
+
+
+def outline_of_bar(camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middle (m, 2) and half-width (m,) of the bar in one camera, 60 mm to either side of its point."""
+    place = np.linspace(-60.0, 60.0, 241)
+    points = axis.point_mm + place[:, None] * axis.direction
+    return outline(camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
+
+
+def coarse_points(view: View, curves: Mapping[int, Curves], wire: Wire, axis: BarAxis,
+                  radius_mm: float) -> tuple[LinePoints, np.ndarray]:
+    """Line points to a pixel, away from the bar, and the frame of each."""
+    pieces = wire_pieces(view, curves, wire, _PIECE_PX, _REACH_PX - 3)
+    pieces = pieces.select(clear_of_bar(pieces, *outline_of_bar(view.camera, axis, radius_mm), 8.0))
+    shift, share = strongest_shift(pieces, _REACH_PX)
+    good = (share > _SHARE) & (np.abs(shift) < _REACH_PX - 4)
+    px = pieces.foot_px + shift[:, None] * pieces.normal
+    points = LinePoints(px, pieces.normal, np.full(len(pieces), _SIGMA_PX), pieces.place)
+    return points.select(good), pieces.source[good]
+
+
+def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis, reach_mm: float,
+              motor_rad: Mapping[int, float]) -> np.ndarray:
+    """Rest shape (2, 4) in mm from frames {index: motor angle} in which nothing touches.
+
+    Raises Refused where no whisker is seen to swing.
+    """
+    motor = np.array(list(motor_rad.values()))
+    rest = np.zeros((2, REST_POWERS))
+    for _ in range(2):
+        curves = {f: one_curve(rest, np.zeros(2), wire.length_mm, m, wire) for f, m in motor_rad.items()}
+        seen = []
+        for number, view in enumerate(views):
+            points, source = coarse_points(view, curves, wire, axis, reach_mm - wire.diameter_mm / 2)
+            seen += [Observed(k, number, points.select(source == f)) for k, f in enumerate(motor_rad)]
+        if sum(len(s.points) for s in seen) < 8 * len(motor_rad):
+            raise Refused("no whisker is seen where the motor angle says it should be")
+        nothing = np.zeros(len(motor), dtype=bool)
+        problem = Problem(cameras, wire, reach_mm, 0.0, axis, motor, nothing, nothing, seen)
+        state, _, _ = solve(problem, start(problem, wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
+        rest = state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
+    return rest
+
+
+def one_curve(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
+    """The centreline of one frame."""
+    return centrelines(np.asarray(rest_mm), np.asarray(bend_rad), np.asarray(contact_mm), np.asarray(motor_rad),
+                       wire)
+
+
+def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float, rest_mm,
+                 motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
+    """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
+    found: dict[int, np.ndarray] = {}
+    last, before = np.zeros(2), np.zeros(2)
+    for frame, motor in motor_rad.items():
+        guess = 2 * last - before
+        arc = contact_arc(rest_mm, guess, motor, axis, wire)
+        curve = one_curve(rest_mm, guess, arc, motor, wire)
+        seen = [coarse_points(view, {frame: curve}, wire, axis, reach_mm - wire.diameter_mm / 2)[0]
+                for view in views]
+        bend = _fit_bend(views, seen, rest_mm, guess, arc, motor, wire)
+        found[frame] = bend
+        before, last = last, bend
+    return found
+
+
+def contact_arc(rest_mm, bend, motor, axis: BarAxis, wire: Wire) -> float:
+    straight = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
+    arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)
+    bent = one_curve(rest_mm, bend, arc, motor, wire)
+    return float(np.clip(closest_arc(bent, axis), 1.0, wire.length_mm))
+
+
+def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire: Wire, rounds: int = 8):
+    """Least squares on the two components of the bend, Cauchy weights of 2 px, a weak pull towards none."""
+    bend, step = np.array(bend, dtype=float), 1e-5
+    for _ in range(rounds):
+        left, columns = _bend_residual(views, seen, rest_mm, bend, arc, motor, wire), []
+        for k in range(2):
+            moved = _bend_residual(views, seen, rest_mm, bend + step * np.eye(2)[k], arc, motor, wire)
+            columns.append((moved - left) / step)
+        weight = 1.0 / (1.0 + (left / 2.0) ** 2)
+        jacobian = np.stack(columns, axis=1)
+        normal = jacobian.T @ (weight[:, None] * jacobian) + np.eye(2) / 0.2**2
+        bend = bend - np.linalg.solve(normal, jacobian.T @ (weight * left) + bend / 0.2**2)
+        bend = np.clip(bend, -0.5, 0.5)
+    return bend
+
+
+def _bend_residual(views, seen, rest_mm, bend, arc, motor, wire: Wire) -> np.ndarray:
+    """Distance in px from line points to the predicted line, all cameras."""
+    curve = one_curve(rest_mm, bend, arc, motor, wire)
+    parts = [np.sum(points.normal * (view.camera.project(curve.at(points.place)[0]) - points.px), axis=1)
+             for view, points in zip(views, seen)]
+    return np.concatenate(parts)

@@ -1,0 +1,67 @@
+"""First touch as the pictures show it: the motor angle at which the unbent whisker reaches the bar."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.contact import BarAxis, clearance
+from vision.fit import Problem, bar_axis, rest_shape
+from vision.scene import Wire
+from vision.wire import centrelines
+
+_SURE_BEND_RAD = np.radians(0.25)
+
+
+@dataclass(frozen=True)
+class FirstTouch:
+    """Motor angle (…) of first touch, contact point (…, 3) of the centreline and its arc length (…)."""
+
+    motor_rad: np.ndarray
+    point_mm: np.ndarray
+    arc_mm: np.ndarray
+
+
+def first_touch(problem: Problem, vector, rounds: int = 6) -> FirstTouch:
+    """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
+    axis = bar_axis(problem, vector)
+    reach = problem.reach_mm + vector[..., 4 + 8]
+    rest = rest_shape(vector)
+    low = np.full(vector.shape[:-1], np.min(problem.motor_rad))
+    high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
+    gap_low, gap_high = (_gap(rest, m, axis, reach, problem.wire)[0] for m in (low, high))
+    for _ in range(rounds):
+        slope = (gap_high - gap_low) / np.where(np.abs(high - low) > 1e-13, high - low, 1e-13)
+        new = high - gap_high / np.where(np.abs(slope) > 1e-9, slope, 1e-9)
+        low, gap_low = high, gap_high
+        high, (gap_high, arc, point) = new, _gap(rest, new, axis, reach, problem.wire)
+    return FirstTouch(high, point, arc)
+
+
+def _gap(rest_mm, motor_rad, axis: BarAxis, reach_mm, wire: Wire):
+    """How far the resting whisker still is from touching, mm; contact arc and point."""
+    none = np.zeros((*motor_rad.shape, 2))
+    curves = centrelines(rest_mm, none, np.full(motor_rad.shape, wire.length_mm / 2), motor_rad, wire)
+    distance, arc, point = clearance(curves, axis)
+    return distance - reach_mm, arc, point
+
+
+def frames_that_touch(motor_rad, bend_rad) -> tuple[np.ndarray, np.ndarray]:
+    """From coarse bends (f, 2): which frames surely touch, and which surely do not; (f,) bool each.
+
+    The bend grows from nothing at touch. A frame is free while no bend to speak of has been seen, touching from
+    the first of at least two frames in a row that are surely bent; the frame before that is left undecided.
+    """
+    size = np.linalg.norm(bend_rad, axis=1)
+    sure = size > _SURE_BEND_RAD
+    runs = sure & np.append(sure[1:], sure[-1])
+    if not np.any(runs):
+        return np.zeros(len(size), dtype=bool), np.ones(len(size), dtype=bool)
+    first = int(np.argmax(runs))
+    index = np.arange(len(size))
+    return (index >= first) & sure, index < max(first - 1, 1)
+
+
+def frames_by_touch(motor_rad, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """The same once touch is known to sigma: frames within three sigma of it are left undecided."""
+    margin = max(3.0 * sigma_rad, np.radians(0.02))
+    return motor_rad > touch_rad + margin, motor_rad < touch_rad - margin

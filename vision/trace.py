@@ -1,0 +1,102 @@
+"""Line points of the wire in every frame, read in narrow bands beside where it is expected."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.fit import Observed
+from vision.line import LinePoints, Noise, Pieces, cut_pieces, read_band
+from vision.scene import Camera, Wire
+from vision.shading import Located, fit_shading, line_points, locate
+from vision.silhouette import outline
+from vision.wire import Curves
+
+BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
+_WORST_SIGMA_PX = 0.5
+# A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
+_WORST_MISFIT = 6.0
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise."""
+
+    camera: Camera
+    frames: Mapping[int, np.ndarray]
+    background: np.ndarray
+    noise: Noise
+
+
+def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:
+    """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame."""
+    bands = [_wire_band(view, frame, curve, wire, margin_px) for frame, curve in curves.items()]
+    pieces = cut_pieces(bands, length_px, view.noise)
+    frames = np.array(list(curves))
+    return _renumbered(pieces, frames)
+
+
+def _renumbered(pieces: Pieces, names) -> Pieces:
+    """Pieces whose source is the frame's index, not the band's number."""
+    values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__}
+    values["source"] = names[pieces.source]
+    return Pieces(**values)
+
+
+def _wire_band(view: View, frame: int, curve: Curves, wire: Wire, margin_px: int):
+    arc = np.linspace(2.0, wire.length_mm - 1.0, 200)
+    points, tangents = curve.at(arc)
+    directions = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+    middle, radius = outline(view.camera, points, directions, wire.radius_mm(arc))
+    half = int(np.ceil(np.nanmax(radius))) + margin_px
+    return read_band(view.frames[frame].astype(float), view.background, middle, arc, radius, half)
+
+
+def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.ndarray:
+    """Which pieces (s,) lie outside the bar's outline, given by its middle (m, 2) and half-width (m,)."""
+    away = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
+    return np.min(away - radius_px[None], axis=1) > margin_px
+
+
+def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
+    """The lens blur, px: the one under which the shading explains the pieces best."""
+    misfit = [fit_shading(pieces, blur, terms, knots_mm)[1] for blur in BLURS_PX]
+    return BLURS_PX[int(np.argmin(misfit))]
+
+
+def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 4,
+          search_px: float = 0.0) -> tuple[Pieces, Located, float]:
+    """Shading and positions by turns; the pieces come back where they were found, with what is left to move.
+
+    search_px: where above 0, the common shift of all pieces is first looked for within it.
+    Also the median misfit (chi² per pixel).
+    """
+    if search_px > 0:
+        pieces = _best_common_shift(pieces, blur_px, terms, knots_mm, search_px)
+    robust = None
+    for _ in range(rounds):
+        shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust)
+        found = locate(pieces, shading)
+        pieces = pieces.moved(found.shift_px)
+        robust = 1.0 / np.maximum(found.chi2 / max(np.median(found.chi2), 1e-9), 1.0) ** 2
+    shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust)
+    found = locate(pieces, shading, rounds=1)
+    return pieces, found, float(np.median(found.chi2))
+
+
+def _best_common_shift(pieces: Pieces, blur_px, terms, knots_mm, search_px) -> Pieces:
+    shifts = np.arange(-search_px, search_px + 1e-9, 0.25)
+    misfit = [fit_shading(pieces.moved(np.full(len(pieces), d)), blur_px, terms, knots_mm)[1] for d in shifts]
+    return pieces.moved(np.full(len(pieces), shifts[int(np.argmin(misfit))]))
+
+
+def to_points(pieces: Pieces, found: Located, misfit: float) -> tuple[LinePoints, np.ndarray]:
+    """Trusted line points and the source of each, with sigmas that hold the misfit."""
+    return line_points(pieces, found, worst_chi2=_WORST_MISFIT * max(misfit, 0.5),
+                       worst_sigma_px=_WORST_SIGMA_PX)
+
+
+def observed(points: LinePoints, source, camera: int, frames: Sequence[int]) -> list[Observed]:
+    """One Observed per frame that has points; frames: the frame index of each position of the whisk."""
+    return [Observed(position, camera, points.select(source == frame))
+            for position, frame in enumerate(frames) if np.any(source == frame)]
