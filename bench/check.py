@@ -34,7 +34,7 @@ def checked_session(path: Path | str, doubts: Doubts | None = None) -> Session:
 
 
 def report_doubts(path: Path, progress: bool) -> int:
-    """Print all refusals and notes of a session. Returns the exit code: 2 with a refusal, 1 with a note, else 0."""
+    """Print refusals and notes. Returns the exit code: 2 where there is a refusal, 1 where a note, else 0."""
     doubts = Doubts(stop_at_first=False)
     with doubts.guard():
         session = checked_session(path, doubts)
@@ -74,11 +74,11 @@ def _note_signals(trial: Trial, signals, doubts: Doubts) -> None:
 
 
 def _check_clock(trial: Trial, signals_s, frames_s, doubts: Doubts) -> None:
-    """Frames are taken while signals are recorded. Raises BadInput where none is."""
+    """Frames are taken while signals are recorded. Raises BadInput where most are not."""
     first, last = signals_s[0], signals_s[-1]
     outside = int(((frames_s < first) | (frames_s > last)).sum())
     found = f"frames from {frames_s[0]:.6g} to {frames_s[-1]:.6g} s, signals from {first:.6g} to {last:.6g} s"
-    if outside == len(frames_s):
+    if outside > len(frames_s) / 2:
         in_ms = first <= frames_s.mean() / 1e3 <= last
         hint = "Are the frames' times in milliseconds?" if in_ms else "They must be times of one clock."
         raise BadInput(f"{found}. {hint}", file=f"trials/{trial.name}")
