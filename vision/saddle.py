@@ -13,15 +13,19 @@ away from the markers.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import convolve1d
 from scipy.special import erf
 
-# Reach along the edges. Longer arms gain little (sigma falls with the root of the length) and see the lens
-# bend the edge: at 12 px the bend of a lens with k1 = -0.1 moves the corner by less than 0.005 px.
-REACH_PX = 12
-# Pixels nearer to a marker than this hold its blur.
+# Reach along the edges: half a square, so that no two corners share a pixel's noise, and at most this. A
+# lens bends an edge by k1 x t² / f over the distance t, which moves the corner by a third of that at the
+# end of the arm: at 24 px 0.003 px for k1 = -0.1, f = 2000 px, x = 0.3, and 0.03 px in the corners of a
+# webcam with k1 = -0.33.
+REACH_PX = 24
+_ARM_SQUARES = 0.5
+# Pixels nearer to a marker than this hold its blur; pixels farther from an edge than the band say nothing
+# of it.
 _CLEAR_OF_MARKER_PX = 1.5
-# Arms end before the next corner, in squares.
-_ARM_SQUARES = 0.8
+_BAND_PX = 6.0
 _MAX_SHIFT_PX = 4.0
 _MAX_SHIFT_SQUARES = 1.0 / 3.0
 _MIN_PIXELS = 40
@@ -29,6 +33,9 @@ _ITERATIONS = 15
 _CONVERGED_PX = 2e-3
 _FIRST_BLUR_PX = 1.0
 _BLUR_LIMITS_PX = (0.2, 8.0)
+# How far apart two pixels' noise still goes together.
+LAGS = 3
+_BLUR_SEARCH_PX = (0.1, 20.0)
 
 X, Y, TURN_1, TURN_2, BLUR_1, BLUR_2, CONTRAST, LEVEL, SLOPE_X, SLOPE_Y = range(10)
 
@@ -49,13 +56,17 @@ class Saddles:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Pixels about each corner: offsets from its anchor dx, dy (k,), grey (n, k), weight 0 or 1 (n, k)."""
+    """Pixels along each corner's edges, (n, k) each, padded with weight 0: offsets dx, dy from the anchor
+    (n, 2), grey, weight 0 or 1."""
 
     anchor: np.ndarray
     dx: np.ndarray
     dy: np.ndarray
     grey: np.ndarray
     weight: np.ndarray
+
+    def chosen(self, which: np.ndarray) -> "_Windows":
+        return _Windows(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
 def fit_saddles(grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float) -> Saddles:
@@ -71,28 +82,34 @@ def fit_saddles(grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, bord
 
 
 def _cut_windows(grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float) -> _Windows:
-    reach = np.arange(-REACH_PX, REACH_PX + 1)
-    dx, dy = (a.ravel().astype(float) for a in np.meshgrid(reach, reach))
-    anchor = np.round(px_guess)
-    columns = anchor[:, :1] + dx
-    rows = anchor[:, 1:] + dy
-    height, width = grey.shape
-    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-    columns = np.clip(columns, 0, width - 1).astype(int)
-    rows = np.clip(rows, 0, height - 1).astype(int)
-    off = np.stack([dx + (anchor - px_guess)[:, :1], dy + (anchor - px_guess)[:, 1:]], axis=1)
-    weight = inside & _along_edges(off, frames, border) & (dx * dx + dy * dy <= REACH_PX**2)
-    return _Windows(anchor, dx, dy, grey[rows, columns].astype(float), weight.astype(float))
+    reach = int(np.ceil(min(REACH_PX, _ARM_SQUARES * np.linalg.norm(frames, axis=1).max())))
+    grid = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))).reshape(2, -1)
+    anchor = np.round(px_guess).astype(int)
+    off = grid + (anchor - px_guess)[:, :, None]
+    place = anchor[:, :, None] + grid
+    inside = (place >= 0).all(axis=1) & (place < np.array(grey.shape[::-1])[:, None]).all(axis=1)
+    taken = inside & _along_edges(off, frames, border) & (np.sum(grid**2, axis=0) <= reach**2)
+    return _packed(grey, anchor, grid, taken)
+
+
+def _packed(grey: np.ndarray, anchor: np.ndarray, grid: np.ndarray, taken: np.ndarray) -> _Windows:
+    """Only the pixels taken, moved to the front of each row."""
+    count = max(int(taken.sum(axis=1).max(initial=0)), 1)
+    order = np.argsort(~taken, axis=1, kind="stable")[:, :count]
+    weight = np.take_along_axis(taken, order, axis=1)
+    dx, dy = grid[0][order], grid[1][order]
+    rows = np.clip(anchor[:, 1:] + dy, 0, grey.shape[0] - 1)
+    columns = np.clip(anchor[:, :1] + dx, 0, grey.shape[1] - 1)
+    return _Windows(*(a.astype(float) for a in (anchor, dx, dy, grey[rows, columns], weight)))
 
 
 def _along_edges(off: np.ndarray, frames: np.ndarray, border: float) -> np.ndarray:
     """Which pixels, offset `off` (n, 2, k) from the guess, see the two edges and no marker. (n, k) bool."""
-    in_squares = np.linalg.solve(frames, off)
-    clear_px = border * np.abs(np.linalg.det(frames))[:, None] / np.linalg.norm(frames[:, :, ::-1], axis=1)
-    width_px = np.maximum(clear_px - _CLEAR_OF_MARKER_PX, _CLEAR_OF_MARKER_PX)
-    px_per_square = clear_px / border
-    beside = np.abs(in_squares) * px_per_square[:, :, None] < width_px[:, :, None]
-    return beside.any(axis=1) & np.all(np.abs(in_squares) < _ARM_SQUARES, axis=1)
+    in_squares = np.abs(np.linalg.solve(frames, off))
+    px_per_square = np.abs(np.linalg.det(frames))[:, None] / np.linalg.norm(frames[:, :, ::-1], axis=1)
+    band_px = np.clip(border * px_per_square - _CLEAR_OF_MARKER_PX, _CLEAR_OF_MARKER_PX, _BAND_PX)
+    beside = in_squares * px_per_square[:, :, None] < band_px[:, :, None]
+    return beside.any(axis=1) & np.all(in_squares < _ARM_SQUARES, axis=1)
 
 
 def _start(windows: _Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -120,7 +137,7 @@ def _model(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     contrast = p[:, CONTRAST, None]
     f1, by_1 = _edge(dx, dy, p[:, TURN_1, None], p[:, BLUR_1, None])
     f2, by_2 = _edge(dx, dy, p[:, TURN_2, None], p[:, BLUR_2, None])
-    J = np.empty((len(p), 10, len(windows.dx)))
+    J = np.empty((len(p), 10, windows.dx.shape[1]))
     J[:, X] = contrast * (by_1[0] * f2 + f1 * by_2[0]) - p[:, SLOPE_X, None]
     J[:, Y] = contrast * (by_1[1] * f2 + f1 * by_2[1]) - p[:, SLOPE_Y, None]
     J[:, TURN_1], J[:, TURN_2] = contrast * by_1[2] * f2, contrast * by_2[2] * f1
@@ -146,9 +163,7 @@ def _edge(dx, dy, turn, log_blur) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     )
 
 
-def _normal_equations(
-    J: np.ndarray, residual: np.ndarray, weight: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _normal_equations(J: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """JᵀWJ (n, m, m) and JᵀWr (n, m) for J (n, m, k)."""
     JW = J * weight[:, None, :]
     return JW @ J.transpose(0, 2, 1), (JW @ residual[:, :, None])[:, :, 0]
@@ -164,24 +179,29 @@ def _solve(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.
 
 
 def _levenberg_marquardt(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Best parameters (n, 10) and whether each corner came to rest (n,)."""
-    cost, normal, gradient = _evaluate(windows, p)
-    damping = np.full(len(p), 1e-3)
-    settled = np.zeros(len(p), dtype=bool)
+    """Best parameters (n, 10) and whether each corner came to rest (n,). Corners at rest are worked on no
+    more.
+    """
+    state = [p, *_evaluate(windows, p), np.full(len(p), 1e-3)]
+    moving = np.arange(len(p))
     for _ in range(_ITERATIONS):
-        step = _solve(normal, gradient, damping)
-        tried = p + step
-        new_cost, new_normal, new_gradient = _evaluate(windows, tried)
-        better = new_cost <= cost
-        p = np.where(better[:, None], tried, p)
-        cost = np.where(better, new_cost, cost)
-        normal = np.where(better[:, None, None], new_normal, normal)
-        gradient = np.where(better[:, None], new_gradient, gradient)
-        damping = np.where(better, damping * 0.2, damping * 10.0)
-        settled |= np.linalg.norm(step[:, :2], axis=1) < _CONVERGED_PX
-        if settled.all():
+        now = [values[moving] for values in state]
+        step = _solve(now[2], now[3], now[4])
+        tried = _within_limits(now[0] + step)
+        new = [tried, *_evaluate(windows.chosen(moving), tried), now[4] * 0.2]
+        worse = new[1] > now[1]
+        for old, values, held in zip(state, new, [*now[:4], now[4] * 10.0]):
+            values[worse] = held[worse]
+            old[moving] = values
+        moving = moving[np.linalg.norm(step[:, :2], axis=1) >= _CONVERGED_PX]
+        if not len(moving):
             break
-    return p, settled
+    return state[0], ~np.isin(np.arange(len(p)), moving)
+
+
+def _within_limits(p: np.ndarray) -> np.ndarray:
+    p[:, [BLUR_1, BLUR_2]] = np.clip(p[:, [BLUR_1, BLUR_2]], *np.log(_BLUR_SEARCH_PX))
+    return p
 
 
 def _evaluate(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -192,11 +212,11 @@ def _evaluate(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def _report(windows: _Windows, p, settled, px_guess: np.ndarray, frames: np.ndarray) -> Saddles:
-    cost, normal, _ = _evaluate(windows, p)
+    grey, J = _model(windows, p)
+    residual = (windows.grey - grey) * windows.weight
     pixels = windows.weight.sum(axis=1)
-    misfit = np.sqrt(cost / np.maximum(pixels - p.shape[1], 1))
-    covariance = np.linalg.pinv(normal, hermitian=True)[:, :2, :2]
-    sigma = misfit * np.sqrt(0.5 * (covariance[:, 0, 0] + covariance[:, 1, 1]))
+    misfit = np.sqrt(np.sum(residual**2, axis=1) / np.maximum(pixels - p.shape[1], 1))
+    sigma = misfit * _spread_per_grey(windows, J, residual / np.maximum(misfit, 1e-9)[:, None])
     blur = np.exp(0.5 * (p[:, BLUR_1] + p[:, BLUR_2]))
     px = windows.anchor + p[:, :2]
     shift = np.linalg.norm(px - px_guess, axis=1)
@@ -205,3 +225,49 @@ def _report(windows: _Windows, p, settled, px_guess: np.ndarray, frames: np.ndar
     good &= shift < np.minimum(_MAX_SHIFT_PX, _MAX_SHIFT_SQUARES * square_px)
     good &= (blur > _BLUR_LIMITS_PX[0]) & (blur < _BLUR_LIMITS_PX[1])
     return Saddles(px, sigma, p[:, CONTRAST], blur, misfit, good)
+
+
+def _spread_per_grey(windows: _Windows, J: np.ndarray, unit_residual: np.ndarray) -> np.ndarray:
+    """Sigma of a corner per axis for pixel noise of one grey level, (n,).
+
+    Noise of neighbouring pixels goes together (demosaicing, compression, a soft lens before a noisy codec),
+    which a plain (JᵀJ)⁻¹ does not see: here it was 2.4 times too small. With the influence of each pixel on
+    the corner a = (JᵀJ)⁻¹ Jᵀ, the variance is aᵀ C a, C being the residuals' own correlation, taken as separable.
+    """
+    normal, _ = _normal_equations(J, unit_residual, windows.weight)
+    influence = np.linalg.pinv(normal, hermitian=True)[:, :2] @ (J * windows.weight[:, None, :])
+    along_x, along_y = (_correlation(_on_grid(windows, unit_residual[:, None])[:, 0], axis) for axis in (2, 1))
+    a = _on_grid(windows, influence)
+    Ca = convolve1d(convolve1d(a, along_x, axis=3, mode="constant"), along_y, axis=2, mode="constant")
+    return np.sqrt(np.maximum(0.5 * np.sum(a * Ca, axis=(1, 2, 3)), 0.0))
+
+
+def _on_grid(windows: _Windows, values: np.ndarray) -> np.ndarray:
+    """Values (n, m, k) of the packed pixels on square grids (n, m, side, side), 0 where no pixel is taken."""
+    reach = int(max(np.abs(windows.dx).max(), np.abs(windows.dy).max()))
+    side = 2 * reach + 1
+    cell = ((windows.dy + reach) * side + windows.dx + reach).astype(int)
+    grid = np.zeros((*values.shape[:2], side * side))
+    rows = np.arange(len(values))[:, None, None]
+    planes = np.arange(values.shape[1])[None, :, None]
+    np.add.at(grid, (rows, planes, cell[:, None, :]), values * windows.weight[:, None, :])
+    return grid.reshape(*values.shape[:2], side, side)
+
+
+def _correlation(residual: np.ndarray, axis: int) -> np.ndarray:
+    """Correlation of residuals (n, side, side) at lags −LAGS to LAGS along an axis, over all corners
+    together.
+    """
+    taken = (residual != 0).astype(float)
+    lags = [_lag_mean(residual, taken, axis, lag) for lag in range(LAGS + 1)]
+    one_sided = np.array(lags) / max(lags[0], 1e-12)
+    return np.concatenate([one_sided[:0:-1], one_sided])
+
+
+def _lag_mean(residual: np.ndarray, taken: np.ndarray, axis: int, lag: int) -> float:
+    def shifted(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        size = a.shape[axis] - lag
+        return a.take(range(size), axis), a.take(range(lag, size + lag), axis)
+
+    (r0, r1), (t0, t1) = shifted(residual), shifted(taken)
+    return float(np.sum(r0 * r1) / max(np.sum(t0 * t1), 1.0))
