@@ -13,13 +13,14 @@ from scipy.optimize import minimize
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.line import LinePoints, Pieces, cut_pieces, read_band, shading_terms
-from vision.shading import fit_shading
+from vision.shading import fit_shading, piece_misfit
 from vision.silhouette import outline
 from vision.trace import View
 
 ARM_MM = 20.0  # the line is handed on as two points, this far to either side
 _INNER_SHARE, _INNER_WEIGHT = 0.72, 0.2
 _FEWEST_PIECES = 4
+_WORST_MISFIT = 5.0  # of the median piece's
 _KNOT_MM = 14.0
 _BLURS_PX = (0.5, 0.6, 0.7, 0.8, 0.9, 1.05, 1.25, 1.5, 1.9, 2.5)
 # Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/truth.md).
@@ -49,6 +50,7 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
     line = np.zeros(2)
     if coarse:
         line = _sweep(pieces, knots)
+    pieces = _of_bar_alone(pieces, line, knots)
     radius = float(np.median(pieces.radius_px))
     blur = _best_blur(pieces, line, radius, knots)
     line, covariance, misfit = _settle(pieces, line, blur, shading_terms(radius, blur), knots)
@@ -78,6 +80,18 @@ def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: flo
     return clear
 
 
+def _of_bar_alone(pieces: Pieces, line, knots) -> Pieces:
+    """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border."""
+    for _ in range(3):
+        moved = pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
+        misfit = piece_misfit(moved, fit_shading(moved, 1.0, 8, knots)[0])
+        good = misfit < _WORST_MISFIT * np.median(misfit)
+        if np.all(good) or np.sum(good) < _FEWEST_PIECES:
+            break
+        pieces = pieces.select(good)
+    return pieces
+
+
 def _misfit(pieces: Pieces, line, blur_px, terms, knots) -> float:
     """Mean chi² per pixel with the line shifted by line[0] px and tilted by line[1] px over ARM_MM."""
     moved = pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
@@ -105,17 +119,21 @@ def _settle(pieces: Pieces, line, blur_px, terms, knots):
     """Shift and tilt at the least misfit, their covariance (2, 2) from its curvature, and the misfit there."""
     simplex = line + np.array([[0.0, 0.0], [0.6, 0.0], [0.0, 0.6]])
     found = minimize(lambda q: _misfit(pieces, q, blur_px, terms, knots), line, method="Nelder-Mead",
-                     options={"initial_simplex": simplex, "xatol": 0.005, "fatol": 1e-5, "maxfev": 70})
+                     options={"initial_simplex": simplex, "xatol": 0.01, "fatol": 1e-5, "maxfev": 60})
+    line, curvature = found.x, _curvature(lambda q: _misfit(pieces, q, blur_px, terms, knots), found.x, found.fun)
     pixels = float(np.sum(pieces.weight > 0))
-    step, here = 0.15, found.fun
-    value = lambda a, b: _misfit(pieces, found.x + [a, b], blur_px, terms, knots)  # noqa: E731
+    values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(found.fun, 1.0))
+    inverse = vectors @ np.diag(1.0 / np.maximum(values, 4.0)) @ vectors.T
+    return line, inverse * _FORMAL_TO_TRUE**2, found.fun
+
+
+def _curvature(misfit, line, here: float, step: float = 0.15) -> np.ndarray:
+    """Second derivatives (2, 2) of the misfit by central differences."""
+    value = lambda a, b: misfit(line + np.array([a, b]))  # noqa: E731
     xx = (value(step, 0) + value(-step, 0) - 2 * here) / step**2
     yy = (value(0, step) + value(0, -step) - 2 * here) / step**2
     xy = (value(step, step) - value(step, -step) - value(-step, step) + value(-step, -step)) / (4 * step**2)
-    curvature = 0.5 * pixels * np.array([[xx, xy], [xy, yy]]) / max(here, 1.0)
-    values, vectors = np.linalg.eigh(curvature)
-    inverse = vectors @ np.diag(1.0 / np.maximum(values, 4.0)) @ vectors.T
-    return found.x, inverse * _FORMAL_TO_TRUE**2, here
+    return np.array([[xx, xy], [xy, yy]])
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:

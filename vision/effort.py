@@ -19,4 +19,4 @@ class VisionSettings:
     bar_margin_px: int = 12
     rounds: int = 2
     clock_sigma_s: float = 0.0
-    bar_reach_mm: float = 28.0
+    bar_reach_mm: float = 36.0

@@ -41,8 +41,9 @@ def _project_out(columns, *targets):
 
     A weak pull keeps the background at 1 × the known picture + 0 where a piece cannot tell.
     """
-    normal = np.einsum("spi,spj->sij", columns, columns) + np.diag([1e-6, 1e-6])
-    found = [np.linalg.solve(normal, np.einsum("spi,spk->sik", columns, target)) for target in targets]
+    turned = columns.transpose(0, 2, 1)
+    normal = turned @ columns + np.diag([1e-6, 1e-6])
+    found = [np.linalg.solve(normal, turned @ target) for target in targets]
     return [target - columns @ x for target, x in zip(targets, found)]
 
 
@@ -57,17 +58,25 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots_mm, robust=Non
     model, rest = _project_out(_surround(pieces, basis[..., 0]), basis * pieces.weight[..., None], seen)
     robust = np.ones(len(pieces)) if robust is None else robust
     hats = _hats(pieces.place, knots_mm)
-    gram = np.einsum("spi,spj,s->sij", model, model, robust)
-    moment = np.einsum("spi,spk,s->si", model, rest, robust)
+    turned = model.transpose(0, 2, 1) * robust[:, None, None]
+    gram, moment = turned @ model, (turned @ rest)[..., 0]
     size = len(knots_mm) * terms
-    left = np.einsum("sm,sn,sij->minj", hats, hats, gram).reshape(size, size)
-    right = np.einsum("sm,si->mi", hats, moment).reshape(size)
+    pairs = (hats[:, :, None] * hats[:, None, :]).reshape(len(pieces), -1).T @ gram.reshape(len(pieces), -1)
+    left = pairs.reshape(len(knots_mm), len(knots_mm), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
+    right = (hats.T @ moment).reshape(size)
     ridge = 1e-6 * np.trace(left) / size * np.eye(size)
     waves = np.linalg.solve(left + ridge, right).reshape(len(knots_mm), terms)
     shading = Shading(np.asarray(knots_mm, dtype=float), waves, blur_px)
-    residual = rest[..., 0] - np.einsum("spi,si->sp", model, shading.at(pieces.place))
+    residual = (rest - model @ shading.at(pieces.place)[..., None])[..., 0]
     chi2 = np.sum(residual**2, axis=1) * robust
     return shading, float(np.sum(chi2) / max(1.0, np.sum((pieces.weight > 0).sum(axis=1) * robust)))
+
+
+def piece_misfit(pieces: Pieces, shading: Shading) -> np.ndarray:
+    """Chi² per pixel (s,) of each piece under a shading, its background's gain and offset free."""
+    waves = shading.at(pieces.place)
+    residual, _, _ = _linearise(pieces, shading, waves, np.zeros(len(pieces)))
+    return np.sum(residual**2, axis=1) / np.maximum((pieces.weight > 0).sum(axis=1) - 3, 1)
 
 
 @dataclass(frozen=True)
@@ -107,14 +116,15 @@ def _linearise(pieces: Pieces, shading: Shading, waves, shift, delta_px: float =
                                    waves.shape[1]) for d in (delta_px, -delta_px))
     cover = 0.5 * (ahead + behind)[..., 0]
     columns = _surround(pieces, cover)
-    rod = np.einsum("spk,sk->sp", 0.5 * (ahead + behind), waves) * pieces.weight
+    rod = (0.5 * (ahead + behind) @ waves[..., None])[..., 0] * pieces.weight
     seen = np.stack([pieces.grey * pieces.weight, rod], axis=-1)
     (rest,) = _project_out(columns, seen)
-    normal = np.einsum("spi,spj->sij", columns, columns) + np.diag([1e-6, 1e-6])
-    around = np.linalg.solve(normal, np.einsum("spi,sp->si", columns, seen[..., 0] - rod)[..., None])[..., 0]
+    turned = columns.transpose(0, 2, 1)
+    around = np.linalg.solve(turned @ columns + np.diag([1e-6, 1e-6]),
+                             turned @ (seen[..., 0] - rod)[..., None])[..., 0]
     by_cover = -(around[:, :1] * pieces.background + around[:, 1:])
     change = (ahead - behind) / (2 * delta_px)
-    slope = (np.einsum("spk,sk->sp", change, waves) + change[..., 0] * by_cover) * pieces.weight
+    slope = ((change @ waves[..., None])[..., 0] + change[..., 0] * by_cover) * pieces.weight
     (slope,) = _project_out(columns, slope[..., None])
     contrast = np.sqrt(np.sum((rod + cover * by_cover * pieces.weight) ** 2, axis=1))
     return rest[..., 0] - rest[..., 1], slope[..., 0], contrast

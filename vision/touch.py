@@ -10,6 +10,7 @@ from vision.scene import Wire
 from vision.wire import centrelines
 
 _SURE_BEND_RAD = np.radians(0.25)
+_TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class FirstTouch:
     arc_mm: np.ndarray
 
 
-def first_touch(problem: Problem, vector, rounds: int = 6) -> FirstTouch:
+def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
     """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
     axis = bar_axis(problem, vector)
     reach = problem.reach_mm + vector[..., 4 + 8]
@@ -30,9 +31,10 @@ def first_touch(problem: Problem, vector, rounds: int = 6) -> FirstTouch:
     high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
     gap_low, gap_high = (_gap(rest, m, axis, reach, problem.wire)[0] for m in (low, high))
     for _ in range(rounds):
-        slope = (gap_high - gap_low) / np.where(np.abs(high - low) > 1e-13, high - low, 1e-13)
-        new = high - gap_high / np.where(np.abs(slope) > 1e-9, slope, 1e-9)
-        low, gap_low = high, gap_high
+        moving = np.abs(gap_high) > _TOUCH_GAP_MM
+        slope = (gap_high - gap_low) / np.where(moving, high - low, 1.0)
+        new = np.where(moving, high - gap_high / np.where(moving, slope, 1.0), high)
+        low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
         high, (gap_high, arc, point) = new, _gap(rest, new, axis, reach, problem.wire)
     return FirstTouch(high, point, arc)
 
