@@ -56,12 +56,13 @@ def _without_pauses(angle: np.ndarray, trough: int, crest: int, jitter: float) -
 
     An encoder stands still between two of its steps, so one step's time at either end belongs to the stroke.
     """
+    within = 2 * jitter  # trough and crest are extremes of the noise, so a pause lies up to twice that from them
     run = angle[trough : crest + 1]
-    leaves = np.flatnonzero(run <= run[0] + jitter)[-1]
-    arrives = np.flatnonzero(run >= run[-1] - jitter)[0]
+    leaves = np.flatnonzero(run <= run[0] + within)[-1]
+    arrives = np.flatnonzero(run >= run[-1] - within)[0]
     step = _step_samples(run[leaves : arrives + 1])
-    first = max(trough + leaves - step, _plateau_start(angle, trough, jitter))
-    last = min(trough + arrives + step, _plateau_end(angle, crest, jitter))
+    first = max(trough + leaves - step, _plateau_start(angle, trough, within))
+    last = min(trough + arrives + step, _plateau_end(angle, crest, within))
     return slice(int(first), int(last) + 1)
 
 
@@ -71,11 +72,11 @@ def _step_samples(rise: np.ndarray) -> int:
     return int(np.percentile(np.diff(moves), 90)) if len(moves) > 2 else 1
 
 
-def _plateau_start(angle: np.ndarray, trough: int, jitter: float) -> int:
-    before = np.flatnonzero(np.abs(angle[:trough] - angle[trough]) > jitter)
+def _plateau_start(angle: np.ndarray, trough: int, within: float) -> int:
+    before = np.flatnonzero(np.abs(angle[:trough] - angle[trough]) > within)
     return int(before[-1]) + 1 if len(before) else 0
 
 
-def _plateau_end(angle: np.ndarray, crest: int, jitter: float) -> int:
-    after = np.flatnonzero(np.abs(angle[crest:] - angle[crest]) > jitter)
+def _plateau_end(angle: np.ndarray, crest: int, within: float) -> int:
+    after = np.flatnonzero(np.abs(angle[crest:] - angle[crest]) > within)
     return crest + int(after[0]) - 1 if len(after) else len(angle) - 1

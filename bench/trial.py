@@ -22,13 +22,18 @@ class Trial:
 
     name: str
     folder: Path
+    camera_sources: dict[str, Path]
+    signals_path: Path
     surface: str
+    purpose: str
     speed_deg_s: float | None
+    speed_sigma_deg_s: float
     beta_deg: float | None
+    beta_sigma_deg: float
     d_x_mm: float | None
+    d_x_sigma_mm: float
     bar_diameter_mm: float
     bar_diameter_sigma_mm: float
-    purpose: str
     follicle_roll_deg: float
     follicle_roll_sigma_deg: float
     force_N: float | None
@@ -36,9 +41,9 @@ class Trial:
     at_mm: float | None
     at_sigma_mm: float
     frame_rate_Hz: float | None
+    frame_rate_sigma_Hz: float
     first_frame_s: float | None
-    camera_sources: dict[str, Path]
-    signals_path: Path
+    first_frame_sigma_s: float
 
     def shown(self, file: str) -> str:
         """How messages name one of its files: by the path inside the session."""
@@ -56,22 +61,9 @@ def load_trial(folder: Path, session: manifest.SessionKeys) -> Trial:
     return Trial(
         name=folder.name,
         folder=folder,
-        surface=keys.surface,
-        speed_deg_s=keys.speed_deg_s,
-        beta_deg=keys.beta_deg,
-        d_x_mm=keys.d_x_mm,
-        purpose=keys.purpose,
-        follicle_roll_deg=keys.follicle_roll_deg,
-        follicle_roll_sigma_deg=keys.follicle_roll_sigma_deg,
-        force_N=keys.force_N,
-        force_sigma_N=keys.force_sigma_N,
-        at_mm=keys.at_mm,
-        at_sigma_mm=keys.at_sigma_mm,
-        frame_rate_Hz=keys.frame_rate_Hz,
-        first_frame_s=keys.first_frame_s,
         camera_sources=camera_sources(folder, shown),
         signals_path=signals_path,
-        **_bar(keys, session.bar),
+        **manifest.values(keys) | _bar(keys, session.bar),
     )
 
 

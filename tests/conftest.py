@@ -1,6 +1,7 @@
 """Fixtures common to all tests: the recorded-like sessions and the real recordings, where they are there."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -35,3 +36,41 @@ def real(shared) -> Path:
     if not folder.is_dir():
         pytest.skip("no real recordings beside this checkout")
     return folder
+
+
+@pytest.fixture(scope="session")
+def small_session() -> Path:
+    """The session that the demo evaluates; read only."""
+    return REPOSITORY / "fixtures" / "small-session"
+
+
+@pytest.fixture
+def small_copy(small_session, tmp_path) -> Path:
+    """A small session to spoil: text files are copies, pictures are links (replace them, never write)."""
+    return Path(shutil.copytree(small_session, tmp_path / "session", copy_function=_copy_or_link))
+
+
+def _copy_or_link(source: str, target: str) -> str:
+    if Path(source).suffix in {".jpg", ".png"}:
+        Path(target).symlink_to(source)
+        return target
+    return shutil.copyfile(source, target)
+
+
+@pytest.fixture
+def as_video():
+    """A function (folder, suffix, fourcc) that puts a video in place of a folder of pictures."""
+    return _as_video
+
+
+def _as_video(folder: Path, suffix: str, fourcc: str):
+    import cv2
+
+    pictures = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted(folder.iterdir())]
+    video, size = folder.with_suffix(suffix), pictures[0].shape[::-1]
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter_fourcc(*fourcc), 20.0, size, False)
+    for picture in pictures:
+        writer.write(picture)
+    writer.release()
+    shutil.rmtree(folder)
+    return video, pictures

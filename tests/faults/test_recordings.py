@@ -89,9 +89,7 @@ def with_column(file, name: str, change) -> None:
 )
 def test_fault_in_a_row_of_signals(session, signals, row, text, expected):
     with_row(signals, row, text)
-    assert re.search(
-        rf"^trials/{TRIAL}/signals.csv.*{expected.removeprefix('signals.csv')}", refusal(session)
-    )
+    assert re.search(rf"^trials/{TRIAL}/signals.csv.*{expected.removeprefix('signals.csv')}", refusal(session))
 
 
 @pytest.mark.parametrize(
@@ -209,9 +207,7 @@ def test_frame_times_of_another_clock(session, frames):
 
 def test_no_frame_times_at_all(session, frames):
     frames.unlink()
-    assert re.search(
-        rf"trials/{TRIAL}/frames.csv: there are no frame times; write frames.csv", refusal(session)
-    )
+    assert re.search(rf"trials/{TRIAL}/frames.csv: there are no frame times; write frames.csv", refusal(session))
 
 
 def replace_picture(file, grey: np.ndarray) -> None:
@@ -238,30 +234,14 @@ def test_an_undecodable_picture_keeps_its_place(session):
     assert doubts.notes == [f"trials/{TRIAL}/low: frame 3 cannot be read (damaged or cut short)"]
 
 
-def as_video(folder, suffix: str, fourcc: str):
-    """Put a video in place of a folder of pictures."""
-    pictures = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted(folder.iterdir())]
-    video = folder.with_suffix(suffix)
-    writer = cv2.VideoWriter(
-        str(video), cv2.VideoWriter_fourcc(*fourcc), 20.0, pictures[0].shape[::-1], False
-    )
-    for picture in pictures:
-        writer.write(picture)
-    writer.release()
-    for file in folder.iterdir():
-        file.unlink()
-    folder.rmdir()
-    return video, pictures
-
-
-def test_a_video_in_place_of_pictures_is_taken(session):
+def test_a_video_in_place_of_pictures_is_taken(session, as_video):
     video, pictures = as_video(session / "trials" / TRIAL / "low", ".mkv", "FFV1")
     assert notes(session) == []
     frames = read_frames(video, range(len(pictures)))
     assert all((frames[k] == picture).all() for k, picture in enumerate(pictures))
 
 
-def test_a_truncated_video_gives_damaged_frames(session):
+def test_a_truncated_video_gives_damaged_frames(session, as_video):
     video, pictures = as_video(session / "trials" / TRIAL / "low", ".avi", "MJPG")
     data = video.read_bytes()
     video.write_bytes(data[: int(0.6 * len(data))])
@@ -275,7 +255,7 @@ def test_a_truncated_video_gives_damaged_frames(session):
     assert any(note.startswith(f"trials/{TRIAL}/low.avi: frame {lost[0]}") for note in doubts.notes)
 
 
-def test_a_video_that_does_not_open_is_the_trials_trouble(session):
+def test_a_video_that_does_not_open_is_the_trials_trouble(session, as_video):
     video, pictures = as_video(session / "trials" / TRIAL / "low", ".mp4", "mp4v")
     video.write_bytes(video.read_bytes()[:20000])
     assert notes(session) == [

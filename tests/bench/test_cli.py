@@ -1,0 +1,104 @@
+"""The command line: thin, quick, one line for bad input, and the exit codes that scripts rely on."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from bench import cli
+from bench.errors import BadInput
+
+
+def verbs() -> list[str]:
+    parser = cli.make_parser()
+    return list(parser._subparsers._group_actions[0].choices)
+
+
+@pytest.mark.parametrize("verb", verbs())
+def test_each_verb_shows_a_worked_example(verb, capsys):
+    with pytest.raises(SystemExit) as done:
+        cli.main([verb, "--help"])
+    assert done.value.code == 0
+    assert f"example:\n  whisker-bench {verb}" in capsys.readouterr().out
+
+
+def test_help_imports_nothing_heavy():
+    code = "import bench.cli, sys; bench.cli.make_parser().format_help(); print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.split()
+    assert not {"numpy", "cv2", "scipy", "matplotlib", "msgspec"} & set(modules)
+
+
+@pytest.mark.parametrize("arguments", [[], ["no-such-verb"], ["check"], ["check", "x", "--no-such-option"]])
+def test_wrong_usage_is_exit_code_2(arguments, capsys):
+    with pytest.raises(SystemExit) as done:
+        cli.main(arguments)
+    assert done.value.code == 2
+    assert capsys.readouterr().err.startswith("usage: whisker-bench")
+
+
+def test_check_of_a_sound_session(small_session, capsys):
+    assert cli.main(["check", str(small_session)]) == 0
+    assert "4 trials, nothing wrong or doubtful" in capsys.readouterr().out
+
+
+def test_check_of_a_doubtful_session(small_copy, capsys):
+    manifest = small_copy / "trials" / "b30_3" / "trial.toml"
+    manifest.write_text(manifest.read_text().replace("speed_deg_s = 10.0", "speed_deg_s = 90.0"))
+    assert cli.main(["check", str(small_copy)]) == 1
+    assert capsys.readouterr().out.startswith("doubtful: trials/b30_3/signals.csv")
+
+
+def test_check_of_a_bad_session(small_copy, capsys):
+    (small_copy / "session.toml").unlink()
+    assert cli.main(["check", str(small_copy)]) == 2
+    assert capsys.readouterr().out.startswith("bad: ")
+
+
+def test_info(capsys):
+    assert cli.main(["info"]) == 0
+    assert "opencv-contrib-python-headless" in capsys.readouterr().out
+
+
+def main_with(monkeypatch, problem: BaseException) -> int:
+    def fail(_):
+        raise problem
+
+    monkeypatch.setattr(cli, "_info", fail)
+    return cli.main(["info"])
+
+
+@pytest.mark.parametrize(
+    ("problem", "code", "line"),
+    [
+        (BadInput("has 3 values", file="a.csv", row=7), 2, "whisker-bench: a.csv, row 7: has 3 values\n"),
+        (KeyboardInterrupt(), 130, "whisker-bench: interrupted; what was finished is kept\n"),
+        (OSError(28, "No space left on device", "out.csv"), 2, "whisker-bench: out.csv: No space left on device\n"),
+        (ZeroDivisionError("x"), 70, "whisker-bench: a fault of ours, please report it (ZeroDivisionError: x); "),
+    ],
+)
+def test_whatever_ends_a_run_is_one_line_and_a_code(monkeypatch, capsys, problem, code, line):
+    assert main_with(monkeypatch, problem) == code
+    error = capsys.readouterr().err
+    assert error.startswith(line)
+    assert error.count("\n") == 1
+
+
+def test_a_polite_kill_ends_as_an_interruption():
+    code = "import sys, time, bench.cli as c; c._info = lambda _: (print('up', flush=True), time.sleep(60)); "
+    command = [sys.executable, "-c", code + "sys.exit(c.main(['info']))"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "up\n"
+        started = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=10) == 130
+        assert time.monotonic() - started < 5
+        assert process.stderr.read() == "whisker-bench: interrupted; what was finished is kept\n"
+
+
+def test_a_reader_that_stops_reading_is_no_fault():
+    shell = f"{sys.executable} -m bench.cli info | head -n 0; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    assert done.stdout.strip() in {"0", "141"}
