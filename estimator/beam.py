@@ -71,9 +71,7 @@ class Beam:
             raise ValueError(f"shape = {self.shape!r}: must be one of {', '.join(SHAPES)}")
 
     @classmethod
-    def from_modulus(
-        cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, shape="cylinder"
-    ) -> Self:
+    def from_modulus(cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, shape="cylinder") -> Self:
         """Beam of a round wire from Young's modulus and the diameter at the base."""
         require_positive("youngs_modulus_GPa", youngs_modulus_GPa, "GPa")
         require_positive("diameter_mm", diameter_mm, "mm")

@@ -15,17 +15,13 @@ TIP = "tip contact: the distance came out as {:.1f} mm, longer than the whisker,
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (2): as if the whisker did not slip sideways."""
     felt = (whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
-    return _estimate(
-        whisk, settings, distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt), alpha_est=0.0
-    )
+    return _estimate(whisk, settings, distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt), alpha_est=0.0)
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (10): slip accounted for, with the assumed friction cone angle."""
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad, whisk.beam.C_Nmm2)
-    return _estimate(
-        whisk, settings, distance.with_friction(*felt), uncertainty.gradient_with_friction(*felt)
-    )
+    return _estimate(whisk, settings, distance.with_friction(*felt), uncertainty.gradient_with_friction(*felt))
 
 
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

@@ -55,9 +55,7 @@ def exact(r_n, theta, beta_0, alpha):
     half_turn = np.where(along >= 0, push / (along + root), (root - along) / steep)
     phi = flat_phi + 2 * np.arctan(half_turn)
     slid = theta * (2 * np.cos(slope) - q) / (np.cos(alpha) + root)
-    return _checked(
-        r_n, theta, beta_0, np.where(slope > alpha, phi, 0.0), np.where(slope > alpha, slid, theta)
-    )
+    return _checked(r_n, theta, beta_0, np.where(slope > alpha, phi, 0.0), np.where(slope > alpha, slid, theta))
 
 
 @elementwise

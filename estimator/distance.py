@@ -42,9 +42,7 @@ def rotational_compliance(theta, m_z):
 def from_compliance(compliance, C):
     """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
-    return _distance(
-        quotient((C, compliance), ()), (("the compliance is missing", ~np.isfinite(compliance)),)
-    )
+    return _distance(quotient((C, compliance), ()), (("the compliance is missing", ~np.isfinite(compliance)),))
 
 
 @elementwise

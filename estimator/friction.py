@@ -16,9 +16,7 @@ READINGS = ("moments", "magnitude")
 GRID = np.radians(np.arange(0.0, 89.95, 0.25))
 GOLDEN = (np.sqrt(5) - 1) / 2
 SHRINKINGS = 45
-NEVER_SLIPPED = (
-    "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
-)
+NEVER_SLIPPED = "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
 VAGUE = "the data hardly hold the friction angle: its sigma is above 1 rad"
 AT_ZERO = "at the bound: the best friction angle is 0"
 
@@ -76,9 +74,7 @@ def _observations(beta, m_y, m_z, d_x, theta, C, reading):
     m_y, m_z = np.broadcast_arrays(np.asarray(m_y, dtype=float), np.asarray(m_z, dtype=float))
     beta, scale = np.broadcast_arrays(np.asarray(beta, dtype=float), np.asarray(C * theta / d_x, dtype=float))
     if m_y.shape[-1:] != beta.shape or beta.size < 2:
-        raise ValueError(
-            f"slopes {beta.shape} and moments {m_y.shape}: need one slope a moment, two at least"
-        )
+        raise ValueError(f"slopes {beta.shape} and moments {m_y.shape}: need one slope a moment, two at least")
     if not (np.isfinite(m_y).all() and np.isfinite(m_z).all() and np.isfinite(beta).all()):
         raise ValueError("a moment or slope is missing or infinite: leave such points out")
     both = np.concatenate([m_y, m_z], axis=-1)

@@ -1,69 +1,114 @@
 """Noise that remembers: covariance of weighted sums of samples, from residuals and their autocorrelation.
 
-Hum, vibration and stick–slip tie neighbouring samples together, so a mean over n of them is not √n better
-than one. Samples are rows, channels are columns; a sample that is to be left out has weight 0 and a
-residual of NaN.
+Hum, vibration and stick–slip tie neighbouring samples together, so a mean over n of them is not √n better than one.
+Samples are rows, channels are columns; a sample that is left out of a sum has weight 0 in it.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 LAGS_PER_SAMPLE = 1 / 6
+TINY = 1e-150  # instead of a scatter of nothing, so that it may be squared and divided by
 
 
-def autocovariance(residuals):
-    """(lags, k, k) covariance of residuals (n, k) with themselves, lag samples later, tapered to zero at n/6.
+@dataclass(frozen=True)
+class Memory:
+    """Covariance of the samples with those some lags later, as residuals show it.
 
-    The Parzen taper keeps the sum over lags from going negative. NaN rows are left out.
+    covariance (lags, k, k) is tapered to zero. seen (lags,) is what white noise of unit variance would show: lines that
+    were fitted take part of the slow noise with them, and the sums are raised by what is missing.
     """
-    known = np.isfinite(residuals).all(axis=1)
-    filled = np.where(known[:, None], residuals, 0.0)
-    lags = max(1, int(known.sum() * LAGS_PER_SAMPLE))
-    return np.stack([_parzen(h / lags) * _lagged(filled, known, h) for h in range(lags)])
+
+    covariance: np.ndarray
+    seen: np.ndarray
+
+    @classmethod
+    def of(cls, x, samples, *stretches) -> "Memory":
+        """Memory of samples (n, k) about a line over x (n,) in each stretch, a mask (n,); stretches do not overlap."""
+        used = np.logical_or.reduce(stretches)
+        residuals, bases = np.zeros_like(samples), []
+        for stretch in stretches:
+            bases += _line_basis(x, stretch)
+            residuals[stretch] = line_residuals(x, samples, stretch)
+        lags = max(1, int(np.count_nonzero(used) * LAGS_PER_SAMPLE))
+        pairs = np.maximum(1.0, np.round(_lagged(used, used, lags)))
+        taper = _parzen(np.arange(lags) / lags)
+        columns = residuals.T
+        products = np.array([[_lagged(a, b, lags) for b in columns] for a in columns])
+        products = (products + products.swapaxes(0, 1)) / 2
+        lost = sum(_lagged(basis, basis, lags) for basis in bases)
+        kept = np.where(np.arange(lags) == 0, pairs, 0.0) - lost
+        return cls(np.moveaxis(products * (taper / pairs), -1, 0), kept * taper / pairs)
+
+    def of_sum(self, weights):
+        """Covariance (k, k) of Σ w_i x_i."""
+        return self._raw(weights, weights, self.covariance) * self._missing(weights)
+
+    def between_sums(self, weights, other):
+        """Covariance (k, k) of Σ w_i x_i with Σ v_i x_i."""
+        raise_by = np.sqrt(self._missing(weights) * self._missing(other))
+        return self._raw(weights, other, self.covariance) * raise_by
+
+    def _missing(self, weights):
+        seen = self._raw(weights, weights, self.seen)
+        return (weights @ weights) / seen if seen > 0 else 1.0
+
+    @staticmethod
+    def _raw(weights, other, covariance):
+        lags = len(covariance)
+        overlap = _lagged(weights, other, lags) + _lagged(other, weights, lags)
+        overlap[0] /= 2
+        return np.tensordot(overlap, covariance, axes=1)
 
 
-def _lagged(residuals, known, lag):
-    n = len(residuals) - lag
-    pairs = max(1, np.count_nonzero(known[:n] & known[lag:]))
-    product = residuals[:n].T @ residuals[lag:] / pairs
-    return (product + product.T) / 2
+def _lagged(a, b, lags):
+    """Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1."""
+    size = 1 << (2 * len(a) - 1).bit_length()
+    spectrum = np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size)
+    return np.fft.irfft(spectrum, size)[:lags]
 
 
 def _parzen(share):
-    return 1 - 6 * share**2 * (1 - share) if share < 0.5 else 2 * (1 - share) ** 3
+    """Taper from 1 to 0 that keeps sums over lags from going negative."""
+    return np.where(share < 0.5, 1 - 6 * share**2 * (1 - share), 2 * (1 - share) ** 3)
 
 
-def covariance_of_sums(weights, other_weights, autocovariance):
-    """(k, k) covariance between the sums Σ w_i x_i and Σ v_i x_i of the channels' samples."""
-    total = np.zeros(autocovariance.shape[1:])
-    for lag, covariance in enumerate(autocovariance):
-        n = len(weights) - lag
-        overlap = weights[:n] @ other_weights[lag:]
-        if lag:
-            overlap += weights[lag:] @ other_weights[:n]
-        total += overlap * covariance
-    return total
+def _line_basis(x, used):
+    """The two orthonormal columns (n,) that a line fitted to the marked samples removes."""
+    spread = np.where(used, x - x[used].mean(), 0.0)
+    return [used / np.sqrt(np.count_nonzero(used)), spread / np.sqrt(spread @ spread)]
+
+
+def wider(one, other):
+    """The wider of two covariances (k, k)."""
+    return one if np.trace(one) >= np.trace(other) else other
+
+
+def weighted_sum(weights, samples, used):
+    """Σ w_i x_i (k,) over the marked samples."""
+    return weights[used] @ samples[used]
 
 
 def mean_weights(used):
-    """Weights (n,) that make the mean of the samples marked in `used`."""
+    """Weights (n,) that make the mean of the marked samples."""
     return used / np.count_nonzero(used)
 
 
 def line_weights(x, used, at):
-    """Weights (n,) that make the least-squares line's value at x = `at` from the samples marked in `used`."""
+    """Weights (n,) that make the least-squares line's value at x = `at` from the marked samples."""
     middle = x[used].mean()
     spread = np.where(used, x - middle, 0.0)
     return mean_weights(used) + spread * (at - middle) / (spread @ spread)
 
 
+def line_slope(x, samples, used):
+    """Slope (k,) of the least-squares line through the marked samples."""
+    spread = x[used] - x[used].mean()
+    return spread @ samples[used] / (spread @ spread)
+
+
 def line_residuals(x, samples, used):
-    """Residuals (n, k) of the least-squares line through the marked samples, NaN elsewhere, of unbiased
-    scatter.
-    """
-    middle = x[used].mean()
-    spread = x - middle
-    mean = samples[used].mean(axis=0)
-    slope = spread[used] @ (samples[used] - mean) / (spread[used] @ spread[used])
-    residuals = np.where(used[:, None], samples - mean - np.outer(spread, slope), np.nan)
-    n = np.count_nonzero(used)
-    return residuals * np.sqrt(n / max(n - 2, 1))
+    """Residuals (m, k) of the marked samples from their least-squares line."""
+    spread = x[used] - x[used].mean()
+    return samples[used] - samples[used].mean(axis=0) - np.outer(spread, line_slope(x, samples, used))

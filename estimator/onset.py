@@ -1,8 +1,7 @@
-"""Felt touch: the motor angle at which the moments leave the line of the free stroke.
+"""Felt touch: the motor angle at which the moments leave the level of the free stroke.
 
-Three ways: extrapolating the rise of the moment, half height of its rate, and the paper's threshold on
-the filtered moment. All take plain arrays over one forward stroke: motor angle (n,) in rad, moments (n,)
-or (n, 2) in any unit.
+Plain arrays over one forward stroke: motor angle (n,) in rad, moments (n,) or (n, 2) in N·mm or volts, time (n,) in s.
+The fit of the rise is here; half height of the rate and the paper's threshold are in `estimator.crossing`.
 """
 
 from dataclasses import dataclass, field
@@ -11,99 +10,161 @@ import numpy as np
 
 from estimator import noise
 
+TOO_FEW = "too few samples to find a touch"
 NO_RISE = "never touches: the moments do not rise above their noise"
 NO_FREE_STROKE = "touching from the start: no free stroke to measure the rise from"
 SHORT_RISE = "touches too near the end of the stroke to fit the rise"
 VAGUE = "no clear onset: the touch angle is uncertain by more than a third of the fitted rise"
 
+WINDOW_RAD = np.radians(2.0)
+WINDOW_S = 0.06
+GUARD_RAD = np.radians(0.1)
 MIN_RISE_IN_SIGMAS = 8.0
 MIN_FREE_SAMPLES = 20
 MIN_RISE_SAMPLES = 12
 COARSE_BINS = 120
-WINDOW_RAD = np.radians(2.0)
-GUARD_RAD = np.radians(0.1)
+SPIKE_IN_SIGMAS = 8.0
+
+
+@dataclass(frozen=True)
+class Level:
+    """What the moments read without contact: offset (k,) with covariance (k, k), at the motor angle centre_rad.
+
+    drift (k,) per rad is the slope of the free stroke beyond its noise. It is not taken off: extrapolated past the
+    free stroke it would bring more noise than it removes. It widens the covariance instead.
+    """
+
+    offset: np.ndarray
+    covariance: np.ndarray
+    drift: np.ndarray
+    centre_rad: float
+
+    def covariance_between(self, one_rad, other_rad):
+        """Covariance (k, k) of the level's errors at two motor angles."""
+        return self.covariance + np.diag(self.drift**2) * (one_rad - self.centre_rad) * (other_rad - self.centre_rad)
+
+
+@dataclass(frozen=True)
+class Rise:
+    """The fitted rise: slope (k,) per rad; gain (k,) turns moments above the level into rad past the touch.
+
+    weights (n,) make the line's value at the touch from the samples, whose noise memory describes.
+    """
+
+    slope: np.ndarray
+    gain: np.ndarray
+    weights: np.ndarray
+    memory: noise.Memory
 
 
 @dataclass(frozen=True)
 class Touch:
-    """First touch as the moments tell it.
+    """First touch as the moments tell it, with its standard deviation; both NaN where status is not empty.
 
-    motor_rad and sigma_rad are NaN where status is not empty. bias_rad is what the method itself is known
-    to be off by (not subtracted). offset (k,) is the level of the free stroke, offset_covariance (k, k);
-    drift (k,) is the slope per sample by which the free stroke rises beyond its noise; rise (k,) is per
-    rad. free marks the samples of the free stroke, rise_end_rad the end of the fitted rise.
+    bias_rad is what the method by its nature is off by, not subtracted. level and rise are what it was found from.
     """
 
     motor_rad: float
     sigma_rad: float
     status: str = ""
     bias_rad: float = 0.0
-    offset: np.ndarray | None = field(default=None, repr=False)
-    offset_covariance: np.ndarray | None = field(default=None, repr=False)
-    drift: np.ndarray | None = field(default=None, repr=False)
-    rise: np.ndarray | None = field(default=None, repr=False)
-    rise_end_rad: float = np.nan
-    free: np.ndarray | None = field(default=None, repr=False)
-    gain: np.ndarray | None = field(default=None, repr=False)
+    level: Level | None = field(default=None, repr=False)
+    rise: Rise | None = field(default=None, repr=False)
 
     @classmethod
     def none(cls, status: str) -> "Touch":
         """No touch, and why."""
         return cls(np.nan, np.nan, status)
 
+    @property
+    def offset(self):
+        """Level (k,) of the free stroke, to be taken off the moments."""
+        return self.level.offset
 
-def felt_touch(motor_rad, moments, *, window_rad=WINDOW_RAD, guard_rad=GUARD_RAD) -> Touch:
+
+def felt_touch(motor_rad, moments, time_s=None, *, window_rad=WINDOW_RAD, guard_rad=GUARD_RAD) -> Touch:
     """Touch where a line fitted to the rise of the moments meets the level of the free stroke.
 
-    The rise is fitted from guard_rad to window_rad past the touch; the channels share one touch angle,
-    weighted by the inverse of their scatter's covariance. Where the whisker sticks and slips, the scatter
-    lies along the surface, so that the weight falls on the moment across it, which rises evenly whatever
-    the slip.
+    The rise is fitted from guard_rad to window_rad past the touch, and over 60 ms at least where time_s is given, so
+    that fast strokes average over hum and vibration too. The channels share one touch angle, weighted by the inverse
+    of their scatter's covariance: where the whisker sticks and slips, the scatter lies along the surface, so that the
+    weight falls on the moment across it, which rises evenly whatever the slip. Isolated spikes and NaN are left out.
     """
-    motor, samples = _as_columns(motor_rad, moments)
-    used = np.isfinite(motor) & np.isfinite(samples).all(axis=1) & _moving(motor)
+    motor, samples = columns(motor_rad, moments)
+    used = usable(motor, samples) & _moving(motor)
     if np.count_nonzero(used) < MIN_FREE_SAMPLES + MIN_RISE_SAMPLES:
-        return Touch.none("too few samples to find a touch")
-    touch, status = _coarse_touch(motor, samples, used)
+        return Touch.none(TOO_FEW)
+    touch = _coarse_touch(motor, samples, used)
+    status = _coarse_status(motor, samples, used, touch)
     if status:
         return Touch.none(status)
-    for window in (2 * window_rad, window_rad, window_rad, window_rad):
-        fit = _extrapolate(motor, samples, used, touch, window, guard_rad)
-        if fit.status:
-            return fit
-        touch = fit.motor_rad
-    return fit
+    window = max(window_rad, speed(motor, time_s) * WINDOW_S)
+    for share in (2.0, 1.0, 1.0, 1.0):
+        found = _extrapolate(motor, samples, used, touch, share * window, guard_rad)
+        if found.status:
+            return found
+        touch = found.motor_rad
+    return found
 
 
-def _as_columns(motor_rad, moments):
+def columns(motor_rad, moments):
+    """Motor angles (n,) and moments (n, k) as float arrays; ValueError where the samples do not match."""
     motor = np.asarray(motor_rad, dtype=float)
     samples = np.asarray(moments, dtype=float)
     samples = samples[:, None] if samples.ndim == 1 else samples
-    if motor.ndim != 1 or samples.shape[:1] != motor.shape:
+    if motor.ndim != 1 or samples.ndim != 2 or samples.shape[0] != motor.size:
         raise ValueError(f"motor angles {motor.shape} and moments {samples.shape} must have the same samples")
     return motor, samples
+
+
+def usable(motor, samples):
+    """Mask (n,) of the samples that are known in all columns and no isolated spikes."""
+    known = np.isfinite(motor) & np.isfinite(samples).all(axis=1)
+    if np.count_nonzero(known) < 5:
+        return known
+    values = samples[known]
+    around = np.stack([np.roll(values, shift, axis=0) for shift in (-2, -1, 0, 1, 2)])
+    off = np.abs(values - np.median(around, axis=0))
+    off[:2], off[-2:] = 0.0, 0.0
+    known[known] = (off <= SPIKE_IN_SIGMAS * np.maximum(_noise(values), noise.TINY)).all(axis=1)
+    return known
+
+
+def speed(motor, time_s):
+    """Usual speed of the motor in rad/s; 0 where there are no times."""
+    if time_s is None or len(motor) < 2:
+        return 0.0
+    return float(np.nanmedian(np.diff(motor)) / np.nanmedian(np.diff(np.asarray(time_s, dtype=float))))
 
 
 def _moving(motor):
     """Mask of the samples at which the motor runs at more than half its usual speed."""
     width = max(1, len(motor) // 100)
+    if len(motor) <= 2 * width:
+        return np.zeros(len(motor), dtype=bool)
     step = np.full(len(motor), np.nan)
     step[width:-width] = motor[2 * width :] - motor[: -2 * width]
     step[:width], step[-width:] = step[width], step[-width - 1]
-    return step > 0.5 * np.nanmedian(step)
+    usual = np.median(step[np.isfinite(step)]) if np.isfinite(step).any() else np.nan
+    return step > 0.5 * usual
+
+
+def _noise(samples):
+    """Standard deviation (k,) of one sample by the median of second differences, blind to rise, drift and spikes."""
+    second = np.abs(np.diff(samples, n=2, axis=0))
+    return np.median(second, axis=0) / (0.6745 * np.sqrt(6))
 
 
 def _coarse_touch(motor, samples, used):
-    """Break of the broken line (level, then rise) that explains most of both channels: (angle, status)."""
+    """Motor angle of the break of the broken line (level, then rise) that explains most of both channels."""
     angle, binned = _binned(motor[used], samples[used])
-    scaled = binned / _noise(samples[used])
+    scaled = binned / np.maximum(_noise(samples[used]), noise.TINY)
     breaks = angle[:-2]
     ramp = np.maximum(0.0, angle[None, :] - breaks[:, None])
     ramp -= ramp.mean(axis=1, keepdims=True)
-    slopes = ramp @ (scaled - scaled.mean(axis=0)) / (ramp**2).sum(axis=1)[:, None]
-    explained = (slopes**2).sum(axis=1) * (ramp**2).sum(axis=1)
-    best = int(np.argmax(explained))
-    return breaks[best], _coarse_status(motor, samples, used, breaks[best])
+    along = ramp @ (scaled - scaled.mean(axis=0))
+    explained = (along**2).sum(axis=1) / (ramp**2).sum(axis=1)
+    return breaks[int(np.argmax(explained))]
 
 
 def _binned(motor, samples):
@@ -113,38 +174,26 @@ def _binned(motor, samples):
     return np.add.reduceat(motor, edges) / counts, mean
 
 
-def _noise(samples):
-    """Standard deviation (k,) of one sample, from second differences, which no rise or drift disturbs."""
-    second = np.diff(samples, n=2, axis=0)
-    return np.maximum(np.sqrt((second**2).mean(axis=0) / 6), np.finfo(float).tiny)
-
-
 def _coarse_status(motor, samples, used, touch):
-    after = used & (motor > touch)
-    before = used & (motor <= touch)
+    after, before = used & (motor > touch), used & (motor <= touch)
     if np.count_nonzero(after) < MIN_RISE_SAMPLES:
         return NO_RISE
-    scatter = np.nanstd(noise.line_residuals(motor, samples, after), axis=0)
-    rise = _slope(motor, samples, after) * (motor[after].max() - touch)
-    if np.hypot.reduce(rise / np.maximum(scatter, np.finfo(float).tiny)) < MIN_RISE_IN_SIGMAS:
+    scatter = np.std(noise.line_residuals(motor, samples, after), axis=0)
+    rise = noise.line_slope(motor, samples, after) * (motor[after].max() - touch)
+    if np.hypot.reduce(rise / np.maximum(scatter, noise.TINY)) < MIN_RISE_IN_SIGMAS:
         return NO_RISE
     if np.count_nonzero(before) < MIN_FREE_SAMPLES or _rises_already(motor, samples, before, after):
         return NO_FREE_STROKE
     return ""
 
 
-def _slope(motor, samples, used):
-    spread = motor[used] - motor[used].mean()
-    return spread @ samples[used] / (spread @ spread)
-
-
 def _rises_already(motor, samples, before, after):
     """Does the supposed free stroke rise at more than a third of the later rate, beyond doubt?"""
-    direction = _slope(motor, samples, after)
+    direction = noise.line_slope(motor, samples, after)
     along = samples @ direction / np.hypot.reduce(direction)
-    slope = _slope(motor, along, before)
+    slope = noise.line_slope(motor, along, before)
     spread = motor[before] - motor[before].mean()
-    sigma = np.nanstd(noise.line_residuals(motor, along[:, None], before)) / np.sqrt(spread @ spread)
+    sigma = np.std(noise.line_residuals(motor, along[:, None], before)) / np.sqrt(spread @ spread)
     return slope > max(np.hypot.reduce(direction) / 3, 5 * sigma)
 
 
@@ -156,37 +205,27 @@ def _extrapolate(motor, samples, used, touch, window, guard):
         return Touch.none(NO_FREE_STROKE)
     if np.count_nonzero(rising) < MIN_RISE_SAMPLES:
         return Touch.none(SHORT_RISE)
-    offset, offset_covariance, drift = level(motor, samples, free, touch)
-    to_touch = noise.line_weights(motor, rising, touch)
-    memory = noise.autocovariance(noise.line_residuals(motor, samples, rising))
-    gap = np.where(rising[:, None], samples, 0.0).T @ to_touch - offset
-    covariance = offset_covariance + noise.covariance_of_sums(to_touch, to_touch, memory)
-    rise = _slope(motor, samples, rising)
-    pull = np.linalg.lstsq(covariance, rise, rcond=None)[0]
-    information = rise @ pull
-    sigma = 1 / np.sqrt(information)
+    level = _level(motor, samples, free)
+    weights = noise.line_weights(motor, rising, touch)
+    memory = noise.Memory.of(motor, samples, free, rising)
+    scatter = noise.wider(memory.of_sum(weights), noise.Memory.of(motor, samples, rising).of_sum(weights))
+    slope = noise.line_slope(motor, samples, rising)
+    gap = noise.weighted_sum(weights, samples, rising) - level.offset
+    pull = np.linalg.pinv(scatter + level.covariance_between(touch, touch), hermitian=True) @ slope
+    information = slope @ pull
+    sigma = 1 / np.sqrt(max(information, noise.TINY))
     if not sigma < window / 3:
         return Touch.none(VAGUE)
-    found = touch - gap @ pull / information
-    end = motor[rising].max()
     gain = pull / information
-    return Touch(found, sigma, "", 0.0, offset, offset_covariance, drift, rise, end, free, gain)
+    rise = Rise(slope, gain, weights, memory)
+    return Touch(float(touch - gap @ gain), float(sigma), level=level, rise=rise)
 
 
-def level(motor, samples, free, at):
-    """Level (k,) of the free stroke, its covariance (k, k) at the motor angle `at`, and its drift (k,)
-    per rad.
-
-    The level is a mean: a slope fitted to a free stroke and extrapolated past it would carry more noise
-    than the drift it removes. A drift beyond its own noise goes into the covariance instead.
-    """
+def _level(motor, samples, free):
     weights = noise.mean_weights(free)
-    residuals = noise.line_residuals(motor, samples, free)
-    memory = noise.autocovariance(residuals)
-    unit = noise.line_weights(motor, free, motor[free].mean() + 1.0) - weights
-    slope = np.where(free[:, None], samples, 0.0).T @ unit
-    doubt = np.diag(noise.covariance_of_sums(unit, unit, memory))
-    drift = np.sqrt(np.maximum(0.0, slope**2 - doubt))
-    covariance = noise.covariance_of_sums(weights, weights, memory)
-    carried = drift * (at - motor[free].mean())
-    return np.where(free[:, None], samples, 0.0).T @ weights, covariance + np.diag(carried**2), drift
+    memory = noise.Memory.of(motor, samples, free)
+    centre = motor[free].mean()
+    per_rad = noise.line_weights(motor, free, centre + 1.0) - weights
+    doubt = np.diag(memory.of_sum(per_rad))
+    drift = np.sqrt(np.maximum(0.0, noise.line_slope(motor, samples, free) ** 2 - doubt))
+    return Level(noise.weighted_sum(weights, samples, free), memory.of_sum(weights), drift, float(centre))

@@ -9,29 +9,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator import noise
-from estimator.onset import Touch, _as_columns, felt_touch, level
+from estimator.crossing import threshold_touch, touch_on_rate, zero_phase_lowpass
+from estimator.domain import require_positive
+from estimator.onset import Touch, columns, felt_touch, speed, usable
 
-__all__ = ["MomentAt", "Touch", "felt_touch", "moment_at", "zero_phase_lowpass"]
+__all__ = [
+    "MomentAt",
+    "Touch",
+    "felt_touch",
+    "moment_at",
+    "threshold_touch",
+    "touch_on_rate",
+    "zero_phase_lowpass",
+]
 
-FILTER_ORDER = 2
 HUM_PERIOD_S = 0.02
 HALF_WINDOW_RAD = np.radians(0.5)
-
-
-def zero_phase_lowpass(x, rate_Hz, cutoff_Hz):
-    """Low-pass of samples along the first axis, forwards and backwards: no delay, −3 dB at `cutoff_Hz`
-    over both passes.
-
-    Second-order Butterworth each way. Raises ValueError for a cut-off outside (0, rate/2).
-    """
-    from scipy.signal import butter, sosfiltfilt
-
-    if not 0 < cutoff_Hz < rate_Hz / 2:
-        raise ValueError(f"cutoff_Hz = {cutoff_Hz}: must lie between 0 and half the rate of {rate_Hz} Hz")
-    each_way = cutoff_Hz / (np.sqrt(2) - 1) ** (1 / (2 * FILTER_ORDER))
-    sections = butter(FILTER_ORDER, min(each_way, 0.499 * rate_Hz), fs=rate_Hz, output="sos")
-    padding = min(len(x) - 1, int(3 * rate_Hz / cutoff_Hz))
-    return sosfiltfilt(sections, np.asarray(x, dtype=float), axis=0, padlen=padding)
+MIN_SAMPLES = 3
+NOT_REACHED = "the stroke does not reach the pushing angle"
 
 
 @dataclass(frozen=True)
@@ -49,33 +44,23 @@ class MomentAt:
     status: str = ""
 
 
-def moment_at(
-    theta_rad, motor_rad, moments, touch, *, half_window_rad=HALF_WINDOW_RAD, time_s=None
-) -> MomentAt:
+def moment_at(theta_rad, motor_rad, moments, touch, *, time_s=None, half_window_rad=HALF_WINDOW_RAD) -> MomentAt:
     """Moments at the pushing angle theta_rad past `touch`, from a line fitted to the samples around it.
 
-    The window is ± half_window_rad, widened where `time_s` is given to hold a period of mains hum, and
-    never reaches back to the touch. The covariance holds the fit (with the residuals' autocorrelation),
-    the free stroke and drift.
+    The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum, and never reaches
+    back to the touch. The covariance holds the fit (with the noise's autocorrelation), the free stroke and drift.
     """
-    motor, samples = _as_columns(motor_rad, moments)
-    channels = samples.shape[1]
+    motor, samples = columns(motor_rad, moments)
     if touch.status:
-        return _nothing(theta_rad, channels, touch.status)
+        return _nothing(theta_rad, samples.shape[1], touch.status)
+    require_positive("theta_rad", theta_rad, "rad")
     at = touch.motor_rad + theta_rad
-    good = np.isfinite(motor) & np.isfinite(samples).all(axis=1)
-    half = min(_half_window(motor, time_s, half_window_rad), 0.9 * theta_rad)
+    half = min(max(half_window_rad, speed(motor, time_s) * HUM_PERIOD_S / 2), 0.9 * theta_rad)
+    good = usable(motor, samples)
     near = good & (np.abs(motor - at) <= half)
-    if not good.any() or np.nanmax(motor[good]) < at or np.count_nonzero(near) < 3:
-        return _nothing(theta_rad, channels, "the stroke does not reach the pushing angle")
+    if not good.any() or motor[good].max() < at or np.count_nonzero(near) < MIN_SAMPLES:
+        return _nothing(theta_rad, samples.shape[1], NOT_REACHED)
     return _local_fit(theta_rad, motor, samples, near, at, touch)
-
-
-def _half_window(motor, time_s, half_window_rad):
-    if time_s is None:
-        return half_window_rad
-    speed = np.median(np.diff(motor)) / np.median(np.diff(time_s))
-    return max(half_window_rad, speed * HUM_PERIOD_S / 2)
 
 
 def _nothing(theta_rad, channels, status):
@@ -85,8 +70,9 @@ def _nothing(theta_rad, channels, status):
 
 def _local_fit(theta_rad, motor, samples, near, at, touch):
     weights = noise.line_weights(motor, near, at)
-    memory = noise.autocovariance(noise.line_residuals(motor, samples, near))
-    offset, offset_covariance, _ = level(motor, samples, touch.free, at)
-    values = np.where(near[:, None], samples, 0.0).T @ weights - offset
-    covariance = noise.covariance_of_sums(weights, weights, memory) + offset_covariance
-    return MomentAt(theta_rad, values, covariance, touch.offset_covariance @ touch.gain)
+    own = noise.Memory.of(motor, samples, near)
+    values = noise.weighted_sum(weights, samples, near) - touch.level.offset
+    scatter = noise.wider(touch.rise.memory.of_sum(weights), own.of_sum(weights))
+    shared = touch.rise.memory.between_sums(touch.rise.weights, weights)
+    with_touch = touch.rise.gain @ (shared + touch.level.covariance_between(touch.motor_rad, at))
+    return MomentAt(theta_rad, values, scatter + touch.level.covariance_between(at, at), with_touch)

@@ -92,9 +92,7 @@ def slope_from_deflection(d_x, theta, d_y, d_z):
     NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
     """
     obstructed = d_x * theta - d_y
-    possible = (
-        (d_x > 0) & (theta >= 0) & (theta < RIGHT_ANGLE) & (d_y > 0) & (obstructed >= 0) & np.isfinite(d_z)
-    )
+    possible = (d_x > 0) & (theta >= 0) & (theta < RIGHT_ANGLE) & (d_y > 0) & (obstructed >= 0) & np.isfinite(d_z)
     beta = np.copysign(np.arctan2(obstructed, np.abs(d_z)), d_z)
     phi = np.where(possible, np.arctan2(d_z, d_y), np.nan)
     return np.where(possible & (d_z != 0), beta, np.nan), phi

@@ -14,9 +14,7 @@ SEARCH_STEP = np.radians(0.1)
 HALVINGS = 50
 
 
-def distance_error(
-    beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False
-):
+def distance_error(beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
     """Relative error of (2) or (10), estimate over truth minus one, where the surface has slope β_0 at
     first touch.
 
@@ -30,9 +28,7 @@ def distance_error(
     return _curved_error(beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", printed)
 
 
-def slope_threshold(
-    error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False
-):
+def slope_threshold(error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
     """β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN
     where never.
 

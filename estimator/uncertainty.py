@@ -74,9 +74,7 @@ def sigma(
     ):
         require_sigma(name, value)
     covariance = np.zeros((2, 2)) if covariance is None else np.asarray(covariance, dtype=float)
-    mixed = (
-        np.zeros(2) if theta_moment_covariance is None else np.asarray(theta_moment_covariance, dtype=float)
-    )
+    mixed = np.zeros(2) if theta_moment_covariance is None else np.asarray(theta_moment_covariance, dtype=float)
     theta, moment, alpha = gradient[..., 0], gradient[..., 1:3], gradient[..., 3]
     variance = theta**2 * (np.square(theta_sigma) + np.square(touch_sigma)) + (alpha * alpha_est_sigma) ** 2
     variance = variance + np.einsum("...i,...ij,...j->...", moment, covariance, moment)
