@@ -1,0 +1,47 @@
+# make demo       evaluates the small session in fixtures/ into ./demo-out (makes .venv first if need be)
+# make test       the default tests;  make test-slow: the long ones;  make lint: ruff
+# PYTHON=python3.12 make demo   takes another Python (3.11 or newer)
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# Not byte-compiling 570 MB of libraries saves half a minute; what is imported is compiled when it is.
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --quiet --no-compile --disable-pip-version-check -c constraints.txt
+# As many workers as there are processors.
+WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
+
+.PHONY: demo test test-slow lint clean
+
+demo: $(VENV)/ready
+	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
+	if [ $$code -gt 1 ]; then exit $$code; fi; \
+	echo; echo "The figures, tables and this summary are in $(CURDIR)/demo-out"
+
+test: $(VENV)/ready-for-tests
+	$(BIN)/python -m pytest -q
+
+test-slow: $(VENV)/ready-for-tests
+	$(BIN)/python -m pytest -q -m slow
+
+lint: $(VENV)/ready-for-tests
+	$(BIN)/ruff check .
+
+clean:
+	rm -rf $(VENV) demo-out
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	|| { echo "Python 3.11 or newer is needed; $(PYTHON) is $$($(PYTHON) -V 2>&1). Try PYTHON=python3.12 make"; exit 2; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
+	|| { echo "Python's venv module is not complete. On Debian and Ubuntu: sudo apt install python3-venv"; exit 2; }
+	@$(PYTHON) -m venv $(VENV)
+
+$(VENV)/ready: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "Installing about 570 MB into $(VENV); this takes a minute or two."
+	@$(PIP_INSTALL) -e .
+	@touch $@
+
+$(VENV)/ready-for-tests: $(VENV)/ready
+	@echo "Installing what the tests need into $(VENV)."
+	@$(PIP_INSTALL) -e '.[test]'
+	@touch $@
