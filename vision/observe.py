@@ -17,7 +17,7 @@ from vision.bar_line import measure_bar
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
-from vision.fit import Observed, Problem, State, bar_axis, bends, curves_of, rest_shape, solve
+from vision.fit import Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
 from vision.line import Noise, measure_noise, shading_terms
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
@@ -133,20 +133,20 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
         return WhiskTruth(number, None, status=f"{len(seen)} frames seen by all cameras, 4 are needed")
     motor = {f: float(motor_rad[f]) for f in seen}
     try:
-        problem, state, scale, covariance = _fit_whisk(views, cameras, rods, axis, motor, settings)
+        problem, state, covariance = _fit_whisk(views, cameras, rods, axis, motor, settings)
     except Refused as reason:
         return WhiskTruth(number, None, status=str(reason))
     if problem is None:
         return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
                           status="the whisker never touches" if state is None else state)
     measured, by_parameter = jacobians(problem, state)
-    lens = calibration_share(problem, state, covariance / scale**2)
+    lens = calibration_share(problem, state, covariance)
     return to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
                     lens, views, rods.bar.radius_mm, settings)
 
 
 def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], settings: VisionSettings):
-    """Problem and state after the last round, the residuals' scale and the parameters' covariance.
+    """Problem and state after the last round, and the parameters' covariance.
 
     (None, reason, …) where there is no touch to fit.
     """
@@ -156,9 +156,9 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
     bend = np.array(list(coarse.values()))
     touching, free = frames_that_touch(angles, bend)
     if not np.any(touching):
-        return None, None, 1.0, None
+        return None, None, None
     if np.sum(~touching) < 2:
-        return None, "touches from the start: fewer than two frames of free stroke", 1.0, None
+        return None, "touches from the start: fewer than two frames of free stroke", None
     state = None
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
     light = {}
@@ -168,14 +168,15 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         seen = _trace_all(views, rods, axis, curves, light, settings)
         problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
         begin = _begin(problem, rest, bend, arcs)
-        fitted, covariance, scale = solve(problem, begin)
+        fitted, _ = solve(problem, begin)
+        problem = honest(problem, fitted)
+        fitted, covariance = solve(problem, fitted, scales=(4.0, 4.0, 4.0))
         state = (problem, fitted)
         rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
         touch = float(first_touch(problem, fitted.vector).motor_rad)
         if round_number < settings.rounds:
             touching, free = frames_by_touch(angles, touch, np.radians(0.02))
-    scale = max(scale, 1.0)
-    return problem, fitted, scale, covariance * scale**2
+    return problem, fitted, covariance
 
 
 def _early(motor: Mapping[int, float]) -> dict[int, float]:

@@ -59,7 +59,7 @@ def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis
             raise Refused("no whisker is seen where the motor angle says it should be")
         nothing = np.zeros(len(motor), dtype=bool)
         problem = Problem(cameras, wire, reach_mm, 0.0, axis, motor, nothing, nothing, seen)
-        state, _, _ = solve(problem, start(problem, wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
+        state, _ = solve(problem, start(problem, wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
         rest = state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
     return rest
 
