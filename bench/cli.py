@@ -58,7 +58,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_evaluate, _add_check, _add_info):
+    for add_verb in (_add_evaluate, _add_check, _add_figures, _add_info):
         add_verb(verbs)
     return parser
 
@@ -141,6 +141,26 @@ def _check(options: argparse.Namespace) -> int:
     from bench.check import report_doubts
 
     return report_doubts(options.session, progress=sys.stderr.isatty())
+
+
+def _add_figures(verbs) -> None:
+    verb = _add(
+        verbs,
+        "figures",
+        _figures,
+        "figures 5 and 6 of the paper, from its equations, as PNG, SVG and CSV",
+        "whisker-bench figures 6 --out figures",
+    )
+    verb.add_argument("number", type=int, choices=(5, 6), metavar="5|6", help="which figure")
+    _add_out(verb, "DIR", "folder for the files")
+
+
+def _figures(options: argparse.Namespace) -> int:
+    from bench.theory_figures import write_figure
+
+    for path in write_figure(options.number, options.out):
+        print(path)
+    return DONE
 
 
 def _add_info(verbs) -> None:

@@ -215,7 +215,16 @@ def _in_plain_words(problem: str, kind: type[Keys]) -> str:
         return _unknown_key(unknown.group(1), path, kind)
     if missing := re.match(r"Object missing required field `(.*)`", what):
         return f"{_key_path([*path, missing.group(1)])} is missing"
-    return f"{_key_path(path)}: {what[0].lower()}{what[1:]}".replace("`str`", "text").replace("`", "")
+    return f"{_key_path(path)}: {_what_is_wrong(what)}"
+
+
+def _what_is_wrong(what: str) -> str:
+    """msgspec's "Expected `float | null`, got `str`" in the words of a person who writes TOML."""
+    if choice := re.match(r"Invalid enum value (.*)", what):
+        return f"{choice.group(1)} is none of its values"
+    words = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "null": "nothing"}
+    found = re.sub(r"`([^`]*)`", lambda m: words.get(m.group(1).removesuffix(" | null"), m.group(1)), what)
+    return found.replace("Expected", "expected").replace("got", "found")
 
 
 def _key_path(path: list[str]) -> str:

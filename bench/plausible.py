@@ -24,8 +24,12 @@ class Window:
     units: tuple[tuple[str, float], ...] = ()
 
     def holds(self, value: float) -> bool:
-        """False also for NaN."""
-        return self.low <= value <= self.high
+        """Whether the value is finite and within."""
+        return math.isfinite(value) and self.low <= value <= self.high
+
+    @property
+    def allowed(self) -> str:
+        return f"{self.low:g} or more" if self.high == math.inf else f"from {self.low:g} to {self.high:g}"
 
     def guess(self, value: float) -> str:
         """' Is it in metres? Then write 100.' or nothing."""
@@ -37,8 +41,7 @@ class Window:
     def check(self, value: float, name: str, file: str) -> None:
         """Raises BadInput where the value is outside."""
         if not self.holds(value):
-            allowed = f"from {self.low:g} to {self.high:g} is allowed."
-            raise BadInput(f"{name} is {value:g}; {allowed}{self.guess(value)}", file=file)
+            raise BadInput(f"{name} is {value:g}; {self.allowed} is allowed.{self.guess(value)}", file=file)
 
 
 LENGTH = Window(1.0, 5000.0, (METRES, MICROMETRES))
@@ -53,7 +56,7 @@ RATE = Window(1e-2, 1e6)
 CLOCK = Window(-1e7, 1e7)
 EXPOSURE = Window(1e-7, 1.0, (MILLISECONDS, MICROSECONDS))
 FORCE = Window(1e-6, 1e3)
-SIGMA = Window(0.0, 1e9)
+SIGMA = Window(0.0, math.inf)
 
 
 def looks_like_radians(angle_deg: float) -> bool:

@@ -20,6 +20,7 @@ from vision.scene import Board
 
 FORMAT = 1
 MANIFEST = "session.toml"
+NMM2_PER_NM2 = 1e6
 # Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.
 _ROTATION_TOLERANCE = 2e-3
 _NEAREST_BOARD_MM = 0.5  # a board's origin this near to the whisker's base is a board placed in metres
@@ -130,9 +131,19 @@ def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
         whisker = Whisker(**manifest.values(keys))
     except ValueError as problem:
         raise BadInput(f"[whisker] {problem}", file=MANIFEST) from None
-    YOUNGS_MODULUS.check(whisker.implied_modulus_GPa, "[whisker] the Young's modulus in GPa that "
-                         "flexural_rigidity_Nmm2 and diameter_mm amount to", MANIFEST)  # fmt: skip
+    _check_rigidity(whisker)
     return whisker
+
+
+def _check_rigidity(whisker: Whisker) -> None:
+    """Rigidity and diameter must amount to a material. Raises BadInput."""
+    modulus_GPa = whisker.implied_modulus_GPa
+    if YOUNGS_MODULUS.holds(modulus_GPa):
+        return
+    in_metres = YOUNGS_MODULUS.holds(modulus_GPa * NMM2_PER_NM2)
+    hint = f" Is it in N m2? Then write {whisker.EI_Nmm2 * NMM2_PER_NM2:.6g}." if in_metres else ""
+    found = f"flexural_rigidity_Nmm2 and diameter_mm amount to a Young's modulus of {modulus_GPa:.3g} GPa"
+    raise BadInput(f"[whisker] {found}; {YOUNGS_MODULUS.allowed} is allowed.{hint}", file=MANIFEST)
 
 
 def _board(keys: manifest.BoardKeys | None) -> Board | None:
@@ -141,7 +152,7 @@ def _board(keys: manifest.BoardKeys | None) -> Board | None:
     try:
         return Board(**manifest.values(keys, leave_out=("marker_sigma_mm",)))
     except Refused as problem:
-        raise BadInput(f"[board] {problem}", file=MANIFEST) from None
+        raise BadInput(f"{problem}", file=MANIFEST) from None
 
 
 def _pose(rows: list[list[float]] | None) -> np.ndarray | None:

@@ -69,7 +69,7 @@ def require_columns(table: Table, names: tuple[str, ...], shown: str) -> None:
     for name in names:
         if name not in table.columns:
             near = difflib.get_close_matches(name, table.columns, n=1, cutoff=0.6)
-            hint = f"; did you mean it by {near[0]!r}?" if near else f"; found {','.join(table.columns)}"
+            hint = f"; found {near[0]!r} (names carry units)" if near else f"; found {','.join(table.columns)}"
             raise BadInput(f"column {name} is missing{hint}", file=shown, row=1)
 
 

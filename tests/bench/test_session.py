@@ -138,3 +138,20 @@ def test_a_session_of_board_views_alone(small_copy):
 def test_a_trial_that_is_not_there(small_session):
     with pytest.raises(BadInput, match=r"no trial 'b99'; there are b30_3, b60_4"):
         load_session(small_session).trial("b99")
+
+
+def test_real_board_videos_make_a_session(real, tmp_path):
+    """The webcam recordings of `real/calibration/single`, wrapped as a session of boards alone."""
+    (tmp_path / "boards").mkdir()
+    for camera in ("cam_0", "cam_2"):
+        (tmp_path / "boards" / f"{camera}.mp4").symlink_to(real / "calibration" / "single" / f"{camera}.mp4")
+    (tmp_path / "session.toml").write_text(
+        "format = 1\n[board]\nsquares = [4, 5]\nsquare_mm = 54.0\nmarker_mm = 40.5\n"
+        'dictionary = "DICT_4X4_50"\ninverted = true\n'
+    )
+    session = load_session(tmp_path)
+    assert {name: path.name for name, path in session.board_sources.items()} == {
+        "cam_0": "cam_0.mp4",
+        "cam_2": "cam_2.mp4",
+    }
+    assert session.board.inverted

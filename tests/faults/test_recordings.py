@@ -80,7 +80,7 @@ def with_column(file, name: str, change) -> None:
         (
             1,
             "time_s,motor_rad,y_V,z_V",
-            r"row 1: column motor_deg is missing; did you mean it by 'motor_rad'",
+            r"row 1: column motor_deg is missing; found 'motor_rad' \(names carry units\)",
         ),
         (1, "time_s,motor_deg,y_V,m_z_Nmm", r"has volts and moments"),
         (1, "time_s,motor_deg,y_V,y_V", r"a column is named twice"),
