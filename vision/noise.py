@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bundle import Knowledge, Sightings, Solution, State, predict, solve
+from vision.adjust import Solution, solve
+from vision.bundle import Knowledge, Sightings, State, predict
 
 # One Gaussian corner in 25 000 lies beyond (two axes): exp(-4.5² / 2).
 REJECT_SIGMA = 4.5

@@ -60,3 +60,8 @@ def compose(T_a_b: np.ndarray, T_b_c: np.ndarray) -> np.ndarray:
 def apply(T_a_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
     """Points of frame b in frame a: (3, 4), (n, 3) → (n, 3)."""
     return points_b @ T_a_b[:, :3].T + T_a_b[:, 3]
+
+
+def pose_difference(T_from: np.ndarray, T_to: np.ndarray) -> np.ndarray:
+    """(w, v) that moves one pose to the other: T_to = (Exp(w) R_from, t_from + v). (6,) rad and mm."""
+    return np.concatenate([log_rotation(T_to[:, :3] @ T_from[:, :3].T), T_to[:, 3] - T_from[:, 3]])
