@@ -11,6 +11,7 @@ from bench.doubts import Doubts
 from bench.errors import BadInput
 from bench.footage import camera_sources, single_pictures
 from bench.plausible import YOUNGS_MODULUS
+from bench.strict_toml import as_keys, read_toml, values
 from bench.trial import Trial, load_trial
 from bench.whisker import Whisker
 from vision.errors import Refused
@@ -78,7 +79,7 @@ def load_session(path: Path | str, doubts: Doubts | None = None) -> Session:
     Raises BadInput at the first thing that is wrong; with a collecting `doubts`, reads on where it can.
     """
     path, doubts = Path(path), doubts or Doubts()
-    keys = _read_manifest(path)
+    keys = _read_manifest(path, doubts)
     whisker, bar = _whisker(keys.whisker), keys.bar
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
@@ -108,15 +109,15 @@ def load_session(path: Path | str, doubts: Doubts | None = None) -> Session:
     return session
 
 
-def _read_manifest(path: Path) -> manifest.SessionKeys:
+def _read_manifest(path: Path, doubts: Doubts) -> manifest.SessionKeys:
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
     if not (path / MANIFEST).is_file():
         raise BadInput(f"there is no {MANIFEST} in this folder, so it is not a session", file=str(path))
-    tables = manifest.read_toml(path / MANIFEST, MANIFEST)
+    tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
-    keys = manifest.as_keys(tables, manifest.SessionKeys, MANIFEST)
+    keys = as_keys(tables, manifest.SessionKeys, MANIFEST, doubts)
     if keys.signals is not None:
         columns = "time_s,motor_deg,y_V,z_V"
         fix = f"export each trial's signals as signals.csv with the columns {columns} and take [signals] out"
@@ -128,7 +129,7 @@ def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
     if keys is None:
         return None
     try:
-        whisker = Whisker(**manifest.values(keys))
+        whisker = Whisker(**values(keys))
     except ValueError as problem:
         raise BadInput(f"[whisker] {problem}", file=MANIFEST) from None
     _check_rigidity(whisker)
@@ -150,7 +151,7 @@ def _board(keys: manifest.BoardKeys | None) -> Board | None:
     if keys is None:
         return None
     try:
-        return Board(**manifest.values(keys, leave_out=("marker_sigma_mm",)))
+        return Board(**values(keys, leave_out=("marker_sigma_mm",)))
     except Refused as problem:
         raise BadInput(f"{problem}", file=MANIFEST) from None
 
@@ -179,7 +180,7 @@ def _pose(rows: list[list[float]] | None) -> np.ndarray | None:
 def _gauges(keys: manifest.GaugeKeys | None) -> Gauges | None:
     if keys is None:
         return None
-    given = {name: np.array(value) for name, value in manifest.values(keys).items() if value is not None}
+    given = {name: np.array(value) for name, value in values(keys).items() if value is not None}
     exact = {"offset_sigma_V": np.zeros(2), "matrix_sigma_Nmm_per_V": np.zeros((2, 2))}
     return Gauges(**exact | given)
 
@@ -192,7 +193,7 @@ def _trials(path: Path, keys: manifest.SessionKeys, doubts: Doubts) -> tuple[Tri
     for entry in sorted(folder.iterdir(), key=natural_order):
         if entry.is_dir() and not entry.name.startswith("."):
             with doubts.guard():
-                found.append(load_trial(entry, keys))
+                found.append(load_trial(entry, keys, doubts))
     return tuple(found)
 
 

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench import manifest
+from bench.doubts import Doubts
 from bench.errors import BadInput
 from bench.footage import camera_sources
+from bench.strict_toml import as_keys, read_toml, values
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
@@ -50,10 +52,10 @@ class Trial:
         return f"trials/{self.name}/{file}"
 
 
-def load_trial(folder: Path, session: manifest.SessionKeys) -> Trial:
+def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts) -> Trial:
     """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput."""
     shown = f"trials/{folder.name}"
-    keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}")
+    keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}", doubts)
     _check_weight(keys, f"{shown}/{MANIFEST}")
     signals_path = folder / SIGNALS
     if not signals_path.is_file():
@@ -63,21 +65,23 @@ def load_trial(folder: Path, session: manifest.SessionKeys) -> Trial:
         folder=folder,
         camera_sources=camera_sources(folder, shown),
         signals_path=signals_path,
-        **manifest.values(keys) | _bar(keys, session.bar),
+        **values(keys) | _bar(keys, session.bar),
     )
 
 
-def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str) -> manifest.TrialKeys:
+def _trial_keys(
+    folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts
+) -> manifest.TrialKeys:
     """trial.toml, absent keys from the session's [trial]; a sigma comes from where its value comes from."""
     file = folder / MANIFEST
     if not file.is_file():
         return defaults
-    given = manifest.read_toml(file, shown)
-    own = manifest.as_keys(given, manifest.TrialKeys, shown)
+    given = read_toml(file, shown)
+    own = as_keys(given, manifest.TrialKeys, shown, doubts)
     decided = set(given) | {manifest.sigma_key(key) for key in given}
     return manifest.TrialKeys(
-        **{name: value for name, value in manifest.values(own).items() if name in decided}
-        | {name: value for name, value in manifest.values(defaults).items() if name not in decided}
+        **{name: value for name, value in values(own).items() if name in decided}
+        | {name: value for name, value in values(defaults).items() if name not in decided}
     )
 
 

@@ -162,3 +162,23 @@ def test_check_collects_what_evaluate_would_stop_at(session):
         "trials/b60_4",
         "trials/gauge_roll0/signals.csv",
     ]
+
+
+def test_check_collects_every_unknown_key(session):
+    edit(session / "session.toml", "legacy", "legasy")
+    edit(session / "session.toml", 'name = "high"', 'nmae = "x"\nname = "high"')
+    edit(session / "trials" / "b30_3" / "trial.toml", "beta_deg", "betta_deg")
+    edit(session / "trials" / "b30_3" / "trial.toml", "surface", "suface")
+    doubts = Doubts(stop_at_first=False)
+    checked_session(session, doubts)
+    assert [line.split(" is not")[0] for line in doubts.refusals] == [
+        "session.toml: [board] legasy",
+        "session.toml: [[cameras]] nmae",
+        "trials/b30_3/trial.toml: suface",
+        "trials/b30_3/trial.toml: betta_deg",
+    ]
+
+
+def test_implausible_value_of_one_camera(session):
+    edit(session / "session.toml", 'name = "high"', 'name = "high"\nexposure_s = 2.0')
+    assert re.search(r"\[\[cameras\]\] exposure_s is 2;.*milliseconds\? Then write 0.002", refusal(session))
