@@ -4,6 +4,7 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -74,3 +75,9 @@ def _as_video(folder: Path, suffix: str, fourcc: str):
     writer.release()
     shutil.rmtree(folder)
     return video, pictures
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A generator with a fixed seed, so that a failure can be seen again."""
+    return np.random.default_rng(20080923)

@@ -14,8 +14,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import BSpline
 
-# Nodes of the mid-point rule over the rod's half circumference. The integrand is smooth and vanishes at both
-# ends; 16 nodes are exact to 1e-4 of the contrast down to a blur of a fifth of the radius.
+# Gauss–Legendre nodes over the rod's half circumference, where the integrand is smooth: 1e-5 of the contrast.
 _NODES_PER_RADIUS_TO_BLUR = 4
 _MOST_WAVES = 8
 _SAME_RADIUS = 0.15
@@ -110,11 +109,12 @@ def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarra
 def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
     """`shading_basis` by integration round the rod."""
     ratio = np.max(radius_px, initial=1.0) / blur_px
-    nodes = int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * ratio), 12, 96))
-    t = (np.arange(nodes) + 0.5) / nodes * np.pi - np.pi / 2
+    nodes, shares = np.polynomial.legendre.leggauss(int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * ratio), 16, 96)))
+    t = 0.5 * np.pi * nodes
     radius = radius_px[..., None]
     z = (offset_px[..., None] - radius * np.sin(t)) / blur_px
-    weight = np.exp(-0.5 * z * z) * (radius * (np.cos(t) * np.pi / nodes / (blur_px * np.sqrt(2 * np.pi))))
+    share = 0.5 * np.pi * shares * np.cos(t) / (blur_px * np.sqrt(2 * np.pi))
+    weight = np.exp(-0.5 * z * z) * (radius * share)
     return weight @ round_the_rod(t, terms)
 
 
@@ -136,8 +136,8 @@ def _from_table(offset_px, table: tuple[float, np.ndarray]) -> np.ndarray:
 
 
 def shading_terms(radius_px: float, blur_px: float) -> int:
-    """How many functions of shading the blur lets through: 4 for a thin wire, 16 for a thick bar."""
-    return int(np.clip(round(0.65 * radius_px / blur_px + 2.0), 4, 16))
+    """How many functions of shading are needed: 8 waves for a thin wire, more, as splines, for a thick bar."""
+    return int(np.clip(round(0.65 * radius_px / blur_px + 2.0), _MOST_WAVES, 16))
 
 
 def round_the_rod(t, terms: int) -> np.ndarray:

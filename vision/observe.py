@@ -18,13 +18,13 @@ from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.fit import Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
-from vision.line import Noise, measure_noise, shading_terms
+from vision.line import Noise, measure_noise
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import first_touch, frames_by_touch, frames_that_touch
-from vision.trace import View, find_blur, observed, to_points, trace, wire_pieces
+from vision.trace import WIRE_TERMS, View, find_blur, observed, to_points, trace, wire_pieces
 from vision.truth import TrialTruth, WhiskTruth
 from vision.wire import Curves
 
@@ -226,12 +226,11 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     if len(pieces) == 0:
         raise Refused(f"camera {view.camera.name} shows no wire clear of the bar")
     knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
-    radius = float(np.median(pieces.radius_px))
     first = view.camera.name not in light
     if first:
-        light[view.camera.name] = find_blur(pieces, 4, knots)
+        light[view.camera.name] = find_blur(pieces, WIRE_TERMS, knots)
     blur = light[view.camera.name]
-    pieces, found, misfit = trace(pieces, blur, shading_terms(radius, blur), knots,
+    pieces, found, misfit = trace(pieces, blur, WIRE_TERMS, knots,
                                   search_px=_SEARCH_PX if first else 0.0)
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))

@@ -4,15 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from vision.fit import Observed
 from vision.line import LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.scene import Camera, Wire
-from vision.shading import Located, fit_shading, line_points, locate
+from vision.shading import Located, fit_shading, line_points, locate, piece_misfit, wave_prior
 from vision.silhouette import outline
 from vision.wire import Curves
 
 BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
+WIRE_TERMS = 8
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
 _WORST_MISFIT = 6.0
@@ -60,7 +62,8 @@ def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.n
 
 def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
     """The lens blur, px: the one under which the shading explains the pieces best."""
-    misfit = [fit_shading(pieces, blur, terms, knots_mm)[1] for blur in BLURS_PX]
+    prior = wave_prior(pieces, terms)
+    misfit = [fit_shading(pieces, blur, terms, knots_mm, prior=prior)[1] for blur in BLURS_PX]
     return BLURS_PX[int(np.argmin(misfit))]
 
 
@@ -73,21 +76,37 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 4,
     """
     if search_px > 0:
         pieces = _best_common_shift(pieces, blur_px, terms, knots_mm, search_px)
-    robust = None
+    prior = wave_prior(pieces, terms)
+    shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, prior=prior)
     for _ in range(rounds):
-        shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust)
+        robust = _robust(piece_misfit(pieces, shading))
+        shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust, prior)
         found = locate(pieces, shading)
         pieces = pieces.moved(found.shift_px)
-        robust = 1.0 / np.maximum(found.chi2 / max(np.median(found.chi2), 1e-9), 1.0) ** 2
-    shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust)
     found = locate(pieces, shading, rounds=1)
     return pieces, found, float(np.median(found.chi2))
 
 
+def _robust(misfit) -> np.ndarray:
+    """Weights (s,) that leave out pieces whose misfit is well above the median."""
+    return 1.0 / np.maximum(misfit / max(np.median(misfit), 1e-9), 1.0) ** 2
+
+
 def _best_common_shift(pieces: Pieces, blur_px, terms, knots_mm, search_px) -> Pieces:
+    """All pieces moved by the one shift that the shading explains best, to a hundredth of a pixel.
+
+    Where both edges stand before an even background, shading and shift can stand in for each other; so only the
+    shift of the whole wire is looked for before its pieces are.
+    """
+    prior = wave_prior(pieces, terms)
+
+    def misfit(shift: float) -> float:
+        return fit_shading(pieces.moved(np.full(len(pieces), shift)), blur_px, terms, knots_mm, prior=prior)[1]
+
     shifts = np.arange(-search_px, search_px + 1e-9, 0.25)
-    misfit = [fit_shading(pieces.moved(np.full(len(pieces), d)), blur_px, terms, knots_mm)[1] for d in shifts]
-    return pieces.moved(np.full(len(pieces), shifts[int(np.argmin(misfit))]))
+    best = shifts[int(np.argmin([misfit(d) for d in shifts]))]
+    found = minimize_scalar(misfit, bounds=(best - 0.25, best + 0.25), method="bounded", options={"xatol": 0.01})
+    return pieces.moved(np.full(len(pieces), found.x))
 
 
 def to_points(pieces: Pieces, found: Located, misfit: float) -> tuple[LinePoints, np.ndarray]:
