@@ -6,26 +6,25 @@ of settings and the equations' names, is `estimator.curvature`.
 
 import numpy as np
 
-from estimator.domain import RIGHT_ANGLE, elementwise, outside
+from estimator.domain import RIGHT_ANGLE, elementwise, where_all
 
 
 def conditions(r_n, theta, beta_0):
+    """What a push against the circle must fulfil: pairs (what is wrong, mask of what must hold)."""
+    known = ~np.isnan(r_n) & np.isfinite(theta) & np.isfinite(beta_0)
     return (
-        (
-            "a measured value is missing or infinite",
-            np.isnan(r_n) | ~(np.isfinite(theta) & np.isfinite(beta_0)),
-        ),
-        ("the radius of curvature is not positive", ~(r_n > 0)),
-        ("the pushing angle is negative", ~(theta >= 0)),
-        ("the pushing angle is 90 degrees or more", ~(theta < RIGHT_ANGLE)),
-        ("the slope beta_0 is 90 degrees or more", ~(np.abs(beta_0) < RIGHT_ANGLE)),
-        ("the whisker has passed the object: theta is 2 y_c or more", ~(theta / r_n < 2 * np.cos(beta_0))),
+        ("a measured value is missing or infinite", known),
+        ("the radius of curvature is not positive", r_n > 0),
+        ("the pushing angle is negative", theta >= 0),
+        ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
+        ("the slope beta_0 is 90 degrees or more", np.abs(beta_0) < RIGHT_ANGLE),
+        ("the whisker has passed the object: theta is 2 y_c or more", theta / r_n < 2 * np.cos(beta_0)),
     )
 
 
 def inside(r_n, theta, beta_0, *values):
-    failed = outside(conditions(r_n, theta, beta_0))
-    return tuple(np.where(failed, np.nan, value) for value in values)
+    """The values where `conditions` hold, NaN elsewhere."""
+    return tuple(where_all(conditions(r_n, theta, beta_0), value) for value in values)
 
 
 def turn(q, beta_0):

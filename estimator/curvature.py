@@ -118,7 +118,7 @@ def why_not(r_n, theta, beta_0, alpha=0.0):
     arguments = (np.asarray(a, dtype=float) for a in (r_n, theta, beta_0, alpha))
     r_n, theta, beta_0, alpha = np.broadcast_arrays(*arguments)
     with np.errstate(all="ignore"):
-        passed = ("the slip angle reaches 90 degrees", np.isnan(circle.exact(r_n, theta, beta_0, alpha)[0]))
+        passed = ("the slip angle reaches 90 degrees", np.isfinite(circle.exact(r_n, theta, beta_0, alpha)[0]))
         return first_failure((*circle.conditions(r_n, theta, beta_0), passed), r_n.shape)
 
 

@@ -12,10 +12,10 @@ from estimator.domain import (
     RIGHT_ANGLE,
     elementwise,
     first_failure,
-    outside,
     quotient,
     require_friction_angle,
     require_positive,
+    where_all,
 )
 
 
@@ -42,7 +42,7 @@ def rotational_compliance(theta, m_z):
 def from_compliance(compliance, C):
     """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
-    return _distance(quotient((C, compliance), ()), (("the compliance is missing", ~np.isfinite(compliance)),))
+    return _distance(quotient((C, compliance), ()), (("the compliance is missing", np.isfinite(compliance)),))
 
 
 @elementwise
@@ -82,8 +82,8 @@ def estimated_slope(m_y, m_z, alpha_est):
     """β_est of (9), in rad: φ ± α_est on the side of φ; NaN where it reaches 90°, and for m_z ≤ 0."""
     require_friction_angle("alpha_est", alpha_est)
     steep = np.arctan2(np.abs(m_y), m_z) + alpha_est
-    failed = outside(_conditions(np.float64(1.0), m_y, m_z, alpha_est))
-    return np.where(failed, np.nan, np.copysign(np.minimum(steep, RIGHT_ANGLE), m_y))
+    slope = np.copysign(np.minimum(steep, RIGHT_ANGLE), m_y)
+    return where_all(_conditions(1.0, m_y, m_z, alpha_est), slope)
 
 
 @elementwise
@@ -213,21 +213,21 @@ def why_not(theta, m_y, m_z, *, alpha_est=0.0, beta=None, C=None):
         if C is not None:
             d_x = known_slope(theta, m_y, m_z, beta, C_or_one)
             d_x = d_x if by_slope else with_friction(theta, m_y, m_z, alpha_est, C_or_one)
-            conditions += (("the distance is beyond the range of a float", np.isnan(d_x)),)
+            conditions += (("the distance is beyond the range of a float", np.isfinite(d_x)),)
         return first_failure(conditions, theta.shape)
 
 
 def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
-    uphill = _across_slope(m_y, m_z, beta)[0] <= 0
+    downhill = _across_slope(m_y, m_z, beta)[0] > 0
     return (
-        ("a measured value is missing or infinite", ~finite),
-        ("the pushing angle is not positive", ~(theta > 0)),
-        ("the pushing angle is 90 degrees or more", ~(theta < RIGHT_ANGLE)),
-        ("m_z is not positive: the whisker does not push towards the object", ~(m_z > 0)),
-        ("the slope beta is 90 degrees or more", ~(np.abs(beta) < RIGHT_ANGLE)),
-        ("m_y points up the slope beta, too strongly for a contact there", uphill),
-        ("phi + alpha_est is 90 degrees or more", _friction_share(m_y, m_z, alpha_est)[0] <= 0),
+        ("a measured value is missing or infinite", finite),
+        ("the pushing angle is not positive", theta > 0),
+        ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
+        ("m_z is not positive: the whisker does not push towards the object", m_z > 0),
+        ("the slope beta is 90 degrees or more", np.abs(beta) < RIGHT_ANGLE),
+        ("m_y points up the slope beta, too strongly for a contact there", downhill),
+        ("phi + alpha_est is 90 degrees or more", _friction_share(m_y, m_z, alpha_est)[0] > 0),
     )
 
 
@@ -239,8 +239,8 @@ def _require_settings(alpha_est, C, length=1.0):
 
 def _distance(value, conditions):
     """`value` where it is a distance: conditions hold, positive, and inside the range of float64."""
-    lost = np.logical_not(np.greater(value, 0)) | np.isinf(value)
-    return np.where(outside(conditions) | lost, np.nan, value)
+    value = np.where(np.greater(value, 0) & np.isfinite(value), value, np.nan)
+    return where_all(conditions, value)
 
 
 def _centred(samples):

@@ -77,16 +77,18 @@ def require_sigma(name: str, value) -> None:
 
 
 def first_failure(conditions, shape):
-    """Text of the first failing condition, element by element; empty where all hold.
+    """Text of the first condition that does not hold, element by element; empty where all do.
 
-    `conditions` are pairs (text, mask of failures). Returns a str for shape (), else an array of str.
+    `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else an array of str.
     """
     reasons = np.full(shape, "", dtype=object)
-    for text, failed in conditions:
-        reasons[np.broadcast_to(failed, shape) & (reasons == "")] = text
+    for text, holds in conditions:
+        failed = np.logical_not(np.broadcast_to(holds, shape))
+        reasons[failed & (reasons == "")] = text
     return reasons.item() if shape == () else reasons.astype(str)
 
 
-def outside(conditions):
-    """Mask of the elements for which any of the `conditions` fails."""
-    return np.logical_or.reduce(np.broadcast_arrays(*(failed for _, failed in conditions)))
+def where_all(conditions, value):
+    """`value` where all conditions hold, NaN elsewhere."""
+    holds = np.logical_and.reduce(np.broadcast_arrays(*(mask for _, mask in conditions)))
+    return np.where(holds, value, np.nan)

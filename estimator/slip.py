@@ -15,10 +15,10 @@ from estimator.domain import (
     RIGHT_ANGLE,
     elementwise,
     first_failure,
-    outside,
     quotient,
     require_friction_angle,
     require_positive,
+    where_all,
 )
 
 
@@ -80,8 +80,8 @@ def moment_from_deflection(d_x, d_y, d_z, C):
     (1.8, 9.0)
     """
     require_positive("C", C, "N·mm²")
-    d_x = np.where(np.isfinite(d_x) & (d_x > 0), d_x, np.nan)
-    return quotient((C, d_z), (d_x, d_x)), quotient((C, d_y), (d_x, d_x))
+    pair = (quotient((C, deflection), (d_x, d_x)) for deflection in (d_z, d_y))
+    return tuple(np.where((d_x > 0) & np.isfinite(d_x) & np.isfinite(m), m, np.nan) for m in pair)
 
 
 @elementwise
@@ -105,15 +105,13 @@ def why_not(d_x, theta, beta):
 
 
 def _conditions(d_x, theta, beta):
+    finite = np.isfinite(d_x) & np.isfinite(theta) & np.isfinite(beta)
     return (
-        (
-            "a measured value is missing or infinite",
-            ~(np.isfinite(d_x) & np.isfinite(theta) & np.isfinite(beta)),
-        ),
-        ("the distance d_x is not positive", ~(d_x > 0)),
-        ("the pushing angle is negative", ~(theta >= 0)),
-        ("the pushing angle is 90 degrees or more", ~(theta < RIGHT_ANGLE)),
-        ("the slope beta is 90 degrees or more", ~(np.abs(beta) < RIGHT_ANGLE)),
+        ("a measured value is missing or infinite", finite),
+        ("the distance d_x is not positive", d_x > 0),
+        ("the pushing angle is negative", theta >= 0),
+        ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
+        ("the slope beta is 90 degrees or more", np.abs(beta) < RIGHT_ANGLE),
     )
 
 
@@ -123,7 +121,7 @@ def _require_settings(alpha, C):
 
 
 def _inside(d_x, theta, beta, value):
-    return np.where(outside(_conditions(d_x, theta, beta)) | np.isinf(value), np.nan, value)
+    return where_all((*_conditions(d_x, theta, beta), ("beyond the range of a float", np.isfinite(value))), value)
 
 
 def _held_angle(beta, alpha):

@@ -10,7 +10,7 @@ from estimator import circle
 from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive
 
 EQUATIONS = ("no_slip", "with_friction")
-SEARCH_STEP = np.radians(0.1)
+SEARCH_STEP = np.radians(0.25)
 HALVINGS = 50
 
 
@@ -25,7 +25,7 @@ def distance_error(beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation=
     _require(alpha, alpha_est, equation)
     if np.all(np.isinf(r_n)):
         return _flat_error(beta_0, alpha, alpha_est, equation == "no_slip")
-    return _curved_error(beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", printed)
+    return _curved_error(beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed))
 
 
 def slope_threshold(error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
@@ -42,7 +42,7 @@ def slope_threshold(error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equat
     if np.all(np.isinf(r_n)):
         return _flat_threshold(error, alpha, alpha_est, equation == "no_slip")
     require_positive("theta", theta, "rad")
-    return _curved_threshold(error, alpha, alpha_est, r_n, theta, equation == "no_slip", printed)
+    return _curved_threshold(error, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed))
 
 
 def _require(alpha, alpha_est, equation):
@@ -76,11 +76,13 @@ def _flat_threshold(error, alpha, alpha_est, no_slip):
     return np.arctan(np.where(no_slip, of_2, np.where(never, np.nan, of_10)))
 
 
+def _form(printed):
+    return circle.printed if printed else circle.exact
+
+
 @elementwise
-def _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, printed):
-    as_printed = circle.printed(r_n, theta, beta_0, alpha)
-    exact = circle.exact(r_n, theta, beta_0, alpha)
-    phi, d = (np.where(printed, *pair) for pair in zip(as_printed, exact))
+def _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, form):
+    phi, d = form(r_n, theta, beta_0, alpha)
     angle, assumed = np.abs(phi), np.where(no_slip, 0.0, alpha_est)
     of_2 = theta / (d * np.cos(angle)) - 1
     of_10 = theta * np.maximum(0.0, np.cos(angle + assumed)) / (d * np.cos(assumed)) - 1
@@ -88,17 +90,16 @@ def _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, printed):
 
 
 @elementwise
-def _curved_threshold(error, alpha, alpha_est, r_n, theta, no_slip, printed):
-    """First slope on a fine grid at which the error is reached, then bisection back to the crossing."""
-    fixed = np.broadcast_arrays(alpha, alpha_est, r_n, theta, no_slip, printed, error)
-    *fixed, error = (a[..., None] for a in fixed)
+def _curved_threshold(error, alpha, alpha_est, r_n, theta, no_slip, form):
+    """First slope on a grid at which the error is reached, then bisection back to the crossing."""
+    fixed = [a[..., None] for a in np.broadcast_arrays(alpha, alpha_est, r_n, theta, no_slip)]
     slopes = np.arange(0.0, RIGHT_ANGLE, SEARCH_STEP)
-    reached = np.abs(_curved_error(slopes, *fixed)) >= error
+    reached = np.abs(_curved_error(slopes, *fixed, form)) >= error[..., None]
     first = np.argmax(reached, axis=-1)
     high, low = slopes[first], slopes[np.maximum(first - 1, 0)]
-    fixed, error = [a[..., 0] for a in fixed], error[..., 0]
+    fixed = [a[..., 0] for a in fixed]
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        beyond = np.abs(_curved_error(middle, *fixed)) >= error
+        beyond = np.abs(_curved_error(middle, *fixed, form)) >= error
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     return np.where(reached.any(axis=-1), high, np.nan)

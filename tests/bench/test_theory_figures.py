@@ -55,7 +55,7 @@ def test_threshold_that_is_never_reached_is_an_empty_cell(written):
 
 @pytest.mark.parametrize("number, curves", [(5, figure_5), (6, figure_6)])
 def test_curves_pass_through_the_printed_points(number, curves):
-    """The text gives β in whole degrees and reads α off the plot to 0.2°, where the curves fall by up to 13° a degree."""
+    """The text gives whole degrees of β and reads α off the plot to 0.2°; the curves fall by up to 13° a degree."""
     drawn = list(curves())
     for panel, points in PRINTED_POINTS[number].items():
         for x, beta in points:
