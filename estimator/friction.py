@@ -16,6 +16,7 @@ READINGS = ("moments", "magnitude")
 GRID = np.radians(np.arange(0.0, 89.95, 0.25))
 GOLDEN = (np.sqrt(5) - 1) / 2
 SHRINKINGS = 45
+ROUNDING = 1e-14  # share of the data's squares that a sum of squares does not tell apart
 NEVER_SLIPPED = "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
 VAGUE = "the data hardly hold the friction angle: its sigma is above 1 rad"
 AT_ZERO = "at the bound: the best friction angle is 0"
@@ -62,7 +63,10 @@ def fit_alpha(beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None,
         sigma, freedom = _sigma_of_residuals(residuals, slopes)
     else:
         sigma, freedom = _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading), np.inf
-    return _fit(alpha, sigma, freedom, residuals, beta)
+    stuck = data - _model(np.full_like(alpha, np.abs(beta).max()), beta, scale, reading)
+    rounding = ROUNDING * (data**2).sum(axis=-1)
+    unseen = (stuck**2).sum(axis=-1) <= (residuals**2).sum(axis=-1) + rounding
+    return _fit(alpha, sigma, freedom, residuals, unseen)
 
 
 def curves(alpha, beta, d_x, theta, C):
@@ -143,8 +147,7 @@ def _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading):
         return np.sqrt((slopes**2 * sigmas**2).sum(axis=-1)) / (slopes**2).sum(axis=-1)
 
 
-def _fit(alpha, sigma, freedom, residuals, beta):
-    unseen = alpha >= np.abs(beta).max()
+def _fit(alpha, sigma, freedom, residuals, unseen):
     vague = ~(sigma < 1) & ~unseen
     at_zero = (alpha < GRID[1] / 100) & ~vague
     status = np.select([unseen, vague, at_zero], [NEVER_SLIPPED, VAGUE, AT_ZERO], "")

@@ -95,8 +95,12 @@ def test_geometry_of_figure_10():
     y_c, z_c = curvature.initial_contact(2.0, np.pi / 6)
     assert (y_c, z_c) == pytest.approx((np.sqrt(3), 1.0), rel=4 * EPSILON)
     assert np.hypot(y_c, z_c) == pytest.approx(2.0, rel=4 * EPSILON)
-    assert curvature.virtual_angle(2.0, 0.1, np.pi / 6) == pytest.approx(np.arctan2(1.0, np.sqrt(3) - 0.1), rel=4 * EPSILON)
-    assert curvature.virtual_radius(2.0, 0.1, np.pi / 6) == pytest.approx(np.hypot(1.0, np.sqrt(3) - 0.1), rel=4 * EPSILON)
+    assert curvature.virtual_angle(2.0, 0.1, np.pi / 6) == pytest.approx(
+        np.arctan2(1.0, np.sqrt(3) - 0.1), rel=4 * EPSILON
+    )
+    assert curvature.virtual_radius(2.0, 0.1, np.pi / 6) == pytest.approx(
+        np.hypot(1.0, np.sqrt(3) - 0.1), rel=4 * EPSILON
+    )
 
 
 def test_angle_of_the_virtual_point_has_no_pole():
