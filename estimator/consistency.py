@@ -4,7 +4,7 @@ With a wrong α the distances are off by a factor that depends on the slip angle
 scatter unless all have the same slip angle: then any α fits alike, and the answer says so.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +18,8 @@ AT_BOUND = "at the bound of the search"
 STEEPEST_SHARE = 0.99
 GRID_SIZE = 121
 SMALL_SPREAD = 0.05
+FEWEST = 6
+TOLERANCE_RAD = 1e-10
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,8 @@ class Contacts:
 
     theta [rad], m_y, m_z [N·mm] at the pushing angle, C = 3EI [N·mm²], touch [rad] the motor angle of
     first touch, z_c [mm] the height of the plane of rotation, poses (n, 3, 4) from each whisker's rig
-    frame to the object's frame (none: all alike), weights. Raises ValueError where shapes disagree.
+    frame to the object's frame (none: all alike), weights. Raises ValueError where shapes disagree or a row is no
+    push against an object.
     """
 
     theta: np.ndarray
@@ -45,6 +48,20 @@ class Contacts:
             raise ValueError("theta, m_y, m_z, touch and z_c must be arrays (n,) of one length")
         if self.poses is not None and np.shape(self.poses) != (*shape, 3, 4):
             raise ValueError(f"poses has shape {np.shape(self.poses)}: must be {(*shape, 3, 4)}")
+        if not np.isfinite(self.distances(0.0)).all():
+            raise ValueError("a contact is no push against an object (see distance.why_not): leave it out")
+
+    def without(self, index):
+        """All contacts but one."""
+        rows = ("theta", "m_y", "m_z", "touch", "z_c", "poses", "weights")
+        kept = {name: getattr(self, name) for name in rows}
+        return replace(self, **{name: np.delete(a, index, axis=0) for name, a in kept.items() if a is not None})
+
+    @property
+    def shares(self):
+        """Weights (n,) that sum to one."""
+        weights = np.ones(len(self.theta)) if self.weights is None else np.asarray(self.weights, dtype=float)
+        return weights / weights.sum()
 
     @property
     def phi(self):
@@ -87,35 +104,49 @@ def most_consistent_alpha(contacts, *, curve="line", stiffness=1e-3) -> Consiste
     if curve not in CURVES:
         raise ValueError(f"curve = {curve!r}: must be one of {', '.join(CURVES)}")
     phi = contacts.phi
-    if len(phi) < 5:
+    if len(np.unique(contacts.points(0.0).round(6), axis=0)) < FEWEST:
         return Consistency(np.nan, np.nan, np.nan, TOO_FEW)
     if not np.ptp(np.abs(np.tan(phi))) > SMALL_SPREAD:
         return Consistency(np.nan, np.nan, np.nan, ONE_SLOPE)
 
-    def residuals(alpha):
-        return _residuals(contacts, alpha, curve, stiffness)
-
     grid = np.linspace(0.0, STEEPEST_SHARE * (np.pi / 2 - np.abs(phi).max()), GRID_SIZE)
-    best = int(np.argmin([np.square(residuals(alpha)).sum() for alpha in grid]))
-    alpha = _refined(residuals, grid, best)
+    best = int(np.argmin([_roughness(contacts, alpha, curve, stiffness) for alpha in grid]))
+    bracket = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    alpha = _smoothest(contacts, bracket, curve, stiffness)
     status = AT_BOUND if best in (0, len(grid) - 1) else ""
-    sigma = _sigma(residuals, alpha, grid[1] / 10)
-    rms = np.sqrt(np.mean(np.sum(_from_curve(contacts.points(alpha), curve, stiffness, None) ** 2, axis=1)))
-    return Consistency(float(alpha), sigma, float(rms), status)
+    sigma = _jackknife(contacts, alpha, grid, curve, stiffness)
+    off = _from_curve(contacts.points(alpha), curve, stiffness, contacts.shares)
+    return Consistency(alpha, sigma, float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), status)
 
 
-def _residuals(contacts, alpha, curve, stiffness):
-    """Weighted distances (n, 2 or 3) from the curve, as shares of d_x."""
-    weights = np.ones(len(contacts.theta)) if contacts.weights is None else np.asarray(contacts.weights)
-    off = _from_curve(contacts.points(alpha), curve, stiffness, weights)
-    return off * (np.sqrt(weights / weights.mean()) / contacts.distances(alpha))[:, None]
+def _roughness(contacts, alpha, curve, stiffness):
+    """Weighted mean square of the distances from the curve, as shares of d_x."""
+    off = _from_curve(contacts.points(alpha), curve, stiffness, contacts.shares)
+    return contacts.shares @ ((off**2).sum(axis=1) / contacts.distances(alpha) ** 2)
+
+
+def _smoothest(contacts, bracket, curve, stiffness, tolerance=TOLERANCE_RAD):
+    from scipy.optimize import minimize_scalar
+
+    def cost(alpha):
+        return _roughness(contacts, alpha, curve, stiffness)
+
+    return float(minimize_scalar(cost, bounds=bracket, method="bounded", options={"xatol": tolerance}).x)
+
+
+def _jackknife(contacts, alpha, grid, curve, stiffness):
+    """Sigma of α from leaving out each contact in turn, so that steep contacts may scatter more than others."""
+    reach = 5 * grid[1]
+    bracket = max(0.0, alpha - reach), min(grid[-1], alpha + reach)
+    count = len(contacts.theta)
+    without = [_smoothest(contacts.without(i), bracket, curve, stiffness, 1e-6) for i in range(count)]
+    return float(np.sqrt((count - 1) * np.var(without)))
 
 
 def _from_curve(points, curve, stiffness, weights):
     """Offsets (n, 3) of points from their best line, or (n, 2) from their smoothing spline along that
     line.
     """
-    weights = np.ones(len(points)) if weights is None else weights
     centred = points - np.average(points, axis=0, weights=weights)
     axes = np.linalg.svd(np.sqrt(weights)[:, None] * centred, full_matrices=False)[2]
     along, across = centred @ axes[0], centred @ axes[1:].T
@@ -139,27 +170,3 @@ def _spline(x, y, weights, stiffness):
         mean = np.bincount(member, weights * column) / total
         columns.append(make_smoothing_spline(centres, mean, w=total, lam=stiffness)(centres)[member])
     return np.stack(columns, axis=-1)
-
-
-def _refined(residuals, grid, best):
-    from scipy.optimize import minimize_scalar
-
-    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    cost = minimize_scalar(
-        lambda alpha: np.square(residuals(alpha)).sum(),
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": 1e-10},
-    )
-    return cost.x
-
-
-def _sigma(residuals, alpha, step):
-    """Sigma of α from each contact's own offset and how fast it changes with α, so steep contacts may
-    scatter more.
-    """
-    here = residuals(alpha)
-    change = (residuals(alpha + step) - residuals(max(alpha - step, 0.0))) / (step + min(alpha, step))
-    pull = (change * here).sum(axis=1)
-    contacts = len(pull)
-    return float(np.sqrt(contacts / (contacts - 3) * (pull**2).sum()) / np.square(change).sum())

@@ -54,7 +54,8 @@ def fit_alpha(beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None,
     """
     if reading not in READINGS:
         raise ValueError(f"reading = {reading!r}: must be one of {', '.join(READINGS)}")
-    require_positive("C", C, "N·mm²")
+    for name, value, unit in (("C", C, "N·mm²"), ("d_x", d_x, "mm"), ("theta", theta, "rad")):
+        require_positive(name, value, unit)
     beta, data, scale = _observations(beta, m_y, m_z, d_x, theta, C, reading)
     alpha = _least_squares(beta, data, scale, reading)
     residuals = data - _model(alpha, beta, scale, reading)
@@ -63,10 +64,7 @@ def fit_alpha(beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None,
         sigma, freedom = _sigma_of_residuals(residuals, slopes)
     else:
         sigma, freedom = _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading), np.inf
-    stuck = data - _model(np.full_like(alpha, np.abs(beta).max()), beta, scale, reading)
-    rounding = ROUNDING * (data**2).sum(axis=-1)
-    unseen = (stuck**2).sum(axis=-1) <= (residuals**2).sum(axis=-1) + rounding
-    return _fit(alpha, sigma, freedom, residuals, unseen)
+    return _fit(alpha, sigma, freedom, residuals, _fits_as_well_without_slip(residuals, beta, data, scale, reading))
 
 
 def curves(alpha, beta, d_x, theta, C):
@@ -76,7 +74,7 @@ def curves(alpha, beta, d_x, theta, C):
 
 def _observations(beta, m_y, m_z, d_x, theta, C, reading):
     m_y, m_z = np.broadcast_arrays(np.asarray(m_y, dtype=float), np.asarray(m_z, dtype=float))
-    beta, scale = np.broadcast_arrays(np.asarray(beta, dtype=float), np.asarray(C * theta / d_x, dtype=float))
+    beta, scale = np.broadcast_arrays(np.asarray(beta, dtype=float), C * np.divide(theta, d_x))
     if m_y.shape[-1:] != beta.shape or beta.size < 2:
         raise ValueError(f"slopes {beta.shape} and moments {m_y.shape}: need one slope a moment, two at least")
     if not (np.isfinite(m_y).all() and np.isfinite(m_z).all() and np.isfinite(beta).all()):
@@ -145,6 +143,12 @@ def _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading):
         sigmas = np.concatenate([sigma_y, sigma_z], axis=-1)
     with np.errstate(all="ignore"):
         return np.sqrt((slopes**2 * sigmas**2).sum(axis=-1)) / (slopes**2).sum(axis=-1)
+
+
+def _fits_as_well_without_slip(residuals, beta, data, scale, reading):
+    stuck = data - _model(np.abs(beta).max(), beta, scale, reading)
+    rounding = ROUNDING * (data**2).sum(axis=-1)
+    return (stuck**2).sum(axis=-1) <= (residuals**2).sum(axis=-1) + rounding
 
 
 def _fit(alpha, sigma, freedom, residuals, unseen):
