@@ -6,21 +6,20 @@ complement). The work grows linearly with views; what is left to solve is as sma
 and its inverse is the covariance of what is kept, everything eliminated being marginalised.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
-from vision.bundle import N_BOARD, N_CAMERA, Knowledge, Sightings, State, predict
+from vision.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, Knowledge, Sightings, State, predict
 from vision.rotation import pose_difference
 
-_TIME = N_CAMERA - 2  # a picture being late moves its corners as the camera's clock offset does
 _GLOBAL = N_CAMERA + N_BOARD
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The state of least cost, its residuals (n, 2) px (seen − predicted), and the covariance (17 C + 3
+    """The state of least cost, its residuals (n, 2) px (seen − predicted), and the covariance (16 C + 3
     squared) of the global parameters with all view poses marginalised; rows of held parameters are 0."""
 
     state: State
@@ -45,12 +44,13 @@ def robust_cost(squared: np.ndarray, width: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Shots:
-    """Pictures: their camera, view (s,), their columns among the globals (s, 20), and what eliminating each
-    one's instant left behind: its own weight and gradient (s,), its coupling to the 26 columns (s, 26)."""
+    """Pictures: camera, view (s,); columns among the globals (s, 19) and among all views' (s, 6 or 18); and what
+    eliminating each one's instant left: its weight and gradient (s,), its coupling to those columns (s, 25 or 37)."""
 
     camera: np.ndarray
     view: np.ndarray
     columns: np.ndarray
+    poses: np.ndarray
     weight: np.ndarray
     gradient: np.ndarray
     coupling: np.ndarray
@@ -58,7 +58,10 @@ class _Shots:
 
 @dataclass(frozen=True, eq=False)
 class _Normal:
-    """Normal equations: A (G, G), a (G,) of the globals; B (V, G, 6); C (V, 6, 6), c (V, 6) of the views."""
+    """Normal equations: A (G, G), a (G,) of the globals; B (G, 6 V); C, c (6 V,) of the views.
+
+    C is kept as its lower band (b, 6 V), C[i − j, j] being row i, column j: views touch only their neighbours in time.
+    """
 
     A: np.ndarray
     a: np.ndarray
@@ -84,44 +87,58 @@ def _normal_equations(
         J.transpose(0, 2, 1) @ np.concatenate([J, r[:, :, None]], axis=2), seen.shot_starts()
     )
     shots, blocks, late_cost = _without_instants(blocks, state, seen, known)
-    parts = _assemble(blocks, shots, len(known.free), len(state.T_world_board))
+    parts = _assemble(blocks, shots, state)
     cost = float(np.sum(robust_cost(squared, width)) + late_cost)
     return _with_knowledge(parts, shots, cost, residual, state, known)
 
 
 def _without_instants(blocks: np.ndarray, state: State, seen: Sightings, known: Knowledge):
-    """Eliminates each picture's instant from its block (26 × 27, the last column being the gradient)."""
-    starts, size = seen.shot_starts(), len(known.free)
+    """Eliminates each picture's instant from its block (25 × 26 or 37 × 38, the last column being the gradient)."""
+    starts = seen.shot_starts()
     camera, view = seen.camera[starts], seen.view[starts]
-    own = N_CAMERA * camera[:, None] + np.arange(N_CAMERA)
-    shared = np.broadcast_to(np.arange(size - N_BOARD, size), (len(starts), N_BOARD))
-    columns = np.concatenate([own, shared], axis=1)
-    if known.late_sigma_s is None:
+    columns, poses = _columns(state, camera, view)
+    if state.trajectory is None or known.late_sigma_s is None:
         nothing = np.zeros(len(starts))
-        return _Shots(camera, view, columns, nothing + 1, nothing, np.zeros((len(starts), 26))), blocks, 0.0
+        return _Shots(camera, view, columns, poses, nothing + 1, nothing, 0 * blocks[:, :, 0]), blocks, 0.0
     information, late = known.late_sigma_s[camera] ** -2.0, state.instants[view, camera]
-    weight = blocks[:, _TIME, _TIME] + information
-    gradient = blocks[:, _TIME, -1] - information * late
-    coupling = blocks[:, :, _TIME]
-    lost = coupling[:, :, None] * np.concatenate([coupling, gradient[:, None]], axis=1)[:, None] / weight[:, None, None]
-    shots = _Shots(camera, view, columns, weight, gradient, coupling)
-    return shots, blocks - lost, float(np.sum(information * late**2))
+    loose = ~state.trajectory.is_reference(view, camera)
+    weight = blocks[:, CLOCK, CLOCK] + information
+    gradient = (blocks[:, CLOCK, -1] - information * late) * loose
+    coupling = blocks[:, :, CLOCK] * loose[:, None]
+    lost = coupling[:, :, None] * np.concatenate([coupling, gradient[:, None]], axis=1)[:, None]
+    shots = _Shots(camera, view, columns, poses, weight, gradient, coupling)
+    return shots, blocks - lost / weight[:, None, None], float(np.sum(information * late**2))
 
 
-def _assemble(blocks: np.ndarray, shots: _Shots, size: int, n_views: int) -> tuple[np.ndarray, ...]:
+def _columns(state: State, camera: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where a picture's parameters stand among the globals (s, 19) and among the views' (s, 6 or 18)."""
+    size = N_CAMERA * len(state.lens)
+    own = N_CAMERA * camera[:, None] + np.arange(N_CAMERA)
+    shared = np.broadcast_to(size + np.arange(N_BOARD), (len(view), N_BOARD))
+    views = view[:, None]
+    if state.trajectory is not None:
+        views = np.concatenate([views, state.trajectory.neighbours[view]], axis=1)
+    poses = (N_VIEW * views[:, :, None] + np.arange(N_VIEW)).reshape(len(view), -1)
+    return np.concatenate([own, shared], axis=1), poses
+
+
+def _assemble(blocks: np.ndarray, shots: _Shots, state: State) -> tuple[np.ndarray, ...]:
     """Adds each picture's block where its parameters stand."""
-    columns, view, m = shots.columns, shots.view, _GLOBAL
-    A, a = np.zeros((size, size)), np.zeros(size)
-    B, C, c = np.zeros((n_views, size, 6)), np.zeros((n_views, 6, 6)), np.zeros((n_views, 6))
+    columns, poses, m = shots.columns, shots.poses, _GLOBAL
+    size, n = N_CAMERA * len(state.lens) + N_BOARD, N_VIEW * len(state.T_world_board)
+    apart = poses[:, :, None] - poses[:, None, :]
+    A, a, B, c = np.zeros((size, size)), np.zeros(size), np.zeros((size, n)), np.zeros(n)
+    C = np.zeros((int(apart.max()) + 1, n))
     np.add.at(A, (columns[:, :, None], columns[:, None, :]), blocks[:, :m, :m])
     np.add.at(a, columns, blocks[:, :m, -1])
-    np.add.at(B, (view[:, None, None], columns[:, :, None], np.arange(6)), blocks[:, :m, m:-1])
-    np.add.at(C, view, blocks[:, m:, m:-1])
-    np.add.at(c, view, blocks[:, m:, -1])
+    np.add.at(B, (columns[:, :, None], poses[:, None, :]), blocks[:, :m, m:-1])
+    lower = apart >= 0
+    np.add.at(C, (apart[lower], np.broadcast_to(poses[:, None, :], apart.shape)[lower]), blocks[:, m:, m:-1][lower])
+    np.add.at(c, poses, blocks[:, m:, -1])
     return A, a, B, C, c
 
 
-def _with_knowledge(parts, shots: _Shots, cost: float, residual: np.ndarray, state: State, known: Knowledge) -> _Normal:
+def _with_knowledge(parts, shots: _Shots, cost: float, residual, state: State, known: Knowledge) -> _Normal:
     """Adds the observations beside the pictures, and takes out what is held."""
     A, a, B, C, c = parts
     weight = 1.0 / known.sigma**2
@@ -131,46 +148,53 @@ def _with_knowledge(parts, shots: _Shots, cost: float, residual: np.ndarray, sta
     a = a + weight * miss
     cost += float(np.sum(weight * miss**2))
     if known.pose_view is not None and known.view_free[known.pose_view]:
-        T, information = state.T_world_board[known.pose_view], 1.0 / known.pose_sigma**2
-        off = -pose_difference(known.pose_T, T)
-        C[known.pose_view] += np.diag(information)
-        c[known.pose_view] += information * off
+        rows = N_VIEW * known.pose_view + np.arange(N_VIEW)
+        information = 1.0 / known.pose_sigma**2
+        off = -pose_difference(known.pose_T, state.T_world_board[known.pose_view])
+        C[0, rows] += information
+        c[rows] += information * off
         cost += float(np.sum(information * off**2))
-    held = ~known.view_free | (np.einsum("vii->v", C) == 0)
-    B[held], c[held], C[held] = 0.0, 0.0, np.eye(6)
+    _hold(B, C, c, np.repeat(~known.view_free, N_VIEW) | (C[0] == 0))
     return _Normal(A, a, B, C, c, shots, cost, residual)
+
+
+def _hold(B: np.ndarray, C: np.ndarray, c: np.ndarray, held: np.ndarray) -> None:
+    """Makes the held (6 V,) parameters of the views stand by themselves, with no step to take."""
+    B[:, held], c[held], C[:, held] = 0.0, 0.0, 0.0
+    for offset in range(1, len(C)):
+        C[offset, :-offset][held[offset:]] = 0.0
+    C[0, held] = 1.0
 
 
 def _solve_step(normal: _Normal, known: Knowledge, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C)."""
     free = known.free
-    raise_by = 1.0 + damping
     C = normal.C.copy()
-    np.einsum("vii->vi", C)[...] *= raise_by
-    reduced, gradient, BC = _eliminate(normal, C, free)
+    C[0] *= 1.0 + damping
+    reduced, gradient, CB, Cc = _eliminate(normal, C, free)
     np.einsum("ii->i", reduced)[...] += damping * np.diag(normal.A)[free]
     step = np.zeros(len(free))
     step[free] = _scaled_solve(reduced, gradient)
-    views = np.linalg.solve(C, normal.c[:, :, None])[:, :, 0] - np.einsum("vgi,g->vi", BC, step[free])
-    return step, views, _instant_steps(normal.shots, step, views, len(free) // N_CAMERA)
+    views = Cc - CB @ step[free]
+    instants = _instant_steps(normal.shots, step, views, len(free) // N_CAMERA)
+    return step, views.reshape(-1, N_VIEW), instants
 
 
 def _instant_steps(shots: _Shots, step: np.ndarray, views: np.ndarray, n_cameras: int) -> np.ndarray:
-    with_others = np.concatenate([step[shots.columns], views[shots.view]], axis=1)
-    instants = np.zeros((len(views), n_cameras))
+    with_others = np.concatenate([step[shots.columns], views[shots.poses]], axis=1)
+    instants = np.zeros((len(views) // N_VIEW, n_cameras))
     instants[shots.view, shots.camera] = (
         shots.gradient - np.sum(shots.coupling * with_others, axis=1)
     ) / shots.weight
     return instants
 
 
-def _eliminate(normal: _Normal, C: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Schur complement: reduced matrix and gradient of the free globals, and B C⁻¹ (V, F, 6)."""
-    B = normal.B[:, free]
-    BC = np.linalg.solve(C, B.transpose(0, 2, 1)).transpose(0, 2, 1)
-    flat, flat_BC = (M.transpose(1, 0, 2).reshape(B.shape[1], 6 * len(B)) for M in (B, BC))
-    reduced = normal.A[np.ix_(free, free)] - flat_BC @ flat.T
-    return reduced, normal.a[free] - flat_BC @ normal.c.ravel(), BC
+def _eliminate(normal: _Normal, C: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Schur complement: reduced matrix and gradient of the free globals, C⁻¹Bᵀ (6 V, F) and C⁻¹c (6 V,)."""
+    B = normal.B[free]
+    solved = solveh_banded(C, np.column_stack([B.T, normal.c]), lower=True, check_finite=False)
+    CB, Cc = solved[:, :-1], solved[:, -1]
+    return normal.A[np.ix_(free, free)] - B @ CB, normal.a[free] - B @ Cc, CB, Cc
 
 
 def _scale(matrix: np.ndarray) -> np.ndarray:
@@ -202,12 +226,10 @@ def solve(
     width: float = np.inf,
     max_iterations: int = 60,
     tolerance: float = 1e-9,
-    between: Callable[[State], State] | None = None,
 ) -> Solution:
     """Least cost from `state`. width: of Cauchy's loss in sigmas, inf for least squares.
 
-    tolerance: relative fall of the cost at which it is done. between: called after each accepted step, for
-    what is taken as known within a step (the board's rates).
+    tolerance: relative fall of the cost at which it is done.
     """
     normal = _normal_equations(state, seen, corners_mm, known, width)
     damping, done, iteration = 1e-4, False, 0
@@ -218,9 +240,6 @@ def solve(
         if trial.cost <= normal.cost * (1 + 1e-13):
             done = normal.cost - trial.cost <= tolerance * (1e-12 + normal.cost)
             state, normal, damping = tried, trial, max(damping * 0.1, 1e-12)
-            if between is not None:
-                state = between(state)
-                normal = _normal_equations(state, seen, corners_mm, known, width)
         else:
             damping *= 10.0
             done = damping > 1e8
@@ -230,6 +249,6 @@ def solve(
 def _solution(state: State, normal: _Normal, known: Knowledge, iterations: int, done: bool) -> Solution:
     covariance = np.zeros((len(known.free),) * 2)
     if np.isfinite(normal.cost) and known.free.any():
-        reduced, _, _ = _eliminate(normal, normal.C, known.free)
+        reduced, *_ = _eliminate(normal, normal.C, known.free)
         covariance[np.ix_(known.free, known.free)] = _inverse(reduced)
     return Solution(state, normal.residual_px, covariance, normal.cost, iterations, done)

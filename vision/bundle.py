@@ -3,7 +3,7 @@ them.
 
 Every observation is a corner of the board, seen by one camera in one view. Parameters:
 
-- of each camera, CAMERA_COLUMNS: nine of the lens, w and v of its pose, clock offset and readout time (17);
+- of each camera, CAMERA_COLUMNS: nine of the lens, w and v of its pose, clock offset (16);
 - of the board, BOARD_COLUMNS: relative size, warp along x and y (3);
 - of each view: w and v of the board's pose (6);
 - where the board moves and cameras are not triggered together, of each picture: how late it is (1).
@@ -16,15 +16,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vision import lens as lens_model
-from vision.rotation import exp_rotation, skew
+from vision.board_motion import Trajectory
+from vision.rotation import exp_rotation, left_jacobian, skew
 
 CAMERA_COLUMNS = (
-    *lens_model.LENS_TERMS, "w_x", "w_y", "w_z", "v_x", "v_y", "v_z", "clock_offset_s", "readout_s",
+    *lens_model.LENS_TERMS, "w_x", "w_y", "w_z", "v_x", "v_y", "v_z", "clock_offset_s",
 )  # fmt: skip
 BOARD_COLUMNS = ("scale", "warp_x_mm", "warp_y_mm")
 N_CAMERA, N_BOARD, N_VIEW = len(CAMERA_COLUMNS), len(BOARD_COLUMNS), 6
 POSE = slice(9, 15)
-CLOCK = slice(15, 17)
+CLOCK = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +59,9 @@ class Sightings:
 @dataclass(frozen=True, eq=False)
 class State:
     """All parameters. lens (C, 9); T_camera_world (C, 3, 4); T_world_board (V, 3, 4); board (3,):
-    BOARD_COLUMNS; clock (C, 2): offset and readout, s. motion (V, 12): the board's rates of turn and travel
-    at each view (rad/s, mm/s) and their growth (rad/s², mm/s²), taken as known; None where cameras are
-    triggered together. instants (V, C): how much later than it should each picture was taken, s.
+    BOARD_COLUMNS; clock (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
+    trajectory: the views in time, along which the board moves between pictures of one view; None where cameras are
+    triggered together.
     """
 
     lens: np.ndarray
@@ -68,23 +69,23 @@ class State:
     T_world_board: np.ndarray
     board: np.ndarray = field(default_factory=lambda: np.zeros(N_BOARD))
     clock: np.ndarray | None = None
-    motion: np.ndarray | None = None
     instants: np.ndarray | None = None
+    trajectory: Trajectory | None = None
 
     def __post_init__(self):
         if self.clock is None:
-            object.__setattr__(self, "clock", np.zeros((len(self.lens), 2)))
+            object.__setattr__(self, "clock", np.zeros(len(self.lens)))
         if self.instants is None:
             object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), len(self.lens))))
 
     def globals(self) -> np.ndarray:
-        """The values that priors speak of, (17 C + 3,); poses stand as 0."""
+        """The values that priors speak of, (16 C + 3,); poses stand as 0."""
         per_camera = np.zeros((len(self.lens), N_CAMERA))
         per_camera[:, :9], per_camera[:, CLOCK] = self.lens, self.clock
         return np.concatenate([per_camera.ravel(), self.board])
 
     def stepped(self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray) -> "State":
-        """Moved by (17 C + 3,), (V, 6) and (V, C)."""
+        """Moved by (16 C + 3,), (V, 6) and (V, C)."""
         cameras = global_step[:-N_BOARD].reshape(-1, N_CAMERA)
         return replace(
             self,
@@ -106,7 +107,7 @@ def _moved(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
 class Knowledge:
     """What is known beside the pictures, and what is held.
 
-    free: (17 C + 3,) bool. mean, sigma: (17 C + 3,) of independent observations of the global parameters,
+    free: (16 C + 3,) bool. mean, sigma: (16 C + 3,) of independent observations of the global parameters,
     sigma inf where there is none (poses: always inf). view_free: (V,) bool. pose_view, pose_T (3, 4),
     pose_sigma (6,): one view whose pose was measured (the board on the rig), in w rad and v mm; pose_view
     is None where there is none. late_sigma_s (C,): how far a picture's instant strays from its time; 0: not
@@ -124,10 +125,13 @@ class Knowledge:
 
 
 def predict(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels (n, 2) and their Jacobian (n, 2, 26): the seeing camera's 17 columns, the board's 3, the
-    view's 6.
+    """Pixels (n, 2) and their Jacobian (n, 2, 25 or 37).
+
+    Its columns: the seeing camera's 16, the board's 3, the view's 6; with a trajectory also the 6 of the view before
+    and the 6 of the view after.
     """
-    px, J = np.empty((len(seen), 2)), np.empty((len(seen), 2, N_CAMERA + N_BOARD + N_VIEW))
+    width = N_CAMERA + N_BOARD + N_VIEW * (1 if state.trajectory is None else 3)
+    px, J = np.empty((len(seen), 2)), np.empty((len(seen), 2, width))
     points, by_board = _printed(state, seen, corners_mm)
     for camera in np.unique(seen.camera):
         rows = np.flatnonzero(seen.camera == camera)
@@ -152,39 +156,62 @@ def _printed(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.
 def _predict_one(state: State, camera: int, seen: Sightings, points: np.ndarray, by_board: np.ndarray):
     T_board, T_camera = state.T_world_board[seen.view], state.T_camera_world[camera]
     turned = np.einsum("nij,nj->ni", T_board[:, :, :3], points)
-    turn, shift, velocity = _motion(state, camera, seen, turned)
-    moved = np.einsum("nij,nj->ni", turn, turned)
+    motion = _motion(state, camera, seen)
+    moved = np.einsum("nij,nj->ni", motion.turn, turned)
     R = T_camera[:, :3]
-    in_camera = (moved + T_board[:, :, 3] + shift) @ R.T
+    in_camera = (moved + T_board[:, :, 3] + motion.shift_mm) @ R.T
     px, by_x, by_lens = lens_model.project_with_jacobians(in_camera + T_camera[:, 3], state.lens[camera])
     by_world = by_x @ R
-    by_time = by_world @ velocity[:, :, None]
-    rows = _row_share(seen.px, state.lens[camera])[:, None, None]
-    columns = [by_lens, -by_x @ skew(in_camera), by_x, by_time, by_time * rows]
-    columns += [by_world @ turn @ T_board[:, :, :3] @ by_board, -by_world @ skew(moved) @ turn, by_world]
-    return px, np.concatenate(columns, axis=2)
+    by_turn = -by_world @ skew(moved)
+    columns = [by_lens, -by_x @ skew(in_camera), by_x]
+    columns.append(by_turn @ motion.turn_rate[:, :, None] + by_world @ motion.shift_rate_mm_s[:, :, None])
+    columns.append(by_world @ motion.turn @ T_board[:, :, :3] @ by_board)
+    columns += [by_turn @ w for w in motion.turn_by_poses] + [by_world * v for v in motion.shift_by_poses]
+    order = [*range(5), *(5 + k + side for k in range(motion.poses) for side in (0, motion.poses))]
+    return px, np.concatenate([columns[k] for k in order], axis=2)
 
 
-def _motion(state: State, camera: int, seen: Sightings, turned: np.ndarray) -> tuple[np.ndarray, ...]:
-    """How the board moved from the view's own time to the instant at which each row was exposed.
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """How the board moved from the view's own time to the instant of a picture, a row a corner.
 
-    Turn (n, 3, 3) about the board's origin, shift (n, 3) mm, and the velocity (n, 3) mm/s of each point then.
+    turn (n, 3, 3) about the board's origin and shift_mm (n, 3); their rates, rad/s and mm/s (n, 3); and how turn (as a
+    small rotation) and shift follow the w and v of the view's own pose and of those before and after: a list of
+    (n, 3, 3) and of (n, 1, 1).
     """
-    if state.motion is None:
-        return np.broadcast_to(np.eye(3), (len(turned), 3, 3)), np.zeros((1, 3)), np.zeros_like(turned)
-    rate, growth = state.motion[seen.view, :6], state.motion[seen.view, 6:]
-    offset_s, readout_s = state.clock[camera]
-    late_s = state.instants[seen.view, camera]
-    elapsed = (seen.time_s + late_s + offset_s + readout_s * _row_share(seen.px, state.lens[camera]))[:, None]
-    path = rate * elapsed + 0.5 * growth * elapsed**2
-    turn = exp_rotation(path[:, :3])
-    now = rate + growth * elapsed
-    velocity = np.cross(now[:, :3], np.einsum("nij,nj->ni", turn, turned)) + now[:, 3:]
-    return turn, path[:, 3:], velocity
+
+    turn: np.ndarray
+    shift_mm: np.ndarray
+    turn_rate: np.ndarray
+    shift_rate_mm_s: np.ndarray
+    turn_by_poses: list[np.ndarray]
+    shift_by_poses: list[np.ndarray]
+
+    @property
+    def poses(self) -> int:
+        return len(self.turn_by_poses)
 
 
-def _row_share(px: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """Place of a row between the picture's top (−½) and bottom (½), taking the principal point as its
-    middle.
-    """
-    return (px[:, 1] - lens[3]) / (2 * lens[3])
+def _motion(state: State, camera: int, seen: Sightings) -> _Motion:
+    n = len(seen)
+    if state.trajectory is None:
+        still, eye = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))
+        return _Motion(eye, still, still, still, [eye], [np.ones((n, 1, 1))])
+    elapsed = seen.time_s + state.instants[seen.view, camera] + state.clock[camera]
+    shares, rates = state.trajectory.shares(seen.view, elapsed)
+    paths = state.trajectory.paths(state.T_world_board)[seen.view]
+    path, rate = (np.einsum("nk,nki->ni", s, paths) for s in (shares, rates))
+    turn, J = exp_rotation(path[:, :3]), left_jacobian(path[:, :3])
+    # log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
+    inverse = np.linalg.inv(left_jacobian(paths[:, :, :3])) * shares[:, :, None, None]
+    by_neighbours = [J @ inverse[:, k] for k in (0, 1)]
+    by_own = turn - J @ np.swapaxes(inverse.sum(axis=1), 1, 2)
+    parts = [1.0 - shares.sum(axis=1), shares[:, 0], shares[:, 1]]
+    return _Motion(
+        turn,
+        path[:, 3:],
+        np.einsum("nij,nj->ni", J, rate[:, :3]),
+        rate[:, 3:],
+        [by_own, *by_neighbours],
+        [part[:, None, None] for part in parts],
+    )

@@ -11,17 +11,27 @@ away (a free k3 on 14 views came out at 6).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bundle import CAMERA_COLUMNS, N_BOARD, N_CAMERA, POSE, Knowledge, Sightings, State
+from vision.board_motion import Trajectory
+from vision.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Knowledge, State
 from vision.corners import Corners
 from vision.errors import Refused
 from vision.first_guess import board_pose, first_lens
+from vision.layout import Alone, Layout, gather, lay_out, looked_at_once
 from vision.noise import Settled, settle
-from vision.recording import check_views, coverage, depth_ratio, tilt_deg, usable_views
-from vision.rotation import compose, invert_transform
+from vision.recording import (
+    check_lenses,
+    check_rig_view,
+    check_views,
+    check_work,
+    coverage,
+    depth_ratio,
+    fixes_pose,
+    tilt_deg,
+)
 from vision.scene import N_PARAMETERS, Board, Camera, Cameras
 from vision.static_board import camera_moved, mean_view
 
@@ -33,6 +43,11 @@ LENS_PRIOR = {"k1": 0.5, "k2": 0.5, "p1": 0.005, "p2": 0.005, "k3": 0.3}
 # The board's warp enters where it lowers the cost by more than chance does once in 10 000 (two parameters).
 _WARP_GAIN = 18.4
 _WARP_SIGMA_MM = 2.0
+# Cameras that share views were not triggered together where they agree this many times worse than each with itself.
+_DISAGREE = 1.5
+# Clock offsets and scatter of instants to begin with, in frame intervals.
+_CLOCK_SIGMA = 0.6
+_FIRST_LATENESS = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +73,25 @@ class CameraReport:
 
 
 @dataclass(frozen=True, eq=False)
+class Timing:
+    """Cameras that are not triggered together: offset_s and scatter_s (C,), how late pictures are on average and how
+    much that varies; s, or frame intervals where the pictures' times were not given (in_frames)."""
+
+    offset_s: np.ndarray
+    scatter_s: np.ndarray
+    in_frames: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Calibration:
-    """Cameras in the rig frame with their covariance, a report each, and notes in plain sentences."""
+    """Cameras in the rig frame with their covariance, a report each, notes in plain sentences; timing is None where
+    pictures of one view count as taken at once; board holds the scale's deviation and the warps x, y in mm."""
 
     cameras: Cameras
     report: tuple[CameraReport, ...]
     notes: tuple[str, ...]
+    timing: Timing | None
+    board: np.ndarray
 
 
 def calibrate_cameras(
@@ -71,66 +99,51 @@ def calibrate_cameras(
     rig_views: Mapping[str, Corners],
     board: Board,
     sizes_px: Mapping[str, tuple[int, int]],
-    T_rig_board: np.ndarray,
+    T_rig_board: np.ndarray | None,
     *,
     T_rig_board_sigma_mm: float = 0.0,
     T_rig_board_sigma_rad: float = 0.0,
     trial_views: Mapping[str, Sequence[Corners]] | None = None,
+    times_s: Mapping[str, Sequence[float]] | None = None,
     work_points_mm: np.ndarray | None = None,
 ) -> Calibration:
     """Calibrates all cameras in one adjustment.
 
-    board_views: each camera's views of the board, not synchronous between cameras. rig_views: the board
-    standing on the rig. T_rig_board (3, 4), mm; its sigmas are per axis, of the shift and of a turn about
-    the board's origin, and are shared by all cameras. trial_views: the rig board in the trials' frames, for
-    cameras that did not move. work_points_mm (n, 3): where the whisker will be, which each camera's board
-    views must cover.
+    board_views: each camera's views of the board; that cameras looked at it at once is found out from the views (and
+    times_s, each picture's time, helps). rig_views: the board standing on the rig; empty, with T_rig_board None, for
+    one camera or cameras that looked at once: then the world is the first camera's frame. T_rig_board (3, 4), mm; its
+    sigmas are per axis, of the shift and of a turn about the board's origin, and are shared by all cameras.
+    trial_views: the rig board in the trials' frames, of cameras that did not move. work_points_mm (n, 3): where the
+    whisker will be, which each camera's views must cover.
 
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
-    names = tuple(board_views)
-    usable = {name: usable_views(board_views[name], board) for name in names}
-    for name in names:
-        check_views(name, usable[name], rig_views.get(name), board, sizes_px[name])
-    standing = {n: mean_view(rig_views[n], (trial_views or {}).get(n, ())) for n in names}
-    state, seen = _first_state(names, usable, standing, board, sizes_px, np.asarray(T_rig_board, dtype=float))
-    known = _knowledge(state, board, np.asarray(T_rig_board), T_rig_board_sigma_mm, T_rig_board_sigma_rad)
-    settled, notes = _settle_with_warp(state, seen, board, known)
-    return _calibration(names, sizes_px, usable, standing, settled, board, notes)
+    with_rig = T_rig_board is not None
+    alone = {n: _alone(n, board_views[n], rig_views.get(n), board, sizes_px[n], with_rig) for n in board_views}
+    standing = {n: mean_view(rig_views[n], (trial_views or {}).get(n, ())) for n in alone} if with_rig else {}
+    together = looked_at_once(alone)
+    layout = lay_out(alone, standing, board, T_rig_board, together=together, times_s=times_s)
+    known = _knowledge(layout.first, board, T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad)
+    settled, notes = _settle_with_warp(layout, board, known)
+    timing = None
+    if together:
+        settled, timing, more = _settle_with_timing(layout, settled, board, alone, times_s is None)
+        notes += more
+    calibration = _calibration(alone, sizes_px, settled, board, notes, timing)
+    check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
+    check_work(calibration.cameras, alone, standing, work_points_mm)
+    return calibration
 
 
-def _first_state(names, usable, standing, board: Board, sizes_px, T_rig_board) -> tuple[State, Sightings]:
-    """View 0 is the board on the rig; then each camera's own views, camera by camera. The world is the rig
-    frame.
-    """
-    lenses, poses, boards = [], [], [T_rig_board]
-    shots = [(c, 0, standing[name]) for c, name in enumerate(names)]
-    for c, name in enumerate(names):
-        alone = calibrate_alone(usable[name], board, sizes_px[name])
-        lens = alone.solution.state.lens[0]
-        T_camera_rig = compose(
-            board_pose(standing[name], board.corners_mm, lens), invert_transform(T_rig_board)
-        )
-        shots += [(c, len(boards) + k, view) for k, view in enumerate(usable[name])]
-        boards += [compose(invert_transform(T_camera_rig), T) for T in alone.solution.state.T_world_board]
-        lenses.append(lens)
-        poses.append(T_camera_rig)
-    return State(np.array(lenses), np.array(poses), np.array(boards)), gather(shots)
-
-
-def gather(shots: Sequence[tuple], times_s: Sequence[float] | None = None) -> Sightings:
-    """Sightings of shots (camera, view, Corners), each with its time after the view's own."""
-    times_s = np.zeros(len(shots)) if times_s is None else times_s
-    order = sorted(range(len(shots)), key=lambda k: shots[k][1::-1])
-    count = [len(shots[k][2]) for k in order]
-    return Sightings(
-        np.repeat([shots[k][0] for k in order], count),
-        np.repeat([shots[k][1] for k in order], count),
-        np.concatenate([shots[k][2].ids for k in order]),
-        np.concatenate([shots[k][2].px for k in order]),
-        np.concatenate([shots[k][2].sigma_px for k in order]),
-        np.repeat([times_s[k] for k in order], count),
-    )
+def _alone(name, views, rig_view, board: Board, size_px, with_rig: bool) -> Alone:
+    """A camera by itself: the start of the joint adjustment, and the error that it has when nobody else is asked."""
+    usable = {k: view for k, view in enumerate(views) if fixes_pose(view, board)}
+    check_views(name, usable.values(), board)
+    if with_rig:
+        check_rig_view(name, rig_view, board)
+    settled = calibrate_alone(list(usable.values()), board, size_px)
+    state = settled.solution.state
+    return Alone(state.lens[0], float(settled.error_px[0]), usable, dict(zip(usable, state.T_world_board)))
 
 
 def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int]) -> Settled:
@@ -155,37 +168,69 @@ def lens_knowledge(n_cameras: int, n_views: int) -> Knowledge:
     return Knowledge(free, mean, sigma, np.ones(n_views, dtype=bool))
 
 
-def _knowledge(state: State, board: Board, T_rig_board, sigma_mm: float, sigma_rad: float) -> Knowledge:
-    """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the
-    square.
+def _knowledge(first: State, board: Board, T_rig_board, sigma_mm: float, sigma_rad: float) -> Knowledge:
+    """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the square.
+
+    Without a rig board the first camera is the world's frame.
     """
-    known = lens_knowledge(len(state.lens), len(state.T_world_board))
-    known.view_free[0] = sigma_mm > 0 or sigma_rad > 0
-    pose_sigma = np.repeat([max(sigma_rad, 1e-9), max(sigma_mm, 1e-7)], 3)
+    known = lens_knowledge(len(first.lens), len(first.T_world_board))
     if board.square_sigma_mm > 0:
         known.free[-N_BOARD] = True
         known.sigma[-N_BOARD] = board.square_sigma_mm / board.square_mm
-    return Knowledge(known.free, known.mean, known.sigma, known.view_free, 0, T_rig_board, pose_sigma)
+    if T_rig_board is None:
+        known.free[POSE] = False
+        return known
+    known.view_free[0] = sigma_mm > 0 or sigma_rad > 0
+    pose_sigma = np.repeat([max(sigma_rad, 1e-9), max(sigma_mm, 1e-7)], 3)
+    return replace(known, pose_view=0, pose_T=T_rig_board, pose_sigma=pose_sigma)
 
 
-def _settle_with_warp(state, seen, board: Board, known: Knowledge) -> tuple[Settled, list[str]]:
+def _settle_with_warp(layout: Layout, board: Board, known: Knowledge) -> tuple[Settled, list[str]]:
     """With a flat board, then with a warped one where the pictures ask for it."""
-    flat = settle(state, seen, board.corners_mm, known)
-    warped_knowledge = allow_warp(known)
-    warped = settle(flat.solution.state, seen, board.corners_mm, warped_knowledge)
+    flat = settle(layout.first, layout.seen, board.corners_mm, known)
+    warped = settle(flat.solution.state, layout.seen, board.corners_mm, allow_warp(known))
     if flat.solution.cost - warped.solution.cost < _WARP_GAIN:
         return flat, []
     x, y = warped.solution.state.board[1:]
     return warped, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
 
 
+def _settle_with_timing(layout: Layout, at_once: Settled, board: Board, alone, in_frames: bool):
+    """With each picture's instant free, where cameras agree far worse with each other than each with itself."""
+    error_alone = np.array([a.error_px for a in alone.values()])
+    if np.median(at_once.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:
+        return at_once, None, []
+    known = allow_lateness(at_once.known, layout.trajectory)
+    state = replace(at_once.solution.state, trajectory=layout.trajectory)
+    settled = settle(state, layout.seen, board.corners_mm, known, error_px=error_alone + 0.1)
+    timing = Timing(settled.solution.state.clock, settled.known.late_sigma_s, in_frames)
+    return settled, timing, [_timing_note(alone, timing)]
+
+
+def _timing_note(names, timing: Timing) -> str:
+    scale, unit = (1.0, "frames") if timing.in_frames else (1e3, "ms")
+    late = (
+        f"{name} {scale * offset:+.3g} ± {scale * scatter:.2g} {unit}"
+        for name, offset, scatter in zip(names, timing.offset_s, timing.scatter_s)
+    )
+    return f"Pictures of one view were not taken at one instant; late by {', '.join(late)}; taken into account."
+
+
+def allow_lateness(known: Knowledge, trajectory: Trajectory) -> Knowledge:
+    """The same with clocks and pictures' instants free. The clock of the camera that ranks first is the clock."""
+    free, sigma = known.free.copy(), known.sigma.copy()
+    clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
+    free[clocks[trajectory.camera_rank > 0]] = True
+    sigma[clocks] = _CLOCK_SIGMA * trajectory.interval_s
+    late = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
+    return replace(known, free=free, sigma=sigma, late_sigma_s=late)
+
+
 def allow_warp(known: Knowledge) -> Knowledge:
     """The same with the board's two warps free."""
     free, sigma = known.free.copy(), known.sigma.copy()
     free[-2:], sigma[-2:] = True, _WARP_SIGMA_MM
-    return Knowledge(
-        free, known.mean, sigma, known.view_free, known.pose_view, known.pose_T, known.pose_sigma
-    )
+    return replace(known, free=free, sigma=sigma)
 
 
 def as_cameras(names, sizes_px, settled: Settled) -> Cameras:
@@ -203,20 +248,17 @@ def _matrix(lens: np.ndarray) -> np.ndarray:
     return np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
 
 
-def _calibration(names, sizes_px, usable, standing, settled: Settled, board: Board, notes) -> Calibration:
-    cameras = as_cameras(names, sizes_px, settled)
+def _calibration(alone, sizes_px, settled: Settled, board: Board, notes, timing) -> Calibration:
+    cameras = as_cameras(alone, sizes_px, settled)
     if not settled.solution.converged:
-        raise Refused(
-            "the adjustment of the cameras did not come to rest: record more views, well spread and tilted"
-        )
-    reports = tuple(_report(c, cameras, usable[name], settled, board) for c, name in enumerate(names))
-    return Calibration(cameras, reports, tuple(notes))
+        raise Refused("the adjustment of the cameras did not come to rest: record more views, well spread and tilted")
+    reports = tuple(_report(c, cameras, a, settled, board) for c, a in enumerate(alone.values()))
+    return Calibration(cameras, reports, tuple(notes), timing, settled.solution.state.board)
 
 
-def _report(c: int, cameras: Cameras, views, settled: Settled, board: Board) -> CameraReport:
+def _report(c: int, cameras: Cameras, alone: Alone, settled: Settled, board: Board) -> CameraReport:
     camera, rows = cameras.cameras[c], settled.seen.camera == c
-    sigma = np.sqrt(np.diag(cameras.covariance)[cameras.parameters_of(camera.name)][:9])
-    poses = [board_pose(view, board.corners_mm, camera.lens) for view in views]
+    views, poses = list(alone.views.values()), list(alone.poses.values())
     return CameraReport(
         name=camera.name,
         views=len(views),
@@ -227,5 +269,5 @@ def _report(c: int, cameras: Cameras, views, settled: Settled, board: Board) -> 
         coverage=coverage(views, camera.size_px),
         depth_ratio=depth_ratio(poses, views, board),
         tilt_deg=tilt_deg(poses),
-        intrinsics_sigma=sigma,
+        intrinsics_sigma=np.sqrt(np.diag(cameras.covariance)[cameras.parameters_of(camera.name)][:9]),
     )

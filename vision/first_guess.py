@@ -82,7 +82,7 @@ def chain_cameras(poses: Mapping[str, Sequence[np.ndarray | None]]) -> dict[str,
         relative = _shared(poses[a], poses[b])
         if not relative:
             raise Refused(f"camera {b} never sees the board at the same time as another: record such views")
-        placed[b] = compose(_most_central(relative), placed[a])
+        placed[b] = compose(most_central(relative), placed[a])
     return placed
 
 
@@ -93,7 +93,7 @@ def _shared(poses_a: Sequence[np.ndarray | None], poses_b: Sequence[np.ndarray |
     ]
 
 
-def _most_central(transforms: Sequence[np.ndarray]) -> np.ndarray:
+def most_central(transforms: Sequence[np.ndarray]) -> np.ndarray:
     """The transform whose turn is nearest to the others': a mirrored pose is far from all of them."""
     turns = np.array([T[:, :3] for T in transforms])
     shifts = np.array([T[:, 3] for T in transforms])

@@ -107,13 +107,17 @@ def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.column_stack([x, J[:, 0, 0] * y[:, 1] - J[:, 1, 0] * y[:, 0]]) / determinant[:, None]
 
 
-def fold_radius(distortion: np.ndarray, limit: float = 3.0) -> float:
-    """Normalised radius at which the radial curve r (1 + k1 r² + k2 r⁴ + k3 r⁶) stops rising; limit if it
-    does not.
+def fold_radius(distortion: np.ndarray) -> float:
+    """How far from the principal point the picture reaches before the lens folds it back, in normalised picture
+    coordinates (distorted; px over focal length); inf where it never does.
 
-    Beyond it two directions share a pixel: a lens that folds inside its own picture is over-fitted.
+    The radial curve r (1 + k1 r² + k2 r⁴ + k3 r⁶) stops rising there. Beyond, two directions share a pixel: a lens that
+    folds inside its own picture is over-fitted.
     """
     k1, k2, _, _, k3 = distortion
-    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    roots = np.roots(np.trim_zeros([7 * k3, 5 * k2, 3 * k1, 1.0], "f"))
     squares = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
-    return float(min(np.sqrt(squares.min()), limit)) if len(squares) else limit
+    if not len(squares):
+        return np.inf
+    r2 = squares.min()
+    return float(np.sqrt(r2) * (1 + r2 * (k1 + r2 * (k2 + r2 * k3))))

@@ -7,7 +7,6 @@ that are left out once; then it is what makes the mean square of the rest one. R
 smaller figure would eat the data from the tails inward.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,20 +22,26 @@ _ROBUST_WIDTH = 3.0
 _FIRST_ERROR_PX = 0.3
 # Median of the squared length of a two-dimensional Gaussian of unit sigma, 2 ln 2.
 _MEDIAN_SQUARED = 2 * np.log(2)
+# Rounds of adjusting and learning the noise anew; instants and their scatter settle more slowly.
+_ROUNDS, _ROUNDS_MOVING = 2, 5
 # A shot with fewer corners left says less than the six parameters of its pose.
 _MIN_SHOT = 4
+# Fewer instants than these give no scatter.
+_MIN_LATE = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
     """An adjustment with its noise: the solution over the kept corners, `seen` with the sigmas used (all
-    corners), kept (n,) bool, residual_px (n, 2) of all corners, error_px (C,) model error of each camera."""
+    corners), kept (n,) bool, residual_px (n, 2) of all corners, error_px (C,) model error of each camera, known as
+    used."""
 
     solution: Solution
     seen: Sightings
     kept: np.ndarray
     residual_px: np.ndarray
     error_px: np.ndarray
+    known: Knowledge
 
     def rms_px(self, camera: int) -> float:
         """Root mean square length of the kept residuals of one camera, as OpenCV counts it."""
@@ -50,25 +55,43 @@ def settle(
     corners_mm: np.ndarray,
     known: Knowledge,
     *,
-    between: Callable[[State], State] | None = None,
+    error_px: np.ndarray | None = None,
 ) -> Settled:
-    """Adjusts robustly, learns each camera's model error, drops outliers once and adjusts by least
-    squares.
+    """Adjusts robustly, learns each camera's model error, drops outliers once and adjusts by least squares.
+
+    Where the state has a trajectory, known.late_sigma_s is where the search for each camera's scatter of instants
+    begins. error_px (C,): model errors to begin with.
     """
-    error = np.full(len(state.lens), _FIRST_ERROR_PX)
-    for _ in range(2):
+    moving = state.trajectory is not None
+    error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
+    for _ in range(_ROUNDS_MOVING if moving else _ROUNDS):
         weighed = _weighed(seen, error)
-        solution = solve(
-            state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-5, between=between
-        )
+        solution = solve(state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-5)
         state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
+        known = _with_lateness(known, state, seen) if moving else known
     kept = _inliers(solution.residual_px, _weighed(seen, error))
     for _ in range(2):
         error = _error_by_mean(solution.residual_px, seen, kept, error, known)
-        solution = solve(state, _weighed(seen, error).chosen(kept), corners_mm, known, between=between)
+        used = _weighed(seen, error).chosen(kept)
+        solution = solve(state, used, corners_mm, known)
         state = solution.state
         solution = replace(solution, residual_px=seen.px - predict(state, seen, corners_mm)[0])
-    return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error)
+    return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error, known)
+
+
+def _with_lateness(known: Knowledge, state: State, seen: Sightings) -> Knowledge:
+    """Each camera's scatter of instants as the instants found have it; of pictures that give their view its time, none.
+
+    A camera with few others keeps the scatter of all.
+    """
+    starts = seen.shot_starts()
+    camera, view = seen.camera[starts], seen.view[starts]
+    loose = ~state.trajectory.is_reference(view, camera)
+    squared = np.where(loose, state.instants[view, camera] ** 2, np.nan)
+    overall = np.nanmean(squared)
+    of = [squared[loose & (camera == c)] for c in range(len(known.late_sigma_s))]
+    sigma = np.sqrt([np.mean(s) if len(s) >= _MIN_LATE else overall for s in of])
+    return replace(known, late_sigma_s=np.maximum(sigma, 0.02 * np.sqrt(overall)))
 
 
 def _weighed(seen: Sightings, error_px: np.ndarray) -> Sightings:
@@ -96,6 +119,7 @@ def _error_by_mean(
     """Model error at which the kept residuals' mean square is what so many fitted parameters leave of it."""
     squared = np.sum(residual**2, axis=1)
     parameters = known.free.sum() + 6 * known.view_free.sum()
+    parameters += len(seen.shot_starts()) if known.late_sigma_s is not None else 0
     left = max(1.0 - parameters / max(2 * kept.sum(), 1), 0.1)
     return np.array(
         [_match(squared[rows] / left, seen.sigma_px[rows]) for rows in _by_camera(seen, kept, len(error))]

@@ -1,13 +1,14 @@
 """Do the views suffice? What a calibration needs of them, and what to record where they do not."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import cv2
 import numpy as np
 
 from vision.corners import Corners
 from vision.errors import Refused
-from vision.scene import Board
+from vision.lens import fold_radius
+from vision.scene import Board, Camera, Cameras
 
 # Six corners over at least two rows and columns give a pose with something left over.
 MIN_VIEW_CORNERS = 6
@@ -16,14 +17,28 @@ MIN_VIEW_CORNERS = 6
 MIN_VIEWS = 5
 # A corner set thinner than this (ratio of its two extents) is as good as a line.
 _MIN_THICKNESS = 0.1
+# Below this tilt the foreshortening that tells focal length from distance, 1 - cos, is under 1.5 %.
+_LEAST_TILT_DEG = 10.0
+_LEAST_DEPTH_RATIO = 1.15
+_MOST_FOCAL_SIGMA = 0.02
+_MOST_ASPECT = 0.03
+# Decentring of a lens shifts the picture's rim by p r² f, some 1e-3 f at most.
+_MOST_DECENTRING = 0.05
+_MOST_STRETCH = 2.0
+# A lens may fold in the very corners, where no board is ever seen, but not before this share of the way there.
+_LEAST_REACH = 0.7
+# Outside the hull of all corners by more than this share of the picture's width, a lens is extrapolated.
+_HULL_MARGIN = 0.05
+_MOST_UNCOVERED = 0.2
 
 
-def usable_views(views: Sequence[Corners], board: Board) -> list[Corners]:
+def usable_views(views: Iterable[Corners], board: Board) -> list[Corners]:
     """The views that fix a board pose."""
-    return [view for view in views if _fixes_pose(view, board)]
+    return [view for view in views if fixes_pose(view, board)]
 
 
-def _fixes_pose(view: Corners, board: Board) -> bool:
+def fixes_pose(view: Corners, board: Board) -> bool:
+    """Are there enough corners, and not along one line?"""
     if len(view) < MIN_VIEW_CORNERS:
         return False
     spread = board.corners_mm[view.ids, :2]
@@ -31,19 +46,119 @@ def _fixes_pose(view: Corners, board: Board) -> bool:
     return bool(extents[1] > _MIN_THICKNESS * extents[0])
 
 
-def check_views(name: str, views, rig_view: Corners | None, board: Board, size_px: tuple[int, int]) -> None:
-    """Refuses a camera that was not given enough to begin with."""
+def check_views(name: str, views: Collection[Corners], board: Board) -> None:
+    """Refuses a camera with too few views."""
     if len(views) < MIN_VIEWS:
         raise Refused(
             f"camera {name}: the board is well seen in {len(views)} views, {MIN_VIEWS} are the least and 15 are good: "
             "record the board tilted to all sides, near and far, in every part of the picture"
         )
-    if rig_view is None or not _fixes_pose(rig_view, board):
-        found = 0 if rig_view is None else len(rig_view)
+
+
+def check_rig_view(name: str, view: Corners | None, board: Board) -> None:
+    """Refuses a camera that does not see the board on the rig."""
+    if view is None or not fixes_pose(view, board):
         raise Refused(
-            f"camera {name}: {found} corners of the board on the rig are seen, {MIN_VIEW_CORNERS} not in a line are "
-            "needed: record the rig board in full view"
+            f"camera {name}: {0 if view is None else len(view)} corners of the board on the rig are seen, "
+            f"{MIN_VIEW_CORNERS} not in a line are needed: record boards/rig/{name} with the board in full view"
         )
+
+
+def check_lenses(cameras: Cameras, reports: Sequence, views: Mapping[str, Iterable[Corners]]) -> None:
+    """Refuses what the views could not settle: no tilt, no depth, a lens that diverged."""
+    for camera, report in zip(cameras, reports):
+        check_geometry(report)
+        check_lens(camera, _reach(camera, np.concatenate([v.px for v in views[camera.name]])))
+        spread = report.intrinsics_sigma[0] / camera.lens[0]
+        if spread > _MOST_FOCAL_SIGMA:
+            raise Refused(
+                f"camera {camera.name}: the focal length is known to {100 * spread:.1f} %, "
+                f"{100 * _MOST_FOCAL_SIGMA:.0f} % is allowed: record more views, tilted by 20 to 45 degrees each way"
+            )
+
+
+def check_geometry(report) -> None:
+    """Refuses views all square to the camera, or all at one distance."""
+    if report.tilt_deg < _LEAST_TILT_DEG:
+        raise Refused(
+            f"camera {report.name}: the board was never tilted by more than {report.tilt_deg:.0f} degrees, so focal "
+            "length and distance cannot be told apart: record views tilted by 20 to 45 degrees to all sides"
+        )
+    if report.depth_ratio < _LEAST_DEPTH_RATIO:
+        raise Refused(
+            f"camera {report.name}: the farthest corner is only {report.depth_ratio:.2f} times as far away as the "
+            f"nearest ({_LEAST_DEPTH_RATIO} is the least): record views nearer to the camera and farther away"
+        )
+
+
+def check_lens(camera: Camera, covered: float | None = None) -> None:
+    """Refuses a lens that cannot be, brought along or fitted: pixels far from square, a lens tilted beyond belief, a
+    picture stretched or folded onto itself where it is used.
+
+    covered: how far from the principal point corners were seen, px over focal length; unknown, most of the picture.
+    """
+    fx, fy = camera.lens[:2]
+    if abs(fx / fy - 1) > _MOST_ASPECT:
+        found = f"fx = {fx:.0f} and fy = {fy:.0f} differ by {100 * abs(fx / fy - 1):.0f} %, real ones by less than 1 %"
+        raise Refused(_over_fitted(camera, found))
+    if np.abs(camera.distortion[2:4]).max() > _MOST_DECENTRING:
+        raise Refused(_over_fitted(camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"))
+    radius = _LEAST_REACH * _picture_radius(camera) if covered is None else covered
+    if fold_radius(camera.distortion) < radius:
+        raise Refused(_over_fitted(camera, "the distortion folds the picture onto itself"))
+    if _stretch(camera.distortion, radius) > _MOST_STRETCH:
+        raise Refused(_over_fitted(camera, f"the distortion stretches the rim {_MOST_STRETCH:.0f}-fold or more"))
+
+
+def _over_fitted(camera: Camera, found: str) -> str:
+    terms = ", ".join(f"{n} {v:.3g}" for n, v in zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion))
+    return (
+        f"camera {camera.name}: {found} ({terms}): the lens diverged or was over-fitted; calibrate again with 15 views "
+        "or more that fill the picture, tilted to all sides"
+    )
+
+
+def _stretch(distortion: np.ndarray, reach: float) -> float:
+    """Largest radial magnification, against the middle's, up to the distorted radius `reach`."""
+    k1, k2, _, _, k3 = distortion
+    r2 = np.linspace(0.0, 2.0 * reach, 400) ** 2
+    inside = np.sqrt(r2) * (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) <= reach
+    return float((1 + r2 * (3 * k1 + r2 * (5 * k2 + 7 * r2 * k3)))[inside].max())
+
+
+def _picture_radius(camera: Camera) -> float:
+    """Distance of the picture's farthest corner from the principal point, px over focal length."""
+    width, height = camera.size_px
+    return _reach(camera, np.array([[0, 0], [width, 0], [0, height], [width, height]], dtype=float))
+
+
+def _reach(camera: Camera, px: np.ndarray) -> float:
+    return float(np.linalg.norm((px - camera.lens[2:4]) / camera.lens[:2], axis=1).max())
+
+
+def check_work(cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm) -> None:
+    """Refuses a camera whose board views leave out where the whisker will be."""
+    if work_points_mm is None:
+        return
+    for camera in cameras:
+        corners = [v.px for v in alone[camera.name].views.values()] + [standing[camera.name].px] * bool(standing)
+        outside = _outside(np.concatenate(corners), camera.project(work_points_mm), camera.size_px)
+        if outside > _MOST_UNCOVERED:
+            raise Refused(
+                f"camera {camera.name}: {100 * outside:.0f} % of where the whisker will be lies outside all board "
+                "views: record views there"
+            )
+
+
+def _outside(corners_px: np.ndarray, work_px: np.ndarray, size_px: tuple[int, int]) -> float:
+    """Share of the points in the picture that lie farther outside the corners' hull than a margin."""
+    inside_picture = np.all((work_px >= 0) & (work_px < size_px), axis=1)
+    if not inside_picture.any():
+        return 1.0
+    hull = cv2.convexHull(corners_px.astype(np.float32))
+    margin = -_HULL_MARGIN * max(size_px)
+    depth = [cv2.pointPolygonTest(hull, tuple(map(float, p)), True) for p in work_px[inside_picture]]
+    return float(np.mean(np.array(depth) < margin))
 
 
 def coverage(views: Sequence[Corners], size_px: tuple[int, int]) -> float:

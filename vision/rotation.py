@@ -24,13 +24,30 @@ def exp_rotation(w: np.ndarray) -> np.ndarray:
 
 
 def log_rotation(R: np.ndarray) -> np.ndarray:
-    """The vector w of smallest length with exp_rotation(w) = R. (3, 3) → (3,)."""
-    axis_sine = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine, cosine = np.linalg.norm(axis_sine), 0.5 * (np.trace(R) - 1.0)
+    """The vector w of smallest length with exp_rotation(w) = R. (..., 3, 3) → (..., 3)."""
+    R = np.asarray(R, dtype=float)
+    axis_sine = 0.5 * np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
+    )
+    sine = np.linalg.norm(axis_sine, axis=-1)
+    cosine = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0)
     angle = np.arctan2(sine, cosine)
-    if sine > 1e-6:
-        return axis_sine * (angle / sine)
-    return axis_sine if cosine > 0 else angle * _axis_of_half_turn(R)
+    w = axis_sine * np.where(sine > 1e-6, angle / np.maximum(sine, 1e-6), 1.0)[..., None]
+    for index in zip(*np.nonzero((sine <= 1e-6) & (cosine < 0))) if R.ndim > 2 else ():
+        w[index] = angle[index] * _axis_of_half_turn(R[index])
+    if R.ndim == 2 and sine <= 1e-6 and cosine < 0:
+        w = angle * _axis_of_half_turn(R)
+    return w
+
+
+def left_jacobian(w: np.ndarray) -> np.ndarray:
+    """J with Exp(w + d) = Exp(J d) Exp(w) to first order in d. (..., 3) → (..., 3, 3)."""
+    angle = np.linalg.norm(w, axis=-1)[..., None, None]
+    small = angle < 1e-4  # (θ − sin θ)/θ³ loses its digits there; its limit is 1/6
+    safe = np.where(small, 1.0, angle)
+    second = np.where(small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    cross = skew(w)
+    return np.eye(3) + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross + second * (cross @ cross)
 
 
 def _axis_of_half_turn(R: np.ndarray) -> np.ndarray:
