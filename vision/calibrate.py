@@ -20,7 +20,7 @@ from vision.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Knowle
 from vision.corners import Corners
 from vision.errors import Refused
 from vision.first_guess import board_pose, first_lens
-from vision.layout import Alone, Layout, gather, lay_out, looked_at_once
+from vision.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
 from vision.noise import Settled, settle
 from vision.recording import (
     check_lenses,
@@ -84,14 +84,18 @@ class Timing:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Cameras in the rig frame with their covariance, a report each, notes in plain sentences; timing is None where
-    pictures of one view count as taken at once; board holds the scale's deviation and the warps x, y in mm."""
+    """Cameras in the rig frame with their covariance, a report each, and notes in plain sentences.
+
+    together: cameras looked at the board at once. timing: None where pictures of one view count as of one instant.
+    board (3,): the board's relative size less 1, and its warps along x and y, mm.
+    """
 
     cameras: Cameras
     report: tuple[CameraReport, ...]
     notes: tuple[str, ...]
     timing: Timing | None
     board: np.ndarray
+    together: bool
 
 
 def calibrate_cameras(
@@ -120,16 +124,19 @@ def calibrate_cameras(
     """
     with_rig = T_rig_board is not None
     alone = {n: _alone(n, board_views[n], rig_views.get(n), board, sizes_px[n], with_rig) for n in board_views}
-    standing = {n: mean_view(rig_views[n], (trial_views or {}).get(n, ())) for n in alone} if with_rig else {}
+    standing = {n: mean_view(rig_views[n], (trial_views or {}).get(n, ())) for n in alone} if with_rig else None
     together = looked_at_once(alone)
-    layout = lay_out(alone, standing, board, T_rig_board, together=together, times_s=times_s)
+    poses = place_cameras(alone, standing, board, T_rig_board, together=together)
+    layout = lay_out(
+        alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=times_s
+    )
     known = _knowledge(layout.first, board, T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad)
     settled, notes = _settle_with_warp(layout, board, known)
     timing = None
     if together:
         settled, timing, more = _settle_with_timing(layout, settled, board, alone, times_s is None)
         notes += more
-    calibration = _calibration(alone, sizes_px, settled, board, notes, timing)
+    calibration = _calibration(alone, sizes_px, settled, board, notes, timing, together)
     check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
     check_work(calibration.cameras, alone, standing, work_points_mm)
     return calibration
@@ -248,12 +255,12 @@ def _matrix(lens: np.ndarray) -> np.ndarray:
     return np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
 
 
-def _calibration(alone, sizes_px, settled: Settled, board: Board, notes, timing) -> Calibration:
+def _calibration(alone, sizes_px, settled: Settled, board: Board, notes, timing, together: bool) -> Calibration:
     cameras = as_cameras(alone, sizes_px, settled)
     if not settled.solution.converged:
         raise Refused("the adjustment of the cameras did not come to rest: record more views, well spread and tilted")
     reports = tuple(_report(c, cameras, a, settled, board) for c, a in enumerate(alone.values()))
-    return Calibration(cameras, reports, tuple(notes), timing, settled.solution.state.board)
+    return Calibration(cameras, reports, tuple(notes), timing, settled.solution.state.board, together)
 
 
 def _report(c: int, cameras: Cameras, alone: Alone, settled: Settled, board: Board) -> CameraReport:

@@ -38,11 +38,12 @@ class Alone:
 @dataclass(frozen=True, eq=False)
 class Layout:
     """seen: all corners. first: the state to start from. trajectory: the views in time; None where views are not
-    shared."""
+    shared. index (V,): of each view in its camera's series, -1 for the board on the rig."""
 
     seen: Sightings
     first: State
     trajectory: Trajectory | None
+    index: np.ndarray
 
 
 def looked_at_once(cameras: Mapping[str, Alone]) -> bool:
@@ -67,38 +68,36 @@ def _agreement(a: Alone, b: Alone) -> tuple[float, int]:
 
 def lay_out(
     cameras: Mapping[str, Alone],
-    standing: Mapping[str, Corners],
-    board: Board,
-    T_rig_board: np.ndarray | None,
+    T_camera_world: np.ndarray,
     *,
+    standing: Mapping[str, Corners] | None = None,
+    T_rig_board: np.ndarray | None = None,
     together: bool,
     times_s: Mapping[str, Sequence[float]] | None = None,
 ) -> Layout:
-    """One table of everything seen, and the first state. The world is the rig frame, or the first camera's.
+    """One table of everything seen, and the first state, for cameras placed at T_camera_world (C, 3, 4).
 
-    standing: the board on the rig; empty where there is none. together: views of one index are of one instant, or of
-    times_s[camera][index] where given. Raises Refused where cameras cannot be placed relative to each other.
+    standing: the board on the rig, where there is one. together: views of one index are of one instant, or of
+    times_s[camera][index] where given.
     """
-    poses = _place_cameras(cameras, standing, board, T_rig_board, together)
-    shots, times, boards = [], [], []
-    if standing:
-        boards.append(T_rig_board)
-        shots += [(c, 0, standing[name]) for c, name in enumerate(cameras)]
     groups = _shared_groups(cameras) if together else _own_groups(cameras)
+    boards = [] if standing is None else [T_rig_board]
+    shots = [] if standing is None else [(c, 0, standing[name]) for c, name in enumerate(cameras)]
+    blank = [np.nan] * len(boards)
     for group in groups:
         best = max(group, key=lambda seen: len(seen[2]))
-        boards.append(compose(invert_transform(poses[best[0]]), best[3]))
+        boards.append(compose(invert_transform(T_camera_world[best[0]]), best[3]))
         shots += [(c, len(boards) - 1, view) for c, _, view, _ in group]
     lenses = np.array([alone.lens for alone in cameras.values()])
-    state = State(lenses, poses, np.array(boards))
-    if together:
-        rank = np.argsort(np.argsort([-len(a.views) for a in cameras.values()], kind="stable"))
-        times = _times(groups, list(cameras), times_s, rank)
-        blank = [np.nan] * bool(standing)
-        since = [0.0] * len(cameras) * bool(standing) + [t - now for now, ts in times for t in ts]
-        trajectory = Trajectory(np.array(blank + [now for now, _ in times]), rank)
-        return Layout(gather(shots, since), state, trajectory)
-    return Layout(gather(shots), state, None)
+    state = State(lenses, np.asarray(T_camera_world), np.array(boards))
+    index = np.array([-1] * len(blank) + [group[0][1] for group in groups])
+    if not together:
+        return Layout(gather(shots), state, None, index)
+    rank = np.argsort(np.argsort([-len(a.views) for a in cameras.values()], kind="stable"))
+    times = _times(groups, list(cameras), times_s, rank)
+    since = [0.0] * len(cameras) * len(blank) + [t - now for now, ts in times for t in ts]
+    trajectory = Trajectory(np.array(blank + [now for now, _ in times]), rank)
+    return Layout(gather(shots, since), state, trajectory, index)
 
 
 def _own_groups(cameras: Mapping[str, Alone]) -> list[list[tuple]]:
@@ -124,13 +123,22 @@ def _times(groups, names: list[str], times_s, rank: np.ndarray) -> list[tuple[fl
     return [(times[first], times) for first, times in zip(firsts, each)]
 
 
-def _place_cameras(cameras, standing, board: Board, T_rig_board, together: bool) -> np.ndarray:
-    """T_camera_world (C, 3, 4) to begin with."""
-    if standing:
+def place_cameras(
+    cameras: Mapping[str, Alone],
+    standing: Mapping[str, Corners] | None,
+    board: Board,
+    T_rig_board: np.ndarray | None,
+    *,
+    together: bool,
+) -> np.ndarray:
+    """T_camera_world (C, 3, 4) to begin with; the world is the rig frame, or the first camera's.
+
+    Raises Refused where cameras cannot be placed relative to each other.
+    """
+    if standing is not None:
         T_board_rig = invert_transform(T_rig_board)
-        return np.array(
-            [compose(board_pose(standing[n], board.corners_mm, a.lens), T_board_rig) for n, a in cameras.items()]
-        )
+        poses = {name: board_pose(standing[name], board.corners_mm, alone.lens) for name, alone in cameras.items()}
+        return np.array([compose(poses[name], T_board_rig) for name in cameras])
     if len(cameras) == 1:
         return np.eye(3, 4)[None]
     if not together:

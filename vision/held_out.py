@@ -1,0 +1,157 @@
+"""How good cameras are on views that they were not made from.
+
+Three figures, each more telling than the one before. A board pose fitted to one camera by itself takes up much of what
+is wrong. One pose for all cameras asks whether they agree. Distances between neighbouring corners brought into space
+ask for millimetres, against the printed pitch.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.adjust import Solution, solve
+from vision.bundle import predict
+from vision.calibrate import Calibration, lens_knowledge
+from vision.corners import Corners
+from vision.first_guess import board_pose
+from vision.layout import Alone, Layout, lay_out
+from vision.recording import fixes_pose
+from vision.scene import Board, Camera, Cameras
+from vision.triangulate import triangulate
+
+# Board poses and instants are fitted robustly, in the corners' sigmas; residuals are then counted whole.
+_ROBUST_WIDTH = 3.0
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Measured on views (how many) with corners and pitches (how many). NaN where there is nothing to measure.
+
+    alone_px: per camera, a pose for each view of that camera. joint_px: one pose for all cameras, root mean square.
+    at_once_px: the same with all pictures of a view taken as of one instant. pitch_rms_mm, pitch_mean_mm: distance of
+    neighbouring corners in space less the pitch.
+    """
+
+    alone_px: Mapping[str, float]
+    joint_px: float = np.nan
+    at_once_px: float = np.nan
+    pitch_rms_mm: float = np.nan
+    pitch_mean_mm: float = np.nan
+    views: int = 0
+    corners: int = 0
+    pitches: int = 0
+
+
+def held_out(
+    calibration: Calibration,
+    views: Mapping[str, Sequence[Corners]],
+    is_held: Sequence[bool],
+    board: Board,
+    *,
+    times_s: Mapping[str, Sequence[float]] | None = None,
+) -> HeldOut:
+    """Measures on the views k with is_held[k]; the others only say how the board moved."""
+    cameras = calibration.cameras
+    usable = {c.name: _alone(c, views[c.name], board) for c in cameras}
+    alone = {name: _alone_px(cameras[name], usable[name], is_held, board) for name in usable}
+    if not calibration.together or len(cameras) < 2:
+        return HeldOut(alone)
+    layout = lay_out(usable, _poses(cameras), together=True, times_s=times_s)
+    rows = np.array([is_held[k] for k in layout.index])[layout.seen.view] & _shared(layout)
+    if not rows.any():
+        return HeldOut(alone)
+    at_once = _fit_boards(layout, calibration, board)
+    fitted = at_once if calibration.timing is None else _fit_moving_board(layout, calibration, board)
+    off = _pitch_errors_mm(cameras, layout, _still(layout, fitted, board), rows, board)
+    views_held = len(np.unique(layout.seen.view[rows]))
+    return HeldOut(
+        alone, _rms(fitted.residual_px[rows]), _rms(at_once.residual_px[rows]),
+        _rms(off[:, None]), float(off.mean()) if len(off) else np.nan, views_held, int(rows.sum()), len(off),
+    )  # fmt: skip
+
+
+def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
+    usable = {k: view for k, view in enumerate(views) if fixes_pose(view, board)}
+    poses = {k: board_pose(view, board.corners_mm, camera.lens) for k, view in usable.items()}
+    return Alone(camera.lens, camera.rms_px, usable, poses)
+
+
+def _alone_px(camera: Camera, alone: Alone, is_held: Sequence[bool], board: Board) -> float:
+    """Each view's pose fitted to this camera; plain least squares, as others count it."""
+    held = {k: view for k, view in alone.views.items() if is_held[k]}
+    if not held:
+        return np.nan
+    layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
+    known = lens_knowledge(1, len(held))
+    even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
+    return _rms(solve(layout.first, even, board.corners_mm, _held(known)).residual_px)
+
+
+def _poses(cameras: Cameras) -> np.ndarray:
+    return np.array([camera.T_camera_rig for camera in cameras])
+
+
+def _shared(layout: Layout) -> np.ndarray:
+    """Corners (n,) in views that more than one camera has."""
+    starts = layout.seen.shot_starts()
+    pictures = np.bincount(layout.seen.view[starts], minlength=len(layout.index))
+    return pictures[layout.seen.view] > 1
+
+
+def _held(known):
+    return replace(known, free=np.zeros_like(known.free))
+
+
+def _fit_boards(layout: Layout, calibration: Calibration, board: Board) -> Solution:
+    """One pose a view for all cameras, all corners alike."""
+    even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
+    first = replace(layout.first, board=calibration.board)
+    known = _held(lens_knowledge(len(layout.first.lens), len(layout.index)))
+    return solve(first, even, board.corners_mm, known)
+
+
+def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board) -> Solution:
+    """One pose a view for all cameras, on the board's path, with each picture's instant."""
+    timing = calibration.timing
+    error = np.array([report.error_px for report in calibration.report])
+    seen = replace(layout.seen, sigma_px=np.hypot(layout.seen.sigma_px, error[layout.seen.camera]))
+    known = _held(lens_knowledge(len(layout.first.lens), len(layout.index)))
+    known = replace(known, late_sigma_s=timing.scatter_s)
+    first = replace(
+        layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory
+    )
+    return solve(first, seen, board.corners_mm, known, width=_ROBUST_WIDTH)
+
+
+def _still(layout: Layout, fitted: Solution, board: Board) -> np.ndarray:
+    """Corners (n, 2) px as they would have been seen at their view's own time."""
+    then, _ = predict(fitted.state, layout.seen, board.corners_mm)
+    now, _ = predict(replace(fitted.state, trajectory=None), layout.seen, board.corners_mm)
+    return layout.seen.px + now - then
+
+
+def _pitch_errors_mm(cameras: Cameras, layout: Layout, px: np.ndarray, rows: np.ndarray, board: Board) -> np.ndarray:
+    """Distances of neighbouring corners, each brought into space by all cameras that see it, less the pitch."""
+    seen, count = layout.seen, len(board.corners_mm)
+    where = {name: np.full((len(layout.index) * count, 2), np.nan) for name in cameras.names}
+    for c, name in enumerate(cameras.names):
+        own = rows & (seen.camera == c)
+        where[name][seen.view[own] * count + seen.corner[own]] = px[own]
+    sigma = {name: np.ones(len(where[name])) for name in cameras.names}
+    points = triangulate(cameras, where, sigma).mm.reshape(len(layout.index), count, 3)
+    off = np.concatenate([np.linalg.norm(points[:, a] - points[:, b], axis=1) - board.square_mm
+                          for a, b in _neighbours(board)])  # fmt: skip
+    return off[np.isfinite(off)]
+
+
+def _neighbours(board: Board) -> list[tuple[int, int]]:
+    columns, rows = board.squares[0] - 1, board.squares[1] - 1
+    across = [(r * columns + c, r * columns + c + 1) for r in range(rows) for c in range(columns - 1)]
+    down = [(r * columns + c, (r + 1) * columns + c) for r in range(rows - 1) for c in range(columns)]
+    return across + down
+
+
+def _rms(vectors: np.ndarray) -> float:
+    """Root mean square length of vectors (n, m); NaN of none."""
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) if len(vectors) else np.nan
