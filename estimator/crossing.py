@@ -10,7 +10,7 @@ import numpy as np
 from estimator.onset import Touch, columns, felt_touch, usable
 
 FILTER_ORDER = 2
-THRESHOLD_IN_SIGMAS = 5.0
+THRESHOLD_IN_SIGMAS = 10.0
 NOT_CROSSED = "never touches: the filtered moment does not cross the threshold"
 
 
@@ -34,79 +34,97 @@ def zero_phase_lowpass(x, rate_Hz, cutoff_Hz):
 def threshold_touch(motor_rad, moments, time_s, cutoff_Hz, *, threshold=None) -> Touch:
     """Touch as the paper finds it: where the filtered moment above its level crosses a threshold for good.
 
-    threshold is in the unit of the moments, for their magnitude; left out, it is five times the filtered noise.
+    threshold is in the unit of the moments, for their magnitude; left out, it is ten times the filtered noise.
     bias_rad says by how much the crossing comes early (negative) or late for the fitted rise.
     """
-    stroke = _Stroke(motor_rad, moments, time_s, cutoff_Hz)
-    if stroke.felt.status:
-        return stroke.felt
-    noise = np.hypot.reduce(np.std(stroke.filtered_noise, axis=0))
-    height = THRESHOLD_IN_SIGMAS * noise if threshold is None else threshold
-    found, steepness = _last_crossing(np.hypot.reduce(stroke.filtered, axis=1), stroke.motor, height)
-    ideal, _ = _last_crossing(np.hypot.reduce(stroke.filtered_ideal, axis=1), stroke.motor, height)
-    if not np.isfinite(found):
+    felt = felt_touch(motor_rad, moments, time_s)
+    if felt.status:
+        return felt
+    stroke = _Stroke(motor_rad, moments, time_s, cutoff_Hz, felt)
+    size, ideal_size = (np.hypot.reduce(x, axis=1) for x in (stroke.filtered, stroke.ideal))
+    middle = stroke.noise(len(size) // 2)
+    height = THRESHOLD_IN_SIGMAS * np.sqrt(np.trace(middle)) if threshold is None else threshold
+    index, found, steepness = _last_crossing(size, stroke.motor, height)
+    if index is None:
         return Touch.none(NOT_CROSSED)
-    return stroke.touch(found, noise / steepness, ideal)
+    along = felt.rise.slope / np.hypot.reduce(felt.rise.slope)
+    scatter = along @ (stroke.noise(index) + felt.level.covariance_between(found, found)) @ along
+    ideal = _last_crossing(ideal_size, stroke.motor, height)[1]
+    return _touch(found, np.sqrt(scatter) / steepness, ideal, felt)
 
 
 def touch_on_rate(motor_rad, moments, time_s, cutoff_Hz) -> Touch:
     """Touch where the filtered moment's rate over the motor angle reaches half of its rate in the fitted rise."""
-    stroke = _Stroke(motor_rad, moments, time_s, cutoff_Hz)
-    if stroke.felt.status:
-        return stroke.felt
-    near = stroke.felt.motor_rad
-    found, steepness = _nearest_crossing(stroke.rate(stroke.filtered), stroke.motor, 0.5, near)
-    ideal, _ = _nearest_crossing(stroke.rate(stroke.filtered_ideal), stroke.motor, 0.5, near)
-    if not np.isfinite(found):
+    felt = felt_touch(motor_rad, moments, time_s)
+    if felt.status:
+        return felt
+    stroke = _Stroke(motor_rad, moments, time_s, cutoff_Hz, felt)
+    rate, ideal_rate = stroke.rate(stroke.filtered), stroke.rate(stroke.ideal)
+    index, found, steepness = _nearest_crossing(rate, stroke.motor, 0.5, felt.motor_rad)
+    if index is None:
         return Touch.none(NOT_CROSSED)
-    return stroke.touch(found, np.std(stroke.rate(stroke.filtered_noise)) / steepness, ideal)
+    scatter = felt.rise.gain @ stroke.noise_of_rate(index) @ felt.rise.gain
+    ideal = _nearest_crossing(ideal_rate, stroke.motor, 0.5, felt.motor_rad)[1]
+    return _touch(found, np.sqrt(scatter) / steepness, ideal, felt)
 
 
 class _Stroke:
-    """A stroke's moments above their level, the broken line fitted to them, and what it leaves over; all filtered."""
+    """A stroke's moments above their level, and the broken line fitted to them; both filtered, as is the motor."""
 
-    def __init__(self, motor_rad, moments, time_s, cutoff_Hz):
+    def __init__(self, motor_rad, moments, time_s, cutoff_Hz, felt):
         motor, samples = columns(motor_rad, moments)
-        self.felt = felt_touch(motor, samples, time_s)
-        if self.felt.status:
-            return
         time = np.asarray(time_s, dtype=float)
         good = usable(motor, samples)
-        above = np.stack([np.interp(time, time[good], c[good]) for c in (samples - self.felt.offset).T], axis=1)
+        above = np.stack([np.interp(time, time[good], c[good]) for c in (samples - felt.offset).T], axis=1)
         motor = np.interp(time, time[good], motor[good])
-        ideal = np.maximum(0.0, motor - self.felt.motor_rad)[:, None] * self.felt.rise.slope
-        rate_Hz = 1 / np.median(np.diff(time))
-        self.filtered, self.filtered_ideal, self.filtered_noise, self.motor = (
-            zero_phase_lowpass(x, rate_Hz, cutoff_Hz) for x in (above, ideal, above - ideal, motor)
-        )
+        ideal = np.maximum(0.0, motor - felt.motor_rad)[:, None] * felt.rise.slope
+        self._rate_Hz, self._cutoff_Hz, self._felt = 1 / np.median(np.diff(time)), cutoff_Hz, felt
+        self.filtered, self.ideal, self.motor = (self._filter(x) for x in (above, ideal, motor))
+
+    def _filter(self, x):
+        return zero_phase_lowpass(x, self._rate_Hz, self._cutoff_Hz)
 
     def rate(self, moments):
         """Slope (n,) of the moments over the motor angle, in units of the fitted rise's."""
         with np.errstate(all="ignore"):
-            return np.gradient(moments @ self.felt.rise.gain) / np.gradient(self.motor)
+            return np.gradient(moments @ self._felt.rise.gain) / np.gradient(self.motor)
 
-    def touch(self, found, sigma, ideal):
-        """The crossing as a Touch; the level's own error adds to its sigma."""
-        gain = self.felt.rise.gain
-        level = gain @ self.felt.level.covariance_between(found, found) @ gain
-        bias = float(ideal - self.felt.motor_rad)
-        return Touch(float(found), float(np.sqrt(sigma**2 + level)), "", bias, self.felt.level, self.felt.rise)
+    def noise(self, index):
+        """Covariance (k, k) of the filtered moments at a sample: what the filter lets through of the noise."""
+        return self._felt.rise.memory.of_sum(self._weights(index))
+
+    def noise_of_rate(self, index):
+        """Covariance (k, k) of the filtered moments' slope over the motor angle at a sample."""
+        change = (self._weights(index + 1) - self._weights(index - 1)) / 2
+        return self._felt.rise.memory.of_sum(change / np.gradient(self.motor)[index])
+
+    def _weights(self, index):
+        """Weights (n,) with which the filter makes its sample from all: its answer to an impulse, being symmetric."""
+        impulse = np.zeros(len(self.motor))
+        impulse[np.clip(index, 0, len(impulse) - 1)] = 1.0
+        return self._filter(impulse)
+
+
+def _touch(found, sigma, ideal, felt):
+    bias = float(ideal - felt.motor_rad)
+    return Touch(float(found), float(sigma), "", bias, felt.level, felt.rise)
 
 
 def _last_crossing(x, motor, height):
-    """(motor angle, slope) at which x last rises through `height`; NaN where it never does."""
-    below = np.flatnonzero(~(x >= height))
+    """(sample, motor angle, slope) at which x last rises through `height`; None and NaN where it never does."""
+    below = np.flatnonzero(np.logical_not(x >= height))
     if below.size == 0 or below[-1] + 1 >= len(x):
-        return np.nan, np.nan
-    return _interpolated(x, motor, height, below[-1])
+        return None, np.nan, np.nan
+    return below[-1], *_interpolated(x, motor, height, below[-1])
 
 
 def _nearest_crossing(x, motor, height, near):
-    """(motor angle, slope) at which x rises through `height` nearest to the motor angle `near`."""
+    """(sample, motor angle, slope) at which x rises through `height` nearest to the motor angle `near`."""
     rising = np.flatnonzero((x[:-1] < height) & (x[1:] >= height))
     if rising.size == 0:
-        return np.nan, np.nan
-    return _interpolated(x, motor, height, rising[np.argmin(np.abs(motor[rising] - near))])
+        return None, np.nan, np.nan
+    index = rising[np.argmin(np.abs(motor[rising] - near))]
+    return index, *_interpolated(x, motor, height, index)
 
 
 def _interpolated(x, motor, height, before):

@@ -1,0 +1,93 @@
+"""Filter and the touches on filtered signals: no delay, and a bias that is known."""
+
+import numpy as np
+import pytest
+
+from estimator.crossing import threshold_touch, touch_on_rate, zero_phase_lowpass
+from estimator.onset import NO_FREE_STROKE, NO_RISE
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+@pytest.mark.parametrize("cutoff_Hz", [5.0, 45.0])
+def test_half_power_at_the_cutoff_without_delay(cutoff_Hz):
+    """A sine at the cut-off keeps its phase and 1/√2 of its height; far from the ends to 1e-3."""
+    time = np.arange(0, 40 / cutoff_Hz, 1 / 2000)
+    sine = np.sin(2 * np.pi * cutoff_Hz * time)
+    filtered = zero_phase_lowpass(sine, 2000.0, cutoff_Hz)
+    inside = slice(len(time) // 4, 3 * len(time) // 4)
+    np.testing.assert_allclose(filtered[inside], sine[inside] / np.sqrt(2), atol=1e-3)
+
+
+def test_slow_passes_and_fast_does_not():
+    time = np.arange(0, 4, 1 / 2000)
+    slow, fast = np.sin(2 * np.pi * 0.5 * time), np.sin(2 * np.pi * 50 * time)
+    filtered = zero_phase_lowpass(np.stack([slow, fast], axis=1), 2000.0, 5.0)[2000:6000]
+    np.testing.assert_allclose(filtered[:, 0], slow[2000:6000], atol=2e-3)
+    assert np.abs(filtered[:, 1]).max() < 2e-3
+
+
+def test_lines_pass_unchanged_to_their_ends():
+    """Odd padding continues a line as a line."""
+    line = np.linspace(0.0, 3.0, 1240)
+    np.testing.assert_allclose(zero_phase_lowpass(line, 2000.0, 5.0), line, atol=1e-3)
+
+
+@pytest.mark.parametrize("cutoff_Hz", [0.0, -5.0, 1000.0, np.nan])
+def test_impossible_cutoffs_are_refused(cutoff_Hz):
+    with pytest.raises(ValueError, match="cutoff_Hz"):
+        zero_phase_lowpass(np.zeros(100), 2000.0, cutoff_Hz)
+
+
+def test_missing_samples_are_refused_by_the_filter_and_bridged_by_the_touch(stroke):
+    s = stroke(np.random.default_rng(1))
+    s.moments[100:105] = np.nan
+    with pytest.raises(ValueError, match="missing"):
+        zero_phase_lowpass(s.moments, 2000.0, 5.0)
+    assert threshold_touch(*s.arrays, s.time_s, 5.0).status == ""
+
+
+@pytest.mark.parametrize("slopes", [(0.0, 0.25), (0.08, 0.08)])
+def test_threshold_after_5_Hz_is_early_by_what_it_says(stroke, slopes):
+    """Section V filters at 5 Hz for 10°/s: a threshold above the noise is crossed about 0.1° early, 4 % of d_x.
+
+    The stated bias is the mean error, within the scatter of 40 strokes.
+    """
+    strokes = [stroke(np.random.default_rng(seed), slopes=slopes) for seed in range(40)]
+    found = [threshold_touch(*s.arrays, s.time_s, 5.0) for s in strokes]
+    errors = np.degrees([touch.motor_rad for touch in found]) - 2.3
+    biases = np.degrees([touch.bias_rad for touch in found])
+    assert -0.2 < errors.mean() < -0.05
+    assert (errors - biases).mean() == pytest.approx(0.0, abs=4 * errors.std() / np.sqrt(40))
+    assert 0.5 < np.std(errors - biases) / np.degrees(np.median([touch.sigma_rad for touch in found])) < 1.5
+
+
+def test_a_high_threshold_is_late_by_its_height_over_the_slope(stroke):
+    """Far above the filter's smear the crossing is threshold / slope after the touch: 0.25 V at 0.25 V/° is 1°."""
+    s = stroke(np.random.default_rng(2), slopes=(0.0, 0.25))
+    touch = threshold_touch(*s.arrays, s.time_s, 45.0, threshold=0.25)
+    assert np.degrees(touch.bias_rad) == pytest.approx(1.0, abs=0.02)
+    assert np.degrees(touch.motor_rad) == pytest.approx(3.3, abs=0.05)
+
+
+@pytest.mark.parametrize("cutoff_Hz", [5.0, 15.0])
+def test_half_height_of_the_rate_has_no_bias(stroke, cutoff_Hz):
+    strokes = [stroke(np.random.default_rng(seed), slopes=(0.0, 0.25)) for seed in range(40)]
+    found = [touch_on_rate(*s.arrays, s.time_s, cutoff_Hz) for s in strokes]
+    errors = np.degrees([touch.motor_rad for touch in found]) - 2.3
+    assert np.abs(np.degrees([touch.bias_rad for touch in found])).max() < 1e-3
+    assert errors.mean() == pytest.approx(0.0, abs=4 * errors.std() / np.sqrt(40))
+    assert 0.5 < errors.std() / np.degrees(np.median([touch.sigma_rad for touch in found])) < 2
+
+
+@pytest.mark.parametrize("settings, status", [({"touch": 99.0}, NO_RISE), ({"touch": 0.0}, NO_FREE_STROKE)])
+def test_no_number_where_there_is_no_touch(stroke, settings, status):
+    s = stroke(np.random.default_rng(3), **settings)
+    for touch in (threshold_touch(*s.arrays, s.time_s, 5.0), touch_on_rate(*s.arrays, s.time_s, 5.0)):
+        assert touch.status == status
+        assert np.isnan(touch.motor_rad)
+
+
+def test_a_threshold_out_of_reach_is_told(stroke):
+    s = stroke(np.random.default_rng(4))
+    assert "does not cross" in threshold_touch(*s.arrays, s.time_s, 5.0, threshold=99.0).status
