@@ -17,18 +17,24 @@ NOT_CROSSED = "never touches: the filtered moment does not cross the threshold"
 def zero_phase_lowpass(x, rate_Hz, cutoff_Hz):
     """Low-pass of samples along the first axis, forwards and backwards: no delay, −3 dB at cutoff_Hz over both passes.
 
-    Second-order Butterworth each way. Raises ValueError for a cut-off outside (0, rate/2), and for NaN.
+    Second-order Butterworth each way. Missing samples (NaN) are bridged by lines for the filter, and stay NaN. Raises
+    ValueError for a cut-off outside (0, rate/2).
     """
     from scipy.signal import butter, sosfiltfilt
 
     x = np.asarray(x, dtype=float)
     if not 0 < cutoff_Hz < rate_Hz / 2:
         raise ValueError(f"cutoff_Hz = {cutoff_Hz}: must lie between 0 and half the rate of {rate_Hz} Hz")
-    if not np.isfinite(x).all():
-        raise ValueError("samples are missing or infinite: a filter would smear them over the rest")
     each_way = cutoff_Hz / (np.sqrt(2) - 1) ** (1 / (2 * FILTER_ORDER))
     sections = butter(FILTER_ORDER, min(each_way, 0.499 * rate_Hz), fs=rate_Hz, output="sos")
-    return sosfiltfilt(sections, x, axis=0, padlen=min(len(x) - 1, int(3 * rate_Hz / cutoff_Hz)))
+    padding = min(len(x) - 1, int(3 * rate_Hz / cutoff_Hz))
+    filtered = sosfiltfilt(sections, np.apply_along_axis(_bridged, 0, x), axis=0, padlen=padding)
+    return np.where(np.isfinite(x), filtered, np.nan)
+
+
+def _bridged(x):
+    known = np.flatnonzero(np.isfinite(x))
+    return np.interp(np.arange(len(x)), known, x[known]) if known.size else np.zeros(len(x))
 
 
 def threshold_touch(motor_rad, moments, time_s, cutoff_Hz, *, threshold=None) -> Touch:

@@ -1,0 +1,206 @@
+"""The built-in estimators on whisks of known distance, and what they say where there is none."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from estimator import builtin, slip
+from estimator.beam import Beam
+from estimator.builtin import ESTIMATORS
+from estimator.signal import felt_touch, moment_at
+from estimator.whisk import Estimate, EstimatorSettings, Whisk
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
+THETA, ALPHA = np.radians(3.0), np.radians(10.5)
+SETTINGS = EstimatorSettings(ALPHA)
+
+
+def whisk_of(m_y, m_z, *, beam=BEAM, sigma=0.01, theta=THETA):
+    samples = np.linspace(-0.02, 0.08, 50)
+    covariance = sigma**2 * np.eye(2)
+    return Whisk(samples * 5, samples, m_y * samples, m_z * samples, theta, m_y, m_z, covariance, 1e-4, beam)
+
+
+def whisk_at(d_x, beta, alpha=ALPHA, **settings):
+    return whisk_of(*slip.moments(d_x, THETA, beta, alpha, BEAM.C_Nmm2), **settings)
+
+
+@pytest.mark.parametrize("beta_deg", [0, 30, 60, 75])
+def test_with_friction_finds_the_distance(beta_deg):
+    estimate = ESTIMATORS["with_friction"](whisk_at(60.0, np.radians(beta_deg)), SETTINGS)
+    assert estimate.d_x_mm == pytest.approx(60.0, rel=1e-12)
+    assert estimate.status == ""
+    assert 0 < estimate.sigma_mm < 1.5
+
+
+def test_without_slip_all_agree():
+    found = [function(whisk_at(60.0, 0.1), SETTINGS).d_x_mm for function in ESTIMATORS.values()]
+    np.testing.assert_allclose(found, 60.0, rtol=1e-14)
+
+
+def test_under_slip_no_slip_and_frictionless_are_too_long():
+    """Section II: slip makes (2) overestimate; (12) with too little friction as well."""
+    whisk = whisk_at(40.0, np.radians(45))
+    no_slip, with_friction, frictionless = (ESTIMATORS[n](whisk, SETTINGS).d_x_mm for n in ESTIMATORS)
+    assert no_slip > frictionless > with_friction == pytest.approx(40.0)
+
+
+def test_no_slip_is_equation_2_whatever_m_y_does():
+    assert ESTIMATORS["no_slip"](whisk_of(5.0, 9.0), SETTINGS).d_x_mm == pytest.approx(BEAM.C_Nmm2 * THETA / 9.0)
+
+
+def test_sigma_holds_touch_moments_and_friction():
+    whisk = whisk_at(60.0, np.radians(60), sigma=0.0)
+    touch_alone = ESTIMATORS["with_friction"](whisk, SETTINGS).sigma_mm
+    assert touch_alone == pytest.approx(60.0 * 1e-4 / THETA, rel=1e-12)
+    doubtful = EstimatorSettings(ALPHA, alpha_est_sigma_rad=np.radians(1.0))
+    sensitivity = np.tan(np.radians(60)) - np.tan(ALPHA)
+    friction_alone = np.sqrt(ESTIMATORS["with_friction"](whisk, doubtful).sigma_mm ** 2 - touch_alone**2)
+    assert friction_alone == pytest.approx(60.0 * sensitivity * np.radians(1.0), rel=1e-9)
+    assert ESTIMATORS["frictionless"](whisk, doubtful).sigma_mm < friction_alone
+
+
+def test_beyond_the_tip_is_the_tip_with_its_sigma_and_a_word():
+    estimate = ESTIMATORS["no_slip"](whisk_at(60.0, np.radians(75)), SETTINGS)
+    assert estimate.d_x_mm == 100.0
+    assert estimate.status.startswith("tip contact: the distance came out as")
+    assert estimate.sigma_mm > 0
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_no_distance_is_nan_with_the_reason(name):
+    estimate = ESTIMATORS[name](whisk_of(1.0, -1.0), SETTINGS)
+    assert np.isnan([estimate.d_x_mm, estimate.sigma_mm]).all()
+    assert "m_z is not positive" in estimate.status
+
+
+def test_friction_that_leaves_no_distance_is_told_by_the_one_that_assumes_it():
+    whisk = whisk_of(9.0, 1.0)
+    assert "phi + alpha_est" in ESTIMATORS["with_friction"](whisk, SETTINGS).status
+    assert "phi + alpha_est" not in ESTIMATORS["frictionless"](whisk, SETTINGS).status
+
+
+def test_cone_is_the_cylinder_with_one_over_length_added():
+    cone = dataclasses.replace(BEAM, shape="cone")
+    moments = slip.moments(80.0, THETA, 0.9, ALPHA, BEAM.C_Nmm2)
+    for function in ESTIMATORS.values():
+        cylinder, tapered = (function(whisk_of(*moments, beam=beam), SETTINGS) for beam in (BEAM, cone))
+        if not cylinder.status:
+            assert 1 / tapered.d_x_mm == pytest.approx(1 / cylinder.d_x_mm + 1 / 100.0, rel=1e-14)
+            shrink = tapered.d_x_mm / cylinder.d_x_mm
+            assert tapered.sigma_mm == pytest.approx(cylinder.sigma_mm * shrink**2, rel=1e-12)
+
+
+def test_estimators_on_a_felt_stroke(stroke):
+    """From samples to distance: 60 strokes scatter by their sigma about the truth, 60 mm on a surface of 40°."""
+    beta, C = np.radians(40), BEAM.C_Nmm2
+    slopes = np.array(slip.moments(60.0, np.radians(1), beta, ALPHA, C)) / 10
+    rng = np.random.default_rng(21)
+    scores = []
+    for _ in range(60):
+        s = stroke(rng, slopes=slopes)
+        moments = 10 * s.moments
+        touch = felt_touch(s.motor_rad, moments, s.time_s)
+        at = moment_at(THETA, s.motor_rad, moments, touch, time_s=s.time_s)
+        above = (moments - touch.offset).T
+        whisk = Whisk(
+            s.time_s,
+            s.motor_rad - touch.motor_rad,
+            *above,
+            THETA,
+            *at.values,
+            at.covariance,
+            touch.sigma_rad,
+            BEAM,
+            at.theta_covariance,
+        )
+        estimate = builtin.with_friction(whisk, SETTINGS)
+        scores.append((estimate.d_x_mm - 60.0) / estimate.sigma_mm)
+    assert abs(np.mean(scores)) < 4 / np.sqrt(60)
+    assert 0.5 < np.std(scores) < 1.3
+
+
+# ---- the session that this package did not make, with gauges found as in section V
+
+
+def stroke_of(trial):
+    import tomllib
+
+    table = np.genfromtxt(trial / "signals.csv", delimiter=",", names=True)
+    truth = tomllib.loads((trial / "truth.toml").read_text())
+    return np.radians(table["motor_deg"]), np.c_[table["y_V"], table["z_V"]], table["time_s"], truth
+
+
+def gauge_matrix(session):
+    """Moments per volt [m_y, m_z] × [y_V, z_V] from (2) on both gauge trials, and the inverse volts' relative sigma.
+
+    Unturned, m_z = Cθ/d_x meets the channels as they are; turned by 90° it meets channel y.
+    """
+    felt, relative = [], []
+    for name in ("gauge_roll90", "gauge_roll0"):
+        motor, volts, time, truth = stroke_of(session / "trials" / name)
+        touch = felt_touch(motor, volts, time)
+        at = moment_at(THETA, motor, volts, touch, time_s=time)
+        felt.append(at.values / (BEAM.C_Nmm2 * THETA / truth["d_x_mm"]))
+        size = np.hypot(*at.values)
+        relative.append(np.hypot(np.sqrt(at.covariance.max()) / size, touch.sigma_rad / THETA))
+    turned, unturned = felt
+    return np.linalg.inv(np.stack([turned, unturned], axis=1)), max(relative)
+
+
+@pytest.mark.parametrize("name", ["b00_2", "b30_3", "b60_4"])
+def test_sample_session_within_three_sigma_at_the_right_friction(steel_sample, name):
+    """α = atan 0.185339 is the session's. Sigma holds noise, touch and gauges; seen values make the gauges here."""
+    matrix, relative = gauge_matrix(steel_sample)
+    motor, volts, time, truth = stroke_of(steel_sample / "trials" / name)
+    moments = volts @ matrix.T
+    touch = felt_touch(motor, moments, time)
+    at = moment_at(THETA, motor, moments, touch, time_s=time)
+    above = (moments - touch.offset).T
+    whisk = Whisk(
+        time,
+        motor - touch.motor_rad,
+        *above,
+        THETA,
+        *at.values,
+        at.covariance,
+        touch.sigma_rad,
+        BEAM,
+        at.theta_covariance,
+    )
+    estimate = builtin.with_friction(whisk, EstimatorSettings(np.arctan(truth["mu_kinetic"])))
+    sigma = np.hypot(estimate.sigma_mm, relative * estimate.d_x_mm)
+    assert abs(estimate.d_x_mm - truth["d_x_mm"]) < 3 * sigma
+    assert sigma < 0.015 * truth["d_x_mm"]
+
+
+# ---- what goes in is checked where it is made
+
+
+def test_settings_are_checked():
+    with pytest.raises(ValueError, match="alpha_est_rad = 10"):
+        EstimatorSettings(10.5)
+    with pytest.raises(ValueError, match="alpha_est_sigma_rad = -0"):
+        EstimatorSettings(0.1, -0.1)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"time_s": np.zeros(3)}, "of one length"),
+        ({"covariance_at": np.eye(3)}, r"must be \(2, 2\)"),
+        ({"theta_moment_covariance_at": np.zeros(3)}, r"shape \(2,\)"),
+        ({"theta_sigma_rad": -1.0}, "theta_sigma_rad = -1"),
+    ],
+)
+def test_whisks_are_checked(change, message):
+    with pytest.raises(ValueError, match=message):
+        dataclasses.replace(whisk_of(1.0, 5.0), **change)
+
+
+def test_answers_are_frozen():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Estimate(1.0, 0.1).d_x_mm = 2.0
