@@ -50,12 +50,17 @@ def held_out(
     board: Board,
     *,
     times_s: Mapping[str, Sequence[float]] | None = None,
+    together: bool | None = None,
 ) -> HeldOut:
-    """Measures on the views k with is_held[k]; the others only say how the board moved."""
+    """Measures on the views k with is_held[k]; the others only say how the board moved.
+
+    together: the views of one index are of one board; by default as the calibration found it.
+    """
     cameras = calibration.cameras
+    together = calibration.together if together is None else together
     usable = {c.name: _alone(c, views[c.name], board) for c in cameras}
     alone = {name: _alone_px(cameras[name], usable[name], is_held, board) for name in usable}
-    if not calibration.together or len(cameras) < 2:
+    if not together or len(cameras) < 2:
         return HeldOut(alone)
     layout = lay_out(usable, _poses(cameras), together=True, times_s=times_s)
     rows = np.array([is_held[k] for k in layout.index])[layout.seen.view] & _shared(layout)

@@ -1,0 +1,148 @@
+"""`whisker-bench calibrate cameras`: cameras.toml from a session's board views, and how far to trust it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from bench.board_views import BoardViews, read_board_views
+from bench.errors import BadInput
+from bench.session import Session, load_session
+from vision.calibrate import Calibration, CameraReport, calibrate_cameras
+from vision.cameras_file import write_cameras
+from vision.corners import Corners
+from vision.errors import Refused
+from vision.held_out import HeldOut, held_out
+from vision.lens import LENS_TERMS
+from vision.scene import Camera
+
+# Every fourth view (index % 4 == 3) measures a calibration from the other three quarters.
+HOLD_EVERY = 4
+# A distortion term this many sigmas from zero is one that the views ask for.
+_ASKED_SIGMAS = 2.0
+_MOST_LEFT_OUT = 0.1
+
+
+def calibrate_cameras_command(session: Path, out: Path) -> int:
+    """Calibrates, writes `out` (TOML) and its .npz, prints the report. Returns 0, or 1 where something is doubtful.
+
+    Raises BadInput or Refused, saying what to record, before anything is written.
+    """
+    loaded = load_session(session)
+    views = read_board_views(loaded)
+    calibration = calibrate_from(loaded, views)
+    measured = measure_held_out(loaded, views)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_cameras(out, calibration.cameras)
+    doubts = list(_doubts(calibration))
+    lines = [*report_lines(calibration), *held_out_lines(measured, calibration), *views.notes, *doubts]
+    print("\n".join([*lines, f"written: {out} and {out.with_suffix('.npz').name}"]))
+    return 1 if doubts or views.notes else 0
+
+
+def calibrate_from(session: Session, views: BoardViews) -> Calibration:
+    """The session's cameras from its views. Raises BadInput."""
+    if session.T_rig_board is not None:
+        missing = [name for name in views.boards if name not in views.rig]
+        if missing:
+            raise BadInput(f"has no picture {missing[0]}.png: record the board standing on the rig", file="boards/rig")
+    try:
+        return calibrate_cameras(
+            views.boards,
+            views.rig,
+            session.board,
+            views.sizes_px,
+            session.T_rig_board,
+            T_rig_board_sigma_mm=session.T_rig_board_sigma_mm,
+            T_rig_board_sigma_rad=session.T_rig_board_sigma_rad,
+            trial_views=views.trials,
+            times_s=views.times_s,
+            work_points_mm=_work_points(session),
+        )
+    except Refused as reason:
+        raise BadInput(str(reason), file="boards") from None
+
+
+def _work_points(session: Session) -> np.ndarray | None:
+    """The unbent whisker, by the session's own word: where cameras must know their lens."""
+    if session.whisker is None or session.T_rig_board is None:
+        return None
+    return np.linspace(0, session.whisker.length_mm, 21)[:, None] * np.array([1.0, 0.0, 0.0])
+
+
+def measure_held_out(session: Session, views: BoardViews) -> HeldOut | None:
+    """Cameras from three quarters of the views, measured on the last. None where too few are left.
+
+    Where cameras did not look at the board at once, they see it at once on the rig only: then every other row of the
+    rig board's corners places the cameras and the rows between measure them.
+    """
+    count = max(len(v) for v in views.boards.values())
+    is_held = np.arange(count) % HOLD_EVERY == HOLD_EVERY - 1
+    kept = views.without(is_held)
+    try:
+        made = calibrate_from(session, kept)
+        if made.together or len(views.boards) < 2:
+            return held_out(made, views.boards, is_held, session.board, times_s=views.times_s)
+        made = calibrate_from(session, _with_even_rows(kept, session))
+    except BadInput:
+        return None
+    alone = held_out(made, views.boards, is_held, session.board).alone_px
+    odd = {name: [_rows(view, session, 1)] for name, view in views.rig.items()}
+    on_rig = held_out(made, odd, [True], session.board, together=True)
+    return HeldOut(alone, **{k: getattr(on_rig, k) for k in HeldOut.__dataclass_fields__ if k != "alone_px"})
+
+
+def _with_even_rows(views: BoardViews, session: Session) -> BoardViews:
+    rig = {name: _rows(view, session, 0) for name, view in views.rig.items()}
+    trials = {name: [_rows(view, session, 0) for view in many] for name, many in views.trials.items()}
+    return BoardViews(views.boards, rig, trials, views.sizes_px, views.times_s, views.notes)
+
+
+def _rows(view: Corners, session: Session, parity: int) -> Corners:
+    return view.chosen(view.ids // (session.board.squares[0] - 1) % 2 == parity)
+
+
+def report_lines(calibration: Calibration) -> Iterator[str]:
+    """What the calibration rests on, in plain lines."""
+    for camera, report in zip(calibration.cameras, calibration.report):
+        yield (
+            f"camera {camera.name}: {report.views} views, {report.corners} corners ({report.left_out} left out), "
+            f"RMS {report.rms_px:.3f} px, of that {report.error_px:.3f} px an axis beyond the corners' own sigma; "
+            f"covers {100 * report.coverage:.0f} % of the picture, depth ratio {report.depth_ratio:.2f}, "
+            f"tilt up to {report.tilt_deg:.0f} degrees"
+        )
+        yield "  " + ", ".join(_terms(camera, report))
+    yield from calibration.notes
+
+
+def _terms(camera: Camera, report: CameraReport) -> Iterator[str]:
+    for name, value, sigma in zip(LENS_TERMS, camera.lens, report.intrinsics_sigma):
+        asked = name[0] not in "kp" or abs(value) > _ASKED_SIGMAS * sigma
+        digits = 2 if name[0] in "fc" else 4
+        yield f"{name} {value:.{digits}f} ± {sigma:.{digits}f}{'' if asked else ' (not asked for)'}"
+
+
+def held_out_lines(measured: HeldOut | None, calibration: Calibration) -> Iterator[str]:
+    """The held-out figures, in plain lines."""
+    if measured is None:
+        yield "held out: too few views to spare any (index % 4 == 3)"
+        return
+    alone = ", ".join(f"{name} {px:.3f} px" for name, px in measured.alone_px.items())
+    yield f"held out, views with index % 4 == 3, each camera with its own board pose: {alone}"
+    if not measured.corners:
+        return
+    what = "board views" if calibration.together else "view of the board on the rig, every other row of corners,"
+    yield f"held out, {measured.views} {what} one board pose for all cameras: {measured.joint_px:.3f} px joint"
+    if calibration.timing is not None:
+        yield f"  (with each picture's instant; {measured.at_once_px:.3f} px if a view's pictures were of one instant)"
+    yield (
+        f"held out, distances of neighbouring corners in space less the pitch: RMS {measured.pitch_rms_mm:.4f} mm, "
+        f"mean {measured.pitch_mean_mm:+.4f} mm, {measured.pitches} pitches"
+    )
+
+
+def _doubts(calibration: Calibration) -> Iterator[str]:
+    for report in calibration.report:
+        share = report.left_out / max(report.corners + report.left_out, 1)
+        if share > _MOST_LEFT_OUT:
+            yield f"doubtful: camera {report.name} has {100 * share:.0f} % of its corners left out as beyond 4.5 sigma"
