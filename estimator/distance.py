@@ -250,16 +250,22 @@ def _centred(samples):
     return deviation / largest, largest[..., 0]
 
 
+def _exponent(x):
+    """Power of two that brings x near one; far below all others for zero."""
+    return np.where(x == 0, -9999, np.frexp(x)[1])
+
+
 def _scaled(m_y, m_z):
     """m_y, m_z over a common power of two that brings the larger near one, and its exponent."""
-    exponent = np.maximum(np.frexp(m_y)[1], np.frexp(m_z)[1])
+    exponent = np.maximum(_exponent(m_y), _exponent(m_z))
     return np.ldexp(m_y, -exponent), np.ldexp(m_z, -exponent), exponent
 
 
 def _friction_share(m_y, m_z, alpha_est):
     """(m_z − μ|m_y|) as a number near one and an exponent of two."""
-    drag, m_z, exponent = _scaled(np.tan(alpha_est) * np.abs(m_y), m_z)
-    return m_z - drag, exponent
+    pull, power = np.frexp(np.abs(m_y))
+    drag, m_z, exponent = _scaled(np.tan(alpha_est) * pull, np.ldexp(m_z, -power))
+    return m_z - drag, exponent + power
 
 
 def _across_slope(m_y, m_z, beta):

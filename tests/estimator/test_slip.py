@@ -43,7 +43,7 @@ def test_without_friction_the_force_is_normal_to_the_surface(beta):
     assert slip.slip_angle(abs(beta), tiny) == max(0.0, abs(beta) - tiny)
 
 
-@given(distances, pushes, slopes, frictions, rigidities, st.integers(-20, 20))
+@given(distances, pushes, slopes, frictions, rigidities, st.integers(-900, 900))
 def test_scale_invariance(d_x, theta, beta, alpha, C, power):
     """Moments scale with C and with 1/d_x, the slip with d_x; powers of two scale normal numbers without rounding."""
     scale = 2.0**power
