@@ -58,7 +58,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_evaluate, _add_check, _add_figures, _add_info):
+    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_info):
         add_verb(verbs)
     return parser
 
@@ -104,13 +104,17 @@ def _add_evaluate(verbs) -> None:
     )
     _add_session(verb)
     _add_out(verb, "OUT", "folder for tables, figures and the summary")
+    verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
+    verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
+    verb.add_argument("--cutoff-Hz", type=float, metavar="X", help="of the low-pass (default: 0.5 for each deg/s)")
+    verb.add_argument("--clock-sigma-s", type=float, metavar="X", help="how well frames' and signals' clocks agree")
     verb.add_argument(
-        "--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)"
+        "--estimator",
+        action="append",
+        dest="estimators",
+        metavar="MODULE:FUNCTION",
+        help="one of your own, importable from here; may be given several times",
     )
-    verb.add_argument(
-        "--alpha-est-deg", type=float, metavar="X", help="friction angle that estimators assume (default 10)"
-    )
-    verb.add_argument("--cutoff-Hz", type=float, metavar="X", help="of the low-pass (default: by speed)")
     _add_workers(verb)
 
 
@@ -120,10 +124,35 @@ def _evaluate(options: argparse.Namespace) -> int:
     from bench.settings import Settings
 
     check_environment()
-    given = {name: getattr(options, name) for name in ("theta_deg", "alpha_est_deg", "cutoff_Hz")}
-    settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
+    names = ("theta_deg", "alpha_est_deg", "cutoff_Hz", "clock_sigma_s", "estimators")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    if "estimators" in given:
+        given["estimators"] = tuple(given["estimators"])
     progress = sys.stderr.isatty()
-    return evaluate(options.session, options.out, settings, workers=options.workers, progress=progress)
+    return evaluate(options.session, options.out, Settings(**given), workers=options.workers, progress=progress)
+
+
+def _add_calibrate(verbs) -> None:
+    calibrate = verbs.add_parser("calibrate", help="cameras from their board views")
+    what = calibrate.add_subparsers(title="what", metavar="WHAT", required=True)
+    cameras = _add(
+        what,
+        "cameras",
+        _calibrate_cameras,
+        "calibrate the cameras from boards/ and place them in the rig, with their uncertainty",
+        "whisker-bench calibrate cameras fixtures/small-session --out cameras.toml",
+    )
+    _add_session(cameras)
+    _add_out(cameras, "FILE", "cameras.toml to write; its covariance goes beside it as .npz")
+
+
+def _calibrate_cameras(options: argparse.Namespace) -> int:
+    from bench.calibrate_cameras import calibrate_cameras_command
+    from bench.environment import check_environment
+
+    check_environment()
+    return calibrate_cameras_command(options.session, options.out)
 
 
 def _add_check(verbs) -> None:

@@ -11,17 +11,22 @@ from bench import cli
 from bench.errors import BadInput
 
 
-def verbs() -> list[str]:
-    parser = cli.make_parser()
-    return list(parser._subparsers._group_actions[0].choices)
+VERBS = ["check", "calibrate cameras", "evaluate", "figures", "info"]
 
 
-@pytest.mark.parametrize("verb", verbs())
+@pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_shows_a_worked_example(verb, capsys):
     with pytest.raises(SystemExit) as done:
-        cli.main([verb, "--help"])
+        cli.main([*verb.split(), "--help"])
     assert done.value.code == 0
     assert f"example:\n  whisker-bench {verb}" in capsys.readouterr().out
+
+
+def test_help_lists_every_verb(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    shown = capsys.readouterr().out
+    assert [verb for verb in VERBS if f"\n    {verb.split()[0]}" not in shown] == []
 
 
 def test_help_imports_nothing_heavy():
