@@ -10,7 +10,6 @@ import pytest
 from bench import cli
 from bench.errors import BadInput
 
-
 VERBS = ["check", "calibrate cameras", "evaluate", "figures", "info"]
 
 
