@@ -82,14 +82,24 @@ def _normal_equations(
     if not np.all(np.isfinite(squared)):
         return _Normal(*(None,) * 6, cost=np.inf, residual_px=residual)
     root = np.sqrt(robust_weight(squared, width)) / seen.sigma_px
-    J, r = J * root[:, None, None], residual * root[:, None]
-    blocks = np.add.reduceat(
-        J.transpose(0, 2, 1) @ np.concatenate([J, r[:, :, None]], axis=2), seen.shot_starts()
-    )
+    weighed = np.concatenate([J, residual[:, :, None]], axis=2) * root[:, None, None]
+    blocks = _shot_blocks(weighed, seen.shot_starts())
     shots, blocks, late_cost = _without_instants(blocks, state, seen, known)
     parts = _assemble(blocks, shots, state)
     cost = float(np.sum(robust_cost(squared, width)) + late_cost)
     return _with_knowledge(parts, shots, cost, residual, state, known)
+
+
+def _shot_blocks(weighed: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """JᵀJ and Jᵀr of each picture, (s, p, p + 1), from the rows (n, 2, p + 1) of all corners.
+
+    Pictures are filled up with zeros to one length: one product for all is ten times as fast as one a corner.
+    """
+    count = np.diff(np.append(starts, len(weighed)))
+    padded = np.zeros((len(starts), count.max(), *weighed.shape[1:]))
+    padded[np.repeat(np.arange(len(starts)), count), np.arange(len(weighed)) - np.repeat(starts, count)] = weighed
+    padded = padded.reshape(len(starts), -1, weighed.shape[2])
+    return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
 
 
 def _without_instants(blocks: np.ndarray, state: State, seen: Sightings, known: Knowledge):
@@ -225,7 +235,7 @@ def solve(
     *,
     width: float = np.inf,
     max_iterations: int = 60,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-8,
 ) -> Solution:
     """Least cost from `state`. width: of Cauchy's loss in sigmas, inf for least squares.
 

@@ -133,9 +133,10 @@ def predict(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.n
     width = N_CAMERA + N_BOARD + N_VIEW * (1 if state.trajectory is None else 3)
     px, J = np.empty((len(seen), 2)), np.empty((len(seen), 2, width))
     points, by_board = _printed(state, seen, corners_mm)
+    paths = _Paths.of(state)
     for camera in np.unique(seen.camera):
         rows = np.flatnonzero(seen.camera == camera)
-        px[rows], J[rows] = _predict_one(state, camera, seen.chosen(rows), points[rows], by_board[rows])
+        px[rows], J[rows] = _predict_one(state, camera, seen.chosen(rows), points[rows], by_board[rows], paths)
     return px, J
 
 
@@ -153,10 +154,10 @@ def _printed(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.
     return points[seen.corner], by_board[seen.corner]
 
 
-def _predict_one(state: State, camera: int, seen: Sightings, points: np.ndarray, by_board: np.ndarray):
+def _predict_one(state: State, camera: int, seen: Sightings, points, by_board, paths):
     T_board, T_camera = state.T_world_board[seen.view], state.T_camera_world[camera]
     turned = np.einsum("nij,nj->ni", T_board[:, :, :3], points)
-    motion = _motion(state, camera, seen)
+    motion = _motion(state, camera, seen, paths)
     moved = np.einsum("nij,nj->ni", motion.turn, turned)
     R = T_camera[:, :3]
     in_camera = (moved + T_board[:, :, 3] + motion.shift_mm) @ R.T
@@ -192,18 +193,33 @@ class _Motion:
         return len(self.turn_by_poses)
 
 
-def _motion(state: State, camera: int, seen: Sightings) -> _Motion:
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """From each view's pose to those before and after: paths (V, 2, 6), and of their turns' left Jacobians the inverse
+    (V, 2, 3, 3)."""
+
+    paths: np.ndarray
+    inverse: np.ndarray
+
+    @staticmethod
+    def of(state: State) -> "_Paths | None":
+        if state.trajectory is None:
+            return None
+        paths = state.trajectory.paths(state.T_world_board)
+        return _Paths(paths, np.linalg.inv(left_jacobian(paths[:, :, :3])))
+
+
+def _motion(state: State, camera: int, seen: Sightings, known: _Paths | None) -> _Motion:
     n = len(seen)
-    if state.trajectory is None:
+    if known is None:
         still, eye = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))
         return _Motion(eye, still, still, still, [eye], [np.ones((n, 1, 1))])
     elapsed = seen.time_s + state.instants[seen.view, camera] + state.clock[camera]
     shares, rates = state.trajectory.shares(seen.view, elapsed)
-    paths = state.trajectory.paths(state.T_world_board)[seen.view]
-    path, rate = (np.einsum("nk,nki->ni", s, paths) for s in (shares, rates))
+    path, rate = (np.einsum("nk,nki->ni", s, known.paths[seen.view]) for s in (shares, rates))
     turn, J = exp_rotation(path[:, :3]), left_jacobian(path[:, :3])
     # log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
-    inverse = np.linalg.inv(left_jacobian(paths[:, :, :3])) * shares[:, :, None, None]
+    inverse = known.inverse[seen.view] * shares[:, :, None, None]
     by_neighbours = [J @ inverse[:, k] for k in (0, 1)]
     by_own = turn - J @ np.swapaxes(inverse.sum(axis=1), 1, 2)
     parts = [1.0 - shares.sum(axis=1), shares[:, 0], shares[:, 1]]

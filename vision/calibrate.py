@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.adjust import solve
 from vision.board_motion import Trajectory
 from vision.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Knowledge, State
 from vision.corners import Corners
@@ -48,6 +49,8 @@ _DISAGREE = 1.5
 # Clock offsets and scatter of instants to begin with, in frame intervals.
 _CLOCK_SIGMA = 0.6
 _FIRST_LATENESS = 0.2
+# What cameras may disagree by, px, before instants have been found.
+_FIRST_EXCESS_PX = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +134,10 @@ def calibrate_cameras(
         alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=times_s
     )
     known = _knowledge(layout.first, board, T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad)
-    settled, notes = _settle_with_warp(layout, board, known)
-    timing = None
-    if together:
-        settled, timing, more = _settle_with_timing(layout, settled, board, alone, times_s is None)
-        notes += more
+    settled, timing = _settle(layout, board, known, np.array([a.error_px for a in alone.values()]), times_s is None)
+    settled, notes = _settle_with_warp(layout, settled, board)
+    if timing is not None:
+        notes.append(_timing_note(alone, timing))
     calibration = _calibration(alone, sizes_px, settled, board, notes, timing, together)
     check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
     check_work(calibration.cameras, alone, standing, work_points_mm)
@@ -192,26 +194,28 @@ def _knowledge(first: State, board: Board, T_rig_board, sigma_mm: float, sigma_r
     return replace(known, pose_view=0, pose_T=T_rig_board, pose_sigma=pose_sigma)
 
 
-def _settle_with_warp(layout: Layout, board: Board, known: Knowledge) -> tuple[Settled, list[str]]:
-    """With a flat board, then with a warped one where the pictures ask for it."""
-    flat = settle(layout.first, layout.seen, board.corners_mm, known)
-    warped = settle(flat.solution.state, layout.seen, board.corners_mm, allow_warp(known))
-    if flat.solution.cost - warped.solution.cost < _WARP_GAIN:
+def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Settled, list[str]]:
+    """With a warped board where that lowers the cost, at the flat board's noise, by more than chance would."""
+    known = allow_warp(flat.known)
+    warped = solve(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, known, tolerance=1e-6)
+    if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []
-    x, y = warped.solution.state.board[1:]
-    return warped, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
+    settled = settle(warped.state, layout.seen, board.corners_mm, known, error_px=flat.error_px)
+    x, y = settled.solution.state.board[1:]
+    return settled, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
 
 
-def _settle_with_timing(layout: Layout, at_once: Settled, board: Board, alone, in_frames: bool):
-    """With each picture's instant free, where cameras agree far worse with each other than each with itself."""
-    error_alone = np.array([a.error_px for a in alone.values()])
-    if np.median(at_once.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:
-        return at_once, None, []
-    known = allow_lateness(at_once.known, layout.trajectory)
-    state = replace(at_once.solution.state, trajectory=layout.trajectory)
-    settled = settle(state, layout.seen, board.corners_mm, known, error_px=error_alone + 0.1)
-    timing = Timing(settled.solution.state.clock, settled.known.late_sigma_s, in_frames)
-    return settled, timing, [_timing_note(alone, timing)]
+def _settle(layout: Layout, board: Board, known: Knowledge, error_alone: np.ndarray, in_frames: bool):
+    """With pictures of one view at one instant, unless cameras agree far worse with each other than with themselves."""
+    if layout.trajectory is None or len(error_alone) < 2:
+        return settle(layout.first, layout.seen, board.corners_mm, known), None
+    rough = settle(layout.first, layout.seen, board.corners_mm, known, rough=True)
+    if np.median(rough.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:
+        return settle(rough.solution.state, layout.seen, board.corners_mm, known), None
+    state = replace(rough.solution.state, trajectory=layout.trajectory)
+    known = allow_lateness(known, layout.trajectory)
+    settled = settle(state, layout.seen, board.corners_mm, known, error_px=error_alone + _FIRST_EXCESS_PX)
+    return settled, Timing(settled.solution.state.clock, settled.known.late_sigma_s, in_frames)
 
 
 def _timing_note(names, timing: Timing) -> str:

@@ -95,9 +95,8 @@ def _shared(poses_a: Sequence[np.ndarray | None], poses_b: Sequence[np.ndarray |
 
 def most_central(transforms: Sequence[np.ndarray]) -> np.ndarray:
     """The transform whose turn is nearest to the others': a mirrored pose is far from all of them."""
-    turns = np.array([T[:, :3] for T in transforms])
-    shifts = np.array([T[:, 3] for T in transforms])
-    apart = np.array([[np.linalg.norm(log_rotation(a @ b.T)) for a in turns] for b in turns])
+    turns, shifts = np.array(transforms)[:, :, :3], np.array(transforms)[:, :, 3]
+    apart = np.linalg.norm(log_rotation(turns[:, None] @ np.swapaxes(turns, 1, 2)[None]), axis=2)
     size = np.median(np.linalg.norm(shifts, axis=1))
     apart += np.linalg.norm(shifts[:, None] - shifts[None], axis=2) / max(size, 1e-9)
     return transforms[int(np.argmin(np.median(apart, axis=1)))]

@@ -126,7 +126,7 @@ def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board) ->
     first = replace(
         layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory
     )
-    return solve(first, seen, board.corners_mm, known, width=_ROBUST_WIDTH)
+    return solve(first, seen, board.corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-5)
 
 
 def _still(layout: Layout, fitted: Solution, board: Board) -> np.ndarray:

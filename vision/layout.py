@@ -61,8 +61,8 @@ def _agreement(a: Alone, b: Alone) -> tuple[float, int]:
         return 0.0, 0
     centre = most_central(shared)
     far = np.median([np.linalg.norm(T[:, 3]) for T in [*a.poses.values(), *b.poses.values()]])
-    turn = np.array([np.linalg.norm(log_rotation(T[:, :3] @ centre[:, :3].T)) for T in shared])
-    shift = np.array([np.linalg.norm(T[:, 3] - centre[:, 3]) for T in shared])
+    turn = np.linalg.norm(log_rotation(np.array(shared)[:, :, :3] @ centre[:, :3].T), axis=1)
+    shift = np.linalg.norm(np.array(shared)[:, :, 3] - centre[:, 3], axis=1)
     return float(np.mean((turn < _SAME_TURN_RAD) & (shift < _SAME_SHIFT * far))), len(shared)
 
 

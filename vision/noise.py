@@ -56,19 +56,23 @@ def settle(
     known: Knowledge,
     *,
     error_px: np.ndarray | None = None,
+    rough: bool = False,
 ) -> Settled:
     """Adjusts robustly, learns each camera's model error, drops outliers once and adjusts by least squares.
 
     Where the state has a trajectory, known.late_sigma_s is where the search for each camera's scatter of instants
-    begins. error_px (C,): model errors to begin with.
+    begins. error_px (C,): model errors to begin with. rough: robustly and once only, to see
+    how large the errors are.
     """
     moving = state.trajectory is not None
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
     for _ in range(_ROUNDS_MOVING if moving else _ROUNDS):
         weighed = _weighed(seen, error)
-        solution = solve(state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-5)
+        solution = solve(state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-4)
         state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
         known = _with_lateness(known, state, seen) if moving else known
+        if rough:
+            return Settled(solution, weighed, np.ones(len(seen), dtype=bool), solution.residual_px, error, known)
     kept = _inliers(solution.residual_px, _weighed(seen, error))
     for _ in range(2):
         error = _error_by_mean(solution.residual_px, seen, kept, error, known)
