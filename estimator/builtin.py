@@ -39,9 +39,7 @@ ESTIMATORS = {
 
 
 def _estimate(whisk, settings, d_x, gradient, alpha_est=None):
-    """Estimate from a cylinder's distance and gradient: sigma, taper, clamp at the tip, and the reason
-    for a NaN.
-    """
+    """Estimate from a cylinder's distance and gradient: sigma, taper, clamp at the tip, reason for a NaN."""
     if d_x != d_x:
         alpha_est = settings.alpha_est_rad if alpha_est is None else alpha_est
         return Estimate(nan, nan, _reason(whisk, alpha_est))

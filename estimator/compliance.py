@@ -24,10 +24,10 @@ def compliance_on_soft_object(d_x, stiffness, C):
 def two_distances(compliance_near, compliance_far, shift, C):
     """(d_x, k): distance of the nearer whisk in mm, stiffness of the object in N/mm.
 
-    compliance_near and compliance_far are k_θ of (1) in rad/(N·mm), as of
-    `distance.rotational_compliance`; the second whisk is made `shift` mm farther away. The stiffness is
-    infinite where the object does not yield beyond the rounding; both are NaN where no distance explains
-    the two compliances. shift ≤ 0 or C ≤ 0 raises ValueError.
+    compliance_near and compliance_far are k_θ of (1) in rad/(N·mm), as of `distance.rotational_compliance`; the
+    second whisk is made `shift` mm farther away. The stiffness is infinite where the object yields no more than a
+    rigid one, as it may within the noise; both are NaN where no distance explains the two compliances. shift ≤ 0 or
+    C ≤ 0 raises ValueError.
 
     With K = C k_θ the cubic terms of (K_1 − d) d² = (K_2 − d − s)(d + s)² cancel, and a quadratic remains.
     """
@@ -39,7 +39,7 @@ def two_distances(compliance_near, compliance_far, shift, C):
     constant = shift * shift * (far - shift)
     d_x = _positive_root(square, linear, constant)
     give = near - d_x
-    possible = (d_x > 0) & np.isfinite(d_x) & (give >= -8 * np.finfo(float).eps * near)
+    possible = (near > 0) & (d_x > 0) & np.isfinite(d_x)
     stiffness = C / (np.maximum(give, 0.0) * d_x * d_x)
     return np.where(possible, d_x, np.nan), np.where(possible, stiffness, np.nan)
 

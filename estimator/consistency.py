@@ -26,10 +26,9 @@ TOLERANCE_RAD = 1e-10
 class Contacts:
     """Whisks against one object, a row each, arrays (n,).
 
-    theta [rad], m_y, m_z [N·mm] at the pushing angle, C = 3EI [N·mm²], touch [rad] the motor angle of
-    first touch, z_c [mm] the height of the plane of rotation, poses (n, 3, 4) from each whisker's rig
-    frame to the object's frame (none: all alike), weights. Raises ValueError where shapes disagree or a row is no
-    push against an object.
+    theta [rad], m_y, m_z [N·mm] at the pushing angle, C = 3EI [N·mm²], touch [rad] the motor angle of first touch,
+    z_c [mm] the height of the plane of rotation, poses (n, 3, 4) from each whisker's rig frame to the object's frame
+    (none: all alike), weights. Raises ValueError where shapes disagree or a row is no push against an object.
     """
 
     theta: np.ndarray
@@ -84,9 +83,7 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Consistency:
-    """The α of the most consistent contacts, its sigma, the rms distance [mm] from the curve, and what is
-    doubtful.
-    """
+    """The α of the most consistent contacts, its sigma, the rms distance [mm] from the curve, and any doubt."""
 
     alpha_rad: float
     sigma_rad: float
@@ -144,9 +141,7 @@ def _jackknife(contacts, alpha, grid, curve, stiffness):
 
 
 def _from_curve(points, curve, stiffness, weights):
-    """Offsets (n, 3) of points from their best line, or (n, 2) from their smoothing spline along that
-    line.
-    """
+    """Offsets (n, 2) of points from their best line, or from their smoothing spline along it."""
     centred = points - np.average(points, axis=0, weights=weights)
     axes = np.linalg.svd(np.sqrt(weights)[:, None] * centred, full_matrices=False)[2]
     along, across = centred @ axes[0], centred @ axes[1:].T

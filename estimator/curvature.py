@@ -56,17 +56,13 @@ def normalized_radius(d_x, r_kappa):
 
 @elementwise
 def initial_contact(r_n, beta_0):
-    """(y_c, z_c) of (26)–(28): the first contact as seen from the centre of curvature, r_n (cos β_0, sin
-    β_0).
-    """
+    """(y_c, z_c) of (26)–(28): the first contact seen from the centre of curvature, r_n (cos β_0, sin β_0)."""
     return circle.inside(r_n, 0.0, beta_0, r_n * np.cos(beta_0), r_n * np.sin(beta_0))
 
 
 @elementwise
 def virtual_angle(r_n, theta, beta_0):
-    """ζ of (25) and (29), in rad: direction of the virtual point from the centre, β_0 and what the push
-    adds.
-    """
+    """ζ of (25) and (29), in rad: direction of the virtual point from the centre, β_0 and what the push adds."""
     return circle.inside(r_n, theta, beta_0, beta_0 + circle.turn(theta / r_n, beta_0))[0]
 
 

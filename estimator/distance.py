@@ -197,8 +197,7 @@ def cartesian(r_c, theta_c, z_c):
 
 
 def why_not(theta, m_y, m_z, *, alpha_est=0.0, beta=None, C=None):
-    """Why there is no distance for these arguments: a sentence, empty where there is one; str or array of
-    str.
+    """Why there is no distance for these arguments, a sentence; empty where there is one. str or array of str.
 
     Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C a distance too large or too
     small for a float is told as well.

@@ -40,8 +40,7 @@ def _plain(result):
 
 
 def quotient(numerator, denominator):
-    """Product of `numerator`'s factors over that of `denominator`'s, without overflow or underflow on the
-    way.
+    """Product of `numerator`'s factors over `denominator`'s, without overflow or underflow on the way.
 
     Significands and exponents go separate ways, so only the result itself can leave the range of float64.
     """

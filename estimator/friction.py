@@ -10,7 +10,19 @@ import numpy as np
 from scipy.special import stdtrit
 
 from estimator import slip
+from estimator.consistency import Consistency, Contacts, most_consistent_alpha
 from estimator.domain import elementwise, require_friction_angle, require_positive, require_sigma
+
+__all__ = [
+    "Consistency",
+    "Contacts",
+    "FrictionFit",
+    "alpha_from_tilts",
+    "confidence",
+    "curves",
+    "fit_alpha",
+    "most_consistent_alpha",
+]
 
 READINGS = ("moments", "magnitude")
 GRID = np.radians(np.arange(0.0, 89.95, 0.25))
@@ -95,9 +107,7 @@ def _model(alpha, beta, scale, reading):
 
 
 def _derivative(alpha, beta, scale, reading):
-    """∂model/∂α, zero where the whisker does not slip: ∂m_y = −cos²β/cos²α, ∂m_z = sin β cos β/cos²α,
-    times Cθ/d_x.
-    """
+    """∂model/∂α, zero without slip; (Cθ/d_x)/cos²α times −cos²β for m_y, sin β cos β for m_z."""
     alpha = np.asarray(alpha)[..., None]
     steep = np.abs(beta)
     share = np.where(steep > alpha, scale * np.cos(beta) / np.cos(alpha) ** 2, 0.0)
@@ -124,8 +134,9 @@ def _least_squares(beta, data, scale, reading):
 
 
 def _sigma_of_residuals(residuals, slopes):
-    """(sigma, degrees of freedom) of α: Σ J² e² / (1 − h) over (Σ J²)², h = J²/Σ J² (MacKinnon & White's
-    HC2).
+    """(sigma, degrees of freedom) of α, after MacKinnon & White's HC2.
+
+    σ² = Σ J² e² / (1 − h) over (Σ J²)², with the residuals e, the slopes J and the leverages h = J²/Σ J².
     """
     with np.errstate(all="ignore"):
         total = (slopes**2).sum(axis=-1)
@@ -192,9 +203,7 @@ def alpha_from_tilts(tilt, phi, *, phi_sigma=0.0) -> FrictionFit:
 
 
 def _dead_band(tilt, phi, phi_sigma):
-    """(middle, half width, masks of both sides) of the least-squares φ = tilt − middle ∓ α beyond a band
-    of zeros.
-    """
+    """(middle, half width, masks of both sides) of the least-squares lines φ = tilt − middle ∓ α."""
     slipping = max(3 * phi_sigma, 0.1 * np.abs(phi).max(initial=0.0))
     sides = (phi < -slipping, phi > slipping)
     middle, alpha = np.nan, np.nan

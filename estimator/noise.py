@@ -7,6 +7,7 @@ Samples are rows, channels are columns; a sample that is left out of a sum has w
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 LAGS_PER_SAMPLE = 1 / 6
 TINY = 1e-150  # instead of a scatter of nothing, so that it may be squared and divided by
@@ -57,16 +58,18 @@ class Memory:
     @staticmethod
     def _raw(weights, other, covariance):
         lags = len(covariance)
-        overlap = _lagged(weights, other, lags) + _lagged(other, weights, lags)
+        forward = _lagged(weights, other, lags)
+        overlap = forward + (forward if other is weights else _lagged(other, weights, lags))
         overlap[0] /= 2
         return np.tensordot(overlap, covariance, axes=1)
 
 
 def _lagged(a, b, lags):
     """Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1."""
-    size = 1 << (2 * len(a) - 1).bit_length()
-    spectrum = np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size)
-    return np.fft.irfft(spectrum, size)[:lags]
+    size = next_fast_len(len(a) + lags, real=True)
+    first = np.fft.rfft(a, size)
+    second = first if b is a else np.fft.rfft(b, size)
+    return np.fft.irfft(np.conj(first) * second, size)[:lags]
 
 
 def _parzen(share):
@@ -77,7 +80,7 @@ def _parzen(share):
 def _line_basis(x, used):
     """The two orthonormal columns (n,) that a line fitted to the marked samples removes."""
     spread = np.where(used, x - x[used].mean(), 0.0)
-    return [used / np.sqrt(np.count_nonzero(used)), spread / np.sqrt(spread @ spread)]
+    return [used / np.sqrt(np.count_nonzero(used)), spread / np.sqrt(max(spread @ spread, TINY))]
 
 
 def wider(one, other):
@@ -99,13 +102,13 @@ def line_weights(x, used, at):
     """Weights (n,) that make the least-squares line's value at x = `at` from the marked samples."""
     middle = x[used].mean()
     spread = np.where(used, x - middle, 0.0)
-    return mean_weights(used) + spread * (at - middle) / (spread @ spread)
+    return mean_weights(used) + spread * (at - middle) / max(spread @ spread, TINY)
 
 
 def line_slope(x, samples, used):
     """Slope (k,) of the least-squares line through the marked samples."""
     spread = x[used] - x[used].mean()
-    return spread @ samples[used] / (spread @ spread)
+    return spread @ samples[used] / max(spread @ spread, TINY)
 
 
 def line_residuals(x, samples, used):

@@ -139,7 +139,7 @@ def speed(motor, time_s):
 
 def _moving(motor):
     """Mask of the samples at which the motor runs at more than half its usual speed."""
-    width = max(1, len(motor) // 100)
+    width = max(1, len(motor) // 40)
     if len(motor) <= 2 * width:
         return np.zeros(len(motor), dtype=bool)
     step = np.full(len(motor), np.nan)
@@ -163,7 +163,7 @@ def _coarse_touch(motor, samples, used):
     ramp = np.maximum(0.0, angle[None, :] - breaks[:, None])
     ramp -= ramp.mean(axis=1, keepdims=True)
     along = ramp @ (scaled - scaled.mean(axis=0))
-    explained = (along**2).sum(axis=1) / (ramp**2).sum(axis=1)
+    explained = (along**2).sum(axis=1) / np.maximum((ramp**2).sum(axis=1), noise.TINY)
     return breaks[int(np.argmax(explained))]
 
 

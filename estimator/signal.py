@@ -1,5 +1,4 @@
-"""From the samples of one forward stroke to what an estimator needs: filter, felt touch, moments at a
-pushing angle.
+"""From the samples of one forward stroke to what an estimator needs: filter, felt touch, moments at an angle.
 
 Everything takes plain arrays; moments may be in N·mm or in volts. Angles in rad, times in s.
 """

@@ -1,7 +1,6 @@
 """How steep a surface may be before a distance is wrong by a given share: the curves of Figs 5 and 6.
 
-All angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed forms; a curved one is
-searched.
+Angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed forms, a curved one is searched.
 """
 
 import numpy as np
@@ -15,8 +14,7 @@ HALVINGS = 50
 
 
 def distance_error(beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
-    """Relative error of (2) or (10), estimate over truth minus one, where the surface has slope β_0 at
-    first touch.
+    """Relative error of (2) or (10), estimate over truth minus one, for a surface of slope β_0 at first touch.
 
     α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature (15).
     `printed` takes Appendix B as printed. −1 where (10) gives no distance because φ + α_est reaches 90°;
@@ -29,8 +27,7 @@ def distance_error(beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation=
 
 
 def slope_threshold(error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
-    """β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN
-    where never.
+    """β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN if never.
 
     Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0.
 
@@ -54,9 +51,7 @@ def _require(alpha, alpha_est, equation):
 
 @elementwise
 def _flat_error(beta_0, alpha, alpha_est, no_slip):
-    """tan β tan φ for (2); −sin(α_est − α) (tan β − tan α) cos α / cos α_est for (10); both zero up to β
-    = α.
-    """
+    """tan β tan φ for (2), sin(α − α_est) (tan β − tan α) cos α / cos α_est for (10); zero up to β = α."""
     slope = np.abs(beta_0)
     phi = np.maximum(0.0, slope - alpha)
     excess = np.sin(phi) / (np.cos(slope) * np.cos(alpha))

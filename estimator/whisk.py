@@ -57,9 +57,7 @@ class EstimatorSettings:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A distance with its standard deviation, both in mm, NaN where there is none; status says what is
-    doubtful.
-    """
+    """A distance with its standard deviation, both in mm; NaN where there is none, and status says why."""
 
     d_x_mm: float
     sigma_mm: float

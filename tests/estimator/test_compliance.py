@@ -42,6 +42,13 @@ def test_rigid_object_is_equation_1():
     assert distance.from_compliance(near, C) == pytest.approx(60.0, rel=1e-15)
 
 
+def test_noise_on_a_rigid_object_leaves_a_distance_and_infinite_stiffness():
+    """0.1 % less compliance than a rigid object would have asks for a negative give, which is none."""
+    d_x, stiffness = compliance.two_distances(0.999 * 60.0 / C, 70.0 / C, 10.0, C)
+    assert d_x == pytest.approx(60.0, rel=0.01)
+    assert stiffness == np.inf
+
+
 def test_soft_object_looks_too_far_away_by_equation_1():
     assert distance.from_compliance(felt_compliance(60.0, 0.3), C) > 60.0
 

@@ -48,7 +48,7 @@ def test_interval_holds_it_with_the_noise_found_from_the_residuals(noise, whisks
     assert 0.93 <= coverage(fit, alpha) <= 0.97
 
 
-def test_the_other_reading_is_as_honest_and_ten_times_less_sure():
+def test_the_other_reading_is_as_honest_and_much_less_sure():
     """|m|² alone hardly changes with α: ∂|m|²/∂α ∝ tan α. Its interval still holds."""
     alpha = np.radians(12.3)
     beta = np.repeat(SLOPES, 10)
