@@ -43,8 +43,9 @@ class Memory:
         return cls(np.moveaxis(products * (taper / pairs), -1, 0), kept * taper / pairs)
 
     def of_sum(self, weights):
-        """Covariance (k, k) of Σ w_i x_i."""
-        return self._raw(weights, weights, self.covariance) * self._missing(weights)
+        """Covariance (k, k) of Σ w_i x_i; gaps can leave a negative direction, which is taken as no scatter."""
+        values, axes = np.linalg.eigh(self._raw(weights, weights, self.covariance))
+        return (axes * np.maximum(values, 0.0)) @ axes.T * self._missing(weights)
 
     def between_sums(self, weights, other):
         """Covariance (k, k) of Σ w_i x_i with Σ v_i x_i."""

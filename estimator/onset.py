@@ -126,7 +126,7 @@ def usable(motor, samples):
     around = np.stack([np.roll(values, shift, axis=0) for shift in (-2, -1, 0, 1, 2)])
     off = np.abs(values - np.median(around, axis=0))
     off[:2], off[-2:] = 0.0, 0.0
-    known[known] = (off <= SPIKE_IN_SIGMAS * np.maximum(_noise(values), noise.TINY)).all(axis=1)
+    known[known] = (off <= SPIKE_IN_SIGMAS * _noise(values)).all(axis=1)
     return known
 
 
@@ -150,15 +150,19 @@ def _moving(motor):
 
 
 def _noise(samples):
-    """Standard deviation (k,) of one sample by the median of second differences, blind to rise, drift and spikes."""
+    """Standard deviation (k,) of one sample by the median of second differences, blind to rise, drift and spikes.
+
+    Never less than a billionth of the range, which is what a flat-topped channel would otherwise show.
+    """
     second = np.abs(np.diff(samples, n=2, axis=0))
-    return np.median(second, axis=0) / (0.6745 * np.sqrt(6))
+    floor = np.maximum(1e-9 * np.ptp(samples, axis=0), noise.TINY)
+    return np.maximum(np.median(second, axis=0) / (0.6745 * np.sqrt(6)), floor)
 
 
 def _coarse_touch(motor, samples, used):
     """Motor angle of the break of the broken line (level, then rise) that explains most of both channels."""
     angle, binned = _binned(motor[used], samples[used])
-    scaled = binned / np.maximum(_noise(samples[used]), noise.TINY)
+    scaled = binned / _noise(samples[used])
     breaks = angle[:-2]
     ramp = np.maximum(0.0, angle[None, :] - breaks[:, None])
     ramp -= ramp.mean(axis=1, keepdims=True)
@@ -189,12 +193,12 @@ def _coarse_status(motor, samples, used, touch):
 
 def _rises_already(motor, samples, before, after):
     """Does the supposed free stroke rise at more than a third of the later rate, beyond doubt?"""
-    direction = noise.line_slope(motor, samples, after)
-    along = samples @ direction / np.hypot.reduce(direction)
-    slope = noise.line_slope(motor, along, before)
-    spread = motor[before] - motor[before].mean()
-    sigma = np.std(noise.line_residuals(motor, along[:, None], before)) / np.sqrt(spread @ spread)
-    return slope > max(np.hypot.reduce(direction) / 3, 5 * sigma)
+    rate = noise.line_slope(motor, samples, after)
+    size = np.hypot.reduce(rate)
+    slope = noise.line_slope(motor, samples, before) @ rate / size
+    scatter = np.std(noise.line_residuals(motor, samples, before) @ rate / size)
+    spread = np.std(motor[before]) * np.sqrt(np.count_nonzero(before))
+    return slope > max(size / 3, 5 * scatter / max(spread, noise.TINY))
 
 
 def _extrapolate(motor, samples, used, touch, window, guard):

@@ -144,6 +144,29 @@ def test_rest_before_and_after_the_stroke_is_not_counted(stroke):
     assert touch.motor_rad == pytest.approx(felt_touch(*s.arrays).motor_rad, abs=0.5 * touch.sigma_rad)
 
 
+SPOILERS = {
+    "a third missing": lambda rng, motor, m: m.__setitem__(rng.random(m.shape) < 0.3, np.nan),
+    "a dead channel": lambda rng, motor, m: m.__setitem__((slice(None), 0), 0.0),
+    "a missing channel": lambda rng, motor, m: m.__setitem__((slice(None), 0), np.nan),
+    "at the rail": lambda rng, motor, m: m.__setitem__(slice(400, None), m[400]),
+    "infinities": lambda rng, motor, m: m.__setitem__(rng.integers(0, len(m), 20), np.inf),
+    "backwards": lambda rng, motor, m: motor.__setitem__(slice(None), motor[::-1].copy()),
+    "a coarse encoder": lambda rng, motor, m: motor.__setitem__(slice(None), np.round(motor, 2)),
+    "a huge unit": lambda rng, motor, m: m.__imul__(1e6),
+}
+
+
+@pytest.mark.parametrize("name", SPOILERS)
+def test_whatever_the_arrays_there_is_a_touch_or_a_reason(stroke, name):
+    """And no warning, which would be an error here."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        s = stroke(rng, touch=rng.choice([2.3, 1.0, 6.0]))
+        SPOILERS[name](rng, *s.arrays)
+        touch = felt_touch(*s.arrays, s.time_s)
+        assert touch.status or (np.isfinite(touch.motor_rad) and touch.sigma_rad > 0)
+
+
 def test_mismatched_arrays_are_refused():
     with pytest.raises(ValueError, match="same samples"):
         felt_touch(np.zeros(10), np.zeros((11, 2)))
