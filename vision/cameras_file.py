@@ -13,6 +13,7 @@ import numpy as np
 import tomli_w
 
 from vision.errors import Refused
+from vision.recording import check_lens
 from vision.scene import PARAMETERS, Camera, Cameras
 
 _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
@@ -88,6 +89,8 @@ def read_cameras(path: Path | str) -> Cameras:
     if not isinstance(tables, dict) or not tables:
         raise Refused("no [cameras.<name>] table found")
     cameras = tuple(_camera(name, table) for name, table in tables.items())
+    for camera in cameras:
+        check_lens(camera)
     return Cameras(cameras, _read_covariance(path, document, cameras))
 
 

@@ -56,7 +56,7 @@ def camera_moved(
     points = board.corners_mm[corners.ids] @ T_rig_board[:, :3].T + T_rig_board[:, 3]
     px, _, by_camera = camera.project_with_jacobians(points)
     J, off = by_camera[:, :, 9:], corners.px - px
-    sigma = np.hypot(corners.sigma_px, camera.rms_px / np.sqrt(2))
+    sigma = np.hypot(corners.sigma_px, np.nan_to_num(camera.rms_px) / np.sqrt(2))
     kept = np.ones(len(off), dtype=bool)
     for _ in range(3):
         motion, covariance = _least_squares(J[kept], off[kept], sigma[kept])

@@ -1,0 +1,245 @@
+"""Where the centre and axis of rotation and the encoder's zero are, by the free strokes and by the board together.
+
+On a free stroke the whisker is a straight piece near its base that turns rigidly with the motor. All its lines meet in
+the centre of rotation, their fan's axis is the motor's, and the line at motor angle 0 is rig x. So the swing gives the
+rig frame (conventions: origin, z, x) by itself, as a turn w and shift v of the frame that the board gave:
+
+    x_board_rig = Exp(w) x_rig + v
+
+A narrow fan fixes its apex well across the whisker and badly along it; covariances say how well, and weigh the two.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from vision.errors import Refused
+from vision.rotation import compose, exp_rotation, skew
+from vision.scene import N_PARAMETERS, Cameras
+
+# Chance by which swing and board, both right, would disagree as much as calls for an alarm.
+_FALSE_ALARM = 1e-3
+# Without a board the swing alone must fix the centre at least this well, a tenth of what the truth may err by.
+_MOST_CENTRE_SIGMA_MM = 0.05
+_MIN_FRAMES = 4
+# A board is at the wrong scale where known lengths say so by this many sigmas and by more than a print's stretch.
+_SCALE_SIGMAS = 4.0
+_SCALE_TOLERANCE = 0.005
+_COMPONENTS = ("w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
+
+
+@dataclass(frozen=True, eq=False)
+class BaseLines:
+    """The whisker's straight piece near its base on free strokes, a row a frame, in the rig frame as the board has it.
+
+    motor_rad (n,); point_mm (n, 3) anywhere on the line and its covariance (n, 3, 3), mm²; direction (n, 3), unit, from
+    the base outward, and its covariance (n, 3, 3). Errors of different frames count as independent.
+    """
+
+    motor_rad: np.ndarray
+    point_mm: np.ndarray
+    point_covariance: np.ndarray
+    direction: np.ndarray
+    direction_covariance: np.ndarray
+
+    def __post_init__(self):
+        n = len(self.motor_rad)
+        vectors, matrices = ("point_mm", "direction"), ("point_covariance", "direction_covariance")
+        shapes = dict.fromkeys(vectors, (n, 3)) | dict.fromkeys(matrices, (n, 3, 3))
+        for name, shape in shapes.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise Refused(f"base lines: {name} of {n} frames must be {shape}, found {found}")
+
+    @property
+    def width_rad(self) -> float:
+        """How far the motor turned over the frames."""
+        return float(np.ptp(self.motor_rad))
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """The rig frame against the board's word of it: step (6,) = w rad, v mm, with its covariance (6, 6).
+
+    rise_rad: elevation of the whisker's base above the plane of rotation (None where no swing was seen). notes: what
+    was learnt. alarm: how swing and board disagree, None where they do not.
+    """
+
+    step: np.ndarray
+    covariance: np.ndarray
+    rise_rad: float | None = None
+    notes: tuple[str, ...] = ()
+    alarm: str | None = None
+
+    @property
+    def T_board_rig(self) -> np.ndarray:
+        """(3, 4): rig coordinates to those of the rig frame that the board gave."""
+        return np.column_stack([exp_rotation(self.step[:3]), self.step[3:]])
+
+    @property
+    def centre_mm(self) -> np.ndarray:
+        """Centre of rotation in the frame that the board gave, (3,)."""
+        return self.step[3:]
+
+    @property
+    def zero_rad(self) -> float:
+        """Encoder's zero: the turn about the axis at which the whisker is where the board has rig x."""
+        return float(self.step[2])
+
+
+def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Placement:
+    """What the board alone says: no step, and the covariance of its measured pose.
+
+    T_rig_board errs by a shift and by a turn about the board's origin, per axis; at the rig's origin that turn shifts.
+    """
+    lever = np.eye(6)
+    lever[3:, :3] = skew(T_rig_board[:, 3])
+    return Placement(np.zeros(6), lever @ np.diag(np.repeat([sigma_rad**2, sigma_mm**2], 3)) @ lever.T)
+
+
+def by_swing(lines: BaseLines) -> Placement:
+    """What the swing alone says. Raises Refused with fewer than four frames or a motor that stood still."""
+    if len(lines.motor_rad) < _MIN_FRAMES or lines.width_rad == 0:
+        raise Refused(
+            f"{len(lines.motor_rad)} frames of free stroke over {np.degrees(lines.width_rad):.2f} degrees: the centre "
+            f"of rotation needs {_MIN_FRAMES} frames at different motor angles"
+        )
+    fitted = least_squares(_residuals, _first(lines), args=(lines,), x_scale="jac", method="lm")
+    covariance = _covariance(fitted.jac)
+    made = Placement(fitted.x[:6], covariance[:6, :6], float(fitted.x[6]))
+    return replace(made, notes=(_learnt(lines.width_rad, made),))
+
+
+def _first(lines: BaseLines) -> np.ndarray:
+    """The board's frame, and the whisker's mean elevation."""
+    return np.append(np.zeros(6), np.arcsin(np.clip(np.mean(lines.direction[:, 2]), -1, 1)))
+
+
+def _predicted(p: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
+    """Directions (n, 3) of the whisker's base at these motor angles, for p = w, v, rise."""
+    cosine, sine = np.cos(motor_rad), np.sin(motor_rad)
+    fan = np.column_stack([np.cos(p[6]) * cosine, np.cos(p[6]) * sine, np.full(len(cosine), np.sin(p[6]))])
+    return fan @ exp_rotation(p[:3]).T
+
+
+def _residuals(p: np.ndarray, lines: BaseLines) -> np.ndarray:
+    """Two of the line's place and two of its direction a frame, across the line, each in its own sigma."""
+    along = _predicted(p, lines.motor_rad)
+    across = _across(along)
+    place = _whitened(across, lines.point_mm - p[3:6], lines.point_covariance)
+    return np.concatenate([place, _whitened(across, lines.direction, lines.direction_covariance)])
+
+
+def _across(along: np.ndarray) -> np.ndarray:
+    """Two unit vectors across each direction (n, 3), as rows (n, 2, 3). Whiskers are not along z."""
+    first = np.cross([0.0, 0.0, 1.0], along)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(along, first)], axis=1)
+
+
+def _whitened(across: np.ndarray, vectors: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    values = np.einsum("nij,nj->ni", across, vectors)
+    root = np.linalg.cholesky(across @ covariance @ np.swapaxes(across, 1, 2))
+    return np.linalg.solve(root, values[:, :, None]).ravel()
+
+
+def _covariance(J: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+    return np.linalg.inv((J * scale).T @ (J * scale)) * np.outer(scale, scale)
+
+
+def combine(board: Placement, swing: Placement) -> Placement:
+    """Both, each by its covariance; with an alarm where they disagree by more than chance allows.
+
+    A board taken as exact stays as it is; the alarm still speaks.
+    """
+    both = board.covariance + swing.covariance
+    gain = np.linalg.solve(both, board.covariance).T
+    step = board.step + gain @ (swing.step - board.step)
+    covariance = board.covariance - gain @ board.covariance
+    apart = swing.step - board.step
+    square = float(apart @ np.linalg.solve(both, apart))
+    alarm = _alarm(apart, np.sqrt(np.diag(both))) if square > chi2.isf(_FALSE_ALARM, 6) else None
+    made = Placement(step, 0.5 * (covariance + covariance.T), swing.rise_rad, swing.notes, alarm)
+    return replace(made, notes=(*swing.notes, f"With the board: {_spread(made)}."))
+
+
+def swing_alone(swing: Placement, lines: BaseLines) -> Placement:
+    """The swing as the only source, without a board. Raises Refused, saying how wide a stroke would do."""
+    worst = np.sqrt(np.diag(swing.covariance)[3:].max())
+    if worst > _MOST_CENTRE_SIGMA_MM:
+        needed = np.degrees(lines.width_rad) * worst / _MOST_CENTRE_SIGMA_MM
+        raise Refused(
+            f"without T_rig_board the free stroke alone places the rig, and one of {np.degrees(lines.width_rad):.1f} "
+            f"degrees fixes the centre of rotation to {worst:.2f} mm; {_MOST_CENTRE_SIGMA_MM} mm is needed: record a "
+            f"free stroke of about {needed:.0f} degrees, or the board on the rig"
+        )
+    return swing
+
+
+def _alarm(apart: np.ndarray, sigma: np.ndarray) -> str:
+    """The component that disagrees most, in words."""
+    worst = int(np.argmax(np.abs(apart) / sigma))
+    words = {
+        "w_x": "the axis leans about rig x", "w_y": "the axis leans about rig y", "w_z": "the encoder's zero is off",
+        "v_x": "the centre lies along the whisker", "v_y": "the centre lies across the whisker",
+        "v_z": "the centre lies along the axis",
+    }  # fmt: skip
+    scale, unit = (np.degrees(1.0), "degrees") if worst < 3 else (1.0, "mm")
+    return (
+        f"board and free stroke disagree: by the stroke {words[_COMPONENTS[worst]]} by {scale * apart[worst]:+.3f} ± "
+        f"{scale * sigma[worst]:.3f} {unit} from where T_rig_board has it; check T_rig_board and the encoder"
+    )
+
+
+def _learnt(width_rad: float, made: Placement) -> str:
+    return f"A free stroke of {np.degrees(width_rad):.1f} degrees gives: {_spread(made)}."
+
+
+def _spread(made: Placement) -> str:
+    sigma = np.sqrt(np.maximum(np.diag(made.covariance), 0.0))
+    across = np.hypot(sigma[4], sigma[5]) / np.sqrt(2)
+    return (
+        f"centre of rotation ± {across:.4f} mm across and ± {sigma[3]:.4f} mm along the whisker, axis ± "
+        f"{np.degrees(max(sigma[0], sigma[1])):.3f} degrees, encoder's zero {np.degrees(made.step[2]):+.3f} ± "
+        f"{np.degrees(sigma[2]):.3f} degrees"
+    )
+
+
+def placed(cameras: Cameras, before: Placement, after: Placement) -> Cameras:
+    """The cameras in the rig frame of `after`, whose poses were made in that of `before` (see `by_board`).
+
+    Their covariance loses the placement error that `before` gave to all of them in common and gains that of `after`.
+    The swing is seen by the same cameras; that link is left out, which errs to the wide side.
+    """
+    moved = tuple(
+        replace(camera, T_camera_rig=compose(camera.T_camera_rig, after.T_board_rig)) for camera in cameras
+    )
+    shared = np.zeros((N_PARAMETERS * len(cameras), 6))
+    for k, camera in enumerate(cameras):
+        for part in (0, 3):
+            first = N_PARAMETERS * k + 9 + part
+            shared[first : first + 3, part : part + 3] = camera.T_camera_rig[:, :3]
+    return Cameras(moved, cameras.covariance + shared @ (after.covariance - before.covariance) @ shared.T)
+
+
+def check_known_lengths(lengths: Mapping[str, tuple[float, float, float, float]]) -> None:
+    """Refuses a board at the wrong scale, by lengths known otherwise (bar diameter, whisker length).
+
+    lengths: name to (seen mm, its sigma, known mm, its sigma). Everything in space scales with the square's size, so
+    one factor must explain all; the factor is named, never applied. Raises Refused.
+    """
+    ratio = np.array([seen / known for seen, _, known, _ in lengths.values()])
+    sigma = np.array([np.hypot(s / seen, k / known) for seen, s, known, k in lengths.values()]) * ratio
+    weight = sigma**-2.0
+    factor, factor_sigma = float(weight @ ratio / weight.sum()), float(weight.sum() ** -0.5)
+    if abs(factor - 1) < _SCALE_SIGMAS * factor_sigma or abs(factor - 1) < _SCALE_TOLERANCE:
+        return
+    seen = ", ".join(f"{name} seen as {s:.3f} mm, known as {k:.3f} mm" for name, (s, _, k, _) in lengths.items())
+    raise Refused(
+        f"the board's squares seem to be {1 / factor:.4f} ± {factor_sigma:.4f} times as large as square_mm says "
+        f"({seen}): measure a square and enter it"
+    )
