@@ -1,0 +1,107 @@
+"""The round bar that the whisker is pushed against, and where a whisker first touches it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.rig.rod import Rod
+
+
+def turned(vectors, angle_rad: float) -> np.ndarray:
+    """Vectors (..., 3) turned about the rotation axis z."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    x, y, z = np.moveaxis(np.asarray(vectors, float), -1, 0)
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
+
+
+def cross(a, b) -> np.ndarray:
+    """Cross product of two vectors; numpy's own takes ten times as long for one pair."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A round bar in the rig frame: a point of its axis, the axis' unit direction (z component positive), its radius."""
+
+    point_mm: np.ndarray
+    axis: np.ndarray
+    radius_mm: float
+
+    @classmethod
+    def placed(cls, *, d_x_mm, beta_rad, psi_rad, touch_rad, radius_mm, whisker_radius_mm) -> "Bar":
+        """The bar that a straight whisker at motor angle `touch_rad` would just touch at `d_x_mm`."""
+        axis = np.array([math.sin(psi_rad), math.cos(psi_rad) * math.sin(beta_rad),
+                         math.cos(psi_rad) * math.cos(beta_rad)])
+        towards_whisker = np.array([0.0, -math.cos(beta_rad), math.sin(beta_rad)])
+        point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
+        return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm)
+
+    def foot_mm(self, point_mm) -> np.ndarray:
+        """The axis' point nearest to a point."""
+        return self.point_mm + ((point_mm - self.point_mm) @ self.axis) * self.axis
+
+    def slope(self, touch_rad: float) -> tuple[float, float]:
+        """(β, ψ) in the contact frame, as in the conventions: β = atan2(a_y, a_z), ψ = asin(a_x)."""
+        x, y, z = turned(self.axis, -touch_rad)
+        return math.atan2(y, z), math.asin(x)
+
+
+@dataclass(frozen=True)
+class Touch:
+    """First touch of the unloaded whisker: motor angle, arc length and the contact point P0 in the rig frame."""
+
+    motor_rad: float
+    arc_mm: float
+    point_mm: np.ndarray
+
+    @property
+    def d_x_mm(self) -> float:
+        """|P0|, the radial distance."""
+        return float(np.linalg.norm(self.point_mm))
+
+
+def unloaded(rod: Rod, motor_rad: float, arc_mm):
+    """Points and tangents of the unloaded whisker in the rig frame, each (..., 3)."""
+    arc = np.asarray(arc_mm, float)
+    along = np.stack([arc, 0 * arc, 0 * arc], -1)
+    tangent = np.array([1.0, 0, 0]) + rod.rest.slope(arc)
+    return turned(along + rod.rest.offset_mm(arc), motor_rad), turned(tangent, motor_rad)
+
+
+def first_touch(rod: Rod, bar: Bar, motor_rad: float, arc_mm: float) -> Touch:
+    """Newton's method from a guess for: nearest point of the centreline, at a distance of both radii.
+
+    Where the nearest point lies beyond the end, the tip touches and the arc is the length.
+    """
+    at = np.array([motor_rad, min(arc_mm, rod.length_mm)])
+    for _ in range(30):
+        residual = _gap(rod, bar, at)
+        jacobian = np.stack([(_gap(rod, bar, at + h) - _gap(rod, bar, at - h)) / 2e-6
+                             for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))], -1)
+        step = np.linalg.solve(jacobian, residual)
+        at = at - step
+        if abs(step[0]) < 1e-13 and abs(step[1]) < 1e-10:
+            break
+    else:
+        raise ArithmeticError("the whisker never touches the bar")
+    if at[1] > rod.length_mm:
+        return _tip_touch(rod, bar, at[0])
+    return Touch(at[0], at[1], unloaded(rod, at[0], at[1])[0])
+
+
+def _gap(rod, bar, at):
+    point, tangent = unloaded(rod, at[0], at[1])
+    apart = point - bar.foot_mm(point)
+    return np.array([np.linalg.norm(apart) - bar.radius_mm - rod.radius_mm(at[1]), apart @ tangent])
+
+
+def _tip_touch(rod, bar, motor_rad):
+    length = rod.length_mm
+    for _ in range(30):
+        gap = [_gap(rod, bar, (motor_rad + h, length))[0] for h in (0, 1e-6)]
+        step = gap[0] / ((gap[1] - gap[0]) / 1e-6)
+        motor_rad -= step
+        if abs(step) < 1e-10:
+            return Touch(motor_rad, length, unloaded(rod, motor_rad, length)[0])
+    raise ArithmeticError("the whisker never touches the bar")
