@@ -70,6 +70,4 @@ def _hold(lock, folder: Path) -> None:
     except BlockingIOError:
         lock.seek(0)
         pid = lock.read().strip() or "unknown"
-        raise BadInput(
-            f"another run (process {pid}) writes to this folder; wait for it", file=folder
-        ) from None
+        raise BadInput(f"another run (process {pid}) writes to this folder; wait for it", file=folder) from None

@@ -193,9 +193,7 @@ def _figures(options: argparse.Namespace) -> int:
 
 
 def _add_info(verbs) -> None:
-    _add(
-        verbs, "info", _info, "versions of what results depend on, and whether they fit", "whisker-bench info"
-    )
+    _add(verbs, "info", _info, "versions of what results depend on, and whether they fit", "whisker-bench info")
 
 
 def _info(_: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
     videos.
     """
     sources: dict[str, Path] = {}
-    for entry in _visible(folder):
+    for entry in visible(folder):
         if not _holds_frames(entry):
             continue
         name = entry.name if entry.is_dir() else entry.stem
@@ -30,7 +30,7 @@ def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
 def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
     """Camera name to its one picture in `folder` (boards/rig)."""
     pictures: dict[str, Path] = {}
-    for entry in _visible(folder):
+    for entry in visible(folder):
         if entry.suffix.lower() not in PICTURE_SUFFIXES:
             continue
         if entry.stem in pictures:
@@ -54,7 +54,8 @@ def decoded_count(source: Path) -> int:
     return len(pictures_in(source)) if source.is_dir() else Video(source).decoded_count
 
 
-def _visible(folder: Path) -> list[Path]:
+def visible(folder: Path) -> list[Path]:
+    """What lies in a folder, in natural order, without hidden files; nothing where there is no folder."""
     if not folder.is_dir():
         return []
     return sorted((e for e in folder.iterdir() if not e.name.startswith(".")), key=natural_order)

@@ -63,9 +63,7 @@ def frame_times(trial: Trial) -> FrameTimes:
     """
     if (trial.folder / "frames.csv").is_file():
         return _common(trial)
-    if trial.camera_sources and all(
-        (trial.folder / _own(camera)).is_file() for camera in trial.camera_sources
-    ):
+    if trial.camera_sources and all((trial.folder / _own(camera)).is_file() for camera in trial.camera_sources):
         return _merged(trial)
     own = [camera for camera in trial.camera_sources if (trial.folder / _own(camera)).is_file()]
     if own:
@@ -84,9 +82,7 @@ def _common(trial: Trial) -> FrameTimes:
     """frames.csv: all cameras triggered together."""
     shown = trial.shown("frames.csv")
     table, repeats = _read(trial.folder / "frames.csv", shown)
-    doubts = tuple(
-        d for camera in trial.camera_sources for d in _check_count(trial, camera, len(table), shown)
-    )
+    doubts = tuple(d for camera in trial.camera_sources for d in _check_count(trial, camera, len(table), shown))
     _check_rate(table[TIME], trial, shown)
     if repeats:
         doubts = (*doubts, f"{shown}: {repeats} repeated rows dropped")
@@ -137,15 +133,9 @@ def _steady(trial: Trial) -> FrameTimes:
     counts = {camera: frame_count(source) for camera, source in trial.camera_sources.items()}
     count = _one_count(counts, trial)
     first_s = 0.0 if trial.first_frame_s is None else trial.first_frame_s
-    doubts = (
-        ()
-        if trial.first_frame_s is not None
-        else (f"{_shown(trial)}: first_frame_s is not given; taken as 0",)
-    )
+    doubts = () if trial.first_frame_s is not None else (f"{_shown(trial)}: first_frame_s is not given; taken as 0",)
     picture = {camera: np.arange(count) for camera in counts}
-    return FrameTimes(
-        first_s + np.arange(count) / trial.frame_rate_Hz, "frame_rate_Hz", picture, doubts=doubts
-    )
+    return FrameTimes(first_s + np.arange(count) / trial.frame_rate_Hz, "frame_rate_Hz", picture, doubts=doubts)
 
 
 def _from_container(trial: Trial) -> FrameTimes:
@@ -196,9 +186,7 @@ def _check_count(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str,
     found = decoded_count(source)
     if found == rows:
         return (f"{trial.shown(source.name)}: the header declares {declared} frames, {found} are there",)
-    raise BadInput(
-        f"has {rows} rows, camera {camera} has {found} frames; there must be a row a frame", file=shown
-    )
+    raise BadInput(f"has {rows} rows, camera {camera} has {found} frames; there must be a row a frame", file=shown)
 
 
 def _one_count(counts: Mapping[str, int], trial: Trial) -> int:
@@ -217,9 +205,7 @@ def _check_rate(time_s: np.ndarray, trial: Trial, shown: str) -> None:
     usual = steps[steps < _DROPPED_STEPS * np.median(steps)]
     stated_s, found_s = 1.0 / trial.frame_rate_Hz, float(usual.mean())
     if abs(found_s - stated_s) > _RATE_TOLERANCE * stated_s + _CLOCK_STEP_S / len(usual):
-        found = (
-            f"frames come at {1 / found_s:.6g} Hz, trial.toml says frame_rate_Hz = {trial.frame_rate_Hz:g}"
-        )
+        found = f"frames come at {1 / found_s:.6g} Hz, trial.toml says frame_rate_Hz = {trial.frame_rate_Hz:g}"
         raise BadInput(f"{found}; mend the wrong one (or take frame_rate_Hz out)", file=shown)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from bench import manifest
 from bench.doubts import Doubts
 from bench.errors import BadInput
-from bench.footage import camera_sources, single_pictures
+from bench.footage import camera_sources, single_pictures, visible
 from bench.plausible import YOUNGS_MODULUS
 from bench.strict_toml import as_keys, read_toml, values
 from bench.trial import Trial, load_trial
@@ -29,7 +29,7 @@ _FARTHEST_BOARD_MM = 5000.0
 
 
 @dataclass(frozen=True)
-class Gauges:
+class GivenGauges:
     """[m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − offset), N·mm; sigmas 0: taken as exact."""
 
     offset_V: np.ndarray
@@ -54,7 +54,7 @@ class Session:
     T_rig_board: np.ndarray | None
     T_rig_board_sigma_mm: float
     T_rig_board_sigma_rad: float
-    gauges: Gauges | None
+    gauges: GivenGauges | None
     camera_names: tuple[str, ...]
     exposure_s: dict[str, float]
     board_sources: dict[str, Path]
@@ -68,9 +68,7 @@ class Session:
         for trial in self.trials:
             if trial.name == name:
                 return trial
-        raise BadInput(
-            f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}", file="trials"
-        )
+        raise BadInput(f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}", file="trials")
 
 
 def load_session(path: Path | str, doubts: Doubts | None = None) -> Session:
@@ -171,27 +169,22 @@ def _pose(rows: list[list[float]] | None) -> np.ndarray | None:
         )
     if 0 < shift_mm < _NEAREST_BOARD_MM or shift_mm > _FARTHEST_BOARD_MM:
         hint = " Is the last column in metres? It is mm." if shift_mm < _NEAREST_BOARD_MM else ""
-        raise BadInput(
-            f"[rig] T_rig_board puts the board {shift_mm:.3g} mm from the base.{hint}", file=MANIFEST
-        )
+        raise BadInput(f"[rig] T_rig_board puts the board {shift_mm:.3g} mm from the base.{hint}", file=MANIFEST)
     return np.column_stack([nearest_rotation(rotation), pose[:, 3]])
 
 
-def _gauges(keys: manifest.GaugeKeys | None) -> Gauges | None:
+def _gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
     if keys is None:
         return None
     given = {name: np.array(value) for name, value in values(keys).items() if value is not None}
     exact = {"offset_sigma_V": np.zeros(2), "matrix_sigma_Nmm_per_V": np.zeros((2, 2))}
-    return Gauges(**exact | given)
+    return GivenGauges(**exact | given)
 
 
 def _trials(path: Path, keys: manifest.SessionKeys, doubts: Doubts) -> tuple[Trial, ...]:
-    folder = path / "trials"
-    if not folder.is_dir():
-        return ()
     found = []
-    for entry in sorted(folder.iterdir(), key=natural_order):
-        if entry.is_dir() and not entry.name.startswith("."):
+    for entry in visible(path / "trials"):
+        if entry.is_dir():
             with doubts.guard():
                 found.append(load_trial(entry, keys, doubts))
     return tuple(found)
@@ -237,13 +230,9 @@ def _check_camera_boards(session: Session, name: str) -> None:
     if session.board is None:
         raise BadInput("[board] is missing, and there is no cameras.toml", file=MANIFEST)
     if name not in session.board_sources:
-        raise BadInput(
-            f"there are no board views of camera {name}, and no cameras.toml", file=f"boards/{name}"
-        )
+        raise BadInput(f"there are no board views of camera {name}, and no cameras.toml", file=f"boards/{name}")
     if session.T_rig_board is not None and name not in session.rig_pictures:
-        raise BadInput(
-            f"there is no picture of the board on the rig by camera {name}", file=f"boards/rig/{name}"
-        )
+        raise BadInput(f"there is no picture of the board on the rig by camera {name}", file=f"boards/rig/{name}")
 
 
 def _if_there(path: Path) -> Path | None:

@@ -117,13 +117,10 @@ def _check_motor(time_s: np.ndarray, motor_deg: np.ndarray, trial: Trial, shown:
     if range_deg < _STILL_DEG:
         return (f"{shown}: the motor stands still ({range_deg:.3g}°): no whisk",)
     if range_deg > _TURN_DEG:
-        raise BadInput(
-            f"motor_deg spans {range_deg:.6g}, more than a turn. Is it in encoder counts?", file=shown
-        )
+        raise BadInput(f"motor_deg spans {range_deg:.6g}, more than a turn. Is it in encoder counts?", file=shown)
     speed_deg_s = _measured_speed(time_s, motor_deg)
-    if _is(DEGREES_PER_RADIAN * speed_deg_s, trial.speed_deg_s) or (
-        trial.speed_deg_s is None and range_deg < _SMALL_RANGE_DEG
-    ):
+    too_small = range_deg < _SMALL_RANGE_DEG and not _is(speed_deg_s, trial.speed_deg_s)
+    if too_small or _is(DEGREES_PER_RADIAN * speed_deg_s, trial.speed_deg_s):
         raise BadInput(
             f"motor_deg spans {range_deg:.3g}. Is it in radians? Then write degrees: it would span "
             f"{range_deg * DEGREES_PER_RADIAN:.3g}",
@@ -138,9 +135,7 @@ def _speed_doubts(speed_deg_s: float, trial: Trial, shown: str) -> tuple[str, ..
         return ()
     if _is(speed_deg_s / DEGREES_PER_RADIAN, trial.speed_deg_s):
         found = f"speed_deg_s is {trial.speed_deg_s:g}, but the motor goes at {speed_deg_s:.3g}°/s"
-        raise BadInput(
-            f"{found}. Is it in rad/s? Then write {speed_deg_s:.3g}.", file=trial.shown("trial.toml")
-        )
+        raise BadInput(f"{found}. Is it in rad/s? Then write {speed_deg_s:.3g}.", file=trial.shown("trial.toml"))
     if _is(speed_deg_s, trial.speed_deg_s):
         return ()
     return (f"{shown}: the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {trial.speed_deg_s:g}",)

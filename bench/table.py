@@ -56,9 +56,7 @@ def forward_in_time(table: Table, time: str, shown: str) -> tuple[Table, int]:
     wrong = np.flatnonzero(np.diff(table[time]) <= 0)
     if len(wrong):
         before, after = table[time][wrong[0]], table[time][wrong[0] + 1]
-        found = (
-            f"goes back from {before:.10g} to {after:.10g}" if after < before else f"{after:.10g} comes twice"
-        )
+        found = f"goes back from {before:.10g} to {after:.10g}" if after < before else f"{after:.10g} comes twice"
         fix = "; times must increase (rows that are wholly the same are dropped)"
         raise BadInput(found + fix, file=shown, row=int(table.row[wrong[0] + 1]), column=time)
     return table, int(repeats.sum())
@@ -91,9 +89,7 @@ def _header(lines: list[str], shown: str) -> list[str]:
     header = lines[0]
     for mark, name in ((";", "semicolons"), ("\t", "tabs")):
         if mark in header:
-            raise BadInput(
-                f"columns are separated by {name}; export with commas (and decimal points)", file=shown
-            )
+            raise BadInput(f"columns are separated by {name}; export with commas (and decimal points)", file=shown)
     names = [name.strip() for name in next(csv.reader([header]))]
     if all(_is_number(name) for name in names):
         raise BadInput(f"the first row must name the columns; found {header!r}", file=shown, row=1)
@@ -122,11 +118,7 @@ def _row(cells: list[str], names: list[str], shown: str, row: int) -> list[float
     if ";" in "".join(cells):
         raise BadInput("values are separated by semicolons; export with commas", file=shown, row=row)
     if len(cells) != len(names):
-        hint = (
-            " Decimal commas? Export with decimal points."
-            if len(names) < len(cells) <= 2 * len(names)
-            else ""
-        )
+        hint = " Decimal commas? Export with decimal points." if len(names) < len(cells) <= 2 * len(names) else ""
         raise BadInput(f"has {len(cells)} values, the header names {len(names)}.{hint}", file=shown, row=row)
     return [_cell(cell.strip(), name, shown, row) for cell, name in zip(cells, names)]
 

@@ -69,9 +69,7 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts) -> T
     )
 
 
-def _trial_keys(
-    folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts
-) -> manifest.TrialKeys:
+def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts) -> manifest.TrialKeys:
     """trial.toml, absent keys from the session's [trial]; a sigma comes from where its value comes from."""
     file = folder / MANIFEST
     if not file.is_file():

@@ -165,9 +165,7 @@ def pictures_in(folder: Path) -> list[Path]:
 
 def natural_order(path: Path) -> list[tuple[int, int | str]]:
     """Sort key under which `img_2` comes before `img_10`."""
-    return [
-        (0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"([0-9]+)", path.name) if part
-    ]
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"([0-9]+)", path.name) if part]
 
 
 def read_picture(path: Path) -> np.ndarray | None:
