@@ -1,0 +1,110 @@
+"""The session's own calibration: cameras in the rig frame and the scene without rods, made from the whole session.
+
+Kept in OUT/calibration with the hash of what it was made from, and made again only where that changed.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.board_views import read_board_views
+from bench.calibrate_cameras import calibrate_from, report_lines
+from bench.errors import BadInput
+from bench.results import hash_of, hash_of_code, hash_of_files, read_result, write_result
+from bench.session import Session
+from vision.cameras_file import read_cameras, write_cameras
+from vision.corners import refine_corners
+from vision.errors import Refused
+from vision.pictures import read_picture
+from vision.scene import Cameras
+from vision.static_board import camera_moved
+
+_MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
+
+
+@dataclass(frozen=True)
+class SessionCalibration:
+    """Cameras (None where the session has no pictures), the scene without whisker and bar by camera (None where there
+    is no such picture), a hash of both, and lines that say what they rest on."""
+
+    cameras: Cameras | None
+    background: dict[str, np.ndarray | None]
+    hash: str
+    notes: tuple[str, ...] = ()
+
+
+def calibrate_session(session: Session, out: Path) -> SessionCalibration:
+    """Cameras and backgrounds. Raises BadInput where the session cannot be calibrated, saying what to record."""
+    if not any(trial.camera_sources for trial in session.trials):
+        return SessionCalibration(None, {}, hash_of("no pictures"))
+    cameras, notes = _given(session) if session.cameras_toml else _made(session, out / "calibration")
+    missing = [name for name in session.camera_names if name not in cameras]
+    if missing:
+        raise BadInput(f"has no camera {missing[0]}, which has frames; calibrate it", file="cameras.toml")
+    background = _backgrounds(session, cameras)
+    content = [[c, cameras.covariance] for c in cameras.cameras], list(background.values())
+    return SessionCalibration(cameras, background, hash_of(*content), notes)
+
+
+def _given(session: Session) -> tuple[Cameras, tuple[str, ...]]:
+    try:
+        return read_cameras(session.cameras_toml), ("cameras as given in cameras.toml",)
+    except Refused as reason:
+        raise BadInput(str(reason), file="cameras.toml") from None
+
+
+def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...]]:
+    """Cameras as kept in `folder`, or calibrated there. What is used is what the file holds, in every run."""
+    key, kept = _key(session), read_result(folder / "cameras.json")
+    if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
+        made = calibrate_from(session, read_board_views(session))
+        folder.mkdir(parents=True, exist_ok=True)
+        write_cameras(folder / "cameras.toml", made.cameras)
+        kept = {"hash": key, "notes": list(report_lines(made))}
+        write_result(folder / "cameras.json", kept)
+    return read_cameras(folder / "cameras.toml"), tuple(kept["notes"])
+
+
+def _key(session: Session) -> str:
+    """Hash of all that the cameras are made from: boards, their givens, and the trials' frames (the rig board is in
+    them)."""
+    frames = [source for trial in session.trials for source in trial.camera_sources.values()]
+    given = [session.board, session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad]
+    return hash_of(hash_of_code(), given, session.whisker, hash_of_files([session.path / "boards", *frames]))
+
+
+def _backgrounds(session: Session, cameras: Cameras) -> dict[str, np.ndarray | None]:
+    """The rig picture of each camera, in which neither whisker nor bar stands."""
+    paths = {name: session.rig_pictures.get(name) for name in cameras.names}
+    return {name: None if path is None else read_picture(path) for name, path in paths.items()}
+
+
+def moved_cameras(session: Session, calibration: SessionCalibration, frames) -> dict[str, str]:
+    """Cameras that stand elsewhere in the first or last of these frames than when calibrated: name to what was seen.
+
+    A camera that does not see the rig board is not checked.
+    """
+    found = {}
+    if session.board is None or session.T_rig_board is None:
+        return found
+    for name, pictures in frames.items():
+        if pictures and calibration.background.get(name) is not None:
+            doubts = (_moved(session, calibration, name, pictures[k]) for k in (min(pictures), max(pictures)))
+            doubt = next(filter(None, doubts), "")
+            found |= {name: doubt} if doubt else {}
+    return found
+
+
+def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -> str:
+    """Sentence on a camera that moved, or ''."""
+    camera, T = calibration.cameras[name], session.T_rig_board
+    points = session.board.corners_mm @ T[:, :3].T + T[:, 3]
+    corners = refine_corners(grey, camera.project(points), np.arange(len(points)), session.board)
+    try:
+        shift_px, sigma_px = camera_moved(camera, corners, session.board, T)
+    except Refused:
+        return ""
+    if shift_px <= max(_MOVED_PX, _MOVED_SIGMAS * sigma_px):
+        return ""
+    return f"camera {name} moved and was left out: the rig board is {shift_px:.2f} ± {sigma_px:.2f} px off"

@@ -1,0 +1,102 @@
+"""The main job: a recorded session in; truth, estimates and their errors out."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bench.assembly import write_tables
+from bench.atomic import lock_output
+from bench.calibration import calibrate_session
+from bench.check import checked_session
+from bench.doubts import Doubts
+from bench.drift import drift_rate, free_slope
+from bench.errors import BadInput
+from bench.estimates import estimators
+from bench.felt import strokes_of
+from bench.gauge_fit import fit_gauges
+from bench.gauge_readings import Pairs, pairs_of
+from bench.gauges import Gauges
+from bench.gauges_file import given_gauges
+from bench.results import hash_of_files, read_result
+from bench.session import Session
+from bench.settings import Settings
+from bench.signals import read_signals
+from bench.trial import Trial
+from bench.unit import Unit, evaluate_unit, see_unit
+from bench.workers import Workers
+
+_MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
+
+
+def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False) -> int:
+    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput."""
+    estimators(settings.estimators)
+    doubts = Doubts()
+    session = checked_session(session_path, doubts)
+    trials = judged(session)
+    with lock_output(out), Workers(workers, progress) as pool:
+        calibration = calibrate_session(session, out)
+        units = [Unit(session, t, hash_of_files([t.folder]), calibration, settings, out) for t in trials]
+        rate = session_drift(trials, settings, pool)
+        gauges = session_gauges(units, rate, pool, doubts)
+        units = [unit.with_gauges(rate, gauges) for unit in units]
+        pool.run(evaluate_unit, units, "trials")
+        results = [read_result(unit.path) for unit in units]
+        write_tables(out, results)
+        return report(session, out, results, gauges, doubts, calibration.notes, settings, pool)
+
+
+def judged(session: Session) -> list[Trial]:
+    """The trials with whisks: all but those with a weight. Raises BadInput where there is none."""
+    trials = [trial for trial in session.trials if trial.purpose != "weight"]
+    if not trials:
+        raise BadInput("there is no trial to evaluate", file="trials")
+    return trials
+
+
+def session_drift(trials: Sequence[Trial], settings: Settings, pool: Workers) -> np.ndarray:
+    """RMS drift (2,) of the channels per second, from free strokes all over the session."""
+    every = max(1, len(trials) // _MOST_DRIFT_STROKES)
+    tasks = [(trial, settings) for trial in trials[::every]]
+    return drift_rate([slope for slopes in pool.run(_free_slopes, tasks, "free strokes") for slope in slopes])
+
+
+def _free_slopes(task: tuple[Trial, Settings]) -> list:
+    trial, settings = task
+    slopes = [free_slope(stroke) for stroke in strokes_of(read_signals(trial), trial, settings)]
+    return [slope for slope in slopes if slope is not None]
+
+
+def session_gauges(units: Sequence[Unit], rate, pool: Workers, doubts: Doubts) -> Gauges | None:
+    """Gauges as brought along, else from the gauge trials; None, and a note, where these cannot fix them."""
+    given = given_gauges(units[0].session)
+    trials = [unit for unit in units if unit.trial.purpose == "gauge" and read_signals(unit.trial).kind == "V"]
+    if given is not None or not trials:
+        return given
+    pool.run(see_unit, trials, "gauge trials")
+    try:
+        return fit_gauges([pairs for unit in trials for pairs in _pairs(unit, rate)])
+    except BadInput as reason:
+        doubts.note(str(reason))
+        return None
+
+
+def _pairs(unit: Unit, rate) -> list[Pairs]:
+    """Pairs of moment and volts of a gauge trial's whisks."""
+    strokes, whisker = strokes_of(read_signals(unit.trial), unit.trial, unit.settings), unit.session.whisker
+    found = [pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
+             for seen, stroke in zip(see_unit(unit)["whisks"], strokes)]
+    return [pairs for pairs in found if pairs is not None]
+
+
+def report(session: Session, out: Path, results: list[dict], gauges: Gauges | None, doubts: Doubts,
+           cameras: Sequence[str], settings: Settings, pool: Workers) -> int:
+    """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
+    from bench.figures import write_figures
+    from bench.score import score
+    from bench.summary import write_summary
+
+    figures = write_figures(session, out, results, settings, pool)
+    scores = score(session, out, gauges)
+    return write_summary(session, out, results, gauges, doubts.notes, cameras, settings, scores, figures)

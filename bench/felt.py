@@ -1,0 +1,77 @@
+"""The felt half of a trial: gauge signals in; touch, zero and channels at an angle out. No picture is read here.
+
+Everything is in the channels' own unit. Touch and zero need no gauge factors, and moments are linear in the channels.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.rails import off_the_rails
+from bench.settings import Settings
+from bench.signals import Signals, forward_strokes
+from bench.trial import Trial
+from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One forward stroke: time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered."""
+
+    time_s: np.ndarray
+    motor_rad: np.ndarray
+    channels: np.ndarray
+    filtered: np.ndarray
+    saturated: int = 0
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Mean speed of the motor over the stroke."""
+        return float(np.ptp(self.motor_rad) / np.ptp(self.time_s))
+
+    def touch(self) -> Touch:
+        """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
+        return felt_touch(self.motor_rad, self.channels, self.time_s)
+
+    def at(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
+        """Filtered channels above the free stroke's level, at a pushing angle past `touch`."""
+        return moment_at(theta_rad, self.motor_rad, self.filtered, touch, time_s=self.time_s, **window)
+
+
+def strokes_of(signals: Signals, trial: Trial, settings: Settings) -> list[Stroke]:
+    """The forward strokes of a trial, each a whisk.
+
+    The whole recording goes through the zero-phase low-pass of section V, so that a stroke's ends are no edges of it.
+    """
+    channels, places = np.stack([signals.y, signals.z], axis=1), forward_strokes(signals)
+    if signals.kind == "V":
+        for where in places:  # elsewhere the motor may rest, and a channel stand still with it
+            channels[where] = off_the_rails(channels[where])
+    found = []
+    for where in places:
+        time, motor = signals.time_s[where], signals.motor_rad[where]
+        cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
+        filtered = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
+        saturated = int(np.isnan(channels[where]).any(axis=1).sum())
+        found.append(Stroke(time, motor, channels[where], filtered[where], saturated))
+    return found
+
+
+def _lowpass(channels, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:
+    """Filtered channels; gaps are bridged by lines for the filter and stay gaps. A cut-off that the sampling rate
+    cannot hold leaves them as they are."""
+    if cutoff_Hz >= rate_Hz / 2:
+        return channels
+    filtered = zero_phase_lowpass(_bridged(channels), rate_Hz, cutoff_Hz)
+    return np.where(np.isnan(channels), np.nan, filtered)
+
+
+def _bridged(channels) -> np.ndarray:
+    bridged, place = channels.copy(), np.arange(len(channels))
+    for column in bridged.T:
+        known = np.isfinite(column)
+        if known.any():
+            column[~known] = np.interp(place[~known], place[known], column[known])
+        else:
+            column[:] = 0.0
+    return bridged

@@ -1,0 +1,60 @@
+"""Gauge coefficients: volts above the zero of each free stroke to moments, and which trial may take which."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+FROM_FILE, FROM_MANIFEST, FROM_TRIALS = "gauges.toml", "session.toml [gauges]", "the session's gauge trials"
+
+
+@dataclass(frozen=True)
+class GaugeMatrix:
+    """[m_y, m_z] in the follicle's axes = matrix · [y_V, z_V] above the free stroke.
+
+    matrix (2, 2), N·mm/V; covariance (4, 4) of its coefficients, row after row.
+    """
+
+    matrix: np.ndarray
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """One standard deviation of each coefficient, (2, 2)."""
+        return np.sqrt(np.diag(self.covariance)).reshape(2, 2)
+
+    def covariance_at(self, volts) -> np.ndarray:
+        """Covariance (2, 2) that the coefficients' uncertainty gives the moment of `volts` (2,)."""
+        rows = np.kron(np.eye(2), np.asarray(volts)[None, :])
+        return rows @ self.covariance @ rows.T
+
+
+@dataclass(frozen=True)
+class Gauges:
+    """A session's gauges.
+
+    all: fitted to every gauge trial, or given. without: for each trial that took part in the fit, the coefficients
+    fitted without it, None where the rest cannot fix them: no whisk is judged by gauges fitted to it. one_factor: the
+    paper's way, one factor a channel and no cross-talk, NaN where a channel was not measured; at_angle: four
+    coefficients from the same readings at one angle. notes: lines for the user.
+    """
+
+    all: GaugeMatrix
+    source: str
+    without: Mapping[str, GaugeMatrix | None] = field(default_factory=dict)
+    one_factor: GaugeMatrix | None = None
+    at_angle: GaugeMatrix | None = None
+    notes: tuple[str, ...] = ()
+
+    def for_trial(self, name: str) -> GaugeMatrix | None:
+        """The coefficients that this trial may be judged by; None where there are none."""
+        return self.without.get(name, self.all)
+
+
+def to_follicle(roll_rad: float) -> np.ndarray:
+    """(2, 2): components (m_y, m_z) in the hub's axes to those in a follicle turned about +x.
+
+    At 90° the follicle's y axis points along rig z and its z axis along rig −y: channel y senses m_z, channel z −m_y.
+    """
+    c, s = np.cos(roll_rad), np.sin(roll_rad)
+    return np.array([[c, s], [-s, c]])

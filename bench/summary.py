@@ -1,0 +1,178 @@
+"""summary.txt: the verdict first, then what it rests on. Also shown in the terminal."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bench.atomic import write_whole
+from bench.compare import Judged, judge, whisks
+from bench.drawing import label_of
+from bench.gauges import GaugeMatrix, Gauges
+from bench.results import number
+from bench.seen import NO_PICTURES
+from bench.session import Session
+from bench.settings import Settings
+from bench.surfaces import Surface, surfaces
+from bench.unit import OWN_GAUGES
+
+DONE, DOUBTFUL = 0, 1
+_SILENT = ("", NO_PICTURES, OWN_GAUGES)
+_U95 = 1.96
+
+
+def write_summary(session: Session, out: Path, results: Sequence[dict], gauges: Gauges | None, doubts: Sequence[str],
+                  cameras: Sequence[str], settings: Settings, scores: Sequence[str], figures: Sequence[str]) -> int:
+    """Write and print the summary. Returns 0, or 1 where something is doubtful."""
+    judged = judge(results)
+    doubtful = [*doubts, *_whisk_doubts(results)]
+    text = "\n".join([
+        *_verdict(session, results, judged, settings, doubtful), "",
+        *_titled("Truth, from the pictures (± one sigma)", _truth_lines(results)),
+        *_titled(f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
+                 _error_lines(judged)),
+        *_titled("Friction: α that (13), (14) fit best", _friction_lines(surfaces(results, session.whisker.C_Nmm2))),
+        *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
+        *_titled("Cameras", cameras),
+        *_titled("Doubtful", doubtful),
+        *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
+        *_titled("Taken as exact, for no sigma was given", _exact(session)),
+        *_titled("Files", _files(figures)),
+    ])
+    write_whole(out / "summary.txt", text.rstrip() + "\n")
+    print(text.rstrip())
+    return DOUBTFUL if doubtful else DONE
+
+
+def _titled(title: str, lines: Iterable[str]) -> list[str]:
+    lines = list(lines)
+    return [title, *(f"  {line}" for line in lines), ""] if lines else []
+
+
+def _verdict(session: Session, results, judged: Sequence[Judged], settings: Settings, doubtful) -> Iterator[str]:
+    measured = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)]
+    seen = [s for result, s, _ in whisks(results) if result["trial"]["purpose"] == "measure"]
+    known = sum(s.get("d_x_mm") is not None for s in seen)
+    for name in dict.fromkeys(j.estimator for j in measured):
+        yield _verdict_on(name, [j for j in measured if j.estimator == name], settings)
+    if not measured:
+        yield "No verdict on the estimators: no whisk has both a truth and an estimate."
+    pictures = any(trial.camera_sources for trial in session.trials)
+    yield (f"{session.name}: truth for {known} of {len(seen)} measured whisks" if pictures
+           else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt") + (
+        f"; {len(doubtful)} doubtful, see below." if doubtful else "; nothing doubtful.")
+
+
+def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
+    errors = np.array([j.error_percent for j in judged])
+    worst = judged[int(np.argmax(np.abs(errors)))]
+    assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
+    spread = f"{errors.min():+.1f} to {errors.max():+.1f} %" if len(errors) > 1 else f"{errors[0]:+.1f} %"
+    return (f"{label_of(name)}{assumed} is wrong by {spread} of d_x over {len(errors)} whisks, "
+            f"most at β = {worst.beta_deg:.1f}° ({worst.trial}).")
+
+
+def _truth_lines(results) -> Iterator[str]:
+    rows = [(r, s, f) for r, s, f in whisks(results) if s.get("d_x_mm") is not None]
+    if rows:
+        yield (f"{'trial':<18}{'whisk':>5}  {'β seen':>16}  {'d_x':>17}  {'slip at θ':>17}  {'touch seen':>17}  "
+               f"{'felt − seen':>11}")
+    for result, s, felt in rows:
+        at = s["at"]
+        late = np.degrees(number(felt.get("touch_felt_rad")) - s["touch_rad"])
+        yield (f"{result['trial']['name']:<18}{s['whisk']:>5}  {_pm(s, 'beta', 2, degrees=True):>15}°  "
+               f"{_pm(s, 'd_x', 3):>14} mm  {_pm(at, 'slip', 3):>14} mm  {_pm(s, 'touch', 3, degrees=True):>16}°  "
+               f"{late:>+10.3f}°")
+
+
+def _pm(source: dict, name: str, digits: int, *, degrees: bool = False) -> str:
+    unit, turn = ("rad", np.degrees) if degrees else ("mm", float)
+    value, sigma = number(source.get(f"{name}_{unit}")), number(source.get(f"{name}_sigma_{unit}"))
+    return f"{turn(value):.{digits}f} ± {turn(sigma):.{digits}f}" if np.isfinite(value) else "-"
+
+
+def _error_lines(judged: Sequence[Judged]) -> Iterator[str]:
+    judged = [j for j in judged if np.isfinite(j.error_percent)]
+    if not judged:
+        return
+    columns = list(dict.fromkeys((j.estimator, j.one_factor) for j in sorted(judged, key=lambda j: j.one_factor)))
+    columns = [c for c in columns if not c[1] or c[0] == "with_friction"]
+    names = [label_of(name) + (", one factor" if one else "") for name, one in columns]
+    widths = [max(17, len(name)) for name in names]
+    yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   " + "  ".join(f"{n:>{width}}" for n, width in zip(names, widths))
+    for key in dict.fromkeys((j.trial, j.whisk) for j in judged):
+        mine = {(j.estimator, j.one_factor): j for j in judged if (j.trial, j.whisk) == key}
+        cells = [f"{_error(mine.get(c)):>{width}}" for c, width in zip(columns, widths)]
+        yield f"{key[0]:<18}{key[1]:>5}  {next(iter(mine.values())).beta_deg:>5.1f}°   " + "  ".join(cells)
+
+
+def _error(j: Judged | None) -> str:
+    return "-" if j is None else f"{j.error_percent:+.2f} ± {j.error_sigma_percent:.2f}"
+
+
+def _friction_lines(fitted: Sequence[Surface]) -> Iterator[str]:
+    for surface in fitted:
+        if surface.fit is None:
+            yield f"{surface.title}: {len(surface.felt)} whisks do not hold it (two slopes above α are needed)"
+            continue
+        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+        doubt = f"; {surface.fit.status}" if surface.fit.status else ""
+        yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {len(surface.felt)} whisks{doubt}"
+
+
+def _gauge_lines(gauges: Gauges | None) -> Iterator[str]:
+    if gauges is None:
+        return
+    yield f"from {gauges.source}; [m_y, m_z] = matrix · [y, z] above each free stroke"
+    yield from _matrix_lines("", gauges.all)
+    yield from _matrix_lines("the paper's way, one factor a channel, no cross-talk", gauges.one_factor)
+    yield from _matrix_lines("four coefficients at one angle, (2)", gauges.at_angle)
+    missing = [name for name, matrix in gauges.without.items() if matrix is None]
+    if missing:
+        yield f"not known without one of these trials, so they are not judged: {', '.join(missing)}"
+    yield from gauges.notes
+
+
+def _matrix_lines(title: str, gauges: GaugeMatrix | None) -> Iterator[str]:
+    if gauges is None:
+        return
+    if title:
+        yield f"{title}:"
+    for row, sigmas in zip(gauges.matrix, gauges.sigma):
+        cells = [f"{value:9.4f}" + (f" ± {_U95 * sigma:.4f}" if sigma > 0 else "") for value, sigma in zip(row, sigmas)]
+        yield "  " + "   ".join(cells)
+
+
+def _whisk_doubts(results) -> Iterator[str]:
+    """A line for each whisk that something is doubtful of. A gauge trial that cannot be judged is as it should be."""
+    for result, seen, felt in whisks(results):
+        name = f"{result['trial']['name']}, whisk {seen['whisk']}"
+        parts = [part for part in dict.fromkeys((seen["status"], felt["status"])) if part not in _SILENT]
+        if parts:
+            yield f"{name}: {'; '.join(parts)}"
+        if felt.get("saturated"):
+            yield f"{name}: {felt['saturated']} saturated samples left out"
+        for answer in felt["estimates"]:
+            if answer["status"] and result["trial"]["purpose"] == "measure":
+                yield f"{name}, {answer['estimator']}: {answer['status']}"
+    for result in results:
+        yield from (f"{result['trial']['name']}: {note}" for note in result["seen"]["notes"] + result["felt"]["notes"])
+
+
+def _exact(session: Session) -> Iterator[str]:
+    whisker = session.whisker
+    given = {"whisker length": whisker.length_sigma_mm, "whisker diameter": whisker.diameter_sigma_mm,
+             "bar diameter": session.bar_diameter_sigma_mm, "stiffness C": whisker.C_sigma_Nmm2}
+    if session.T_rig_board is not None:
+        given["T_rig_board"] = session.T_rig_board_sigma_mm + session.T_rig_board_sigma_rad
+    if session.board is not None:
+        given["board square"] = session.board.square_sigma_mm
+    exact = [name for name, sigma in given.items() if not sigma]
+    if exact:
+        yield ", ".join(exact)
+
+
+def _files(figures: Sequence[str]) -> list[str]:
+    single = [name for name in figures if "/" not in name]
+    folders = sorted({name.split("/")[0] for name in figures if "/" in name})
+    return [f"{', '.join(['whisks.csv', 'estimates.csv', 'track/', *single, *(f + '/' for f in folders)])}"]
