@@ -262,9 +262,10 @@ def _scaled(m_y, m_z):
 
 def _friction_share(m_y, m_z, alpha_est):
     """(m_z − μ|m_y|) as a number near one and an exponent of two."""
-    pull, power = np.frexp(np.abs(m_y))
-    drag, m_z, exponent = _scaled(np.tan(alpha_est) * pull, np.ldexp(m_z, -power))
-    return m_z - drag, exponent + power
+    (across, across_power), (along, along_power) = np.frexp(m_z), np.frexp(np.abs(m_y))
+    drag = np.tan(alpha_est) * along
+    exponent = np.where(drag == 0, across_power, np.maximum(across_power, along_power))
+    return np.ldexp(across, across_power - exponent) - np.ldexp(drag, along_power - exponent), exponent
 
 
 def _across_slope(m_y, m_z, beta):

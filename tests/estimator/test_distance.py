@@ -83,6 +83,14 @@ def test_scale_invariance(theta, phi, alpha_est, C, power):
     assert distance.cone(theta, m_y, m_z, alpha_est, C * scale, length * scale) == cone * scale
 
 
+@pytest.mark.parametrize("m_y", [0.0, 5e-324, 1e-320, 1e-300, 1e-16])
+def test_the_smallest_slip_is_no_slip(m_y):
+    """Even a subnormal m_y leaves the distance of (2), to the last digit."""
+    for alpha_est in (0.0, 0.2, 1.5):
+        assert distance.with_friction(0.05, m_y, 9.0, alpha_est, 9000.0) == pytest.approx(50.0, rel=4 * EPSILON)
+    assert distance.known_slope(0.05, m_y, 9.0, 0.3, 9000.0) == pytest.approx(50.0, rel=4 * EPSILON)
+
+
 @given(pushes, slopes, st.floats(0.0, 0.1), rigidities)
 def test_mirrored_moment_gives_the_same_distance(theta, phi, alpha_est, C):
     m_y, m_z = np.sin(phi), np.cos(phi)
