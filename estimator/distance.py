@@ -130,7 +130,7 @@ def general(theta, m_y, m_z, alpha_est, nu):
     require_friction_angle("alpha_est", alpha_est)
     share, exponent = _friction_share(m_y, m_z, alpha_est)
     magnitude = np.hypot(m_y, m_z)
-    scaled_theta = np.ldexp(quotient((theta, share), (magnitude,)), exponent)
+    scaled_theta = quotient((theta, share), (magnitude,), exponent)
     return _distance(nu(scaled_theta, magnitude), _conditions(theta, m_y, m_z, alpha_est))
 
 
@@ -276,14 +276,14 @@ def _across_slope(m_y, m_z, beta):
 
 def _by_slope(theta, m_y, m_z, beta, C):
     across, exponent = _across_slope(m_y, m_z, beta)
-    return np.ldexp(quotient((C, theta, np.cos(beta)), (across,)), -exponent)
+    return quotient((C, theta, np.cos(beta)), (across,), -exponent)
 
 
 def _by_friction(theta, m_y, m_z, alpha_est, C):
     share, share_exponent = _friction_share(m_y, m_z, alpha_est)
     m_y, m_z, exponent = _scaled(m_y, m_z)
     square = m_z * m_z + m_y * m_y
-    return np.ldexp(quotient((C, theta, share), (square,)), share_exponent - 2 * exponent)
+    return quotient((C, theta, share), (square,), share_exponent - 2 * exponent)
 
 
 def _harmonic(d_x, length):

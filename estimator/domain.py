@@ -39,12 +39,12 @@ def _plain(result):
     return np.asarray(result).item() if np.ndim(result) == 0 else result
 
 
-def quotient(numerator, denominator):
-    """Product of `numerator`'s factors over `denominator`'s, without overflow or underflow on the way.
+def quotient(numerator, denominator, exponent=0):
+    """2^exponent times `numerator`'s factors over `denominator`'s, without overflow or underflow on the way.
 
     Significands and exponents go separate ways, so only the result itself can leave the range of float64.
     """
-    value, exponent = 1.0, 0
+    value = 1.0
     for factor in numerator:
         significand, power = np.frexp(factor)
         value, exponent = value * significand, exponent + power
