@@ -110,9 +110,7 @@ def _described(trial: Trial) -> dict:
 def feel_trial(unit: Unit, signals: Signals) -> dict:
     """Felt touch, moments and estimates of each whisk."""
     strokes = strokes_of(signals, unit.trial, unit.settings)
-    mended = [f"{count} {cause} mended" for cause, count in signals.dropped.items()]
-    return {"whisks": [{"whisk": k} | _feel(unit, signals.kind, stroke) for k, stroke in enumerate(strokes)],
-            "notes": [*signals.doubts, *mended]}
+    return {"whisks": [{"whisk": k} | _feel(unit, signals.kind, stroke) for k, stroke in enumerate(strokes)]}
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke) -> dict:

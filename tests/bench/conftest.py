@@ -1,0 +1,98 @@
+"""Sessions whose truth is known without looking at their pictures, so that the bench is tested apart from vision."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.calibration import SessionCalibration
+from bench.results import hash_of
+from bench.seen import whisk_record
+from bench.signals import forward_strokes
+from vision.truth import FrameTruth, Smooth, WhiskTruth
+
+SIGMA_MM, SIGMA_RAD = 0.005, np.radians(0.05)
+
+
+def read_csv(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a CSV file of numbers."""
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    return {name: np.atleast_1d(table[name]) for name in table.dtype.names}
+
+
+def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
+    """The truth of one whisk (the given rows of truth.csv) as vision would tell it, without error."""
+    at = {k: v[number] if isinstance(v, list) else v for k, v in tomllib.loads((folder / "truth.toml").read_text()).items()}
+    table = {name: values[rows] for name, values in read_csv(folder / "truth.csv").items()}
+    touch, d_x, beta = np.radians(at["touch_deg"]), at["d_x_mm"], np.radians(at["beta_deg"])
+    touching = table["contact"] == 1
+    theta = np.radians(table["motor_deg"]) - touch
+    points = np.stack([table[k] for k in ("x_mm", "y_mm", "z_mm")], axis=1)
+    contact = points @ np.array([[np.cos(touch), -np.sin(touch), 0], [np.sin(touch), np.cos(touch), 0], [0, 0, 1]])
+    d_y, d_z = np.where(touching, d_x * np.tan(theta) - contact[:, 1], np.nan), contact[:, 2]
+    phi = np.arctan2(d_z, d_y)
+    values = {"slip": table["slip_mm"], "longitudinal_slip": table["arc_mm"] - d_x, "d_y": d_y, "d_z": d_z, "phi": phi,
+              "alpha": abs(beta) - np.abs(phi)}
+    plain = {}
+    for name, column in values.items():
+        unit, sigma = ("rad", SIGMA_RAD) if name in ("phi", "alpha") else ("mm", SIGMA_MM)
+        plain |= {f"{name}_{unit}": column, f"{name}_sigma_{unit}": np.where(touching, sigma, np.nan)}
+    frames = FrameTruth(index=table["frame"].astype(int), time_s=table["time_s"], motor_rad=np.radians(table["motor_deg"]),
+                        theta_rad=theta, theta_sigma_rad=np.full(len(theta), SIGMA_RAD), touching=touching,
+                        point_mm=points, point_sigma_mm=np.full_like(points, SIGMA_MM), arc_mm=table["arc_mm"],
+                        status=("",) * len(theta), **plain)
+    first = d_x * np.array([np.cos(touch), np.sin(touch), 0.0])
+    # One parameter a value and frame: every number has the same sigma and no number shares another's error.
+    n, kinds = int(touching.sum()), len(values)
+    own = {name: np.eye(n * kinds)[k * n:(k + 1) * n] for k, name in enumerate(values)}
+    smooth = Smooth(theta[touching], np.zeros(n * kinds), {k: v[touching] for k, v in values.items()}, own,
+                    SIGMA_MM**2 * np.eye(n * kinds))
+    return WhiskTruth(number, frames, touch, SIGMA_RAD / 5, first, np.full(3, SIGMA_MM), d_x, 2 * SIGMA_MM, beta,
+                      2 * SIGMA_RAD, np.radians(at["psi_deg"]), SIGMA_RAD, 2, len(theta), smooth=smooth)
+
+
+def see_exactly(session, trial, signals, calibration, settings) -> dict:
+    """In place of `see_trial`: what perfect pictures would show, from the truth files."""
+    strokes = forward_strokes(signals)
+    time_s = read_csv(trial.folder / "truth.csv")["time_s"]
+    whisks = []
+    for number, stroke in enumerate(strokes):
+        first, last = signals.time_s[stroke][[0, -1]]
+        rows = np.flatnonzero((time_s >= first) & (time_s <= last))
+        whisks.append(whisk_record(exact_truth(trial.folder, number, rows), settings))
+    return {"whisks": whisks, "bar_radius_mm": 3.0, "wire_radius_mm": 0.5, "notes": []}
+
+
+@pytest.fixture
+def exact_vision(monkeypatch):
+    """Evaluations (with workers=0) see exactly, and count how many trials they looked at."""
+    looks = []
+
+    def see(session, trial, *rest):
+        looks.append(trial.name)
+        return see_exactly(session, trial, *rest)
+
+    monkeypatch.setattr("bench.unit.see_trial", see)
+    nothing = SessionCalibration(None, {}, hash_of("exact"))
+    monkeypatch.setattr("bench.evaluate.calibrate_session", lambda session, out: nothing)
+    return looks
+
+
+@pytest.fixture
+def without_pictures(small_copy) -> Path:
+    """The small session's signals, with gauges and distances as one would write them into the manifests."""
+    for camera in ("high", "low"):
+        for folder in [small_copy / "boards" / camera, *small_copy.glob(f"trials/*/{camera}")]:
+            for picture in folder.iterdir():
+                picture.unlink()
+            folder.rmdir()
+    for picture in (small_copy / "boards" / "rig").iterdir():
+        picture.unlink()
+    for trial, d_x_mm in (("b30_3", 55.0), ("b60_4", 65.0)):
+        with (small_copy / "trials" / trial / "trial.toml").open("a") as file:
+            file.write(f"\nd_x_mm = {d_x_mm}\n")
+    with (small_copy / "session.toml").open("a") as file:
+        file.write("\n[gauges]\noffset_V = [0.0, 0.0]\n"
+                   "matrix_Nmm_per_V = [[11.31159, 0.32265], [-0.24882, 10.53619]]\n")
+    return small_copy
