@@ -27,21 +27,25 @@ class Friction:
             raise ValueError(f"friction: static ({self.static}) ≥ kinetic ({self.kinetic}) ≥ 0 is needed")
 
 
-def march(rod: Rod, bar: Bar, friction: Friction, touch: Touch, path_rad: Iterable[float]) -> list[State | None]:
-    """States along motor angles that begin at first touch or after it; a jump yields two states at one angle.
+class March:
+    """A whisker's states along the motor's way, from first touch.
 
-    Quasi-static: the whisker sticks while the force stays in the static cone, and when it leaves it, jumps to the kinetic one.
-    None stands for no contact: the motor back before the touch angle, or the tip slid off the bar.
+    Quasi-static: the whisker holds while the force stays in the static cone; when it leaves it, it jumps to the kinetic one.
     """
-    walker = _Walker(Contact(rod, bar), friction, touch)
-    return [state for motor_rad in path_rad for state in walker.go(float(motor_rad))]
 
-
-class _Walker:
-    def __init__(self, contact, friction, touch):
-        self.contact, self.friction, self.touch = contact, friction, touch
-        self.state, self.before, self.jump_rad = contact.touching(touch), None, -math.inf
+    def __init__(self, rod: Rod, bar: Bar, friction: Friction, touch: Touch):
+        self.contact, self.friction, self.touch = Contact(rod, bar), friction, touch
+        self.state, self.before, self.jump_rad = self.contact.touching(touch), None, -math.inf
         self.passed = False
+
+    def along(self, path_rad: Iterable[float]) -> tuple[np.ndarray, list[State | None]]:
+        """Motor angles and states met on the way through the angles of `path_rad`; a jump yields two states at one angle.
+
+        None stands for no contact: the motor before the touch angle, or the tip slid off the bar.
+        Raises ArithmeticError where no equilibrium is found.
+        """
+        met = [(motor if state is None else state.motor_rad, state) for motor in path_rad for state in self.go(float(motor))]
+        return np.array([motor for motor, _ in met]), [state for _, state in met]
 
     def go(self, motor_rad) -> list[State | None]:
         """Step to a motor angle; the states met on the way, the last one at that angle."""

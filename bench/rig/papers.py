@@ -1,0 +1,124 @@
+"""The text files of a session: what its people write, and the truth that only a synthetic one has."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from bench.rig import build
+from bench.rig.protocol import Protocol
+from bench.rig.recording import Recording
+
+_TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm"
+
+
+def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
+    w, b, g = protocol.whisker, protocol.board, protocol.gauges
+    rig = {"T_rig_board": [[round(float(x), 9) for x in row] for row in stated_T_rig_board]}
+    for unit, sigma in (("mm", b.pose_sigma_mm), ("deg", b.pose_sigma_deg)):
+        if sigma:
+            rig[f"T_rig_board_sigma_{unit}"] = sigma
+    cameras = [{"name": c.name, "exposure_s": protocol.pictures.exposure_s} for c in protocol.cameras]
+    session = {
+        "format": 1, "name": protocol.name,
+        "whisker": {"shape": w.shape, "length_mm": w.length_mm, "diameter_mm": w.diameter_mm,
+                    "youngs_modulus_GPa": w.youngs_modulus_GPa},
+        "bar": {"diameter_mm": protocol.bar_diameter_mm},
+        "board": {"squares": list(b.squares), "square_mm": b.square_mm, "marker_mm": b.marker_mm, "dictionary": b.dictionary,
+                  "legacy": b.legacy, "inverted": b.inverted},
+        "rig": rig,
+        **({"cameras": cameras} if cameras else {}),
+        **({"gauges": {"offset_V": list(g.offset_V), "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V]}} if g.known else {}),
+    }
+    return tomli_w.dumps(session)
+
+
+def truth_json(protocol: Protocol, seed: int) -> str:
+    """Exact cameras, board pose, gauges and friction; the seed and the protocol's fingerprint."""
+    cameras = {c.name: {"name": c.name, "K": c.matrix.tolist(), "dist": c.distortion.tolist(), "width": c.size_px[0],
+                        "height": c.size_px[1], "R": c.rotation.tolist(), "t": c.translation_mm.tolist()}
+               for c in build.cameras(protocol)}
+    alphas = sorted({(_alpha_deg(t.static_friction, t.friction), _alpha_deg(t.friction)) for t in protocol.trials})
+    truth = {
+        "cameras": cameras,
+        "T_rig_board": [*build.T_rig_board(protocol).tolist(), [0.0, 0.0, 0.0, 1.0]],
+        "gauge_matrix_Nmm_per_V": protocol.gauges.matrix_Nmm_per_V,
+        "gauge_offset_V": protocol.gauges.offset_V,
+        "E_GPa": protocol.whisker.youngs_modulus_GPa,
+        "alpha_deg": list(alphas[0]) if len(alphas) == 1 else [list(a) for a in alphas],
+        "clock_offset_s": protocol.pictures.clock_offset_s,
+        "seed": seed,
+        "protocol": protocol.fingerprint(),
+    }
+    return json.dumps(truth, indent=1) + "\n"
+
+
+def _alpha_deg(*coefficients):
+    return math.degrees(math.atan(next(c for c in coefficients if c is not None)))
+
+
+def trial_toml(recording: Recording) -> str:
+    run, table = recording.run, recording.run.table
+    trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "beta_deg": float(run.beta_deg),
+             "d_x_mm": float(run.d_x_mm), "purpose": table.purpose}
+    if table.bar_diameter_mm:
+        trial["bar_diameter_mm"] = table.bar_diameter_mm
+    if table.purpose == "gauge":
+        trial["follicle_roll_deg"] = table.follicle_roll_deg
+    return tomli_w.dumps(trial)
+
+
+def frames_csv(recording: Recording, clock_offset_s: float) -> str:
+    lines = [f"{i},{time - clock_offset_s:.6f}" for i, time in enumerate(recording.frames.time_s)]
+    return "\n".join(["frame,time_s", *lines]) + "\n"
+
+
+def signals_csv(recording: Recording) -> str:
+    lines = ["%.6f,%.5f,%.6f,%.6f" % tuple(row) for row in recording.signals]
+    return "\n".join(["time_s,motor_deg,y_V,z_V", *lines]) + "\n"
+
+
+def truth_csv(recording: Recording) -> str:
+    frames = recording.frames
+    rows = zip(frames.time_s, frames.motor_rad, frames.whisk, recording.states)
+    return "\n".join([_TRUTH, *(_truth_row(i, recording.whisks[w], t, m, s) for i, (t, m, w, s) in enumerate(rows))]) + "\n"
+
+
+def _truth_row(frame, whisk, time, motor, state):
+    place, slip, arc = np.full(3, np.nan), np.nan, np.nan
+    if state is not None:
+        place, slip, arc = state.point_mm, float(whisk.slip_mm(state.point_mm)), state.arc_mm
+    moments = whisk.forward.moment_Nmm[_row(whisk, motor)] if state is not None else (0.0, 0.0)
+    values = [time, math.degrees(motor)], [*place, slip, arc, *moments]
+    first, rest = (",".join(f"{v:.6f}" for v in part) for part in values)
+    return f"{frame},{first},{int(state is not None)},{rest}"
+
+
+def _row(whisk, motor):
+    return int(np.searchsorted(whisk.forward.motor_rad, motor + 1e-9, side="right") - 1)
+
+
+def truth_toml(recording: Recording) -> str:
+    """One value a key, or a list where the recording holds several whisks."""
+    values = [_whisk_truth(whisk) for whisk in recording.whisks]
+    lines = []
+    for key in values[0]:
+        texts = [f"{v[key]:.6f}" for v in values]
+        lines.append(f"{key} = {texts[0] if len(texts) == 1 else '[' + ', '.join(texts) + ']'}")
+    return "\n".join(lines) + "\n"
+
+
+def _whisk_truth(whisk):
+    beta, psi = whisk.bar.slope(whisk.touch.motor_rad)
+    slip = whisk.slip_mm(whisk.forward.point_mm)
+    return {"touch_deg": math.degrees(whisk.touch.motor_rad), "d_x_mm": whisk.touch.d_x_mm, "beta_deg": math.degrees(beta),
+            "psi_deg": math.degrees(psi), "slip_at_3deg_mm": whisk.slip_at(math.radians(3)),
+            "slip_jump_mm": float(np.nanmax(np.abs(np.diff(slip)))),
+            "mu_static": whisk.friction.static, "mu_kinetic": whisk.friction.kinetic}
+
+
+def write(path: Path, text: str) -> None:
+    """UTF-8 with plain newlines on every system."""
+    path.write_bytes(text.encode())

@@ -1,0 +1,255 @@
+"""A rig and what is to be recorded on it, as a TOML file describes them. Every key has a default; unknown keys are refused."""
+
+import hashlib
+import itertools
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+
+from bench.errors import BadInput
+
+Three = tuple[float, float, float]
+Pair = tuple[float, float]
+Size = tuple[int, int]
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+Zero = Annotated[float, msgspec.Meta(ge=0)]
+Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]+$")]
+FOLDER = Path(__file__).with_name("protocols")
+
+
+class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One table of a protocol file."""
+
+
+class WhiskerTable(Table):
+    shape: Literal["cylinder", "cone"] = "cylinder"
+    length_mm: Positive = 100.0
+    diameter_mm: Positive = 1.0
+    youngs_modulus_GPa: Positive = 60.0
+    density_kg_m3: Positive = 6450.0
+    sag_mm: float = 0.0  # the tip's drop under its own weight
+    set_y_mm: float = 0.0  # the tip's departure by the curvature that spool wire keeps
+    set_z_mm: float = 0.0
+
+
+class BoardTable(Table):
+    squares: Size = (8, 6)
+    square_mm: Positive = 15.0
+    marker_mm: Positive = 11.0
+    dictionary: str = "DICT_5X5_100"
+    legacy: bool = False
+    inverted: bool = False
+    views: Annotated[int, msgspec.Meta(ge=1)] = 14  # pictures a camera for its lens
+    origin_mm: Three = (4.2, 38.9, -44.4)  # of the board on the rig
+    turn_deg: float = 4.0  # about the rig's z
+    tilt_deg: Pair = (0.15, 1.05)  # about the board's x and y
+    pose_sigma_mm: Zero = 0.0  # error of the T_rig_board that session.toml states
+    pose_sigma_deg: Zero = 0.0
+
+
+class CameraTable(Table, kw_only=True):
+    name: Name
+    position_mm: Three
+    target_mm: Three = (55.0, 0.0, 0.0)
+    roll_deg: float = 0.0
+    focal_px: Positive = 2000.0
+    aspect: Positive = 1.0012
+    size_px: Size = (1280, 720)
+    centre_px: Pair | None = None
+    distortion: tuple[float, float, float, float, float] = (-0.1, 0.1, 0.0, 0.0, 0.0)
+
+
+class LightTable(Table):
+    towards: Three = (-0.3, -0.5, 0.8)  # direction of the lamp
+    lamp: Zero = 0.55
+    soft: Zero = 0.35  # light from all round, in parts of full scale
+    paper: Zero = 0.75
+    ink: Zero = 0.04
+    floor: Zero = 0.2
+    wall: Zero = 0.36
+    wire_matt: Zero = 0.25
+    wire_shiny: Zero = 0.5
+    wire_gloss: Positive = 18.0
+    wire_rim: Zero = 0.3  # 0: no darkening towards the edges
+    bar_matt: Zero = 0.22
+    bar_shiny: Zero = 0.6
+    bar_gloss: Positive = 12.0
+    bar_rim: Zero = 0.5
+
+
+class PicturesTable(Table):
+    format: Literal["jpg", "png", "mkv"] = "jpg"  # JPEG quality 95, PNG, lossless FFV1
+    bits: Literal[8, 12] = 8
+    blur_px: Annotated[float, msgspec.Meta(ge=0.3, le=6)] = 0.9  # sigma of lens and defocus
+    vignetting: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.15
+    read_noise: Zero = 0.8  # grey levels of 255
+    shot_noise: Zero = 0.4  # of one level
+    grain: Zero = 0.055  # in parts of the level
+    exposure_s: Zero = 0.001
+    motion_blur: bool = True
+    before_deg: Zero = 1.6  # frames of a whisk: from before touch …
+    after_deg: Zero = 4.6  # … to after it
+    step_deg: Positive = 0.5
+    rate_Hz: Positive | None = None  # instead of step_deg
+    clock_offset_s: float = 0.0  # frames.csv runs behind the signals by this
+
+
+class MotorTable(Table):
+    before_deg: Zero = 1.605  # the stroke: from before touch …
+    after_deg: Zero = 4.6  # … to after it
+    ramp_s: Zero = 0.0  # to reach the speed and to lose it again
+    pause_s: Zero = 0.0  # at either end
+    back_stroke: bool | None = None  # recorded too; by default where there are several whisks
+    encoder_step_deg: Zero = 0.005  # 0: no steps
+
+
+class FrictionTable(Table):
+    scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
+    finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
+
+
+class GaugesTable(Table):
+    matrix_Nmm_per_V: tuple[Pair, Pair] = ((11.3, 0.32), (-0.25, 10.5))
+    offset_V: Pair = (-0.015, -0.026)
+    noise_V: Zero = 0.0064
+    hum_V: Zero = 0.0023
+    hum_Hz: Positive = 58.0
+    drift_V_per_s: float = 0.0
+    filter_Hz: Zero = 800.0  # 0: no filter
+    rate_Hz: Positive = 2000.0
+    adc_bits: Annotated[int, msgspec.Meta(ge=0, le=24)] = 16  # 0: no steps
+    range_V: Positive = 10.0
+    vibration: bool = False
+    damping: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 0.02
+    known: bool = False  # written into session.toml
+
+
+def _many(value):
+    return value if isinstance(value, list) else [value]
+
+
+class TrialTable(Table):
+    """Trials with every combination of the listed values."""
+
+    surface: Name = "steel"
+    beta_deg: float | list[float] = 0.0
+    psi_deg: float | list[float] = 0.0
+    d_x_mm: float | list[float] = 60.0
+    speed_deg_s: float | list[float] = 10.0
+    friction: Zero = 0.185339  # kinetic
+    static_friction: Zero | None = None  # by default the kinetic one
+    bar_diameter_mm: Positive | None = None
+    whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
+    repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
+    purpose: Literal["measure", "gauge"] = "measure"
+    follicle_roll_deg: float = 0.0
+    name: str = ""
+    # Sigmas of what the bench's people set against what they wanted:
+    beta_scatter_deg: Zero = 0.4
+    d_x_scatter_mm: Zero = 0.4
+    psi_scatter_deg: Zero = 0.0
+    touch_deg: float = 2.3
+    touch_scatter_deg: Zero = 0.07
+
+
+class Protocol(Table, kw_only=True):
+    """A session to be simulated."""
+
+    name: str = "synthetic"
+    whisker: WhiskerTable = WhiskerTable()
+    bar_diameter_mm: Positive = 6.0
+    board: BoardTable = BoardTable()
+    cameras: list[CameraTable] = []
+    light: LightTable = LightTable()
+    pictures: PicturesTable = PicturesTable()
+    motor: MotorTable = MotorTable()
+    friction: FrictionTable = FrictionTable()
+    gauges: GaugesTable = GaugesTable()
+    trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
+
+    def runs(self) -> list["Run"]:
+        """The trials one by one."""
+        runs = [run for table in self.trials for run in _runs(table)]
+        return [msgspec.structs.replace(run, name=name) for run, name in zip(runs, _distinct([r.name for r in runs]))]
+
+    def fingerprint(self) -> str:
+        """Changes with any value."""
+        return hashlib.sha256(msgspec.json.encode(self)).hexdigest()
+
+
+class Run(msgspec.Struct, frozen=True):
+    """One trial."""
+
+    name: str
+    beta_deg: float
+    psi_deg: float
+    d_x_mm: float
+    speed_deg_s: float
+    table: TrialTable
+
+
+def _runs(table):
+    combinations = itertools.product(*map(_many, (table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm)))
+    for (speed, beta, psi, d_x), _ in itertools.product(combinations, range(table.repeats)):
+        name = table.name or ("gauge" if table.purpose == "gauge" else table.surface)
+        if table.purpose == "gauge":
+            name = f"{name}_roll{table.follicle_roll_deg:g}"
+        else:
+            name += f"_b{beta:02g}" + (f"_psi{psi:g}" if psi else "") + f"_v{speed:g}"
+        yield Run(name, beta, psi, d_x, speed, table)
+
+
+def _distinct(names):
+    """The names, numbered where they are used more than once."""
+    counts = {}
+    for name in names:
+        counts[name] = counts.get(name, 0) + 1
+        yield name if names.count(name) == 1 else f"{name}_{counts[name]}"
+
+
+def load(protocol: str | Path) -> Protocol:
+    """A protocol by its name ("quick", "paper") or from a file. Raises BadInput in one line where it is not one."""
+    path = FOLDER / f"{protocol}.toml"
+    path = path if isinstance(protocol, str) and path.is_file() else Path(protocol)
+    try:
+        tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as problem:
+        known = ", ".join(sorted(p.stem for p in FOLDER.glob("*.toml")))
+        raise BadInput(f"cannot be read ({problem.strerror}); the built-in protocols are {known}", file=path) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise BadInput(f"is not TOML: {problem}", file=path) from None
+    try:
+        found = msgspec.convert(tables, Protocol)
+    except msgspec.ValidationError as problem:
+        raise BadInput(str(problem), file=path) from None
+    _check(found, path)
+    return found
+
+
+def _check(protocol, path):
+    names = [c.name for c in protocol.cameras]
+    if len(set(names)) < len(names) or "rig" in names:
+        raise BadInput(f"cameras need names of their own, none of them 'rig'; found {names}", file=path)
+    for run in protocol.runs():
+        _check_run(protocol, run, path)
+
+
+def _check_run(protocol, run, path):
+    table, motor, pictures = run.table, protocol.motor, protocol.pictures
+    if not -80 <= run.beta_deg <= 80 or not -60 <= run.psi_deg <= 60:
+        raise BadInput(f"beta_deg {run.beta_deg:g}, psi_deg {run.psi_deg:g}; ±80 and ±60 are allowed", file=path)
+    if not 0.1 * protocol.whisker.length_mm <= run.d_x_mm <= 1.05 * protocol.whisker.length_mm:
+        raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside 0.1 to 1.05 of the whisker's length", file=path)
+    if not 0.01 <= run.speed_deg_s <= 1000:
+        raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 1000 is allowed", file=path)
+    if table.static_friction is not None and table.static_friction < table.friction:
+        raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
+    if not 0 < motor.after_deg <= 25 or motor.before_deg < 0.1:
+        raise BadInput("motor: before_deg ≥ 0.1 and 0 < after_deg ≤ 25 are needed", file=path)
+    if pictures.before_deg > motor.before_deg or pictures.after_deg > motor.after_deg:
+        raise BadInput("pictures are taken within the stroke: their before_deg and after_deg are at most the motor's", file=path)
+    if math.isclose(sum(abs(x) for x in protocol.light.towards), 0):
+        raise BadInput("light: towards is a direction, not zero", file=path)

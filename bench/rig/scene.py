@@ -1,0 +1,153 @@
+"""What stands in front of a camera: floor, board, post and hub, whisker, bar with its block. Painted far to near."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.rig.bar import Bar, turned
+from bench.rig.board import Board, Ink, marker
+from bench.rig.light import Light, Material
+from bench.rig.plate import Plate, Print
+from bench.rig.tube import Tube
+from bench.rig.window import Window
+
+HUB_FRONT_MM = 5.0  # how far the hub reaches along the whisker
+_HUB_LOW, _HUB_HIGH = np.array([-17.0, -9.0, -6.0]), np.array([HUB_FRONT_MM, 9.0, 7.0])
+_BLOCK_HALF = np.array([9.0, 9.0, 7.0])
+_HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Light and surfaces of a scene. `shadow`: how much of the light the whisker's and the bar's shadows take from the board."""
+
+    light: Light
+    ink: Ink
+    wire: Material
+    bar: Material
+    dark: Material
+    floor: float
+    wall: float
+    floor_z_mm: float = -95.0
+    wall_y_mm: float = 420.0
+    margin_mm: float = 7.5
+    shadow: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A block with plain faces and perhaps a marker on one. Axes (3, 3): its own x, y, z as columns, rig frame."""
+
+    low_mm: np.ndarray
+    high_mm: np.ndarray
+    axes: np.ndarray
+    origin_mm: np.ndarray
+    reflectance: float
+
+    def faces(self):
+        """(name, plate) of the six faces, prints facing outwards."""
+        for axis in range(3):
+            for end, limit in ((-1, self.low_mm), (1, self.high_mm)):
+                yield (axis, end), self._face(axis, end, limit[axis])
+
+    def _face(self, axis, end, level):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        inward = -end * self.axes[:, axis]
+        first, second = self.axes[:, i], np.cross(inward, self.axes[:, i])
+        low, high = self.low_mm, self.high_mm
+        corner = self.axes[:, axis] * level + first * low[i] + self.axes[:, j] * (low[j] if second @ self.axes[:, j] > 0 else high[j])
+        pose = np.column_stack([first, second, inward, self.origin_mm + corner])
+        return Plate(Print.plain(high[i] - low[i], high[j] - low[j], self.reflectance), pose)
+
+    def paint(self, window, paint, light, print_=None, on=(2, 1)):
+        """All faces, and a print centred on one of them."""
+        for name, plate in self.faces():
+            plate.paint(window, paint, light)
+            if print_ is not None and name == on:
+                x, y = (0.5 * e[[0, -1]].sum() for e in (plate.print.x_mm, plate.print.y_mm))
+                Plate(print_.moved(x, y), plate.pose).paint(window, paint, light)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The rig that a board, a bar and a whisker make. `T_rig_board` (3, 4)."""
+
+    board: Board
+    T_rig_board: np.ndarray
+    looks: Looks
+
+    def backdrop(self, window: Window) -> np.ndarray:
+        """Floor, wall and board: what the rig's board picture shows."""
+        paint = _floor_and_wall(window, self.looks)
+        self.print_board(window, paint, self.T_rig_board)
+        return paint
+
+    def print_board(self, window, paint, T_rig_board) -> None:
+        """The board anywhere, as the views for the lens show it."""
+        looks = self.looks
+        plate = Plate(self.board.printed(looks.ink, looks.margin_mm), T_rig_board)
+        plate.paint(window, paint, looks.light)
+
+    def stand_bar(self, window: Window, paint: np.ndarray, bar: Bar, middle_mm: np.ndarray) -> None:
+        """The post under the hub, and the bar (its middle where first touched) with a block at its upper end."""
+        looks = self.looks
+        post = Tube.straight([-6, 0, -18], [-6, 0, looks.floor_z_mm], 11.0, looks.dark)
+        post.paint(window, paint, looks.light)
+        Tube.straight([-6, 0, -4], [-6, 0, -19], 3.0, looks.dark).paint(window, paint, looks.light)
+        up, down = middle_mm + 52 * bar.axis, middle_mm - self._reach_down(bar, middle_mm) * bar.axis
+        Tube.straight(down, up, bar.radius_mm, looks.bar).paint(window, paint, looks.light)
+        print_ = marker(self.board.dictionary, self._marker(_BLOCK_MARKER), 10.0, looks.ink)
+        front = np.array([0.0, -1.0, 0.0]) - bar.axis * -bar.axis[1]
+        front /= np.linalg.norm(front)
+        axes = np.column_stack([np.cross(front, bar.axis), front, bar.axis])
+        Box(-_BLOCK_HALF, _BLOCK_HALF, axes, up, 0.1).paint(window, paint, looks.light, print_, (1, 1))
+
+    def _reach_down(self, bar, middle):
+        """To the board, but no further than a rod of this length would."""
+        below = self.T_rig_board[:, 2]
+        towards = -(bar.axis @ below)
+        to_board = (self.T_rig_board[:, 3] - middle) @ below / towards if abs(towards) > 1e-6 else math.inf
+        return float(np.clip(abs(to_board), 20, 75))
+
+    def _marker(self, from_end):
+        known = self.board.opencv().getDictionary()
+        return len(known.bytesList) + from_end
+
+    def hub(self, motor_rad: float) -> Box:
+        return Box(_HUB_LOW, _HUB_HIGH, turned(np.eye(3), motor_rad).T, np.zeros(3), 0.05)
+
+    def move(self, window: Window, paint: np.ndarray, motor_rad: float, whisker: Tube) -> None:
+        """The hub at a motor angle and the whisker; the nearer of the two last."""
+        hub = self.hub(motor_rad)
+        print_ = marker(self.board.dictionary, self._marker(_HUB_MARKER), 10.0, self.looks.ink)
+        front = dict(hub.faces())[(0, 1)]
+        if front.faces(window.camera.centre_mm):
+            hub.paint(window, paint, self.looks.light, print_)
+            whisker.paint(window, paint, self.looks.light)
+        else:
+            whisker.paint(window, paint, self.looks.light)
+            hub.paint(window, paint, self.looks.light, print_)
+
+    def moving_px(self, camera, motor_rad: float, whisker: Tube) -> np.ndarray:
+        """Pixels (n, 2) between which all that moves lies."""
+        corners = np.concatenate([p.corners_mm() for _, p in self.hub(motor_rad).faces()])
+        return np.concatenate([camera.project(corners), *whisker.silhouette(camera)])
+
+
+def _floor_and_wall(window, looks):
+    """A grey floor that darkens away from the rig, and the wall behind it."""
+    coarse = Window(window.camera, window.left, window.top, window.right, window.bottom, 1, 1.0)
+    x, y = coarse.rays()
+    rays = np.stack([x, y, np.ones_like(x)], -1) @ window.camera.rotation.astype(np.float32)
+    centre = window.camera.centre_mm
+    down, back = np.minimum(rays[..., 2], -1e-3), np.maximum(rays[..., 1], 1e-3)
+    to_floor, to_wall = (looks.floor_z_mm - centre[2]) / down, (looks.wall_y_mm - centre[1]) / back
+    beyond = 1 / (1 + np.exp(np.clip((to_floor - to_wall) / 1.5, -50, 50)))
+    at = rays * np.minimum(to_floor, to_wall)[..., None] + centre
+    near = 1 / (1 + (at[..., 0] - 40) ** 2 / 9e5 + at[..., 1] ** 2 / 9e5)
+    grain = 1 + 0.02 * np.sin(0.11 * at[..., 0] + 0.3) * np.sin(0.13 * at[..., 1] + 0.7 * at[..., 2])
+    light = looks.light
+    floor, wall = (r * light.flat(n) for r, n in ((looks.floor, [0, 0, 1.0]), (looks.wall, [0, -1.0, 0])))
+    tone = ((floor * beyond + wall * (1 - beyond)) * near * grain).astype(np.float32)
+    return np.repeat(np.repeat(tone, window.fine, 0), window.fine, 1)
