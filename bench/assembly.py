@@ -11,10 +11,21 @@ from bench.compare import whisks
 from bench.results import number
 
 # Column and key of the value; in the table each is followed by its sigma.
-_AT_TOUCH = (("touch_deg", "touch_rad"), ("touch_felt_deg", "touch_felt_rad"), ("d_x_mm", "d_x_mm"),
-             ("beta_deg", "beta_rad"), ("psi_deg", "psi_rad"))
-_AT_ANGLE = (("slip_mm", "slip_mm"), ("longitudinal_slip_mm", "longitudinal_slip_mm"), ("d_y_mm", "d_y_mm"),
-             ("d_z_mm", "d_z_mm"), ("phi_seen_deg", "phi_rad"), ("alpha_seen_deg", "alpha_rad"))
+_AT_TOUCH = (
+    ("touch_deg", "touch_rad"),
+    ("touch_felt_deg", "touch_felt_rad"),
+    ("d_x_mm", "d_x_mm"),
+    ("beta_deg", "beta_rad"),
+    ("psi_deg", "psi_rad"),
+)
+_AT_ANGLE = (
+    ("slip_mm", "slip_mm"),
+    ("longitudinal_slip_mm", "longitudinal_slip_mm"),
+    ("d_y_mm", "d_y_mm"),
+    ("d_z_mm", "d_z_mm"),
+    ("phi_seen_deg", "phi_rad"),
+    ("alpha_seen_deg", "alpha_rad"),
+)
 _FELT = (("m_y_Nmm", "m_y_Nmm"), ("m_z_Nmm", "m_z_Nmm"), ("phi_felt_deg", "phi_felt_rad"))
 _PLACE = ("x_mm", "y_mm", "z_mm")
 
@@ -35,10 +46,33 @@ WHISK_COLUMNS = (
     *_with_sigmas(_PLACE),
     *("cameras", "frames_used", "status"),
 )
-ESTIMATE_COLUMNS = ("trial", "whisk", "estimator", "alpha_est_deg", "d_x_est_mm", "d_x_est_sigma_mm", "beta_est_deg",
-                    "error_mm", "error_percent", "status")
-TRACK_COLUMNS = ("frame", "whisk", "time_s", "motor_deg", "theta_deg", "touching", *_PLACE, "slip_mm",
-                 *map(sigma_name, (*_PLACE, "slip_mm")), "d_y_mm", "d_z_mm", "phi_seen_deg", "status")
+ESTIMATE_COLUMNS = (
+    "trial",
+    "whisk",
+    "estimator",
+    "alpha_est_deg",
+    "d_x_est_mm",
+    "d_x_est_sigma_mm",
+    "beta_est_deg",
+    "error_mm",
+    "error_percent",
+    "status",
+)
+TRACK_COLUMNS = (
+    "frame",
+    "whisk",
+    "time_s",
+    "motor_deg",
+    "theta_deg",
+    "touching",
+    *_PLACE,
+    "slip_mm",
+    *map(sigma_name, (*_PLACE, "slip_mm")),
+    "d_y_mm",
+    "d_z_mm",
+    "phi_seen_deg",
+    "status",
+)
 
 
 def write_tables(out: Path, results: Sequence[dict]) -> None:
@@ -92,9 +126,14 @@ def estimate_rows(results: Iterable[dict]) -> Iterator[dict]:
         truth = number(seen.get("d_x_mm"))
         for answer in felt["estimates"]:
             error = number(answer["d_x_est_mm"]) - truth
-            yield answer | {"trial": result["trial"]["name"], "whisk": seen["whisk"], "error_mm": error,
-                            "alpha_est_deg": _degrees(answer["alpha_est_rad"]), "error_percent": 100.0 * error / truth,
-                            "beta_est_deg": _degrees(answer["beta_est_rad"])}
+            yield answer | {
+                "trial": result["trial"]["name"],
+                "whisk": seen["whisk"],
+                "error_mm": error,
+                "alpha_est_deg": _degrees(answer["alpha_est_rad"]),
+                "error_percent": 100.0 * error / truth,
+                "beta_est_deg": _degrees(answer["beta_est_rad"]),
+            }
 
 
 def track_rows(result: dict) -> Iterator[dict]:

@@ -57,15 +57,27 @@ def slope_deg(result: dict, seen: dict) -> float:
 
 def judge(results: Iterable[dict]) -> list[Judged]:
     """Every estimate of every whisk."""
-    return [_judged(result, seen, answer, one_factor)
-            for result, seen, felt in whisks(results)
-            for one_factor, kind in ((False, "estimates"), (True, "one_factor"))
-            for answer in felt[kind]]
+    return [
+        _judged(result, seen, answer, one_factor)
+        for result, seen, felt in whisks(results)
+        for one_factor, kind in ((False, "estimates"), (True, "one_factor"))
+        for answer in felt[kind]
+    ]
 
 
 def _judged(result: dict, seen: dict, answer: dict, one_factor: bool) -> Judged:
     trial = result["trial"]
-    return Judged(trial["name"], seen["whisk"], trial["purpose"], trial["surface"], number(trial["speed_deg_s"]),
-                  answer["estimator"], slope_deg(result, seen), number(seen.get("d_x_mm")),
-                  number(seen.get("d_x_sigma_mm")), number(answer["d_x_est_mm"]), number(answer["d_x_est_sigma_mm"]),
-                  one_factor)
+    return Judged(
+        trial["name"],
+        seen["whisk"],
+        trial["purpose"],
+        trial["surface"],
+        number(trial["speed_deg_s"]),
+        answer["estimator"],
+        slope_deg(result, seen),
+        number(seen.get("d_x_mm")),
+        number(seen.get("d_x_sigma_mm")),
+        number(answer["d_x_est_mm"]),
+        number(answer["d_x_est_sigma_mm"]),
+        one_factor,
+    )

@@ -11,8 +11,15 @@ from bench.atomic import whole_file
 COLOURS = {"no_slip": "#b2182b", "with_friction": "#2166ac", "frictionless": "#e08214"}
 OTHER_COLOURS = ("#1b7837", "#762a83", "#8c510a", "#01665e")
 LABELS = {"no_slip": "(2) no slip", "with_friction": "(10) with friction", "frictionless": "(12) frictionless"}
-_STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 10,
-          "legend.frameon": False, "legend.fontsize": 8, "axes.linewidth": 0.8}
+_STYLE = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "axes.linewidth": 0.8,
+}
 _STAMP = "Source"
 
 

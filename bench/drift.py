@@ -50,8 +50,8 @@ def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
 
 
 def allow_drift(touch: Touch, rate, speed_rad_s: float) -> Touch:
-    """The same touch, with a zero that may drift at `rate` (k,) per second at least."""
+    """The same touch, with a zero that may drift at `rate` (k,) per second: the session's, and not the stroke's own,
+    which is mostly noise."""
     if touch.status or speed_rad_s <= 0:
         return touch
-    drift = np.maximum(touch.level.drift, np.asarray(rate) / speed_rad_s)
-    return replace(touch, level=replace(touch.level, drift=drift))
+    return replace(touch, level=replace(touch.level, drift=np.asarray(rate) / speed_rad_s))

@@ -82,9 +82,19 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
         return touch, at.status
     moments = (stroke.filtered - touch.offset) @ hand.matrix.T
     m_y, m_z = hand.matrix @ at.values
-    return touch, Whisk(stroke.time_s, stroke.motor_rad - touch.motor_rad, moments[:, 0], moments[:, 1], theta_rad,
-                        float(m_y), float(m_z), hand.covariance(at.values, at.covariance), touch.sigma_rad, beam,
-                        hand.matrix @ at.theta_covariance)
+    return touch, Whisk(
+        stroke.time_s,
+        stroke.motor_rad - touch.motor_rad,
+        moments[:, 0],
+        moments[:, 1],
+        theta_rad,
+        float(m_y),
+        float(m_z),
+        hand.covariance(at.values, at.covariance),
+        touch.sigma_rad,
+        beam,
+        hand.matrix @ at.theta_covariance,
+    )
 
 
 def as_felt(touch: Touch, whisk: Whisk | None) -> dict:
@@ -94,8 +104,14 @@ def as_felt(touch: Touch, whisk: Whisk | None) -> dict:
         return felt
     sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at))
     phi, phi_sigma = _slip_angle(whisk)
-    return felt | {"m_y_Nmm": whisk.m_y_at_Nmm, "m_y_sigma_Nmm": sigma_y, "m_z_Nmm": whisk.m_z_at_Nmm,
-                   "m_z_sigma_Nmm": sigma_z, "phi_felt_rad": phi, "phi_felt_sigma_rad": phi_sigma}
+    return felt | {
+        "m_y_Nmm": whisk.m_y_at_Nmm,
+        "m_y_sigma_Nmm": sigma_y,
+        "m_z_Nmm": whisk.m_z_at_Nmm,
+        "m_z_sigma_Nmm": sigma_z,
+        "phi_felt_rad": phi,
+        "phi_felt_sigma_rad": phi_sigma,
+    }
 
 
 def _slip_angle(whisk: Whisk) -> tuple[float, float]:
@@ -117,5 +133,11 @@ def _answer(name: str, estimator: Estimator, whisk: Whisk, settings: Settings) -
         raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
     alpha_rad = {"no_slip": None, "frictionless": 0.0}.get(name, settings.alpha_est_rad)
     slope = None if alpha_rad is None else estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad)
-    return {"estimator": name, "alpha_est_rad": alpha_rad, "d_x_est_mm": estimate.d_x_mm,
-            "d_x_est_sigma_mm": estimate.sigma_mm, "beta_est_rad": slope, "status": estimate.status}
+    return {
+        "estimator": name,
+        "alpha_est_rad": alpha_rad,
+        "d_x_est_mm": estimate.d_x_mm,
+        "d_x_est_sigma_mm": estimate.sigma_mm,
+        "beta_est_rad": slope,
+        "status": estimate.status,
+    }

@@ -85,13 +85,23 @@ def session_gauges(units: Sequence[Unit], rate, pool: Workers, doubts: Doubts) -
 def _pairs(unit: Unit, rate) -> list[Pairs]:
     """Pairs of moment and volts of a gauge trial's whisks."""
     strokes, whisker = strokes_of(read_signals(unit.trial), unit.trial, unit.settings), unit.session.whisker
-    found = [pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
-             for seen, stroke in zip(see_unit(unit)["whisks"], strokes)]
+    found = [
+        pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
+        for seen, stroke in zip(see_unit(unit)["whisks"], strokes)
+    ]
     return [pairs for pairs in found if pairs is not None]
 
 
-def report(session: Session, out: Path, results: list[dict], gauges: Gauges | None, doubts: Doubts,
-           cameras: Sequence[str], settings: Settings, pool: Workers) -> int:
+def report(
+    session: Session,
+    out: Path,
+    results: list[dict],
+    gauges: Gauges | None,
+    doubts: Doubts,
+    cameras: Sequence[str],
+    settings: Settings,
+    pool: Workers,
+) -> int:
     """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
     from bench.figures import write_figures
     from bench.score import score

@@ -67,13 +67,13 @@ def figure_8(fitted: Sequence[Surface]) -> Figure:
     blocks = -(-len(fitted) // columns)
     figure = Figure(figsize=(1.2 + 3.2 * columns, 5.2 * blocks), layout="constrained")
     grid = figure.subplots(2 * blocks, columns, sharex=True, sharey="row", squeeze=False)
-    for axes in grid.flat[len(fitted) * 2:] if blocks == 1 else []:
+    for axes in grid.flat[len(fitted) * 2 :] if blocks == 1 else []:
         axes.set_visible(False)
     for number, surface in enumerate(fitted):
-        top, bottom = grid[2 * (number // columns):2 * (number // columns) + 2, number % columns]
+        top, bottom = grid[2 * (number // columns) : 2 * (number // columns) + 2, number % columns]
         _panel(top, bottom, surface, f"({'abcdefghijklmnopqrstuvwxyz'[number % 26]})")
     for number in range(len(fitted), blocks * columns):
-        for axes in grid[2 * (number // columns):2 * (number // columns) + 2, number % columns]:
+        for axes in grid[2 * (number // columns) : 2 * (number // columns) + 2, number % columns]:
             axes.set_visible(False)
     for axes in grid[::2, 0]:
         axes.set_ylabel("|m|  [EI/m]")
@@ -87,8 +87,13 @@ def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
     points, EI = surface.points(), surface.C_Nmm2 / 3.0
     beta = [abs(p.beta_deg) for p in points]
     look = {"fmt": "o", "ms": 4, "color": "black", "capsize": 2.5, "elinewidth": 1.0, "lw": 0, "zorder": 3}
-    top.errorbar(beta, [moment_in_EI_per_metre(p.m_Nmm, EI) for p in points],
-                 [moment_in_EI_per_metre(p.m_sd_Nmm, EI) for p in points], **look, label=_what(points))
+    top.errorbar(
+        beta,
+        [moment_in_EI_per_metre(p.m_Nmm, EI) for p in points],
+        [moment_in_EI_per_metre(p.m_sd_Nmm, EI) for p in points],
+        **look,
+        label=_what(points),
+    )
     bottom.errorbar(beta, [abs(p.phi_deg) for p in points], [p.phi_sd_deg for p in points], **look)
     if surface.fit is not None:
         theta = float(np.median([f.theta_rad for f in surface.felt]))
@@ -102,8 +107,15 @@ def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
     top.legend(loc="lower left", handlelength=1.4)
     top.set_ylim(bottom=0)
     bottom.set(xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""), xlim=(-2, 82), ylim=(-3, 82))
-    top.annotate(f"|m| scaled to d$_x$ = {surface.common_d_x_mm:.1f} mm", (0.97, 0.95), xycoords="axes fraction",
-                 fontsize=7, color="0.35", ha="right", va="top")
+    top.annotate(
+        f"|m| scaled to d$_x$ = {surface.common_d_x_mm:.1f} mm",
+        (0.97, 0.95),
+        xycoords="axes fraction",
+        fontsize=7,
+        color="0.35",
+        ha="right",
+        va="top",
+    )
 
 
 def _what(points: Sequence[Point]) -> str:
@@ -146,9 +158,15 @@ def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], se
     for surface in fitted if assumed is not None else ():
         if surface.fit is not None:
             error = distance_error(np.radians(_SLOPES_DEG), surface.alpha_rad, assumed, equation=equation)
-            axes.plot(_SLOPES_DEG, 100.0 * error, color=colour_of(name, number), lw=1.2, alpha=0.8,
-                      ls=("-", "--", ":", "-.")[fitted.index(surface) % 4],
-                      label=f"{label_of(name)}, predicted, α = {np.degrees(surface.alpha_rad):.1f}°")
+            axes.plot(
+                _SLOPES_DEG,
+                100.0 * error,
+                color=colour_of(name, number),
+                lw=1.2,
+                alpha=0.8,
+                ls=("-", "--", ":", "-.")[fitted.index(surface) % 4],
+                label=f"{label_of(name)}, predicted, α = {np.degrees(surface.alpha_rad):.1f}°",
+            )
 
 
 def _points(axes: Axes, judged: Sequence[Judged], number: int, name: str, fitted: Sequence[Surface]) -> None:
@@ -157,10 +175,19 @@ def _points(axes: Axes, judged: Sequence[Judged], number: int, name: str, fitted
         for place, key in enumerate(keys):
             chosen = [j for j in judged if j.one_factor == one_factor and (j.surface, j.speed_deg_s) == key]
             if chosen:
-                axes.errorbar([abs(j.beta_deg) for j in chosen], [j.error_percent for j in chosen],
-                              [j.error_sigma_percent for j in chosen], fmt=_MARKERS[place % len(_MARKERS)], ms=5,
-                              color=colour_of(name, number), mfc="white" if one_factor else None, capsize=2.5, lw=0,
-                              elinewidth=1.0, label=_point_label(name, one_factor, fitted[place], len(keys)))
+                axes.errorbar(
+                    [abs(j.beta_deg) for j in chosen],
+                    [j.error_percent for j in chosen],
+                    [j.error_sigma_percent for j in chosen],
+                    fmt=_MARKERS[place % len(_MARKERS)],
+                    ms=5,
+                    color=colour_of(name, number),
+                    mfc="white" if one_factor else None,
+                    capsize=2.5,
+                    lw=0,
+                    elinewidth=1.0,
+                    label=_point_label(name, one_factor, fitted[place], len(keys)),
+                )
 
 
 def _point_label(name: str, one_factor: bool, surface: Surface, count: int) -> str:

@@ -22,8 +22,11 @@ def fit_gauges(pairs: Sequence[Pairs]) -> Gauges:
     """
     fitted = fit_matrix(pairs)
     if fitted is None:
-        raise BadInput(f"the gauge trials do not fix both channels ({_recorded(pairs)}); record gauge trials with the "
-                       "follicle unturned and turned by 90° (follicle_roll_deg = 90)", file="trials")
+        raise BadInput(
+            f"the gauge trials do not fix both channels ({_recorded(pairs)}); record gauge trials with the "
+            "follicle unturned and turned by 90° (follicle_roll_deg = 90)",
+            file="trials",
+        )
     names = list(dict.fromkeys(p.trial for p in pairs))
     without = {name: fit_matrix([p for p in pairs if p.trial != name]) for name in names}
     return Gauges(fitted, FROM_TRIALS, without, one_factor(pairs), four_at_angle(pairs))
@@ -94,6 +97,9 @@ def one_factor(pairs: Sequence[Pairs]) -> GaugeMatrix:
 
 def _factor(pairs: Sequence[Pairs], channel: int, roll_deg: float) -> float:
     """Mean ratio of moment to volts of one channel at the pushing angle; NaN where no follicle was turned so."""
-    ratios = [p.paper_moment[channel] / p.paper_volts[channel] for p in pairs
-              if abs((p.roll_deg - roll_deg + 90.0) % 180.0 - 90.0) < _SQUARE_DEG]
+    ratios = [
+        p.paper_moment[channel] / p.paper_volts[channel]
+        for p in pairs
+        if abs((p.roll_deg - roll_deg + 90.0) % 180.0 - 90.0) < _SQUARE_DEG
+    ]
     return float(np.nanmean(ratios)) if np.isfinite(ratios).any() else float("nan")

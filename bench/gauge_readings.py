@@ -140,8 +140,9 @@ def known_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Known | 
     return Known(touch.motor_rad, trial.d_x_mm, touch.motor_rad + theta, theta, moments, covariance)
 
 
-def _paired(trial: Trial, whisk: int, known: Known, stroke: Stroke, touch: Touch, rigid_Nmm: float,
-            theta_rad: float) -> Pairs | None:
+def _paired(
+    trial: Trial, whisk: int, known: Known, stroke: Stroke, touch: Touch, rigid_Nmm: float, theta_rad: float
+) -> Pairs | None:
     """Volts at the same motor angles, each from a short line through the samples around it."""
     theta = known.motor_rad - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(known.motor_rad), initial=np.inf))
@@ -152,9 +153,18 @@ def _paired(trial: Trial, whisk: int, known: Known, stroke: Stroke, touch: Touch
     read, rows = [r for r, keep in zip(read, kept) if keep], np.repeat(kept, 2)
     moments, covariance = _seen_from_follicle(trial, known.moments[kept], known.covariance[np.ix_(rows, rows)])
     at = stroke.at(known.touch_rad + theta_rad - touch.motor_rad, touch)
-    return Pairs(trial.name, whisk, trial.follicle_roll_deg, known.theta_rad[kept], moments, covariance,
-                 np.array([r.values for r in read]), _volts_covariance(read, theta[kept], touch),
-                 to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm], at.values)
+    return Pairs(
+        trial.name,
+        whisk,
+        trial.follicle_roll_deg,
+        known.theta_rad[kept],
+        moments,
+        covariance,
+        np.array([r.values for r in read]),
+        _volts_covariance(read, theta[kept], touch),
+        to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
+        at.values,
+    )
 
 
 def _seen_from_follicle(trial: Trial, moments, covariance) -> tuple[np.ndarray, np.ndarray]:
@@ -172,5 +182,5 @@ def _volts_covariance(read: Sequence, theta, touch: Touch) -> np.ndarray:
     for i in range(n):
         for j in range(n):
             both = touch.level.covariance_between(touch.motor_rad + theta[i], touch.motor_rad + theta[j])
-            covariance[2 * i:2 * i + 2, 2 * j:2 * j + 2] = read[i].covariance if i == j else both
+            covariance[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = read[i].covariance if i == j else both
     return covariance

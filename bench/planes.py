@@ -25,7 +25,7 @@ def draw_planes(result: dict, friction: tuple[float, str], out: Path, stamp: str
         rows = -(-len(whisks) // columns)
         figure = Figure(figsize=(6.4 * columns, 5.6 * rows), layout="constrained")
         grid = figure.subplots(rows, columns, squeeze=False)
-        for axes in grid.flat[len(whisks):]:
+        for axes in grid.flat[len(whisks) :]:
             axes.set_visible(False)
         for axes, whisk in zip(grid.flat, whisks):
             sensing_plane(axes, result, whisk, friction)
@@ -49,8 +49,17 @@ def sensing_plane(axes: Axes, result: dict, whisk: dict, friction: tuple[float, 
     low, high = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="y  [mm]", ylabel="z  [mm]")
     axes.set_title(f"{result['trial']['name']}, whisk {whisk['whisk']}, θ = {np.degrees(theta):.2f}°", loc="left")
-    axes.text(0.98, 0.02, _values(whisk, friction), transform=axes.transAxes, ha="right", va="bottom", fontsize=8,
-              linespacing=1.5, bbox={"fc": "white", "ec": "none", "alpha": 0.8})
+    axes.text(
+        0.98,
+        0.02,
+        _values(whisk, friction),
+        transform=axes.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=8,
+        linespacing=1.5,
+        bbox={"fc": "white", "ec": "none", "alpha": 0.8},
+    )
 
 
 def contact_path(whisk: dict) -> np.ndarray:
@@ -67,8 +76,9 @@ def _draw_bar(axes: Axes, seen: dict, along, normal) -> None:
     far = 60.0 * along
     near = -seen["wire_radius_mm"] * normal
     width = -2.0 * seen["bar_radius_mm"] * normal
-    axes.add_patch(Polygon([near - far, near + far, near + far + width, near - far + width], fc=_BAR, ec="0.45", lw=0.8,
-                           zorder=0))
+    axes.add_patch(
+        Polygon([near - far, near + far, near + far + width, near - far + width], fc=_BAR, ec="0.45", lw=0.8, zorder=0)
+    )
     axis = near + 0.5 * width
     axes.plot(*zip(axis - far, axis + far), color="0.45", lw=0.7, ls=(0, (8, 3, 1, 3)), zorder=1)
 
@@ -77,8 +87,19 @@ def _draw_cone(axes: Axes, contact, normal, friction: tuple[float, str], size: f
     """Directions that a force without slip may have, about the contact's normal."""
     middle, half = np.degrees(np.arctan2(normal[1], normal[0])), np.degrees(friction[0])
     reach = max(1.2, 0.75 * size)
-    axes.add_patch(Wedge(contact, reach, middle - half, middle + half, fc=_CONE, ec="none", alpha=0.9, zorder=1,
-                         label=f"friction cone, α = {half:.1f}° {friction[1]}"))
+    axes.add_patch(
+        Wedge(
+            contact,
+            reach,
+            middle - half,
+            middle + half,
+            fc=_CONE,
+            ec="none",
+            alpha=0.9,
+            zorder=1,
+            label=f"friction cone, α = {half:.1f}° {friction[1]}",
+        )
+    )
     axes.plot(*zip(contact, contact + reach * normal), color="0.4", lw=0.8, ls="--", zorder=2)
 
 
@@ -88,12 +109,20 @@ def _draw_whisker(axes: Axes, seen: dict, contact, virtual, path) -> None:
         axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
     axes.add_patch(Circle(virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
     axes.plot(*path.T, "-o", color=_PATH, ms=2.5, lw=1.0, zorder=5, label="contact, frame by frame")
-    axes.annotate("", contact, virtual, arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 1.6, "shrinkA": 0,
-                                                    "shrinkB": 0}, zorder=4)
+    axes.annotate(
+        "",
+        contact,
+        virtual,
+        arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 1.6, "shrinkA": 0, "shrinkB": 0},
+        zorder=4,
+    )
     axes.plot(*zip(contact, contact + 0.5 * (contact - virtual)), color=_FORCE, lw=0.8, zorder=4)
     axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force on the whisker")
-    for place, name, shift in ((np.zeros(2), "P$_0$", (-0.5, -0.75)), (contact, "P", (-0.6, 0.55)),
-                               (virtual, "V", (0.55, -0.55))):
+    for place, name, shift in (
+        (np.zeros(2), "P$_0$", (-0.5, -0.75)),
+        (contact, "P", (-0.6, 0.55)),
+        (virtual, "V", (0.55, -0.55)),
+    ):
         axes.annotate(name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6)
     axes.legend(loc="upper left", fontsize=7)
 
@@ -103,8 +132,12 @@ def _draw_slip(axes: Axes, contact, normal) -> None:
     if np.linalg.norm(contact) < 0.3:
         return
     aside = 0.95 * normal
-    axes.annotate("", contact + aside, aside, arrowprops={"arrowstyle": "<->", "color": _PATH, "lw": 0.9, "shrinkA": 0,
-                                                          "shrinkB": 0})
+    axes.annotate(
+        "",
+        contact + aside,
+        aside,
+        arrowprops={"arrowstyle": "<->", "color": _PATH, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
+    )
     axes.annotate("σ", 0.5 * contact + 1.25 * normal, ha="center", va="center", color=_PATH, fontsize=10)
 
 
@@ -133,10 +166,13 @@ def _draw_angles(axes: Axes, whisk: dict, contact, virtual) -> None:
 
 def _values(whisk: dict, friction: tuple[float, str]) -> str:
     at = whisk["at"]
-    lines = [("d$_x$", whisk["d_x_mm"], whisk["d_x_sigma_mm"], "mm", 3),
-             ("σ", at["slip_mm"], at["slip_sigma_mm"], "mm", 3),
-             ("β", *np.degrees([whisk["beta_rad"], whisk["beta_sigma_rad"]]), "°", 2),
-             ("φ", *np.degrees([at["phi_rad"], at["phi_sigma_rad"]]), "°", 2),
-             ("α seen", *np.degrees([at["alpha_rad"], at["alpha_sigma_rad"]]), "°", 2)]
-    return "\n".join(f"{name} = {value:.{digits}f} ± {sigma:.{digits}f} {unit}"
-                     for name, value, sigma, unit, digits in lines)
+    lines = [
+        ("d$_x$", whisk["d_x_mm"], whisk["d_x_sigma_mm"], "mm", 3),
+        ("σ", at["slip_mm"], at["slip_sigma_mm"], "mm", 3),
+        ("β", *np.degrees([whisk["beta_rad"], whisk["beta_sigma_rad"]]), "°", 2),
+        ("φ", *np.degrees([at["phi_rad"], at["phi_sigma_rad"]]), "°", 2),
+        ("α seen", *np.degrees([at["alpha_rad"], at["alpha_sigma_rad"]]), "°", 2),
+    ]
+    return "\n".join(
+        f"{name} = {value:.{digits}f} ± {sigma:.{digits}f} {unit}" for name, value, sigma, unit, digits in lines
+    )

@@ -3,8 +3,8 @@
 A straight rod, clamped at the origin along +x, is held at one point by one force. In the plane of clamp and force the
 angle of its tangent obeys EI dpsi/ds = F · (lever of the force about the point at s). The force stands at right angles
 to the rod's tangent at the contact, turned by friction along the rod. Gauge calibration rests on this line and not on
-the small-angle theory of the estimators, which are to be judged: C d_y/d_x² is off by 0.2 % at 3° and by 1 to 13 % at 12 to
-16°.
+the small-angle theory of the estimators, which are to be judged: C d_y/d_x² is off by 0.2 % at 3° and by 1 to 13 % at
+12 to 16°.
 """
 
 from collections.abc import Callable
@@ -73,8 +73,9 @@ def _integration() -> tuple[np.ndarray, np.ndarray]:
     """Chebyshev–Lobatto points on −1 … 1, and the matrix that turns values there into integrals from −1."""
     points = -np.cos(np.pi * np.arange(_NODES) / (_NODES - 1))
     to_series = np.linalg.inv(chebyshev.chebvander(points, _NODES - 1))
-    integrals = np.stack([chebyshev.chebval(points, chebyshev.chebint(column, lbnd=-1)) for column in to_series.T],
-                         axis=1)
+    integrals = np.stack(
+        [chebyshev.chebval(points, chebyshev.chebint(column, lbnd=-1)) for column in to_series.T], axis=1
+    )
     return points, integrals
 
 

@@ -15,8 +15,13 @@ from bench.gauges import Gauges
 from bench.session import Session
 
 # Column of whisks.csv and key of truth.toml.
-_AT_TOUCH = (("d_x_mm", "d_x_mm"), ("touch_deg", "touch_deg"), ("touch_felt_deg", "touch_deg"),
-             ("beta_deg", "beta_deg"), ("psi_deg", "psi_deg"))
+_AT_TOUCH = (
+    ("d_x_mm", "d_x_mm"),
+    ("touch_deg", "touch_deg"),
+    ("touch_felt_deg", "touch_deg"),
+    ("beta_deg", "beta_deg"),
+    ("psi_deg", "psi_deg"),
+)
 _SLIP_THETA_DEG = 3.0
 _WITHIN_95 = 1.959964
 
@@ -35,8 +40,10 @@ class Score:
         z = np.abs(self.errors) / self.sigmas
         known = z[np.isfinite(z)]
         held = f"{100 * np.mean(known <= _WITHIN_95):5.0f} %   {known.max():5.2f}" if len(known) else "    -       -"
-        return (f"{self.name:<28}{len(self.errors):5d}  {np.mean(self.errors):+9.4f}  "
-                f"{np.sqrt(np.mean(self.errors**2)):8.4f} {self.unit:<4}{held}")
+        return (
+            f"{self.name:<28}{len(self.errors):5d}  {np.mean(self.errors):+9.4f}  "
+            f"{np.sqrt(np.mean(self.errors**2)):8.4f} {self.unit:<4}{held}"
+        )
 
 
 def score(session: Session, out: Path, gauges: Gauges | None = None) -> list[str]:
@@ -71,8 +78,11 @@ def _scores(session: Session, out: Path) -> Iterator[Score]:
 
 def _compared(column: str, pairs, name: str = "") -> Iterator[Score]:
     """The score of a column where both sides are known; nothing where none is."""
-    known = [(float(row[column]), float(row[sigma_name(column)] or "nan"), float(truth)) for row, truth in pairs
-             if truth is not None and row[column] and np.isfinite(float(truth))]
+    known = [
+        (float(row[column]), float(row[sigma_name(column)] or "nan"), float(truth))
+        for row, truth in pairs
+        if truth is not None and row[column] and np.isfinite(float(truth))
+    ]
     if known:
         values, sigmas, truths = np.array(known).T
         yield Score(name or column, column.rpartition("_")[2], values - truths, sigmas)
@@ -85,8 +95,11 @@ def _truth_of(session: Session, row: dict) -> dict | None:
         return None
     number = int(row["whisk"])
     values = tomllib.loads(path.read_text())
-    return {key: value[number] if isinstance(value, list) else value for key, value in values.items()
-            if not isinstance(value, list) or number < len(value)}
+    return {
+        key: value[number] if isinstance(value, list) else value
+        for key, value in values.items()
+        if not isinstance(value, list) or number < len(value)
+    }
 
 
 def _frames(session: Session, out: Path, column: str) -> Iterator[tuple[dict, float]]:
@@ -115,8 +128,10 @@ def _gauge_lines(session: Session, gauges: Gauges | None) -> Iterator[str]:
         if made is not None:
             diagonal = 100.0 * (np.diag(made.matrix) / np.diag(true) - 1.0)
             cross = 100.0 * (made.matrix / np.diag(made.matrix) - true / np.diag(true))
-            yield (f"gauges {name:<14} diagonal {diagonal[0]:+.2f} %, {diagonal[1]:+.2f} %; "
-                   f"cross-talk {cross[0, 1]:+.2f}, {cross[1, 0]:+.2f} points")
+            yield (
+                f"gauges {name:<14} diagonal {diagonal[0]:+.2f} %, {diagonal[1]:+.2f} %; "
+                f"cross-talk {cross[0, 1]:+.2f}, {cross[1, 0]:+.2f} points"
+            )
 
 
 def _read(path: Path) -> list[dict]:

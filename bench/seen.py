@@ -20,8 +20,9 @@ _MOST_DEFLECTIONS = 12
 _NOT_PLAIN = ("smooth", "frames", "overlay")
 
 
-def see_trial(session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration,
-              settings: Settings) -> dict:
+def see_trial(
+    session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration, settings: Settings
+) -> dict:
     """Whisks of a trial as the cameras show them: {"whisks": [...], "notes": [...]}.
 
     What keeps a trial from being seen is the status of its whisks; the others go on.
@@ -40,8 +41,9 @@ def _unseen(count: int, status: str) -> dict:
     return {"whisks": [{"whisk": number} | nothing for number in range(count)], "notes": []}
 
 
-def _see(session: Session, trial: Trial, signals: Signals, strokes, calibration: SessionCalibration,
-         settings: Settings) -> dict:
+def _see(
+    session: Session, trial: Trial, signals: Signals, strokes, calibration: SessionCalibration, settings: Settings
+) -> dict:
     times = frame_times(trial)
     frames = _frames(trial, times)
     moved = moved_cameras(session, calibration, frames)
@@ -58,8 +60,13 @@ def _see(session: Session, trial: Trial, signals: Signals, strokes, calibration:
         VisionSettings(clock_sigma_s=settings.clock_sigma_s),
     )
     whisks = [whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks]
-    return {"whisks": whisks, "bar": {"point_mm": truth.bar_point_mm, "direction": truth.bar_direction},
-            "bar_radius_mm": 0.5 * trial.bar_diameter_mm, "wire_radius_mm": 0.5 * wire.diameter_mm, "notes": truth.notes}
+    return {
+        "whisks": whisks,
+        "bar": {"point_mm": truth.bar_point_mm, "direction": truth.bar_direction},
+        "bar_radius_mm": 0.5 * trial.bar_diameter_mm,
+        "wire_radius_mm": 0.5 * wire.diameter_mm,
+        "notes": truth.notes,
+    }
 
 
 def _wire(session: Session) -> Wire:
@@ -82,8 +89,13 @@ def whisk_record(truth: WhiskTruth, settings: Settings, doubts=()) -> dict:
     at = truth.at(settings.theta_rad)
     record = {name: getattr(truth, name) for name in truth.__dataclass_fields__ if name not in _NOT_PLAIN}
     status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *doubts])))
-    return record | {"status": status, "at": at, "frames": truth.frames, "deflection": _deflection(truth),
-                     "overlay": _overlay(truth, at.theta_rad)}
+    return record | {
+        "status": status,
+        "at": at,
+        "frames": truth.frames,
+        "deflection": _deflection(truth),
+        "overlay": _overlay(truth, at.theta_rad),
+    }
 
 
 def _deflection(truth: WhiskTruth) -> dict | None:
@@ -100,10 +112,15 @@ def _deflection(truth: WhiskTruth) -> dict | None:
     towards = np.cos(truth.touch_rad) * x + np.sin(truth.touch_rad) * y - truth.d_x_mm
     by_y = np.cos(theta)[:, None] * smooth.jacobians["d_y"][chosen]
     jacobian = np.stack([smooth.jacobians["d_z"][chosen], by_y], axis=1).reshape(2 * len(chosen), -1)
-    return {"theta_rad": theta, "motor_rad": truth.touch_rad + theta, "slip_mm": smooth.values["slip"][chosen],
-            "along_mm": truth.d_x_mm / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
-            "across_y_mm": d_y * np.cos(theta) + towards * np.sin(theta), "across_z_mm": d_z,
-            "covariance": jacobian @ smooth.covariance @ jacobian.T}
+    return {
+        "theta_rad": theta,
+        "motor_rad": truth.touch_rad + theta,
+        "slip_mm": smooth.values["slip"][chosen],
+        "along_mm": truth.d_x_mm / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
+        "across_y_mm": d_y * np.cos(theta) + towards * np.sin(theta),
+        "across_z_mm": d_z,
+        "covariance": jacobian @ smooth.covariance @ jacobian.T,
+    }
 
 
 def _overlay(truth: WhiskTruth, theta_rad: float) -> dict:

@@ -22,24 +22,40 @@ _WRONG_BY_DESIGN = ("no_slip", "frictionless")  # what they miss is the result, 
 _U95 = 1.96
 
 
-def write_summary(session: Session, out: Path, results: Sequence[dict], gauges: Gauges | None, doubts: Sequence[str],
-                  cameras: Sequence[str], settings: Settings, scores: Sequence[str], figures: Sequence[str]) -> int:
+def write_summary(
+    session: Session,
+    out: Path,
+    results: Sequence[dict],
+    gauges: Gauges | None,
+    doubts: Sequence[str],
+    cameras: Sequence[str],
+    settings: Settings,
+    scores: Sequence[str],
+    figures: Sequence[str],
+) -> int:
     """Write and print the summary. Returns 0, or 1 where something is doubtful."""
     judged = judge(results)
     doubtful = [*doubts, *_whisk_doubts(results)]
-    text = "\n".join([
-        *_verdict(session, results, judged, settings, doubtful), "",
-        *_titled("Truth, from the pictures (± one sigma)", _truth_lines(results)),
-        *_titled(f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
-                 _error_lines(judged)),
-        *_titled("Friction: α that (13), (14) fit best", _friction_lines(surfaces(results, session.whisker.C_Nmm2))),
-        *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
-        *_titled("Cameras", cameras),
-        *_titled("Doubtful", doubtful),
-        *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
-        *_titled("Taken as exact, for no sigma was given", _exact(session)),
-        *_titled("Files", _files(figures)),
-    ])
+    text = "\n".join(
+        [
+            *_verdict(session, results, judged, settings, doubtful),
+            "",
+            *_titled("Truth, from the pictures (± one sigma)", _truth_lines(results)),
+            *_titled(
+                f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
+                _error_lines(judged),
+            ),
+            *_titled(
+                "Friction: α that (13), (14) fit best", _friction_lines(surfaces(results, session.whisker.C_Nmm2))
+            ),
+            *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
+            *_titled("Cameras", cameras),
+            *_titled("Doubtful", doubtful),
+            *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
+            *_titled("Taken as exact, for no sigma was given", _exact(session)),
+            *_titled("Files", _files(figures)),
+        ]
+    )
     write_whole(out / "summary.txt", text.rstrip() + "\n")
     print(text.rstrip())
     return DOUBTFUL if doubtful else DONE
@@ -59,9 +75,11 @@ def _verdict(session: Session, results, judged: Sequence[Judged], settings: Sett
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
-    yield (f"{session.name}: truth for {known} of {len(seen)} measured whisks" if pictures
-           else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt") + (
-        f"; {len(doubtful)} doubtful, see below." if doubtful else "; nothing doubtful.")
+    yield (
+        f"{session.name}: truth for {known} of {len(seen)} measured whisks"
+        if pictures
+        else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
+    ) + (f"; {len(doubtful)} doubtful, see below." if doubtful else "; nothing doubtful.")
 
 
 def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
@@ -69,21 +87,27 @@ def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
     worst = judged[int(np.argmax(np.abs(errors)))]
     assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
     spread = f"{errors.min():+.1f} to {errors.max():+.1f} %" if len(errors) > 1 else f"{errors[0]:+.1f} %"
-    return (f"{label_of(name)}{assumed} is wrong by {spread} of d_x over {len(errors)} whisks, "
-            f"most at β = {worst.beta_deg:.1f}° ({worst.trial}).")
+    return (
+        f"{label_of(name)}{assumed} is wrong by {spread} of d_x over {len(errors)} whisks, "
+        f"most at β = {worst.beta_deg:.1f}° ({worst.trial})."
+    )
 
 
 def _truth_lines(results) -> Iterator[str]:
     rows = [(r, s, f) for r, s, f in whisks(results) if s.get("d_x_mm") is not None]
     if rows:
-        yield (f"{'trial':<18}{'whisk':>5}  {'β seen':>16}  {'d_x':>17}  {'slip at θ':>17}  {'touch seen':>17}  "
-               f"{'felt − seen':>11}")
+        yield (
+            f"{'trial':<18}{'whisk':>5}  {'β seen':>16}  {'d_x':>17}  {'slip at θ':>17}  {'touch seen':>17}  "
+            f"{'felt − seen':>11}"
+        )
     for result, s, felt in rows:
         at = s["at"]
         late = np.degrees(number(felt.get("touch_felt_rad")) - s["touch_rad"])
-        yield (f"{result['trial']['name']:<18}{s['whisk']:>5}  {_pm(s, 'beta', 2, degrees=True):>15}°  "
-               f"{_pm(s, 'd_x', 3):>14} mm  {_pm(at, 'slip', 3):>14} mm  {_pm(s, 'touch', 3, degrees=True):>16}°  "
-               f"{late:>+10.3f}°")
+        yield (
+            f"{result['trial']['name']:<18}{s['whisk']:>5}  {_pm(s, 'beta', 2, degrees=True):>15}°  "
+            f"{_pm(s, 'd_x', 3):>14} mm  {_pm(at, 'slip', 3):>14} mm  {_pm(s, 'touch', 3, degrees=True):>16}°  "
+            f"{late:>+10.3f}°"
+        )
 
 
 def _pm(source: dict, name: str, digits: int, *, degrees: bool = False) -> str:
@@ -162,8 +186,12 @@ def _whisk_doubts(results) -> Iterator[str]:
 
 def _exact(session: Session) -> Iterator[str]:
     whisker = session.whisker
-    given = {"whisker length": whisker.length_sigma_mm, "whisker diameter": whisker.diameter_sigma_mm,
-             "bar diameter": session.bar_diameter_sigma_mm, "stiffness C": whisker.C_sigma_Nmm2}
+    given = {
+        "whisker length": whisker.length_sigma_mm,
+        "whisker diameter": whisker.diameter_sigma_mm,
+        "bar diameter": session.bar_diameter_sigma_mm,
+        "stiffness C": whisker.C_sigma_Nmm2,
+    }
     if session.T_rig_board is not None:
         given["T_rig_board"] = session.T_rig_board_sigma_mm + session.T_rig_board_sigma_rad
     if session.board is not None:

@@ -113,8 +113,15 @@ def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
         return None
     columns = {name: np.array([getattr(f, name) for f in felt]) for name in Felt.__dataclass_fields__}
     sigmas = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
-    fit = fit_alpha(np.radians(columns["beta_deg"]), columns["m_y_Nmm"], columns["m_z_Nmm"], columns["d_x_mm"],
-                    columns["theta_rad"], C_Nmm2, **sigmas)
+    fit = fit_alpha(
+        np.radians(columns["beta_deg"]),
+        columns["m_y_Nmm"],
+        columns["m_z_Nmm"],
+        columns["d_x_mm"],
+        columns["theta_rad"],
+        C_Nmm2,
+        **sigmas,
+    )
     return fit if np.isfinite(fit.alpha_rad) else None
 
 

@@ -54,8 +54,16 @@ class Unit:
     def seen_hash(self) -> str:
         """Hash of all that the seen half depends on."""
         session = self.session
-        return hash_of(hash_of_code(), self.files, self.trial, session.whisker, session.board, session.T_rig_board,
-                       self.calibration.hash, self.settings.seen())
+        return hash_of(
+            hash_of_code(),
+            self.files,
+            self.trial,
+            session.whisker,
+            session.board,
+            session.T_rig_board,
+            self.calibration.hash,
+            self.settings.seen(),
+        )
 
     @property
     def hash(self) -> str:
@@ -98,13 +106,23 @@ def trial_result(unit: Unit) -> dict:
     seen = _kept_seen(unit)
     if seen is None:
         seen = plain(see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings))
-    return {"trial": _described(unit.trial), "theta_deg": unit.settings.theta_deg, "seen": seen,
-            "felt": feel_trial(unit, signals)}
+    return {
+        "trial": _described(unit.trial),
+        "theta_deg": unit.settings.theta_deg,
+        "seen": seen,
+        "felt": feel_trial(unit, signals),
+    }
 
 
 def _described(trial: Trial) -> dict:
-    return {"name": trial.name, "purpose": trial.purpose, "surface": trial.surface, "speed_deg_s": trial.speed_deg_s,
-            "d_x_nominal_mm": trial.d_x_mm, "beta_nominal_deg": trial.beta_deg}
+    return {
+        "name": trial.name,
+        "purpose": trial.purpose,
+        "surface": trial.surface,
+        "speed_deg_s": trial.speed_deg_s,
+        "d_x_nominal_mm": trial.d_x_mm,
+        "beta_nominal_deg": trial.beta_deg,
+    }
 
 
 def feel_trial(unit: Unit, signals: Signals) -> dict:
@@ -141,8 +159,9 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> list[dict]:
     plain_gauges = unit.gauges and unit.gauges.one_factor
     if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
         return []
-    _, whisk = felt_whisk(stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session),
-                          unit.settings.theta_rad)
+    _, whisk = felt_whisk(
+        stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad
+    )
     return answers(whisk, estimators(()), unit.settings)
 
 

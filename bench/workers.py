@@ -38,8 +38,9 @@ class Workers:
     def run(self, job: Callable, tasks: Sequence, name: str) -> list:
         """job(task) of every task, in their order; a bar over them where progress is wanted."""
         results = [None] * len(tasks)
-        for place, result in tqdm(self._finished(job, tasks), desc=name, total=len(tasks), leave=False,
-                                  disable=not self.progress):
+        for place, result in tqdm(
+            self._finished(job, tasks), desc=name, total=len(tasks), leave=False, disable=not self.progress
+        ):
             results[place] = result
         return results
 

@@ -9,6 +9,7 @@ import pytest
 from bench.calibration import SessionCalibration
 from bench.results import hash_of
 from bench.seen import whisk_record
+from bench.settings import Settings
 from bench.signals import forward_strokes
 from vision.truth import FrameTruth, Smooth, WhiskTruth
 
@@ -23,7 +24,8 @@ def read_csv(path: Path) -> dict[str, np.ndarray]:
 
 def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
     """The truth of one whisk (the given rows of truth.csv) as vision would tell it, without error."""
-    at = {k: v[number] if isinstance(v, list) else v for k, v in tomllib.loads((folder / "truth.toml").read_text()).items()}
+    whole = tomllib.loads((folder / "truth.toml").read_text())
+    at = {key: value[number] if isinstance(value, list) else value for key, value in whole.items()}
     table = {name: values[rows] for name, values in read_csv(folder / "truth.csv").items()}
     touch, d_x, beta = np.radians(at["touch_deg"]), at["d_x_mm"], np.radians(at["beta_deg"])
     touching = table["contact"] == 1
@@ -32,24 +34,59 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
     contact = points @ np.array([[np.cos(touch), -np.sin(touch), 0], [np.sin(touch), np.cos(touch), 0], [0, 0, 1]])
     d_y, d_z = np.where(touching, d_x * np.tan(theta) - contact[:, 1], np.nan), contact[:, 2]
     phi = np.arctan2(d_z, d_y)
-    values = {"slip": table["slip_mm"], "longitudinal_slip": table["arc_mm"] - d_x, "d_y": d_y, "d_z": d_z, "phi": phi,
-              "alpha": abs(beta) - np.abs(phi)}
+    values = {
+        "slip": table["slip_mm"],
+        "longitudinal_slip": table["arc_mm"] - d_x,
+        "d_y": d_y,
+        "d_z": d_z,
+        "phi": phi,
+        "alpha": abs(beta) - np.abs(phi),
+    }
     plain = {}
     for name, column in values.items():
         unit, sigma = ("rad", SIGMA_RAD) if name in ("phi", "alpha") else ("mm", SIGMA_MM)
         plain |= {f"{name}_{unit}": column, f"{name}_sigma_{unit}": np.where(touching, sigma, np.nan)}
-    frames = FrameTruth(index=table["frame"].astype(int), time_s=table["time_s"], motor_rad=np.radians(table["motor_deg"]),
-                        theta_rad=theta, theta_sigma_rad=np.full(len(theta), SIGMA_RAD), touching=touching,
-                        point_mm=points, point_sigma_mm=np.full_like(points, SIGMA_MM), arc_mm=table["arc_mm"],
-                        status=("",) * len(theta), **plain)
+    frames = FrameTruth(
+        index=table["frame"].astype(int),
+        time_s=table["time_s"],
+        motor_rad=np.radians(table["motor_deg"]),
+        theta_rad=theta,
+        theta_sigma_rad=np.full(len(theta), SIGMA_RAD),
+        touching=touching,
+        point_mm=points,
+        point_sigma_mm=np.full_like(points, SIGMA_MM),
+        arc_mm=table["arc_mm"],
+        status=("",) * len(theta),
+        **plain,
+    )
     first = d_x * np.array([np.cos(touch), np.sin(touch), 0.0])
     # One parameter a value and frame: every number has the same sigma and no number shares another's error.
     n, kinds = int(touching.sum()), len(values)
-    own = {name: np.eye(n * kinds)[k * n:(k + 1) * n] for k, name in enumerate(values)}
-    smooth = Smooth(theta[touching], np.zeros(n * kinds), {k: v[touching] for k, v in values.items()}, own,
-                    SIGMA_MM**2 * np.eye(n * kinds))
-    return WhiskTruth(number, frames, touch, SIGMA_RAD / 5, first, np.full(3, SIGMA_MM), d_x, 2 * SIGMA_MM, beta,
-                      2 * SIGMA_RAD, np.radians(at["psi_deg"]), SIGMA_RAD, 2, len(theta), smooth=smooth)
+    own = {name: np.eye(n * kinds)[k * n : (k + 1) * n] for k, name in enumerate(values)}
+    smooth = Smooth(
+        theta[touching],
+        np.zeros(n * kinds),
+        {k: v[touching] for k, v in values.items()},
+        own,
+        SIGMA_MM**2 * np.eye(n * kinds),
+    )
+    return WhiskTruth(
+        number,
+        frames,
+        touch,
+        SIGMA_RAD / 5,
+        first,
+        np.full(3, SIGMA_MM),
+        d_x,
+        2 * SIGMA_MM,
+        beta,
+        2 * SIGMA_RAD,
+        np.radians(at["psi_deg"]),
+        SIGMA_RAD,
+        2,
+        len(theta),
+        smooth=smooth,
+    )
 
 
 def see_exactly(session, trial, signals, calibration, settings) -> dict:
@@ -62,6 +99,17 @@ def see_exactly(session, trial, signals, calibration, settings) -> dict:
         rows = np.flatnonzero((time_s >= first) & (time_s <= last))
         whisks.append(whisk_record(exact_truth(trial.folder, number, rows), settings))
     return {"whisks": whisks, "bar_radius_mm": 3.0, "wire_radius_mm": 0.5, "notes": []}
+
+
+@pytest.fixture
+def exact_record():
+    """A function (trial) that gives the record of its first whisk as perfect pictures would."""
+
+    def record(trial) -> dict:
+        rows = np.arange(len(read_csv(trial.folder / "truth.csv")["frame"]))
+        return whisk_record(exact_truth(trial.folder, 0, rows), Settings())
+
+    return record
 
 
 @pytest.fixture
@@ -93,6 +141,7 @@ def without_pictures(small_copy) -> Path:
         with (small_copy / "trials" / trial / "trial.toml").open("a") as file:
             file.write(f"\nd_x_mm = {d_x_mm}\n")
     with (small_copy / "session.toml").open("a") as file:
-        file.write("\n[gauges]\noffset_V = [0.0, 0.0]\n"
-                   "matrix_Nmm_per_V = [[11.31159, 0.32265], [-0.24882, 10.53619]]\n")
+        file.write(
+            "\n[gauges]\noffset_V = [0.0, 0.0]\nmatrix_Nmm_per_V = [[11.31159, 0.32265], [-0.24882, 10.53619]]\n"
+        )
     return small_copy

@@ -46,8 +46,17 @@ def test_tables_have_the_columns_of_the_format_in_their_order(steel):
     """Names are what other people's scripts rely on, so they stand here as in the format's description."""
     first = "trial,whisk,surface,speed_deg_s,beta_nominal_deg,theta_deg,touch_deg,touch_sigma_deg,touch_felt_deg"
     assert ",".join(WHISK_COLUMNS).startswith(first)
-    assert WHISK_COLUMNS[-9:] == ("x_mm", "x_sigma_mm", "y_mm", "y_sigma_mm", "z_mm", "z_sigma_mm", "cameras",
-                                  "frames_used", "status")
+    assert WHISK_COLUMNS[-9:] == (
+        "x_mm",
+        "x_sigma_mm",
+        "y_mm",
+        "y_sigma_mm",
+        "z_mm",
+        "z_sigma_mm",
+        "cameras",
+        "frames_used",
+        "status",
+    )
     for name, columns in (("whisks", WHISK_COLUMNS), ("estimates", ESTIMATE_COLUMNS), ("track/b60_4", TRACK_COLUMNS)):
         assert (steel / f"{name}.csv").read_text().splitlines()[0] == ",".join(columns)
 
@@ -197,7 +206,7 @@ def test_several_whisks_of_a_recording_each_have_a_row(without_pictures, tmp_pat
     back = rows[::-1].copy()
     back[:, 0], once = rows[:, 0] + rows[-1, 0] + 0.0005, 2 * (rows[-1, 0] + 0.0005)
     cycle = np.concatenate([rows, back])
-    whole = np.concatenate([cycle + [k * once, 0, 0, 0] for k in range(3)])
+    whole = np.concatenate([cycle + np.array([k * once, 0, 0, 0]) for k in range(3)])
     np.savetxt(folder / "signals.csv", whole, "%.6f", ",", header=header, comments="")
     out = tmp_path / "out"
     run(without_pictures, out)
@@ -220,7 +229,8 @@ def test_without_gauges_the_truth_still_stands(small_copy, exact_vision, tmp_pat
 def test_estimators_of_ones_own_stand_beside_the_others(without_pictures, tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(
         "from estimator.whisk import Estimate\n\n\ndef half_way(whisk, settings):\n"
-        "    return Estimate(whisk.beam.length_mm / 2, 1.0)\n")
+        "    return Estimate(whisk.beam.length_mm / 2, 1.0)\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     run(without_pictures, tmp_path / "out", Settings(estimators=("mine:half_way",)))
     assert estimates(tmp_path / "out")["b30_3", "mine:half_way"]["d_x_est_mm"] == "50"

@@ -1,0 +1,66 @@
+"""Pictures in, verdict out: the real thing on the small session, and in full (slow) on the sample session."""
+
+import csv
+import time
+
+import pytest
+
+from bench.cli import main
+from bench.evaluate import evaluate
+from bench.settings import Settings
+
+
+def read(path) -> list[dict]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def check(session, out, trials) -> None:
+    """The limits of truth and estimate that the sample session was recorded for."""
+    truth = {row["trial"]: row for row in read(out / "whisks.csv")}
+    estimates = {(row["trial"], row["estimator"]): row for row in read(out / "estimates.csv")}
+    for trial, d_x, beta in trials:
+        row = truth[trial]
+        for column, true, most in (("d_x", d_x, 0.10), ("beta", beta, 0.6)):
+            unit = "mm" if column == "d_x" else "deg"
+            error, sigma = float(row[f"{column}_{unit}"]) - true, float(row[f"{column}_sigma_{unit}"])
+            assert abs(error) <= min(most, 3 * sigma), (trial, column)
+        assert float(row["d_x_sigma_mm"]) <= 0.08 and float(row["slip_sigma_mm"]) <= 0.08
+        error = float(estimates[trial, "with_friction"]["error_percent"])
+        assert abs(error) <= (1.5 if beta < 45 else 4.0), trial
+    slips = [(a, b) for trial, *_ in trials for a, b in _touching(session, out, trial)]
+    assert (sum((a - b) ** 2 for a, b in slips) / len(slips)) ** 0.5 <= 0.10
+
+
+def _touching(session, out, trial):
+    true = {row["frame"]: row for row in read(session / "trials" / trial / "truth.csv")}
+    for row in read(out / "track" / f"{trial}.csv"):
+        if row["touching"] == "1":
+            yield float(row["slip_mm"]), float(true[row["frame"]]["slip_mm"])
+
+
+def test_small_session(small_session, tmp_path, capsys):
+    """Through the command line with two workers, then again: nothing is redone, the same verdict is printed."""
+    command = ["evaluate", str(small_session), "--out", str(tmp_path), "--alpha-est-deg", "10.5", "--workers", "2"]
+    assert main(command) in (0, 1)
+    first = capsys.readouterr().out
+    check(small_session, tmp_path, [("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)])
+    assert "camera high:" in first and "camera low:" in first
+    assert (tmp_path / "overlays" / "b60_4_0.png").is_file()
+    begun = time.monotonic()
+    assert main(command) in (0, 1)
+    assert capsys.readouterr().out == first
+    assert time.monotonic() - begun < 15.0
+
+
+@pytest.mark.slow
+def test_sample_session(steel_sample, tmp_path):
+    evaluate(steel_sample, tmp_path, Settings(alpha_est_deg=10.5), workers=2)
+    check(
+        steel_sample,
+        tmp_path,
+        [("b00_2", 60.122331, -0.552223), ("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)],
+    )
+    rows = {(row["trial"], row["estimator"]): row for row in read(tmp_path / "estimates.csv")}
+    for trial, ratio in (("b30_3", 1.204), ("b60_4", 3.03)):
+        assert 1 + float(rows[trial, "no_slip"]["error_percent"]) / 100 == pytest.approx(ratio, rel=0.04)

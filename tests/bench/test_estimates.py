@@ -1,0 +1,88 @@
+"""Channels to moments: turned follicles, covariances, and the answers' columns."""
+
+import numpy as np
+import pytest
+
+from bench.drift import allow_drift
+from bench.errors import BadInput
+from bench.estimates import Hand, answers, as_felt, estimators, felt_whisk
+from bench.felt import Stroke
+from bench.gauges import GaugeMatrix
+from bench.settings import Settings
+from estimator import slip
+from estimator.beam import Beam
+
+MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
+BEAM = Beam(8835.7, 100.0)
+THETA, BETA, ALPHA = np.radians([3.0, 60.0, 10.0])
+
+
+def stroke(rng, d_x=60.0, noise=1e-3, roll=0.0) -> Stroke:
+    """A stroke of the small-angle theory (13), (14) at 10°/s, in volts of a turned follicle."""
+    time = np.arange(1240) / 2000.0
+    motor = np.radians(10.0) * time + 0.02
+    theta = np.maximum(0.0, motor - 0.02 - np.radians(1.6))
+    m_y, m_z = slip.moments(d_x, 1.0, BETA, ALPHA, BEAM.C_Nmm2)
+    c, s = np.cos(roll), np.sin(roll)
+    follicle = np.outer(theta, np.array([[c, s], [-s, c]]) @ [m_y, m_z])
+    volts = np.linalg.solve(MATRIX, follicle.T).T + 0.2 + noise * rng.normal(size=follicle.shape)
+    return Stroke(time, motor, volts, volts)
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 90.0, -30.0])
+def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
+    """Noise of 1 mV is 0.01 N·mm a sample, some 200 of them: 1e-3 N·mm."""
+    hand = Hand(GaugeMatrix(MATRIX), np.radians(roll_deg))
+    _, whisk = felt_whisk(stroke(rng, roll=np.radians(roll_deg)), hand, np.zeros(2), BEAM, THETA)
+    expected = slip.moments(60.0, THETA, BETA, ALPHA, BEAM.C_Nmm2)
+    assert (whisk.m_y_at_Nmm, whisk.m_z_at_Nmm) == pytest.approx(expected, abs=0.01)
+
+
+def test_answers_carry_what_they_assumed(rng):
+    touch, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    rows = {row["estimator"]: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))}
+    assert rows["no_slip"]["alpha_est_rad"] is None and rows["no_slip"]["beta_est_rad"] is None
+    assert rows["frictionless"]["alpha_est_rad"] == 0.0
+    assert rows["with_friction"]["d_x_est_mm"] == pytest.approx(60.0, rel=5e-3)
+    assert np.degrees(rows["with_friction"]["beta_est_rad"]) == pytest.approx(60.0, abs=0.2)
+    assert np.degrees(as_felt(touch, whisk)["phi_felt_rad"]) == pytest.approx(50.0, abs=0.2)
+
+
+def test_sigma_of_10_is_its_scatter(rng):
+    """Over 200 strokes the sampled standard deviation scatters by 5 %; the stated one averages over them."""
+    stated, found = [], []
+    for _ in range(200):
+        _, whisk = felt_whisk(stroke(rng, noise=0.01), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+        row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
+        stated.append(row["d_x_est_sigma_mm"])
+        found.append(row["d_x_est_mm"])
+    assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
+
+
+def test_gauges_and_turn_add_to_the_moments_covariance():
+    volts = np.array([0.3, 0.7])
+    hand = Hand(GaugeMatrix(MATRIX, 1e-2 * np.eye(4)), 0.0, np.radians(1.0))
+    added = hand.covariance(volts, np.zeros((2, 2)))
+    m_y, m_z = MATRIX @ volts
+    turn = np.radians(1.0) * np.array([-m_z, m_y])
+    assert added == pytest.approx(1e-2 * (volts @ volts) * np.eye(2) + np.outer(turn, turn))
+
+
+def test_no_touch_is_a_reason(rng):
+    free = stroke(rng)
+    silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
+    touch, reason = felt_whisk(silent, Hand.bare(), np.zeros(2), BEAM, THETA)
+    assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
+    assert np.isnan(as_felt(touch, None)["touch_felt_rad"])
+
+
+@pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])
+def test_estimators_that_cannot_be_had(name):
+    with pytest.raises(BadInput, match=name):
+        estimators((name,))
+
+
+def test_an_answer_must_be_an_estimate(rng):
+    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    with pytest.raises(BadInput, match="must return an Estimate"):
+        answers(whisk, {"mine:f": lambda *_: 60.0}, Settings())

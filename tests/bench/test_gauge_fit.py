@@ -1,0 +1,111 @@
+"""Four gauge coefficients: exact without noise, honest with it, and refused where the trials cannot hold them."""
+
+import numpy as np
+import pytest
+
+from bench.errors import BadInput
+from bench.gauge_fit import fit_gauges, fit_matrix
+from bench.gauge_readings import Pairs
+from bench.gauges import GaugeMatrix, to_follicle
+
+TRUE = np.array([[11.3, 0.32], [-0.25, 10.5]])
+THETA = np.radians([0.5, 1.5, 2.5, 3.5, 4.5])
+RIGID = 9.3  # N·mm at 3°
+
+
+def pairs(
+    trial: str, roll_deg: float, rng=None, *, noise_V=0.0005, zero_V=0.002, distance=0.002, point_Nmm=0.01
+) -> Pairs:
+    """A push at β = 0 on a follicle turned by roll_deg, with noise of each kind where there is a generator."""
+    hub = np.stack([np.zeros_like(THETA), RIGID * THETA / np.radians(3.0)], axis=1)
+    moments = hub @ to_follicle(np.radians(roll_deg)).T
+    volts = np.linalg.solve(TRUE, moments.T).T
+    n = 2 * len(THETA)
+    moments_covariance = distance**2 * np.outer(moments.ravel(), moments.ravel()) + point_Nmm**2 * np.eye(n)
+    volts_covariance = np.kron(np.ones((len(THETA),) * 2), zero_V**2 * np.eye(2)) + noise_V**2 * np.eye(n)
+    paper = to_follicle(np.radians(roll_deg)) @ [0.0, RIGID]
+    if rng is not None:
+        moments = moments + rng.multivariate_normal(np.zeros(n), moments_covariance).reshape(-1, 2)
+        volts = volts + rng.multivariate_normal(np.zeros(n), volts_covariance).reshape(-1, 2)
+    return Pairs(
+        trial,
+        0,
+        roll_deg,
+        THETA,
+        moments,
+        moments_covariance,
+        volts,
+        volts_covariance,
+        paper,
+        np.linalg.solve(TRUE, paper),
+    )
+
+
+def test_roll_convention():
+    """At 90° channel y senses m_z and channel z senses −m_y (the session format's words)."""
+    m_y, m_z = 2.0, 5.0
+    assert to_follicle(np.pi / 2) @ [m_y, m_z] == pytest.approx([m_z, -m_y])
+    assert to_follicle(0.0) @ [m_y, m_z] == pytest.approx([m_y, m_z])
+
+
+def test_noiseless_readings_give_the_coefficients_back():
+    gauges = fit_gauges([pairs("a", 0.0), pairs("b", 90.0)])
+    assert gauges.all.matrix == pytest.approx(TRUE, rel=1e-9)
+    assert gauges.at_angle.matrix == pytest.approx(TRUE, rel=1e-9)
+
+
+def test_one_factor_a_channel_leaves_cross_talk_out():
+    """Each factor is moment over volts where that channel senses the push, so it holds the other's cross-talk: the
+    inverse of the inverse matrix's diagonal."""
+    gauges = fit_gauges([pairs("a", 0.0), pairs("b", 90.0)])
+    assert np.diag(gauges.one_factor.matrix) == pytest.approx(1 / np.diag(np.linalg.inv(TRUE)), rel=1e-9)
+    assert gauges.one_factor.matrix[0, 1] == gauges.one_factor.matrix[1, 0] == 0.0
+
+
+def test_stated_intervals_hold():
+    """95 % intervals of the four coefficients over 1000 simulated calibrations of four whisks, noise of every kind.
+
+    The share scatters by 0.7 % (binomial) and coefficients of one calibration are correlated; the scatter of the
+    residuals only ever widens an interval, which is why more than 95 % may hold.
+    """
+    rng = np.random.default_rng(7)
+    held = []
+    for _ in range(1000):
+        made = fit_matrix([pairs(name, roll, rng) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))])
+        held.append(np.abs(made.matrix - TRUE) < 1.959964 * made.sigma)
+    share = np.mean(held, axis=0)
+    assert np.all(share > 0.93) and np.all(share < 0.98)
+
+
+def test_wider_scatter_than_stated_widens_the_result():
+    rng = np.random.default_rng(3)
+    sound = [pairs(name, roll, rng) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))]
+    wild = [pairs(name, roll, rng, point_Nmm=0.2) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))]
+    claimed = [Pairs(**(vars(p) | {"moments_covariance": q.moments_covariance})) for p, q in zip(wild, sound)]
+    assert fit_matrix(claimed).sigma[1, 1] > 3 * fit_matrix(sound).sigma[1, 1]
+
+
+def test_one_position_of_the_follicle_is_refused_with_what_to_record():
+    with pytest.raises(BadInput, match="turned by 90°"):
+        fit_gauges([pairs("a", 0.0), pairs("b", 0.0)])
+    with pytest.raises(BadInput, match="no whisk could be read"):
+        fit_gauges([])
+
+
+def test_each_trial_gets_the_coefficients_fitted_without_it():
+    rng = np.random.default_rng(11)
+    recorded = [pairs("a", 0.0, rng), pairs("b", 90.0, rng), pairs("c", 90.0, rng)]
+    gauges = fit_gauges(recorded)
+    assert gauges.for_trial("b").matrix == pytest.approx(fit_matrix([recorded[0], recorded[2]]).matrix)
+    assert gauges.for_trial("a") is None  # the only one with the follicle unturned
+    assert gauges.for_trial("measured").matrix == pytest.approx(gauges.all.matrix)
+
+
+def test_covariance_of_a_moment_from_that_of_the_coefficients():
+    """Against sampling: 4000 matrices drawn from the stated covariance, 2 % for the sampled standard deviation."""
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(4, 4)) * 0.05
+    made = GaugeMatrix(TRUE, root @ root.T)
+    volts = np.array([0.3, 0.7])
+    drawn = rng.multivariate_normal(TRUE.ravel(), made.covariance, size=4000).reshape(-1, 2, 2) @ volts
+    assert np.sqrt(np.diag(made.covariance_at(volts))) == pytest.approx(drawn.std(axis=0), rel=0.05)

@@ -1,0 +1,80 @@
+"""Fig. 8 from the results: groups, means, and the friction angle that the moments hold."""
+
+import numpy as np
+import pytest
+
+from bench.surfaces import surfaces
+from estimator import slip
+
+C = 8835.7
+THETA = np.radians(3.0)
+
+
+def result(
+    beta_deg, alpha_deg, d_x=60.0, *, surface="steel", speed=10.0, purpose="measure", seen=True, noise=(0, 0)
+) -> dict:
+    """One whisk's result as (13), (14) have it."""
+    m_y, m_z = slip.moments(d_x, THETA, np.radians(beta_deg), np.radians(alpha_deg), C)
+    m_y, m_z = m_y + noise[0], m_z + noise[1]
+    felt = {
+        "m_y_Nmm": m_y,
+        "m_z_Nmm": m_z,
+        "m_y_sigma_Nmm": 0.02,
+        "m_z_sigma_Nmm": 0.02,
+        "phi_felt_rad": np.arctan2(m_y, m_z),
+        "phi_felt_sigma_rad": 0.002,
+    }
+    truth = {"d_x_mm": d_x, "beta_rad": np.radians(beta_deg)} if seen else {"d_x_mm": None}
+    trial = {
+        "surface": surface,
+        "speed_deg_s": speed,
+        "purpose": purpose,
+        "beta_nominal_deg": beta_deg,
+        "d_x_nominal_mm": d_x,
+    }
+    return {"trial": trial, "theta_deg": 3.0, "seen": {"whisks": [truth]}, "felt": {"whisks": [felt]}}
+
+
+def test_fit_gives_the_friction_angle_back_with_distances_that_differ():
+    found = surfaces([result(b, 12.0, d) for b, d in ((0, 60), (30, 50), (60, 70), (-45, 55))], C)
+    assert len(found) == 1
+    assert np.degrees(found[0].alpha_rad) == pytest.approx(12.0, abs=1e-6)
+
+
+def test_without_pictures_the_nominal_slope_is_taken():
+    found = surfaces([result(b, 20.0, seen=False) for b in (0, 30, 60)], C)[0]
+    assert np.degrees(found.alpha_rad) == pytest.approx(20.0, abs=1e-6)
+    assert all(f.nominal for f in found.felt)
+
+
+def test_a_panel_for_each_surface_and_speed_and_none_for_gauge_trials():
+    found = surfaces(
+        [
+            result(30, 10),
+            result(30, 10, speed=90.0),
+            result(30, 23, surface="sandpaper"),
+            result(0, 10, purpose="gauge"),
+        ],
+        C,
+    )
+    assert [(s.name, s.speed_deg_s) for s in found] == [("steel", 10.0), ("steel", 90.0), ("sandpaper", 10.0)]
+    assert all(s.fit is None for s in found)  # one whisk each holds no α
+
+
+def test_points_are_means_over_whisks_of_one_slope(rng):
+    whisks = [result(b, 10.5, noise=rng.normal(0, 0.05, 2)) for b in (0, 45) for _ in range(10)]
+    first, second = surfaces(whisks, C)[0].points()
+    assert (first.whisks, second.whisks) == (10, 10)
+    assert second.beta_deg == pytest.approx(45)
+    assert second.m_sd_Nmm == pytest.approx(0.05, rel=0.6)  # 10 samples: 24 % a sigma
+    assert first.m_Nmm == pytest.approx(C * THETA / 60, abs=0.06)  # 0.05/√10, 4 sigma
+
+
+def test_moments_are_scaled_to_one_distance():
+    """|m| goes as 1/d_x, so whisks of one slope and friction at two distances are one point without scatter."""
+    (point,) = surfaces([result(45, 10.5, d) for d in (50.0, 60.0, 70.0)], C)[0].points()
+    assert point.m_sd_Nmm == pytest.approx(0.0, abs=1e-9)
+
+
+def test_no_slope_above_the_friction_angle_holds_none():
+    assert surfaces([result(b, 25.0) for b in (0, 5, 10)], C)[0].fit is None
