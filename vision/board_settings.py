@@ -25,13 +25,13 @@ def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
     entered = corner_share(greys, board)
     if entered > _LEAST_SHARE:
         return None
-    best, share = max(((b, corner_share(greys, b)) for b in other_settings(greys, board)), key=lambda s: s[1],
-                      default=(board, 0.0))  # fmt: skip
-    if share > max(_LEAST_SHARE, _CLEARLY_MORE * entered):
-        return (
-            f"the board as entered ({_named(board)}) is not found, but one with {_difference(board, best)} is; if that "
-            "is the board in the pictures, enter it"
-        )
+    for candidates in (_other_print(board), _other_dictionary(greys, board)):
+        best, share = _best(greys, candidates)
+        if share > max(_LEAST_SHARE, _CLEARLY_MORE * entered):
+            return (
+                f"the board as entered ({_named(board)}) is not found, but one with {_difference(board, best)} is; "
+                "if that is the board in the pictures, enter it"
+            )
     return None if entered > 0 else _what_is_there(greys, board)
 
 
@@ -57,14 +57,28 @@ def _plausible_count(grey: np.ndarray, board: Board) -> int:
     return 0 if H is None else int(good.sum())
 
 
-def other_settings(greys: Sequence[np.ndarray], board: Board) -> Iterable[Board]:
-    """Boards that differ in what people mix up: inverted, legacy, columns for rows, dictionary."""
-    variants = [replace(board, inverted=i, legacy=old, squares=s)
-                for i in (False, True) for old in (False, True)
-                for s in dict.fromkeys((board.squares, board.squares[::-1]))]  # fmt: skip
-    yield from (b for b in variants if b != board)
+def _best(greys: Sequence[np.ndarray], boards: Iterable[Board]) -> tuple[Board | None, float]:
+    shares = [(board, corner_share(greys, board)) for board in boards]
+    return max(shares, key=lambda found: found[1], default=(None, 0.0))
+
+
+def _other_print(board: Board) -> list[Board]:
+    """What people mix up first: inverted, legacy, columns for rows."""
+    turned = dict.fromkeys((board.squares, board.squares[::-1]))
+    variants = [
+        replace(board, inverted=inverted, legacy=legacy, squares=squares)
+        for inverted in (False, True)
+        for legacy in (False, True)
+        for squares in turned
+    ]
+    return [variant for variant in variants if variant != board]
+
+
+def _other_dictionary(greys: Sequence[np.ndarray], board: Board) -> Iterable[Board]:
+    """The dictionaries whose markers are seen, with the print as entered and otherwise."""
     for dictionary in _dictionaries_seen(greys, board):
-        yield from (replace(b, dictionary=dictionary) for b in variants)
+        entered = replace(board, dictionary=dictionary)
+        yield from (entered, *_other_print(entered))
 
 
 def _dictionaries_seen(greys: Sequence[np.ndarray], board: Board) -> list[str]:

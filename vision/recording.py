@@ -15,8 +15,9 @@ MIN_VIEW_CORNERS = 6
 # Each view adds 6 unknowns to the lens's 9; below this the lens rests on three or four independent
 # directions.
 MIN_VIEWS = 5
-# A corner set thinner than this (ratio of its two extents) is as good as a line.
-_MIN_THICKNESS = 0.1
+# Of a homography's directions the weakest must be felt by this share of the strongest: 0.4 for a whole board, 0.16 for
+# two rows of seven corners, 0 for a line, or for a line and one corner beside it.
+_LEAST_STRENGTH = 0.05
 # Below this tilt the foreshortening that tells focal length from distance, 1 - cos, is under 1.5 %.
 _LEAST_TILT_DEG = 10.0
 _LEAST_DEPTH_RATIO = 1.15
@@ -38,12 +39,24 @@ def usable_views(views: Iterable[Corners], board: Board) -> list[Corners]:
 
 
 def fixes_pose(view: Corners, board: Board) -> bool:
-    """Are there enough corners, and not along one line?"""
+    """Are there enough corners, and so spread that they fix a homography? (Five in a row and one beside do not.)"""
     if len(view) < MIN_VIEW_CORNERS:
         return False
-    spread = board.corners_mm[view.ids, :2]
-    extents = np.linalg.svd(spread - spread.mean(axis=0), compute_uv=False)
-    return bool(extents[1] > _MIN_THICKNESS * extents[0])
+    x, y = _centred(board.corners_mm[view.ids, :2]).T
+    one, none = np.ones_like(x), np.zeros_like(x)
+    # The direct linear transform of these points onto themselves: eight of its nine directions must be felt.
+    rows = np.concatenate([
+        np.column_stack([x, y, one, none, none, none, -x * x, -x * y, -x]),
+        np.column_stack([none, none, none, x, y, one, -y * x, -y * y, -y]),
+    ])  # fmt: skip
+    strength = np.linalg.svd(rows, compute_uv=False)
+    return bool(strength[7] > _LEAST_STRENGTH * strength[0])
+
+
+def _centred(points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) about their mean, in units of their larger spread; a line keeps its thinness."""
+    spread = points - points.mean(axis=0)
+    return spread / max(np.sqrt(np.mean(np.sum(spread**2, axis=1))), 1e-12)
 
 
 def check_views(name: str, views: Collection[Corners], board: Board) -> None:

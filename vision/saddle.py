@@ -29,6 +29,9 @@ _BAND_PX = 6.0
 _MAX_SHIFT_PX = 4.0
 _MAX_SHIFT_SQUARES = 1.0 / 3.0
 _MIN_PIXELS = 40
+# Contrast against what the model leaves over, and against the rounding to whole grey levels.
+_LEAST_CONTRAST = 3.0
+_ROUNDING = 0.3
 _ITERATIONS = 15
 _CONVERGED_PX = 2e-3
 _FIRST_BLUR_PX = 1.0
@@ -223,6 +226,7 @@ def _report(windows: _Windows, p, settled, px_guess: np.ndarray, frames: np.ndar
     square_px = np.linalg.norm(frames, axis=1).min(axis=1)
     good = settled & (pixels >= _MIN_PIXELS) & (sigma > 0) & np.isfinite(sigma)
     good &= shift < np.minimum(_MAX_SHIFT_PX, _MAX_SHIFT_SQUARES * square_px)
+    good &= np.abs(p[:, CONTRAST]) > _LEAST_CONTRAST * np.maximum(misfit, _ROUNDING)
     good &= (blur > _BLUR_LIMITS_PX[0]) & (blur < _BLUR_LIMITS_PX[1])
     return Saddles(px, sigma, p[:, CONTRAST], blur, misfit, good)
 
