@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 # Gauss–Legendre nodes over the rod's half circumference, where the integrand is smooth: 1e-5 of the contrast.
 _NODES_PER_RADIUS_TO_BLUR = 4
-_MOST_WAVES = 8
+WAVES, RIMS = 8, 6  # how many functions of the angle describe a thin rod, and the rims of a thick one
 _SAME_RADIUS = 0.15
 _TABLE_STEP_PX = 0.025
 
@@ -135,27 +134,19 @@ def _from_table(offset_px, table: tuple[float, np.ndarray]) -> np.ndarray:
     return values[below] * (1.0 - share) + values[below + 1] * share
 
 
-def shading_terms(radius_px: float, blur_px: float) -> int:
-    """How many functions of shading are needed: 8 waves for a thin wire, more, as splines, for a thick bar."""
-    return int(np.clip(round(0.65 * radius_px / blur_px + 2.0), _MOST_WAVES, 16))
-
-
 def round_the_rod(t, terms: int) -> np.ndarray:
     """Functions (n, terms) of the angle t (n,) round the rod, from edge (-pi/2) to edge (pi/2); the first is 1.
 
-    Few terms: 1, sin t, cos t, sin 2t …. Many: quadratic splines with knots within 60° of the middle, where
-    highlights are sharp; one smooth piece each from there to the edges, or else the shading could imitate a
-    shift of the edge itself.
+    WAVES: 1, sin t, cos t, sin 2t …, the whole of a thin rod. RIMS: for each side its own square polynomial in the
+    angle from the edge, for a rod so thick that the two rims can be looked at alone.
     """
-    if terms <= _MOST_WAVES:
-        waves = [np.ones_like(t)]
-        for k in range(1, terms // 2 + 1):
-            waves += [np.sin(k * t), np.cos(k * t)]
-        return np.stack(waves[:terms], axis=-1)
-    inner = np.linspace(-np.pi / 3, np.pi / 3, terms - 3)
-    knots = np.concatenate([np.full(3, -np.pi / 2), inner, np.full(3, np.pi / 2)])
-    splines = BSpline(knots, np.eye(terms), 2)(t)
-    return np.concatenate([np.ones((len(t), 1)), splines[:, :-1]], axis=1)
+    if terms == RIMS:
+        side, inward = np.sign(t), np.pi / 2 - np.abs(t)
+        return np.stack([shape for k in range(RIMS // 2) for shape in (inward**k, side * inward**k)], axis=-1)
+    waves = [np.ones_like(t)]
+    for k in range(1, terms // 2 + 1):
+        waves += [np.sin(k * t), np.cos(k * t)]
+    return np.stack(waves[:terms], axis=-1)
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,13 @@ from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.fit import Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
-from vision.line import Noise, measure_noise
+from vision.line import WAVES, Noise, measure_noise
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import first_touch, frames_by_touch, frames_that_touch
-from vision.trace import WIRE_TERMS, View, find_blur, observed, to_points, trace, wire_pieces
+from vision.trace import View, find_blur, observed, to_points, trace, wire_pieces
 from vision.truth import TrialTruth, WhiskTruth
 from vision.wire import Curves
 
@@ -32,6 +32,9 @@ _WIRE_KNOT_MM = 12.0
 _NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 _BESIDE_BAR_PX = 4.0
 _SEARCH_PX = 1.5
+_MEDIAN_OF, _MEAN_OF = 11, 40  # frames: more would not make bar or noise clearer
+_FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
+_STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 
 @dataclass(frozen=True)
@@ -94,8 +97,14 @@ def _views(frames, cameras: Cameras, background) -> list[View]:
     return views
 
 
+def _spread(view: View, most: int) -> list[np.ndarray]:
+    """At most so many of the view's pictures, spread over all of them."""
+    pictures = list(view.frames.values())
+    return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
+
+
 def _mean_picture(view: View) -> np.ndarray:
-    return np.mean([picture.astype(np.float32) for picture in view.frames.values()], axis=0)
+    return np.mean([picture.astype(np.float32) for picture in _spread(view, _MEAN_OF)], axis=0)
 
 
 def _quieter(noise: Noise, count: int) -> Noise:
@@ -106,7 +115,7 @@ def _quieter(noise: Noise, count: int) -> Noise:
 
 def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSettings) -> BarAxis:
     """The bar's axis from the pictures of all frames, before any wire is known."""
-    changes = {view.camera.name: changed(np.median(list(view.frames.values()), axis=0), view.background, view.noise)
+    changes = {view.camera.name: changed(np.median(_spread(view, _MEDIAN_OF), axis=0), view.background, view.noise)
                for view in views}
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
@@ -118,7 +127,7 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
 
 def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, coarse: bool):
     """The bar's line in each camera that shows enough of it."""
-    found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, len(view.frames))),
+    found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), _MEAN_OF))),
                                            _mean_picture(view), axis, rods.bar.radius_mm,
                                            wires.get(view.camera.name, []), settings, coarse)
              for view in views}
@@ -157,8 +166,8 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
     touching, free = frames_that_touch(angles, bend)
     if not np.any(touching):
         return None, None, None
-    if np.sum(~touching) < 2:
-        return None, "touches from the start: fewer than two frames of free stroke", None
+    if np.sum(~touching) < _FEWEST_FREE:
+        return None, _STARTS_TOUCHING, None
     state = None
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
     light = {}
@@ -176,6 +185,10 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         touch = float(first_touch(problem, fitted.vector).motor_rad)
         if round_number < settings.rounds:
             touching, free = frames_by_touch(angles, touch, np.radians(0.02))
+            if np.sum(free) < _FEWEST_FREE:
+                return None, _STARTS_TOUCHING, None
+            if not np.any(touching):
+                return None, None, None
     return problem, fitted, covariance
 
 
@@ -228,9 +241,9 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
     first = view.camera.name not in light
     if first:
-        light[view.camera.name] = find_blur(pieces, WIRE_TERMS, knots)
+        light[view.camera.name] = find_blur(pieces, WAVES, knots)
     blur = light[view.camera.name]
-    pieces, found, misfit = trace(pieces, blur, WIRE_TERMS, knots,
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots,
                                   search_px=_SEARCH_PX if first else 0.0)
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))

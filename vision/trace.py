@@ -14,7 +14,6 @@ from vision.silhouette import outline
 from vision.wire import Curves
 
 BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
-WIRE_TERMS = 8
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
 _WORST_MISFIT = 6.0
