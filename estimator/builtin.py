@@ -1,7 +1,8 @@
 """The paper's estimators, written as anyone would write one: a function of a whisk and the settings.
 
-For a cone the equations run on the base's cylinder, and 1/d_x gains 1/L (`distance.cone`). An estimate
-beyond the whisker's length is set to the length and said to be a tip contact (section VII).
+For a cone the equations run on the base's cylinder, and 1/d_x gains 1/L (`distance.cone`). An estimate of (10) or
+(12) beyond the whisker's length is set to the length and said to be a tip contact (section VII). (2) overestimates
+by as much as slip it ignores, so that beyond the length it tells of slip, not of the tip: it is flagged and left.
 """
 
 from math import nan
@@ -9,13 +10,14 @@ from math import nan
 from estimator import distance, uncertainty
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
+BEYOND = "longer than the whisker: (2) ignores slip"
 TIP = "tip contact: the distance came out as {:.1f} mm, longer than the whisker, and was set to its length"
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (2): as if the whisker did not slip sideways."""
     felt = (whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
-    return _estimate(whisk, settings, distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt), alpha_est=0.0)
+    return _estimate(whisk, settings, distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt), alpha_est=0.0, clamp=False)
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -38,7 +40,7 @@ ESTIMATORS = {
 }
 
 
-def _estimate(whisk, settings, d_x, gradient, alpha_est=None):
+def _estimate(whisk, settings, d_x, gradient, alpha_est=None, clamp=True):
     """Estimate from a cylinder's distance and gradient: sigma, taper, clamp at the tip, reason for a NaN."""
     if d_x != d_x:
         alpha_est = settings.alpha_est_rad if alpha_est is None else alpha_est
@@ -55,6 +57,8 @@ def _estimate(whisk, settings, d_x, gradient, alpha_est=None):
         tapered = distance.taper(d_x, length)
         d_x, sigma = tapered, sigma * (tapered / d_x) ** 2
     clamped, at_tip = distance.clamp_to_length(d_x, length)
+    if at_tip and not clamp:
+        return Estimate(d_x, sigma, BEYOND)
     return Estimate(clamped, sigma, TIP.format(d_x) if at_tip else "")
 
 

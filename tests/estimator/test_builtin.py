@@ -64,10 +64,19 @@ def test_sigma_holds_touch_moments_and_friction():
 
 
 def test_beyond_the_tip_is_the_tip_with_its_sigma_and_a_word():
-    estimate = ESTIMATORS["no_slip"](whisk_at(60.0, np.radians(75)), SETTINGS)
+    estimate = ESTIMATORS["frictionless"](whisk_at(80.0, np.radians(75)), SETTINGS)
     assert estimate.d_x_mm == 100.0
     assert estimate.status.startswith("tip contact: the distance came out as")
     assert estimate.sigma_mm > 0
+
+
+def test_no_slip_beyond_the_length_is_left_and_flagged():
+    """d_x cos α/(cos β cos φ), the slip that (2) ignores: nothing touched the tip."""
+    beta = np.radians(75)
+    estimate = ESTIMATORS["no_slip"](whisk_at(60.0, beta), SETTINGS)
+    ratio = np.cos(ALPHA) / (np.cos(beta) * np.cos(beta - ALPHA))
+    assert estimate.d_x_mm == pytest.approx(60.0 * ratio, rel=1e-9)
+    assert estimate.status.startswith("longer than the whisker")
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
