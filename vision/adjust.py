@@ -15,6 +15,11 @@ from vision.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, Knowledge, Sightings
 from vision.rotation import pose_difference
 
 _GLOBAL = N_CAMERA + N_BOARD
+# Keeps a view whose few corners fix no pose solvable; of what is fixed it changes the tenth digit.
+_RIDGE = 1e-10
+# Where iterations run out while the cost still falls, but by less than this share a step, the rest is below a tenth of
+# a sigma.
+_NEARLY_AT_REST = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +207,9 @@ def _instant_steps(shots: _Shots, step: np.ndarray, views: np.ndarray, n_cameras
 def _eliminate(normal: _Normal, C: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, ...]:
     """Schur complement: reduced matrix and gradient of the free globals, C⁻¹Bᵀ (6 V, F) and C⁻¹c (6 V,)."""
     B = normal.B[free]
-    solved = solveh_banded(C, np.column_stack([B.T, normal.c]), lower=True, check_finite=False)
+    firm = C.copy()
+    firm[0] *= 1.0 + _RIDGE
+    solved = solveh_banded(firm, np.column_stack([B.T, normal.c]), lower=True, check_finite=False)
     CB, Cc = solved[:, :-1], solved[:, -1]
     return normal.A[np.ix_(free, free)] - B @ CB, normal.a[free] - B @ Cc, CB, Cc
 
@@ -242,18 +249,19 @@ def solve(
     tolerance: relative fall of the cost at which it is done.
     """
     normal = _normal_equations(state, seen, corners_mm, known, width)
-    damping, done, iteration = 1e-4, False, 0
+    damping, done, iteration, fall = 1e-4, False, 0, np.inf
     while not done and iteration < max_iterations and np.isfinite(normal.cost):
         iteration += 1
         tried = state.stepped(*_solve_step(normal, known, damping))
         trial = _normal_equations(tried, seen, corners_mm, known, width)
         if trial.cost <= normal.cost * (1 + 1e-13):
-            done = normal.cost - trial.cost <= tolerance * (1e-12 + normal.cost)
+            fall = (normal.cost - trial.cost) / (1e-12 + normal.cost)
+            done = fall <= tolerance
             state, normal, damping = tried, trial, max(damping * 0.1, 1e-12)
         else:
             damping *= 10.0
             done = damping > 1e8
-    return _solution(state, normal, known, iteration, done)
+    return _solution(state, normal, known, iteration, done or fall < _NEARLY_AT_REST)
 
 
 def _solution(state: State, normal: _Normal, known: Knowledge, iterations: int, done: bool) -> Solution:

@@ -20,7 +20,7 @@ from vision.board_motion import Trajectory
 from vision.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Knowledge, State
 from vision.corners import Corners
 from vision.errors import Refused
-from vision.first_guess import board_pose, first_lens
+from vision.first_guess import board_pose, first_lens, has_pose
 from vision.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
 from vision.noise import Settled, settle
 from vision.recording import (
@@ -32,6 +32,7 @@ from vision.recording import (
     depth_ratio,
     fixes_pose,
     tilt_deg,
+    without_strays,
 )
 from vision.scene import N_PARAMETERS, Board, Camera, Cameras
 from vision.static_board import camera_moved, mean_view
@@ -113,6 +114,7 @@ def calibrate_cameras(
     trial_views: Mapping[str, Sequence[Corners]] | None = None,
     times_s: Mapping[str, Sequence[float]] | None = None,
     work_points_mm: np.ndarray | None = None,
+    triggered: bool = False,
 ) -> Calibration:
     """Calibrates all cameras in one adjustment.
 
@@ -121,20 +123,21 @@ def calibrate_cameras(
     one camera or cameras that looked at once: then the world is the first camera's frame. T_rig_board (3, 4), mm; its
     sigmas are per axis, of the shift and of a turn about the board's origin, and are shared by all cameras.
     trial_views: the rig board in the trials' frames, of cameras that did not move. work_points_mm (n, 3): where the
-    whisker will be, which each camera's views must cover.
+    whisker will be, which each camera's views must cover. triggered: pictures of one view are known to be of one
+    instant, so that no other is looked for.
 
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
     with_rig = T_rig_board is not None
     alone = {n: _alone(n, board_views[n], rig_views.get(n), board, sizes_px[n], with_rig) for n in board_views}
-    standing = {n: mean_view(rig_views[n], (trial_views or {}).get(n, ())) for n in alone} if with_rig else None
+    standing = {n: _standing(rig_views[n], (trial_views or {}).get(n, ()), board) for n in alone} if with_rig else None
     together = looked_at_once(alone)
     poses = place_cameras(alone, standing, board, T_rig_board, together=together)
     layout = lay_out(
         alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=times_s
     )
     known = _knowledge(layout.first, board, T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad)
-    settled, timing = _settle(layout, board, known, np.array([a.error_px for a in alone.values()]), times_s is None)
+    settled, timing = _settle(layout, board, known, _errors(alone, triggered), times_s is None)
     settled, notes = _settle_with_warp(layout, settled, board)
     if timing is not None:
         notes.append(_timing_note(alone, timing))
@@ -146,13 +149,21 @@ def calibrate_cameras(
 
 def _alone(name, views, rig_view, board: Board, size_px, with_rig: bool) -> Alone:
     """A camera by itself: the start of the joint adjustment, and the error that it has when nobody else is asked."""
-    usable = {k: view for k, view in enumerate(views) if fixes_pose(view, board)}
+    seen = {k: without_strays(view, board) for k, view in enumerate(views)}
+    usable = {k: view for k, view in seen.items() if fixes_pose(view, board)}
+    lens = first_lens(usable.values(), board.corners_mm, size_px)
+    usable = {k: view for k, view in usable.items() if has_pose(view, board.corners_mm, lens)}
     check_views(name, usable.values(), board)
     if with_rig:
-        check_rig_view(name, rig_view, board)
+        check_rig_view(name, None if rig_view is None else without_strays(rig_view, board), board)
     settled = calibrate_alone(list(usable.values()), board, size_px)
     state = settled.solution.state
     return Alone(state.lens[0], float(settled.error_px[0]), usable, dict(zip(usable, state.T_world_board)))
+
+
+def _standing(rig_view: Corners, frames: Sequence[Corners], board: Board) -> Corners:
+    """The board on the rig in one camera, over its picture and the trials' frames."""
+    return mean_view(without_strays(rig_view, board), frames)
 
 
 def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int]) -> Settled:
@@ -205,9 +216,14 @@ def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Sett
     return settled, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
 
 
-def _settle(layout: Layout, board: Board, known: Knowledge, error_alone: np.ndarray, in_frames: bool):
+def _errors(alone: Mapping[str, Alone], triggered: bool) -> np.ndarray | None:
+    """Each camera's error by itself, against which to judge how they agree; None where there is no need to."""
+    return None if triggered or len(alone) < 2 else np.array([a.error_px for a in alone.values()])
+
+
+def _settle(layout: Layout, board: Board, known: Knowledge, error_alone: np.ndarray | None, in_frames: bool):
     """With pictures of one view at one instant, unless cameras agree far worse with each other than with themselves."""
-    if layout.trajectory is None or len(error_alone) < 2:
+    if layout.trajectory is None or error_alone is None:
         return settle(layout.first, layout.seen, board.corners_mm, known), None
     rough = settle(layout.first, layout.seen, board.corners_mm, known, rough=True)
     if np.median(rough.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:

@@ -28,10 +28,17 @@ def focal_length_px(views: Sequence[Corners], corners_mm: np.ndarray, size_px: t
     """
     equations = [_focal_equations(view, corners_mm, size_px) for view in views]
     left, right = np.concatenate(equations).T if equations else np.zeros((2, 1))
-    inverse_square = np.sum(left * right) / max(np.sum(left**2), 1e-300)
+    inverse_square = _weighted_median(right / np.where(left == 0, np.inf, left), left**2)
     focal = size_px[0] / np.sqrt(inverse_square) if inverse_square > 0 else np.inf
     low, high = (limit * size_px[0] for limit in _FOCAL_LIMITS)
     return float(focal) if low < focal < high else float(size_px[0])
+
+
+def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    """Half of the weight lies on either side; one view gone wrong cannot carry it off."""
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(reached, 0.5 * reached[-1])]) if reached[-1] > 0 else 0.0
 
 
 def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
@@ -59,11 +66,19 @@ def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.nd
     found, turns, shifts, _ = cv2.solvePnPGeneric(
         points, ab[seen][:, None], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )
-    if not found:
+    if not found or np.any(points @ cv2.Rodrigues(turns[0])[0][2] + shifts[0][2] <= 0):
         raise Refused(
             f"a view of {len(view)} corners gives no board pose: corners along one line, or a wrong board"
         )
     return np.column_stack([cv2.Rodrigues(turns[0])[0], shifts[0].ravel()])
+
+
+def has_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> bool:
+    """Does `board_pose` find one?"""
+    try:
+        return bool(np.isfinite(board_pose(view, corners_mm, lens)).all())
+    except Refused:
+        return False
 
 
 def chain_cameras(poses: Mapping[str, Sequence[np.ndarray | None]]) -> dict[str, np.ndarray]:

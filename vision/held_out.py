@@ -14,9 +14,9 @@ from vision.adjust import Solution, solve
 from vision.bundle import predict
 from vision.calibrate import Calibration, lens_knowledge
 from vision.corners import Corners
-from vision.first_guess import board_pose
+from vision.first_guess import board_pose, has_pose
 from vision.layout import Alone, Layout, lay_out
-from vision.recording import fixes_pose
+from vision.recording import fixes_pose, without_strays
 from vision.scene import Board, Camera, Cameras
 from vision.triangulate import triangulate
 
@@ -77,7 +77,12 @@ def held_out(
 
 
 def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
-    usable = {k: view for k, view in enumerate(views) if fixes_pose(view, board)}
+    seen = {k: without_strays(view, board) for k, view in enumerate(views)}
+    usable = {
+        k: view
+        for k, view in seen.items()
+        if fixes_pose(view, board) and has_pose(view, board.corners_mm, camera.lens)
+    }
     poses = {k: board_pose(view, board.corners_mm, camera.lens) for k, view in usable.items()}
     return Alone(camera.lens, camera.rms_px, usable, poses)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from vision.adjust import Solution, solve
 from vision.bundle import Knowledge, Sightings, State, predict
+from vision.errors import Refused
 
 # One Gaussian corner in 25 000 lies beyond (two axes): exp(-4.5² / 2).
 REJECT_SIGMA = 4.5
@@ -69,11 +70,14 @@ def settle(
     for _ in range(_ROUNDS_MOVING if moving else _ROUNDS):
         weighed = _weighed(seen, error)
         solution = solve(state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-4)
+        _require_finite(solution)
         state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
         known = _with_lateness(known, state, seen) if moving else known
         if rough:
             return Settled(solution, weighed, np.ones(len(seen), dtype=bool), solution.residual_px, error, known)
     kept = _inliers(solution.residual_px, _weighed(seen, error))
+    if not kept.any():
+        raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
         error = _error_by_mean(solution.residual_px, seen, kept, error, known)
         used = _weighed(seen, error).chosen(kept)
@@ -81,6 +85,11 @@ def settle(
         state = solution.state
         solution = replace(solution, residual_px=seen.px - predict(state, seen, corners_mm)[0])
     return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error, known)
+
+
+def _require_finite(solution: Solution) -> None:
+    if not np.isfinite(solution.cost):
+        raise Refused("the views contradict each other from the start: is this the board as described?")
 
 
 def _with_lateness(known: Knowledge, state: State, seen: Sightings) -> Knowledge:

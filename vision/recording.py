@@ -18,6 +18,8 @@ MIN_VIEWS = 5
 # Of a homography's directions the weakest must be felt by this share of the strongest: 0.4 for a whole board, 0.16 for
 # two rows of seven corners, 0 for a line, or for a line and one corner beside it.
 _LEAST_STRENGTH = 0.05
+# A lens bends a board out of a plane's picture by less than this share of its size, or these px.
+_STRAY_SHARE, _STRAY_PX = 0.04, 3.0
 # Below this tilt the foreshortening that tells focal length from distance, 1 - cos, is under 1.5 %.
 _LEAST_TILT_DEG = 10.0
 _LEAST_DEPTH_RATIO = 1.15
@@ -34,8 +36,17 @@ _MOST_UNCOVERED = 0.2
 
 
 def usable_views(views: Iterable[Corners], board: Board) -> list[Corners]:
-    """The views that fix a board pose."""
-    return [view for view in views if fixes_pose(view, board)]
+    """The views that fix a board pose, without strays."""
+    return [view for view in (without_strays(v, board) for v in views) if fixes_pose(view, board)]
+
+
+def without_strays(view: Corners, board: Board) -> Corners:
+    """The corners that lie as on a plane seen through any lens; none where too few do (a mislabelled board)."""
+    if len(view) < MIN_VIEW_CORNERS:
+        return Corners.none()
+    reach_px = max(_STRAY_PX, _STRAY_SHARE * float(np.ptp(view.px, axis=0).max()))
+    H, near = cv2.findHomography(board.corners_mm[view.ids, :2], view.px, cv2.RANSAC, reach_px)
+    return Corners.none() if H is None else view.chosen(near.ravel().astype(bool))
 
 
 def fixes_pose(view: Corners, board: Board) -> bool:
