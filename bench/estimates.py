@@ -48,6 +48,7 @@ class Hand:
     gauges: GaugeMatrix
     roll_rad: float = 0.0
     roll_sigma_rad: float = 0.0
+    is_gauged: bool = False
 
     @classmethod
     def bare(cls) -> "Hand":
@@ -57,12 +58,16 @@ class Hand:
     @classmethod
     def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Hand":
         """The trial's follicle with these gauges."""
-        return cls(gauges, math.radians(trial.follicle_roll_deg), math.radians(trial.follicle_roll_sigma_deg))
+        return cls(gauges, math.radians(trial.follicle_roll_deg), math.radians(trial.follicle_roll_sigma_deg), True)
 
     @property
     def matrix(self) -> np.ndarray:
         """(2, 2): channels to (m_y, m_z) in the hub's axes."""
         return to_follicle(self.roll_rad).T @ self.gauges.matrix
+
+    def in_follicle(self, whisk: Whisk) -> np.ndarray:
+        """The whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
+        return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
     def covariance(self, channels, of_channels) -> np.ndarray:
         """Covariance (2, 2) of the moments of `channels` (2,): from the channels', the gauges' and the turn's."""

@@ -14,6 +14,7 @@ from bench.drift import drift_rate, free_slope
 from bench.errors import BadInput
 from bench.estimates import estimators
 from bench.felt import strokes_of
+from bench.gauge_checks import Undetermined, check_alive
 from bench.gauge_fit import fit_gauges
 from bench.gauge_readings import Pairs, pairs_of
 from bench.gauges import Gauges
@@ -77,7 +78,7 @@ def session_gauges(units: Sequence[Unit], rate, pool: Workers, doubts: Doubts) -
     pool.run(see_unit, trials, "gauge trials")
     try:
         return fit_gauges([pairs for unit in trials for pairs in _pairs(unit, rate)])
-    except BadInput as reason:
+    except Undetermined as reason:
         doubts.note(str(reason))
         return None
 
@@ -85,6 +86,7 @@ def session_gauges(units: Sequence[Unit], rate, pool: Workers, doubts: Doubts) -
 def _pairs(unit: Unit, rate) -> list[Pairs]:
     """Pairs of moment and volts of a gauge trial's whisks."""
     strokes, whisker = strokes_of(read_signals(unit.trial), unit.trial, unit.settings), unit.session.whisker
+    check_alive(strokes)
     found = [
         pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
         for seen, stroke in zip(see_unit(unit)["whisks"], strokes)

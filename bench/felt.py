@@ -22,7 +22,11 @@ class Stroke:
     motor_rad: np.ndarray
     channels: np.ndarray
     filtered: np.ndarray
-    saturated: int = 0
+
+    @property
+    def saturated(self) -> int:
+        """How many samples were left out as saturated."""
+        return int(np.isnan(self.channels).any(axis=1).sum())
 
     @property
     def speed_rad_s(self) -> float:
@@ -52,8 +56,7 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings) -> list[Strok
         time, motor = signals.time_s[where], signals.motor_rad[where]
         cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
         filtered = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
-        saturated = int(np.isnan(channels[where]).any(axis=1).sum())
-        found.append(Stroke(time, motor, channels[where], filtered[where], saturated))
+        found.append(Stroke(time, motor, channels[where], filtered[where]))
     return found
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.errors import BadInput
+from bench.gauge_checks import Undetermined, check_channels, check_heard
 from bench.gauge_readings import Pairs
 from bench.gauges import FROM_TRIALS, GaugeMatrix, Gauges
 
@@ -18,18 +18,21 @@ _SQUARE_DEG = 20.0  # a follicle turned by 0° or 90° within this reads one cha
 def fit_gauges(pairs: Sequence[Pairs]) -> Gauges:
     """Coefficients from all pairs, and for each trial those without it; the paper's way beside them.
 
-    Raises BadInput where the pairs do not fix the four coefficients, saying what to record.
+    Raises Undetermined where the pairs do not fix the four coefficients, saying what to record, and BadInput where the
+    channels are swapped, reversed or silent.
     """
+    if fixes_matrix(pairs):
+        check_heard(pairs)
     fitted = fit_matrix(pairs)
     if fitted is None:
-        raise BadInput(
+        raise Undetermined(
             f"the gauge trials do not fix both channels ({_recorded(pairs)}); record gauge trials with the "
             "follicle unturned and turned by 90° (follicle_roll_deg = 90)",
             file="trials",
         )
-    names = list(dict.fromkeys(p.trial for p in pairs))
-    without = {name: fit_matrix([p for p in pairs if p.trial != name]) for name in names}
-    return Gauges(fitted, FROM_TRIALS, without, one_factor(pairs), four_at_angle(pairs))
+    check_channels(fitted)
+    full_scale = np.abs(np.concatenate([p.moments for p in pairs])).max(axis=0)
+    return Gauges(fitted, FROM_TRIALS, leave_out(pairs, fitted), one_factor(pairs), four_at_angle(pairs), full_scale)
 
 
 def _recorded(pairs: Sequence[Pairs]) -> str:
@@ -46,23 +49,47 @@ def fit_matrix(pairs: Sequence[Pairs]) -> GaugeMatrix | None:
     volts, moments = np.concatenate([p.volts for p in pairs]), np.concatenate([p.moments for p in pairs])
     matrix = np.linalg.lstsq(volts, moments, rcond=None)[0].T
     for _ in range(_ROUNDS):
-        normal, right = np.zeros((4, 4)), np.zeros(4)
-        weights = [_weight(p, matrix) for p in pairs]
-        for p, weight in zip(pairs, weights):
-            rows = _rows(p)
-            normal += rows.T @ weight @ rows
-            right += rows.T @ weight @ p.moments.ravel()
-        matrix = np.linalg.solve(normal, right).reshape(2, 2)
-    return GaugeMatrix(matrix, np.linalg.inv(normal) * max(1.0, _reduced_chi2(pairs, weights, matrix)))
+        parts = [_normal(p, matrix) for p in pairs]
+        matrix = _solve(parts)[0].reshape(2, 2)
+    covariance = np.linalg.inv(sum(normal for normal, _ in parts))
+    return GaugeMatrix(matrix, covariance * widening(pairs, matrix))
+
+
+def leave_out(pairs: Sequence[Pairs], fitted: GaugeMatrix) -> dict[str, GaugeMatrix | None]:
+    """For each trial, the coefficients without its pairs; None where the rest do not fix them.
+
+    The weights are those of the whole fit, so that hundreds of trials cost hundreds of subtractions.
+    """
+    parts, wider = [_normal(p, fitted.matrix) for p in pairs], widening(pairs, fitted.matrix)
+    found: dict[str, GaugeMatrix | None] = {}
+    for name in dict.fromkeys(p.trial for p in pairs):
+        rest = [part for p, part in zip(pairs, parts) if p.trial != name]
+        if fixes_matrix([p for p in pairs if p.trial != name]):
+            coefficients, covariance = _solve(rest)
+            found[name] = GaugeMatrix(coefficients.reshape(2, 2), covariance * wider)
+        else:
+            found[name] = None
+    return found
 
 
 def fixes_matrix(pairs: Sequence[Pairs]) -> bool:
     """Do the moments point in two directions?"""
-    moments = np.concatenate([p.moments for p in pairs]) if pairs else np.zeros((0, 2))
-    if len(moments) < 2:
+    if not pairs:
         return False
-    strong, weak = np.linalg.svd(moments, compute_uv=False)
+    weak, strong = np.sqrt(np.maximum(np.linalg.eigvalsh(sum(p.moments.T @ p.moments for p in pairs)), 0.0))
     return bool(weak > _LEAST_DIRECTION * strong)
+
+
+def _normal(p: Pairs, matrix) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix (4, 4) and right-hand side (4,) of one whisk's pairs."""
+    rows, weight = _rows(p), _weight(p, matrix)
+    return rows.T @ weight @ rows, rows.T @ weight @ p.moments.ravel()
+
+
+def _solve(parts) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients (4,) and covariance (4, 4) of the summed normal equations."""
+    covariance = np.linalg.inv(sum(normal for normal, _ in parts))
+    return covariance @ sum(right for _, right in parts), covariance
 
 
 def _rows(p: Pairs) -> np.ndarray:
@@ -75,10 +102,12 @@ def _weight(p: Pairs, matrix) -> np.ndarray:
     return np.linalg.inv(p.moments_covariance + through @ p.volts_covariance @ through.T)
 
 
-def _reduced_chi2(pairs, weights, matrix) -> float:
+def widening(pairs: Sequence[Pairs], matrix) -> float:
+    """By how much the residuals' squares exceed what was stated; 1 where they do not."""
     residuals = [(p.volts @ matrix.T - p.moments).ravel() for p in pairs]
     freedom = sum(len(r) for r in residuals) - 4
-    return sum(r @ w @ r for r, w in zip(residuals, weights)) / freedom if freedom > 0 else 1.0
+    squares = sum(r @ _weight(p, matrix) @ r for p, r in zip(pairs, residuals))
+    return max(1.0, squares / freedom) if freedom > 0 else 1.0
 
 
 def four_at_angle(pairs: Sequence[Pairs]) -> GaugeMatrix | None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+_BEYOND = 1.05  # of the largest calibrated moment; up to there a line is still the same line
+
 FROM_FILE, FROM_MANIFEST, FROM_TRIALS = "gauges.toml", "session.toml [gauges]", "the session's gauge trials"
 
 
@@ -36,7 +38,8 @@ class Gauges:
     all: fitted to every gauge trial, or given. without: for each trial that took part in the fit, the coefficients
     fitted without it, None where the rest cannot fix them: no whisk is judged by gauges fitted to it. one_factor: the
     paper's way, one factor a channel and no cross-talk, NaN where a channel was not measured; at_angle: four
-    coefficients from the same readings at one angle. notes: lines for the user.
+    coefficients from the same readings at one angle. full_scale_Nmm: the largest moment (2,) in the follicle's axes
+    that the coefficients rest on; None where it is not known. notes: lines for the user.
     """
 
     all: GaugeMatrix
@@ -44,11 +47,24 @@ class Gauges:
     without: Mapping[str, GaugeMatrix | None] = field(default_factory=dict)
     one_factor: GaugeMatrix | None = None
     at_angle: GaugeMatrix | None = None
+    full_scale_Nmm: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
     def for_trial(self, name: str) -> GaugeMatrix | None:
         """The coefficients that this trial may be judged by; None where there are none."""
         return self.without.get(name, self.all)
+
+    def beyond(self, moments_Nmm) -> str:
+        """What to say of moments (2,) in the follicle's axes that exceed the calibrated range; '' within."""
+        if self.full_scale_Nmm is None:
+            return ""
+        over = np.abs(moments_Nmm) > _BEYOND * self.full_scale_Nmm
+        worst = "; ".join(
+            f"{name} of {value:.2f} N·mm is beyond the {most:.2f} N·mm that the gauges were calibrated to"
+            for name, value, most, is_over in zip(("m_y", "m_z"), moments_Nmm, self.full_scale_Nmm, over)
+            if is_over
+        )
+        return worst
 
 
 def to_follicle(roll_rad: float) -> np.ndarray:

@@ -160,7 +160,7 @@ def _draw_angles(axes: Axes, whisk: dict, contact, virtual) -> None:
     if abs(beta) > 3.0:
         low, high = sorted((90.0, 90.0 - beta))
         axes.add_patch(Arc((0, 0), 3.2, 3.2, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
-        middle = np.radians(90.0 - 0.5 * beta)
+        middle = np.radians(90.0 - 0.25 * beta)  # beside the dimension line of σ
         axes.annotate("β", 1.95 * np.array([np.cos(middle), np.sin(middle)]), ha="center", va="center")
 
 

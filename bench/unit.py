@@ -137,6 +137,8 @@ def _feel(unit: Unit, kind: str, stroke: Stroke) -> dict:
     touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
     known = None if status else whisk
+    if known is not None and hand.is_gauged:
+        status = unit.gauges.beyond(hand.in_follicle(known))
     felt = as_felt(touch, known) | {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
     if known is None:
         return felt

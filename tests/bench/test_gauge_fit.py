@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from bench.errors import BadInput
+from bench.felt import Stroke
+from bench.gauge_checks import check_alive
 from bench.gauge_fit import fit_gauges, fit_matrix
 from bench.gauge_readings import Pairs
 from bench.gauges import GaugeMatrix, to_follicle
@@ -96,7 +98,8 @@ def test_each_trial_gets_the_coefficients_fitted_without_it():
     rng = np.random.default_rng(11)
     recorded = [pairs("a", 0.0, rng), pairs("b", 90.0, rng), pairs("c", 90.0, rng)]
     gauges = fit_gauges(recorded)
-    assert gauges.for_trial("b").matrix == pytest.approx(fit_matrix([recorded[0], recorded[2]]).matrix)
+    # the weights are those of the whole fit: they differ by its change of some 0.1 %, the result by the square of it
+    assert gauges.for_trial("b").matrix == pytest.approx(fit_matrix([recorded[0], recorded[2]]).matrix, rel=1e-4)
     assert gauges.for_trial("a") is None  # the only one with the follicle unturned
     assert gauges.for_trial("measured").matrix == pytest.approx(gauges.all.matrix)
 
@@ -109,3 +112,41 @@ def test_covariance_of_a_moment_from_that_of_the_coefficients():
     volts = np.array([0.3, 0.7])
     drawn = rng.multivariate_normal(TRUE.ravel(), made.covariance, size=4000).reshape(-1, 2, 2) @ volts
     assert np.sqrt(np.diag(made.covariance_at(volts))) == pytest.approx(drawn.std(axis=0), rel=0.05)
+
+
+def spoilt(roll_deg: float, change) -> Pairs:
+    """Pairs whose volts went through `change` (n, 2) → (n, 2)."""
+    sound = pairs(f"at {roll_deg:g}", roll_deg)
+    return Pairs(**(vars(sound) | {"volts": change(sound.volts)}))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda v: v[:, ::-1], "swapped"),
+        (lambda v: v * [1.0, -1.0], "channel z falls .* reversed sign"),
+        (lambda v: v * [-1.0, 1.0], "channel y falls .* reversed sign"),
+        (lambda v: v * [1e-4, 1.0], "channel y stays within its noise .* connected"),
+    ],
+)
+def test_what_no_gauge_should_show_is_refused_by_name(change, said):
+    with pytest.raises(BadInput, match=said):
+        fit_gauges([spoilt(0.0, change), spoilt(90.0, change)])
+
+
+def test_a_channel_that_stands_still_is_refused():
+    time = np.arange(100) / 100.0
+    still = np.stack([np.full(100, 10.0), time], axis=1)
+    with pytest.raises(BadInput, match="channel y reads 10 V throughout"):
+        check_alive([Stroke(time, time, still, still)])
+    railed = np.stack([time, np.full(100, np.nan)], axis=1)
+    with pytest.raises(BadInput, match="channel z is saturated throughout"):
+        check_alive([Stroke(time, time, railed, railed)])
+
+
+def test_moments_beyond_the_calibrated_range_are_said():
+    gauges = fit_gauges([pairs("a", 0.0), pairs("b", 90.0)])
+    most = gauges.full_scale_Nmm
+    assert most == pytest.approx(RIGID * 1.5 * np.ones(2))
+    assert gauges.beyond(1.04 * most) == ""
+    assert "m_z of" in gauges.beyond(most * [1.0, 1.1]) and "m_y of" not in gauges.beyond(most * [1.0, 1.1])
