@@ -61,7 +61,7 @@ def read_board_views(session: Session) -> BoardViews:
         sizes[name] = frames.size_px
         boards[name] = _series(frames, session.board, name)
         if name in session.rig_pictures and session.T_rig_board is not None:
-            rig[name] = _rig_view(session, name, frames.size_px)
+            rig[name] = rig_view(session, name, frames.size_px)
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
     return BoardViews(boards, rig, trials, sizes, _times(session, boards), tuple(notes))
@@ -97,7 +97,8 @@ def sampled_frames(count: int) -> set[int]:
     return {int(first) + k for first in firsts for k in range(_RUN)}
 
 
-def _rig_view(session: Session, name: str, size_px: tuple[int, int]) -> Corners:
+def rig_view(session: Session, name: str, size_px: tuple[int, int]) -> Corners:
+    """Corners of the board on the rig in one camera's picture. Raises BadInput where it is of another size."""
     path = session.rig_pictures[name]
     shown, grey = f"boards/rig/{path.name}", read_picture(path)
     if grey is None:

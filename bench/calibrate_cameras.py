@@ -5,16 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.board_views import BoardViews, read_board_views
+from bench.board_views import BoardViews, read_board_views, rig_view
 from bench.errors import BadInput
 from bench.session import Session, load_session
 from vision.calibrate import Calibration, CameraReport, calibrate_cameras
 from vision.cameras_file import write_cameras
+from vision.cameras_import import import_cameras, place_on_rig
 from vision.corners import Corners
 from vision.errors import Refused
 from vision.held_out import HeldOut, held_out
 from vision.lens import LENS_TERMS
-from vision.scene import Camera
+from vision.scene import Camera, Cameras
 
 # Every fourth view (index % 4 == 3) measures a calibration from the other three quarters.
 HOLD_EVERY = 4
@@ -23,21 +24,42 @@ _ASKED_SIGMAS = 2.0
 _MOST_LEFT_OUT = 0.1
 
 
-def calibrate_cameras_command(session: Path, out: Path) -> int:
+def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = None) -> int:
     """Calibrates, writes `out` (TOML) and its .npz, prints the report. Returns 0, or 1 where something is doubtful.
 
+    lenses: a camera TOML of caliscope or aniposelib to take the lenses from; the session then only places the cameras.
     Raises BadInput or Refused, saying what to record, before anything is written.
     """
     loaded = load_session(session)
+    if lenses is not None:
+        return _write(out, place_imported(loaded, lenses), [f"lenses as in {lenses.name}, taken as exact"], [])
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
     measured = measure_held_out(loaded, views)
+    lines = [*report_lines(calibration), *held_out_lines(measured, calibration)]
+    return _write(out, calibration.cameras, lines, [*views.notes, *_doubts(calibration)])
+
+
+def _write(out: Path, cameras: Cameras, lines: list[str], doubts: list[str]) -> int:
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_cameras(out, calibration.cameras)
-    doubts = list(_doubts(calibration))
-    lines = [*report_lines(calibration), *held_out_lines(measured, calibration), *views.notes, *doubts]
-    print("\n".join([*lines, f"written: {out} and {out.with_suffix('.npz').name}"]))
-    return 1 if doubts or views.notes else 0
+    write_cameras(out, cameras)
+    print("\n".join([*lines, *doubts, f"written: {out} and {out.with_suffix('.npz').name}"]))
+    return 1 if doubts else 0
+
+
+def place_imported(session: Session, lenses: Path) -> Cameras:
+    """Cameras calibrated elsewhere, placed by the board on the rig; in their own world where there is none."""
+    if not lenses.is_file():
+        raise BadInput("there is no such file", file=str(lenses))
+    try:
+        cameras = import_cameras(lenses)
+        if session.T_rig_board is None:
+            return cameras
+        views = {name: rig_view(session, name, cameras[name].size_px) for name in cameras.names
+                 if name in session.rig_pictures}  # fmt: skip
+        return place_on_rig(cameras, views, session.board, session.T_rig_board)
+    except Refused as reason:
+        raise BadInput(str(reason), file=lenses.name) from None
 
 
 def calibrate_from(session: Session, views: BoardViews) -> Calibration:

@@ -1,7 +1,9 @@
 """`calibrate cameras`: the report, the files, and one line where it cannot be done."""
 
+import json
 import shutil
 
+import numpy as np
 import pytest
 
 from bench.board_views import sampled_frames
@@ -60,3 +62,34 @@ def test_a_long_series_is_sampled_in_runs_of_neighbours():
     assert len(chosen) == 120 and chosen[0] == 0 and chosen[-1] == 2999
     assert all(chosen[k + 2] == chosen[k] + 2 for k in range(0, 120, 3))
     assert sampled_frames(48) == set(range(48))
+
+
+LENSES = """
+[cam_{name}]
+name = "{name}"
+size = [1280, 720]
+matrix = {K}
+distortions = {dist}
+rotation = [0.0, 0.0, 0.1]
+translation = [0.0, 0.0, 500.0]
+"""
+
+
+def test_lenses_of_another_tool_are_placed_by_the_rig_board(steel_sample, tmp_path, capsys):
+    truth = json.loads((steel_sample / "truth.json").read_text())["cameras"]
+    text = "".join(LENSES.format(name=n, K=t["K"], dist=t["dist"]) for n, t in truth.items())
+    (tmp_path / "anipose.toml").write_text(text)
+    assert calibrate_cameras_command(steel_sample, tmp_path / "c.toml", tmp_path / "anipose.toml") == 0
+    assert "lenses as in anipose.toml" in capsys.readouterr().out
+    for camera in read_cameras(tmp_path / "c.toml"):
+        # With true lenses a camera's place is known to some hundredths of a millimetre from one picture.
+        assert np.abs(camera.T_camera_rig[:, 3] - truth[camera.name]["t"]).max() < 0.3
+        assert np.abs(camera.T_camera_rig[:, :3] - truth[camera.name]["R"]).max() < 1e-3
+
+
+def test_lenses_that_cannot_be_are_refused(steel_sample, tmp_path):
+    text = LENSES.format(name="high", K=[[3754, 0, 545], [0, 3323, 683], [0, 0, 1]], dist=[-2.9, 0.01, -0.3, 0.1, 625])
+    (tmp_path / "wild.toml").write_text(text)
+    with pytest.raises(BadInput, match=r"wild\.toml: camera high: fx = 3754 and fy = 3323"):
+        calibrate_cameras_command(steel_sample, tmp_path / "c.toml", tmp_path / "wild.toml")
+    assert not (tmp_path / "c.toml").exists()

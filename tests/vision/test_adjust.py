@@ -126,3 +126,11 @@ def test_more_iterations_change_nothing_at_rest():
     again = solve(settled.solution.state, seen, BOARD.corners_mm, replace(known), tolerance=1e-14)
     sigma = np.sqrt(np.diag(again.covariance)[:9])
     assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
+
+
+def test_cost_is_linear_in_views():
+    from tests.speed.cameras import seconds
+
+    few, many = seconds(2, 15), seconds(2, 60)
+    # Four times the views cost four times as much; a dense solve would cost up to 64 times. Twice for a busy machine.
+    assert many < 8 * few
