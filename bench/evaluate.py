@@ -13,6 +13,7 @@ from bench.doubts import Doubts
 from bench.drift import drift_rate, free_slope
 from bench.errors import BadInput
 from bench.estimates import estimators
+from bench.explained import write_explained
 from bench.felt import strokes_of
 from bench.gauge_checks import Undetermined, check_alive
 from bench.gauge_fit import fit_gauges
@@ -45,6 +46,7 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         pool.run(evaluate_unit, units, "trials")
         results = [read_result(unit.path) for unit in units]
         write_tables(out, results)
+        write_explained(out, results, session.whisker)
         return report(session, out, results, gauges, doubts, calibration.notes, settings, pool)
 
 

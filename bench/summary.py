@@ -204,4 +204,6 @@ def _exact(session: Session) -> Iterator[str]:
 def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    return [f"{', '.join(['whisks.csv', 'estimates.csv', 'track/', *single, *(f + '/' for f in folders)])}"]
+    return [
+        f"{', '.join(['whisks.csv', 'estimates.csv', 'explained.csv', 'track/', *single, *(f + '/' for f in folders)])}"
+    ]

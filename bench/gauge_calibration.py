@@ -1,0 +1,83 @@
+"""`whisker-bench calibrate gauges`: gauges.toml from a session's gauge trials, with its certificate."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from bench.atomic import whole_file
+from bench.calibration import calibrate_session
+from bench.check import checked_session
+from bench.doubts import Doubts
+from bench.drift import drift_rate, free_slope
+from bench.errors import BadInput
+from bench.felt import Stroke, strokes_of
+from bench.gauge_certificate import Certificate, page
+from bench.gauge_checks import check_alive
+from bench.gauge_fit import fit_gauges
+from bench.gauge_readings import pairs_of
+from bench.gauges_file import write_gauges
+from bench.results import hash_of_files
+from bench.session import Session
+from bench.settings import Settings
+from bench.signals import read_signals
+from bench.trial import Trial
+from bench.unit import Unit, see_unit
+from bench.workers import Workers
+
+
+def calibrate_gauges_command(
+    session: Path, out: Path, *, every_trial: bool = False, workers: int = 1, progress: bool = False
+) -> int:
+    """Calibrate, write `out` (TOML) and its certificate beside it as PDF, print it.
+
+    Returns 0, or 1 where the session is doubtful. every_trial: all trials with whisks, not only those marked "gauge".
+    Raises BadInput.
+    """
+    doubts = Doubts()
+    loaded = checked_session(session, doubts)
+    certificate = calibrate_gauges(loaded, chosen_trials(loaded, every_trial), workers, progress)
+    zero, zero_sigma = zeros(certificate.strokes)
+    header = certificate.lines()
+    write_gauges(out, certificate.gauges, zero, zero_sigma, certificate.whisker.C_Nmm2, header)
+    with whole_file(out.with_suffix(".pdf")) as temporary:
+        page(certificate).savefig(temporary, metadata={"CreationDate": None, "Producer": None, "Creator": None})
+    print("\n".join([*header, "", *(f"doubtful: {note}" for note in doubts.notes), f"written: {out}, {out.stem}.pdf"]))
+    return 1 if doubts.notes else 0
+
+
+def chosen_trials(session: Session, every_trial: bool) -> list[Trial]:
+    """Trials with volts that the coefficients may rest on. Raises BadInput where there is none."""
+    wanted = ("gauge", "measure") if every_trial else ("gauge",)
+    trials = [t for t in session.trials if t.purpose in wanted and read_signals(t).kind == "V"]
+    if not trials:
+        raise BadInput('no trial with volts is marked purpose = "gauge"; mark them, or give --all', file="trials")
+    return trials
+
+
+def calibrate_gauges(session: Session, trials: list[Trial], workers: int, progress: bool) -> Certificate:
+    """Coefficients from what the cameras and the gauges show of these trials. Raises BadInput."""
+    settings = Settings()
+    strokes = {trial.name: strokes_of(read_signals(trial), trial, settings) for trial in trials}
+    check_alive([stroke for many in strokes.values() for stroke in many])
+    slopes = [free_slope(stroke) for many in strokes.values() for stroke in many]
+    rate = drift_rate([slope for slope in slopes if slope is not None])
+    with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
+        calibration = calibrate_session(session, Path(folder))
+        units = [Unit(session, t, hash_of_files([t.folder]), calibration, settings, Path(folder)) for t in trials]
+        seen = pool.run(see_unit, units, "trials")
+    pairs = [
+        pairs_of(trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
+        for trial, of_trial in zip(trials, seen)
+        for whisk, stroke in zip(of_trial["whisks"], strokes[trial.name])
+    ]
+    used = tuple(p for p in pairs if p is not None)
+    every_stroke = tuple(stroke for many in strokes.values() for stroke in many)
+    return Certificate(session.name, session.whisker, fit_gauges(used), used, every_stroke, rate)
+
+
+def zeros(strokes: tuple[Stroke, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean zero (2,) of the free strokes and the scatter of one, in volts."""
+    levels = np.array([touch.offset for touch in (stroke.touch() for stroke in strokes) if not touch.status])
+    scatter = levels.std(axis=0, ddof=1) if len(levels) > 1 else np.zeros(2)
+    return levels.mean(axis=0), scatter
