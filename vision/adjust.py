@@ -36,9 +36,7 @@ class Solution:
 
 
 def robust_weight(squared: np.ndarray, width: float) -> np.ndarray:
-    """Cauchy's weight of a corner whose squared residual, in sigmas, is `squared`; all 1 for infinite
-    width.
-    """
+    """Cauchy's weight of a corner whose squared residual, in sigmas, is `squared`; all 1 for infinite width."""
     return 1.0 / (1.0 + squared / width**2)
 
 

@@ -26,9 +26,7 @@ _ODD_FACTOR = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Corners of one board in one picture: ids (n,), px (n, 2), sigma_px (n,) one standard deviation per
-    axis.
-    """
+    """Corners of one board in one picture: ids (n,), px (n, 2), sigma_px (n,) one standard deviation per axis."""
 
     ids: np.ndarray
     px: np.ndarray
@@ -119,9 +117,7 @@ def _local_frames(px: np.ndarray, ids: np.ndarray, board: Board) -> np.ndarray |
 
 
 def _same_board(saddles, ids: np.ndarray, board: Board) -> np.ndarray:
-    """Corners that look like the board's other corners: colours alternate, blur, contrast and misfit are
-    alike.
-    """
+    """Corners that look like the board's other corners: colours alternate, blur, contrast and misfit are alike."""
     good = saddles.converged
     if not good.any():
         return good

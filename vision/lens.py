@@ -39,18 +39,14 @@ def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
 
 
 def project(x_camera: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """Pixels (n, 2) of points in camera coordinates (n, 3); NaN where a point is not in front of the
-    camera.
-    """
+    """Pixels (n, 2) of points in camera coordinates (n, 3); NaN where a point is not in front of the camera."""
     return distort(_normalised(x_camera), lens[4:]) * lens[:2] + lens[2:4]
 
 
 def project_with_jacobians(
     x_camera: np.ndarray, lens: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels (n, 2) with their derivatives by the point (n, 2, 3) and by the nine lens parameters (n, 2,
-    9).
-    """
+    """Pixels (n, 2) with their derivatives by the point (n, 2, 3) and by the nine lens parameters (n, 2, 9)."""
     ab = _normalised(x_camera)
     bent = distort(ab, lens[4:])
     px = bent * lens[:2] + lens[2:4]

@@ -144,9 +144,7 @@ def _by_camera(seen: Sightings, kept: np.ndarray, n_cameras: int) -> list[np.nda
 
 
 def _match(squared: np.ndarray, sigma: np.ndarray) -> float:
-    """e ≥ 0 with mean(squared / (2 (sigma² + e²))) = 1, by bisection on e²; 0 where sigma alone explains
-    it.
-    """
+    """e ≥ 0 with mean(squared / (2 (sigma² + e²))) = 1, by bisection on e²; 0 where sigma alone explains it."""
     if not len(squared) or np.mean(squared / (2 * sigma**2)) <= 1:
         return 0.0
     low, high = 0.0, float(np.mean(squared))

@@ -35,11 +35,6 @@ _HULL_MARGIN = 0.05
 _MOST_UNCOVERED = 0.2
 
 
-def usable_views(views: Iterable[Corners], board: Board) -> list[Corners]:
-    """The views that fix a board pose, without strays."""
-    return [view for view in (without_strays(v, board) for v in views) if fixes_pose(view, board)]
-
-
 def without_strays(view: Corners, board: Board) -> Corners:
     """The corners that lie as on a plane seen through any lens; none where too few do (a mislabelled board)."""
     if len(view) < MIN_VIEW_CORNERS:

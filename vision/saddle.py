@@ -45,9 +45,7 @@ X, Y, TURN_1, TURN_2, BLUR_1, BLUR_2, CONTRAST, LEVEL, SLOPE_X, SLOPE_Y = range(
 
 @dataclass(frozen=True, eq=False)
 class Saddles:
-    """Fitted corners, a row each: px (n, 2); sigma_px, contrast, blur_px, misfit (grey levels), converged:
-    (n,).
-    """
+    """Fitted corners, a row each: px (n, 2); sigma_px, contrast, blur_px, misfit (grey levels), converged: (n,)."""
 
     px: np.ndarray
     sigma_px: np.ndarray
@@ -116,9 +114,7 @@ def _along_edges(off: np.ndarray, frames: np.ndarray, border: float) -> np.ndarr
 
 
 def _start(windows: _Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """First parameters (n, 10): edges as the homography has them, then level, slope and contrast by least
-    squares.
-    """
+    """First parameters (n, 10): edges as the homography has them, then level, slope and contrast by least squares."""
     p = np.zeros((len(px_guess), 10))
     p[:, [X, Y]] = px_guess - windows.anchor
     # Edge 1 runs along board y and edge 2 along board x; each is named by the direction of its normal.
@@ -151,9 +147,7 @@ def _model(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _edge(dx, dy, turn, log_blur) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """A blurred edge erf(e / (√2 s)), −1 to 1, with its derivatives by x0, y0, turn and log s. Each (n,
-    k).
-    """
+    """A blurred edge erf(e / (√2 s)), −1 to 1, with its derivatives by x0, y0, turn and log s. Each (n, k)."""
     cosine, sine, blur = np.cos(turn), np.sin(turn), np.exp(log_blur)
     t = (cosine * dx + sine * dy) / blur
     slope = np.sqrt(2 / np.pi) * np.exp(-0.5 * t * t)
@@ -182,9 +176,7 @@ def _solve(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.
 
 
 def _levenberg_marquardt(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Best parameters (n, 10) and whether each corner came to rest (n,). Corners at rest are worked on no
-    more.
-    """
+    """Best parameters (n, 10) and whether each corner came to rest (n,). Corners at rest are worked on no more."""
     state = [p, *_evaluate(windows, p), np.full(len(p), 1e-3)]
     moving = np.arange(len(p))
     for _ in range(_ITERATIONS):
@@ -259,9 +251,7 @@ def _on_grid(windows: _Windows, values: np.ndarray) -> np.ndarray:
 
 
 def _correlation(residual: np.ndarray, axis: int) -> np.ndarray:
-    """Correlation of residuals (n, side, side) at lags −LAGS to LAGS along an axis, over all corners
-    together.
-    """
+    """Correlation of residuals (n, side, side) at lags −LAGS to LAGS along an axis, over all corners together."""
     taken = (residual != 0).astype(float)
     lags = [_lag_mean(residual, taken, axis, lag) for lag in range(LAGS + 1)]
     one_sided = np.array(lags) / max(lags[0], 1e-12)

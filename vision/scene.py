@@ -42,9 +42,7 @@ def _require_length(owner: str, **lengths_mm: float) -> None:
 
 @dataclass(frozen=True)
 class Wire:
-    """The whisker: a cylinder, or a cone that ends in a point at its length. Refused where a length is not
-    > 0.
-    """
+    """The whisker: a cylinder, or a cone that ends in a point at its length. Refused where a length is not > 0."""
 
     shape: str
     length_mm: float
@@ -226,17 +224,13 @@ class Camera:
         return px, by_x @ R, np.concatenate([by_lens, by_turn, by_x], axis=2)
 
     def rays(self, px: np.ndarray) -> np.ndarray:
-        """Directions (n, 3), unit vectors of the rig frame, in which pixels (n, 2) look; NaN where the lens
-        folds.
-        """
+        """Directions (n, 3), unit vectors of the rig frame, in which pixels (n, 2) look; NaN where the lens folds."""
         ab = lens_model.unproject(np.asarray(px, dtype=float), self.lens)
         directions = np.column_stack([ab, np.ones(len(ab))]) @ self.T_camera_rig[:, :3]
         return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
     def moved(self, step: np.ndarray) -> "Camera":
-        """The camera whose 15 parameters differ by `step` (15,): one draw from a covariance, one fitting
-        step.
-        """
+        """The camera whose 15 parameters differ by `step` (15,): one draw from a covariance, one fitting step."""
         fx, fy, cx, cy = self.lens[:4] + step[:4]
         T = self.T_camera_rig
         return replace(
