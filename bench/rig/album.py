@@ -32,7 +32,8 @@ def _write_film(path, pictures):
     for picture in pictures:
         if film is None:
             size = (picture.shape[1], picture.shape[0])
-            film = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), 20.0, size, isColor=False)
+            code = cv2.VideoWriter_fourcc(*"FFV1")
+            film = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, 20.0, size, isColor=False)
             if not film.isOpened():
                 raise OSError(f"{path}: OpenCV cannot write FFV1 here")
         film.write(picture)

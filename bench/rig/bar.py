@@ -22,7 +22,7 @@ def cross(a, b) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Bar:
-    """A round bar in the rig frame: a point of its axis, the axis' unit direction (z component positive), its radius."""
+    """A round bar in the rig frame: a point of its axis, the axis' unit direction (its z positive), its radius."""
 
     point_mm: np.ndarray
     axis: np.ndarray

@@ -34,7 +34,8 @@ class Board:
             raise ValueError("a board's marker is smaller than its square, and both are positive")
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
-        board = cv2.aruco.CharucoBoard(tuple(self.squares), self.square_mm, self.marker_mm, _dictionary(self.dictionary))
+        known = _dictionary(self.dictionary)
+        board = cv2.aruco.CharucoBoard(tuple(self.squares), self.square_mm, self.marker_mm, known)
         board.setLegacyPattern(self.legacy)
         return board
 
@@ -53,7 +54,7 @@ class Board:
         modules = _dictionary(self.dictionary).markerSize + 2
         gap, module = (self.square_mm - self.marker_mm) / 2, self.marker_mm / modules
         step = np.concatenate([[0], gap + module * np.arange(modules + 1)])
-        x, y = (np.concatenate([*(i * self.square_mm + step for i in range(n)), [n * self.square_mm]]) for n in self.squares)
+        x, y = (np.append(np.add.outer(np.arange(n) * self.square_mm, step), n * self.square_mm) for n in self.squares)
         dark = np.ones((len(y) - 1, len(x) - 1), bool)
         per = modules + 2
         for marker, place in zip(board.getIds().ravel(), board.getObjPoints()):

@@ -1,4 +1,6 @@
-"""How a careful person holds the board up for a camera's calibration: tilted all ways, near and far, all over the picture."""
+"""How a careful person holds the board up for a camera's calibration: tilted all ways, near and far, all over the
+picture.
+"""
 
 import math
 
@@ -26,8 +28,8 @@ def _pose(board, camera, index, depth_rank, count, rng):
     axis = np.array([math.cos(way), math.sin(way), 0.0])
     turn = cv2.Rodrigues(tilt * axis)[0] @ cv2.Rodrigues(np.array([0, 0, math.radians(rng.uniform(-50, 50))]))[0]
     spread = 0.28 * np.array([math.cos(2.4 * way), math.sin(2.4 * way)]) * math.sqrt(index / count)
-    px = camera.matrix[:2, 2] + spread * camera.size_px + rng.uniform(-20, 20, 2)
-    ray = np.array([(px[0] - camera.matrix[0, 2]) / camera.matrix[0, 0], (px[1] - camera.matrix[1, 2]) / camera.matrix[1, 1], 1])
+    off_px = spread * camera.size_px + rng.uniform(-20, 20, 2)
+    ray = np.append(off_px / np.diag(camera.matrix)[:2], 1.0)
     middle = turn @ [0.5 * board.size_mm[0], 0.5 * board.size_mm[1], 0]
     to_rig = camera.rotation.T
     return np.column_stack([to_rig @ turn, to_rig @ (depth * ray - middle - camera.translation_mm)])

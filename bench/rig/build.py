@@ -28,7 +28,7 @@ def gauges(protocol: Protocol) -> Gauges:
 
 
 def cameras(protocol: Protocol) -> list[Camera]:
-    return [Camera.looking(c.name, size_px=tuple(c.size_px), focal_px=c.focal_px, aspect=c.aspect, distortion=c.distortion,
+    return [Camera.looking(c.name, size_px=c.size_px, focal_px=c.focal_px, aspect=c.aspect, distortion=c.distortion,
                            position_mm=np.array(c.position_mm), target_mm=np.array(c.target_mm),
                            roll_rad=math.radians(c.roll_deg), centre_px=c.centre_px) for c in protocol.cameras]
 
@@ -47,7 +47,9 @@ def T_rig_board(protocol: Protocol) -> np.ndarray:
 
 
 def stated_T_rig_board(protocol: Protocol, rng: np.random.Generator) -> np.ndarray:
-    """What session.toml says of the board's pose: the true one, wrong by the protocol's sigmas about the board's middle."""
+    """What session.toml says of the board's pose: the true one, wrong by the protocol's sigmas about the board's
+    middle.
+    """
     true, b = T_rig_board(protocol), protocol.board
     turn = cv2.Rodrigues(math.radians(b.pose_sigma_deg) * rng.standard_normal(3))[0]
     shift = b.pose_sigma_mm * rng.standard_normal(3)

@@ -23,7 +23,8 @@ class Camera:
     translation_mm: np.ndarray
 
     @classmethod
-    def looking(cls, name, *, size_px, focal_px, distortion, position_mm, target_mm, roll_rad=0.0, centre_px=None, aspect=1.0):
+    def looking(cls, name, *, size_px, focal_px, distortion, position_mm, target_mm, roll_rad=0.0, centre_px=None,
+                aspect=1.0) -> "Camera":
         """A camera at a position looking at a point, the rig's z upwards in its picture up to `roll_rad`.
 
         Raises ValueError where it looks straight up or down (there is no upwards then) or stands on its target.
@@ -50,7 +51,8 @@ class Camera:
     def rays(self, u_px: np.ndarray, v_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Undistorted x/z and y/z on the grid of columns `u_px` and rows `v_px`: two (rows, columns) float32 arrays.
 
-        From a polynomial in the pixel position that inverts the lens to 1e-5 px (tested), so that any grid costs two matrix products.
+        From a polynomial in the pixel position that inverts the lens to 1e-5 px (tested), so that any grid costs two
+        matrix products.
         """
         columns, rows = self._basis(u_px, 0), self._basis(v_px, 1)
         return tuple((rows @ c @ columns.T).astype(np.float32) for c in self._lens)

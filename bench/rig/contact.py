@@ -1,13 +1,14 @@
-"""A bent whisker on a round bar: the equations of one contact and their exact derivatives.
+"""A bent whisker on a round bar: the equations of one contact and their exact derivatives, solved by Newton's method.
 
-Unknowns: the bar's force on the whisker (hub frame, N), the arc length of the contact (mm), and where it slides, in which direction. Two equations say where the contact
-is: the centreline's point nearest to the axis, at a distance of both radii (for the tip, the arc is the length instead of nearest).
-Two more say what friction does in the plane that touches the bar:
+Unknowns: the bar's force on the whisker (hub frame, N), the arc length of the contact (mm), and where it slides, in
+which direction. Two equations say where the contact is: the centreline's point nearest to the axis, at a distance of
+both radii (for the tip, the arc is the length instead of nearest). The others say what friction does in the plane
+that touches the bar:
 
-- sliding: the force lies on the edge of the friction cone, against the motion of the whisker's material there, whatever its
-  direction (along the bar or along the whisker);
-- held: the material does not move along the bar. Along the whisker it slides all the same, since a rod that does not stretch cannot
-  bend between two fixed points; what the cone leaves of the friction acts there.
+- sliding: the force lies on the edge of the friction cone, against the motion of the whisker's material there,
+  whatever its direction (along the bar or along the whisker);
+- held: the material does not move along the bar. Along the whisker it slides all the same, since a rod that does not
+  stretch cannot bend between two fixed points; what the cone leaves of the friction acts there.
 """
 
 import math
@@ -17,15 +18,20 @@ import numpy as np
 
 from bench.rig.bar import Bar, Touch, cross
 from bench.rig.elastica import Elastica
+from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
 from bench.rig.rod import Rod
 
+_PARTS = 0.5 ** np.arange(8)
 _ACROSS = np.array([0.0, 1.0, 0.0])
+_BACKWARDS_MM = -1e-9
 
 
 @dataclass(frozen=True)
 class State:
-    """One equilibrium in contact. Vectors in the rig frame except `force_hub_N`. `share`: force along the bar over the
-    normal force (its size). `status` is held, sliding or tip."""
+    """One equilibrium in contact. Vectors in the rig frame except `force_hub_N`. `share`: force along the bar over
+    the normal force (its size). `heading_rad`: direction of the material's motion, 0 along the bar. `status` is
+    held, sliding or tip.
+    """
 
     motor_rad: float
     force_hub_N: np.ndarray
@@ -34,7 +40,7 @@ class State:
     tangent: np.ndarray
     share: float
     status: str
-    heading_rad: float = 0.0  # direction of the material's motion: 0 along the bar, towards its other side at 90°
+    heading_rad: float = 0.0
     motion_aside_mm: float = 0.0  # the material's motion round the bar in the last step
     angle: np.ndarray | None = None  # of the elastica, to start the next solution from
 
@@ -43,23 +49,15 @@ class State:
         return np.append(self.force_hub_N, self.arc_mm)
 
 
-@dataclass(frozen=True)
-class _Pose:
-    """Where the loaded point is and how it answers to the four unknowns: (3, 4) derivatives."""
-
-    point: np.ndarray
-    point_by: np.ndarray
-    tangent: np.ndarray
-    tangent_by: np.ndarray
-    angle: np.ndarray
-
-
 class Contact:
-    """The contact problem of one whisker and one bar, solved by Newton's method at a given motor angle."""
+    """The contact problem of one whisker and one bar at a given motor angle.
+
+    `guess` (4,) is a force in the hub frame and an arc. Everything raises ArithmeticError where no contact is found,
+    or one that pulls, or friction along the motion.
+    """
 
     def __init__(self, rod: Rod, bar: Bar):
         self.rod, self.bar, self.elastica = rod, bar, Elastica(rod)
-        self._flat = np.eye(3) - np.outer(bar.axis, bar.axis)
 
     def touching(self, touch: Touch) -> State:
         """The state at first touch, no force yet."""
@@ -69,91 +67,168 @@ class Contact:
                      _turn(touch.motor_rad) @ tangent, 0.0, status)
 
     def hold(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip=False) -> State:
-        """Equilibrium at which the material has not moved along the bar since `old`, friction being what the cone leaves.
-
-        `guess` (4,): force in the hub frame and arc. Raises ArithmeticError where Newton's method does not settle.
+        """Equilibrium at which the material has not moved along the bar since `old`, friction being what the cone
+        leaves.
         """
-        return self._solve(motor_rad, old, guess, _Held(friction), tip)
+        return self._solve(motor_rad, old, guess, Held(friction), tip)
 
     def slide(self, motor_rad, old: State, guess: np.ndarray, heading_rad: float, friction: float, tip=False) -> State:
-        """Equilibrium on the edge of the cone, the force against the motion since `old`.
+        """Equilibrium on the edge of the cone, the force against the motion since `old`."""
+        return self._solve(motor_rad, old, np.append(guess, heading_rad), Sliding(friction), tip)
 
-        Raises ArithmeticError where Newton's method does not settle, or settles on a motion along the force.
-        """
-        return self._solve(motor_rad, old, np.append(guess, heading_rad), _Sliding(friction), tip)
+    def ease(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip=False) -> State:
+        """Sliding where no heading is at hand (the motor has just turned back): friction first as soft as oil, then
+        ever stiffer, until it gives way by no more than 10 nm."""
+        for give_mm in np.geomspace(1.0, GIVE_MM, 16):
+            state = self._solve(motor_rad, old, guess, Oiled(friction, give_mm), tip)
+            guess = state.unknowns
+        return state
+
+    def foot_side(self, state: State) -> float:
+        """Newton's method with Deuflhard's monotonicity test: a step is halved until the next one would be smaller."""
+        return float((state.point_mm - self.bar.foot_mm(state.point_mm)) @ state.tangent)
 
     def _solve(self, motor_rad, old, unknowns, law, tip):
-        turn, angle = _turn(motor_rad), old.angle
-        for _ in range(30):
-            pose = self._pose(turn, unknowns, angle)
-            angle = pose.angle
-            residual, jacobian, forces = self._equations(turn, unknowns, pose, old, law, tip)
-            step = np.linalg.solve(jacobian, residual)
-            unknowns = unknowns - step
+        """Newton's method with Deuflhard's monotonicity test: a step that would not bring the next one down is
+        halved.
+        """
+        problem = _Problem(self, _turn(motor_rad), old, law, tip)
+        here = problem.at(unknowns, old.angle)
+        for _ in range(40):
+            step = np.linalg.solve(here.jacobian, here.residual)
             if _settled(step, unknowns):
-                return self._state(motor_rad, unknowns, self._pose(turn, unknowns, angle), law, forces, tip)
+                return here.state(motor_rad, unknowns - step, "tip" if tip else law.status)
+            unknowns, here = problem.nearer(unknowns, here, step)
         raise ArithmeticError(f"no contact found at motor angle {math.degrees(motor_rad):.4f} deg")
 
-    def _state(self, motor_rad, unknowns, pose, law, forces, tip):
-        press, shear, motion = forces
-        heading = float(unknowns[4]) if len(unknowns) > 4 else 0.0
-        onward = motion[0] * math.cos(heading) + motion[1] * math.sin(heading)
-        if press < 0 or (len(unknowns) > 4 and onward < -1e-9):
-            raise ArithmeticError("a contact that pulls, or friction along the motion")
-        return State(motor_rad, unknowns[:3], unknowns[3], pose.point, pose.tangent, abs(shear[0]) / press,
-                     "tip" if tip else law.status, heading, motion[1], pose.angle)
 
-    def _pose(self, turn, unknowns, guess):
+@dataclass(frozen=True)
+class _Pose:
+    """Where the loaded point is and how it answers to the force and the arc: (3, 4) derivatives, rig frame."""
+
+    point: np.ndarray
+    point_by: np.ndarray
+    tangent: np.ndarray
+    tangent_by: np.ndarray
+    angle: np.ndarray
+
+    @classmethod
+    def of(cls, contact: Contact, turn, unknowns, guess) -> "_Pose":
         force, arc = unknowns[:3], unknowns[3]
         across = math.hypot(force[1], force[2])
         e = np.array([0.0, force[1] / across, force[2] / across]) if across else _ACROSS
-        bent = self.elastica.solve(force[0], across, arc, guess)
-        planar = _planar_derivatives(e)
-        point, point_by = _lift(bent.end_mm, bent.end_by, e, across, planar)
+        bent = contact.elastica.solve(force[0], across, arc, guess)
+        point, point_by = _lift(bent.end_mm, bent.end_by, e, across)
         ahead = np.array([math.cos(bent.slope), math.sin(bent.slope)])
-        ahead_by = np.outer([-ahead[1], ahead[0]], bent.slope_by)
-        tangent, tangent_by = _lift(ahead, ahead_by, e, across, planar)
-        rest = self.rod.rest
-        point, tangent = point + rest.offset_mm(arc), tangent + rest.slope(arc)
-        point_by[:, 3] += rest.slope(arc)
+        tangent, tangent_by = _lift(ahead, np.outer([-ahead[1], ahead[0]], bent.slope_by), e, across)
+        rest = contact.rod.rest
+        slope = rest.slope(arc)
+        point_by[:, 3] += slope
         tangent_by[:, 3] += rest.curvature(arc)
-        return _Pose(turn @ point, turn @ point_by, turn @ tangent, turn @ tangent_by, bent.angle)
+        return cls(turn @ (point + rest.offset_mm(arc)), turn @ point_by, turn @ (tangent + slope), turn @ tangent_by,
+                   bent.angle)
 
-    def _equations(self, turn, unknowns, pose, old, law, tip):
-        bar, arc = self.bar, unknowns[3]
-        apart = self._flat @ (pose.point - bar.point_mm)
+
+def _lift(planar, planar_by, e, across):
+    """A vector of the plane of bending in three dimensions, and its derivatives by (F_x, F_y, F_z, arc)."""
+    vector = np.array([planar[0], 0, 0]) + planar[1] * e
+    by_force = np.array([[1.0, 0, 0, 0], [0, e[1], e[2], 0], [0, 0, 0, 1.0]])
+    by = np.outer([1.0, 0, 0], planar_by[0] @ by_force) + np.outer(e, planar_by[1] @ by_force)
+    sideways = planar[1] / across if across else planar_by[1, 1]
+    by[1:, 1:3] += sideways * (np.eye(2) - np.outer(e[1:], e[1:]))
+    return vector, by
+
+
+@dataclass(frozen=True)
+class _Here:
+    """The equations at one set of unknowns. `press`, `shear`, `motion` as the laws of friction see them."""
+
+    pose: _Pose
+    residual: np.ndarray
+    jacobian: np.ndarray
+    press: float
+    shear: np.ndarray
+    motion: np.ndarray
+
+    def state(self, motor_rad, unknowns, status) -> State:
+        sliding = len(unknowns) > 4
+        heading = float(unknowns[4]) if sliding else math.atan2(self.motion[1], self.motion[0])
+        onward = self.motion[0] * math.cos(heading) + self.motion[1] * math.sin(heading)
+        if self.press < 0 or (sliding and onward < _BACKWARDS_MM):
+            raise ArithmeticError("a contact that pulls, or friction along the motion")
+        share = abs(self.shear[0]) / self.press
+        return State(motor_rad, unknowns[:3], float(unknowns[3]), self.pose.point, self.pose.tangent, share, status,
+                     heading, float(self.motion[1]), self.pose.angle)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What stays the same while Newton's method runs."""
+
+    contact: Contact
+    turn: np.ndarray
+    old: State
+    law: Sliding | Oiled | Held
+    tip: bool
+
+    def at(self, unknowns, angle) -> _Here:
+        """The equations at unknowns, the elastica starting from `angle`."""
+        pose = _Pose.of(self.contact, self.turn, unknowns, angle)
+        bar = self.contact.bar
+        flat = np.eye(3) - np.outer(bar.axis, bar.axis)
+        apart = flat @ (pose.point - bar.point_mm)
         distance = math.sqrt(apart @ apart)
         normal = apart / distance
-        normal_by = (self._flat - np.outer(normal, normal)) @ pose.point_by / distance
+        normal_by = (flat - np.outer(normal, normal)) @ pose.point_by / distance
         side, side_by = cross(bar.axis, normal), _cross_matrix(bar.axis) @ normal_by
-        reach = bar.radius_mm + float(self.rod.radius_mm(arc))
-        taper = np.array([0, 0, 0, self.rod.taper])
-        if tip:
-            nearest, nearest_by = arc - self.rod.length_mm, np.array([0, 0, 0, 1.0])
-        else:
-            nearest = apart @ pose.tangent
-            nearest_by = pose.tangent @ (self._flat @ pose.point_by) + apart @ pose.tangent_by
-        touching, touching_by = distance - reach, normal @ pose.point_by - taper
+        press, press_by, shear, shear_by = self._forces(unknowns, normal, normal_by, side, side_by)
+        motion, motion_by = self._motion(unknowns[3], pose, side, side_by)
+        laws, laws_by = self.law(press, press_by, shear, shear_by, motion, motion_by, unknowns[4:])
+        jacobian = np.zeros((len(unknowns), len(unknowns)))
+        nearest, jacobian[0, :4] = self._nearest(unknowns[3], pose, flat, apart)
+        jacobian[1, :4] = normal @ pose.point_by
+        jacobian[1, 3] -= self.contact.rod.taper
+        jacobian[2:] = laws_by
+        reach = bar.radius_mm + float(self.contact.rod.radius_mm(unknowns[3]))
+        return _Here(pose, np.array([nearest, distance - reach, *laws]), jacobian, press, shear, motion)
 
-        # How far has the material that is now at the contact moved since `old`?  The old rod was straight there.
+    def _nearest(self, arc, pose, flat, apart):
+        """Zero where the contact is the nearest point (or the tip)."""
+        if self.tip:
+            return arc - self.contact.rod.length_mm, np.array([0, 0, 0, 1.0])
+        return apart @ pose.tangent, pose.tangent @ (flat @ pose.point_by) + apart @ pose.tangent_by
+
+    def _forces(self, unknowns, normal, normal_by, side, side_by):
+        """Normal and shear force, the latter along the bar and round it."""
+        axis, force = self.contact.bar.axis, self.turn @ unknowns[:3]
+        force_by = np.concatenate([self.turn, np.zeros((3, 1))], 1)
+        press, press_by = force @ normal, normal @ force_by + force @ normal_by
+        shear = np.array([force @ axis, force @ side])
+        return press, press_by, shear, np.stack([axis @ force_by, side @ force_by + force @ side_by])
+
+    def _motion(self, arc, pose, side, side_by):
+        """How far the material that is now at the contact has moved since `old`. The old rod was straight there."""
+        axis, old = self.contact.bar.axis, self.old
         moved = pose.point - old.point_mm - old.tangent * (arc - old.arc_mm)
         moved_by = pose.point_by.copy()
         moved_by[:, 3] -= old.tangent
-        motion = np.array([moved @ bar.axis, moved @ side])
-        motion_by = np.stack([bar.axis @ moved_by, side @ moved_by + moved @ side_by])
+        motion = np.array([moved @ axis, moved @ side])
+        return motion, np.stack([axis @ moved_by, side @ moved_by + moved @ side_by])
 
-        force, force_by = turn @ unknowns[:3], np.concatenate([turn, np.zeros((3, 1))], 1)
-        press, press_by = force @ normal, normal @ force_by + force @ normal_by
-        shear = np.array([force @ bar.axis, force @ side])
-        shear_by = np.stack([bar.axis @ force_by, side @ force_by + force @ side_by])
-        laws, laws_by = law(press, press_by, shear, shear_by, motion, motion_by, unknowns[4:])
-        jacobian = np.zeros((len(unknowns), len(unknowns)))
-        jacobian[0, :4], jacobian[1, :4], jacobian[2:] = nearest_by, touching_by, laws_by
-        return np.array([nearest, touching, *laws]), jacobian, (press, shear, motion)
-
-    def foot_side(self, state: State) -> float:
-        """Positive where the bar's nearest point lies behind the contact along the whisker, negative ahead of it, mm."""
-        return float((state.point_mm - self.bar.foot_mm(state.point_mm)) @ state.tangent)
+    def nearer(self, unknowns, here, step):
+        """The unknowns after as much of a step as is good, and the equations there."""
+        force = np.abs(unknowns[:3]).max() + np.abs(step[:3]).max()
+        size = np.array([1 / force] * 3 + [1.0, 1.0])[: len(step)]
+        length = np.linalg.norm(size * step)
+        for part in _PARTS:
+            try:
+                there = self.at(unknowns - part * step, here.pose.angle)
+                left = np.linalg.norm(size * np.linalg.solve(here.jacobian, there.residual))
+            except ArithmeticError:
+                continue
+            if left <= (1 - part / 4) * length or part == _PARTS[-1]:
+                return unknowns - part * step, there
+        raise ArithmeticError("no way towards a contact found")
 
 
 def moments_Nmm(state: State) -> tuple[float, float]:
@@ -161,58 +236,6 @@ def moments_Nmm(state: State) -> tuple[float, float]:
     point = _turn(-state.motor_rad) @ state.point_mm
     moment = -cross(point, state.force_hub_N)
     return moment[1], moment[2]
-
-
-@dataclass(frozen=True)
-class _Sliding:
-    """Shear force = −μ · normal force · unit vector at the heading; the motion has that heading too."""
-
-    friction: float
-    status = "sliding"
-
-    def __call__(self, press, press_by, shear, shear_by, motion, motion_by, heading):
-        ahead = np.array([math.cos(heading[0]), math.sin(heading[0])])
-        aside = np.array([-ahead[1], ahead[0]])
-        law_by = np.zeros((3, 5))
-        law_by[:2, :4] = shear_by + self.friction * np.outer(ahead, press_by)
-        law_by[:2, 4] = self.friction * press * aside
-        law_by[2, :4], law_by[2, 4] = aside @ motion_by, -ahead @ motion
-        return [*(shear + self.friction * press * ahead), aside @ motion], law_by
-
-
-@dataclass(frozen=True)
-class _Held:
-    """No motion along the bar; along the whisker a friction μN(1 − x²), x = force along the bar / μN, against the motion.
-
-    That is inside the cone, the whole of μN where nothing acts along the bar, and (unlike the cone's own circle) smooth at its end.
-    """
-
-    friction: float
-    status = "held"
-
-    def __call__(self, press, press_by, shear, shear_by, motion, motion_by, _):
-        cone = self.friction * press
-        x = shear[0] / cone if cone else 1.0
-        if abs(x) >= 1:
-            return [motion[0], shear[1]], np.stack([motion_by[0], shear_by[1]])
-        way = math.copysign(1.0, motion[1])
-        left_by = (1 + x**2) * self.friction * press_by - 2 * x * shear_by[0]
-        law = [motion[0], shear[1] + way * cone * (1 - x**2)]
-        return law, np.stack([motion_by[0], shear_by[1] + way * left_by])
-
-
-def _lift(planar, planar_by, e, across, by_force):
-    """A vector of the plane of bending in three dimensions, and its derivatives by (F_x, F_y, F_z, arc)."""
-    vector = np.array([planar[0], 0, 0]) + planar[1] * e
-    by = np.outer([1.0, 0, 0], planar_by[0] @ by_force) + np.outer(e, planar_by[1] @ by_force)
-    sideways = planar[1] / across if across else planar_by[1, 1]
-    by[1:, 1:3] += sideways * (np.eye(2) - np.outer(e[1:], e[1:]))
-    return vector, by
-
-
-def _planar_derivatives(e):
-    """(F_x, F across, arc) by (F_x, F_y, F_z, arc)."""
-    return np.array([[1.0, 0, 0, 0], [0, e[1], e[2], 0], [0, 0, 0, 1.0]])
 
 
 def _turn(angle_rad):

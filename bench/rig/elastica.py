@@ -1,8 +1,8 @@
 """The exact planar elastica: a rod clamped at its base, bent by one point force, however large the deflection.
 
-One point force on a straight rod of round section bends it in the plane of clamped tangent and force, so this is all the bending
-that a whisker on a bar needs, in three dimensions too. Chebyshev collocation of the tangent angle and Newton's method; nothing
-marches in time.
+One point force on a straight rod of round section bends it in the plane of clamped tangent and force, so this is all
+the bending that a whisker on a bar needs, in three dimensions too. Chebyshev collocation of the tangent angle and
+Newton's method; nothing marches in time.
 """
 
 from dataclasses import dataclass
@@ -16,10 +16,11 @@ from bench.rig.rod import Rod
 class Bent:
     """An equilibrium: where the loaded point went, how the rod points there, and how both answer to the load.
 
-    In the plane of bending: along the clamped tangent (x) and across it (e). `angle` (n,) is the tangent's at the nodes.
+    In the plane of bending: along the clamped tangent (x) and across it (e). `angle` (n,) is the tangent's at the
+    nodes.
     """
 
-    __slots__ = ("angle", "arc_mm", "end_mm", "end_by", "slope", "slope_by")
+    __slots__ = ("angle", "arc_mm", "end_by", "end_mm", "slope", "slope_by")
 
     def __init__(self, angle, arc_mm, end_mm, end_by, slope, slope_by):
         self.angle, self.arc_mm = angle, arc_mm
@@ -53,8 +54,8 @@ def _integral(k, count, at):
 class Elastica:
     """Solves EI(u) dψ/du = (x_s − x_u) F_e − (e_s − e_u) F_x, ψ(0) = 0, for the tangent angle ψ along 0 ≤ u ≤ s.
 
-    With u = s·x this reads ψ = K g, g = (F_e cos ψ − F_x sin ψ) s²/EI, where K integrates twice (the moment from the load, then
-    the curvature from the base). Beyond the load the rod is straight.
+    With u = s·x this reads ψ = K g, g = (F_e cos ψ − F_x sin ψ) s²/EI, where K integrates twice (the moment from the
+    load, then the curvature from the base). Beyond the load the rod is straight.
     """
 
     def __init__(self, rod: Rod, nodes: int = 0):

@@ -1,4 +1,4 @@
-"""Coulomb friction marched along the motor's path: stick, slip, the saw-tooth between them, the way back, letting go."""
+"""Coulomb friction marched along the motor's way: hold, slide, the saw-tooth between them, the way back, letting go."""
 
 import math
 from collections.abc import Iterable
@@ -30,7 +30,8 @@ class Friction:
 class March:
     """A whisker's states along the motor's way, from first touch.
 
-    Quasi-static: the whisker holds while the force stays in the static cone; when it leaves it, it jumps to the kinetic one.
+    Quasi-static: the whisker holds while the force stays in the static cone; when it leaves it, it jumps to the
+    kinetic one.
     """
 
     def __init__(self, rod: Rod, bar: Bar, friction: Friction, touch: Touch):
@@ -39,15 +40,17 @@ class March:
         self.passed = False
 
     def along(self, path_rad: Iterable[float]) -> tuple[np.ndarray, list[State | None]]:
-        """Motor angles and states met on the way through the angles of `path_rad`; a jump yields two states at one angle.
+        """Motor angles and states met on the way through the angles of `path_rad`; a jump yields two states at one
+        angle.
 
-        None stands for no contact: the motor before the touch angle, or the tip slid off the bar.
-        Raises ArithmeticError where no equilibrium is found.
+        None stands for no contact: the motor before the touch angle, or the tip slid off the bar. Raises
+        ArithmeticError where no equilibrium is found.
         """
-        met = [(motor if state is None else state.motor_rad, state) for motor in path_rad for state in self.go(float(motor))]
-        return np.array([motor for motor, _ in met]), [state for _, state in met]
+        met = [(motor, state) for motor in path_rad for state in self._go(float(motor))]
+        angles = [motor if state is None else state.motor_rad for motor, state in met]
+        return np.array(angles), [state for _, state in met]
 
-    def go(self, motor_rad) -> list[State | None]:
+    def _go(self, motor_rad) -> list[State | None]:
         """Step to a motor angle; the states met on the way, the last one at that angle."""
         if motor_rad <= self.touch.motor_rad + _NO_PUSH_RAD or self.passed:
             self.state, self.before = self.contact.touching(self.touch), None
@@ -91,14 +94,16 @@ class March:
         return self._tooth(motor_rad, held, tip)
 
     def _slide_on(self, motor_rad, tip):
-        """Slide as before if that can be; else (first touch, turning back) look from where the contact would be held."""
-        if self.state.force_hub_N.any():
-            try:
-                return self.contact.slide(motor_rad, self.state, self._guess(motor_rad), self.state.heading_rad,
-                                          self.friction.kinetic, tip)
-            except (ArithmeticError, np.linalg.LinAlgError):
-                pass
-        return self._slide(motor_rad, self.state, self._hold(motor_rad, tip), tip)
+        """Slide as before if that can be; at first touch look from where the contact would be held, on turning back
+        ease in.
+        """
+        if not self.state.force_hub_N.any():
+            return self._slide(motor_rad, self.state, self._hold(motor_rad, tip), tip)
+        guess, kinetic = self._guess(motor_rad), self.friction.kinetic
+        try:
+            return self.contact.slide(motor_rad, self.state, guess, self.state.heading_rad, kinetic, tip)
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return self.contact.ease(motor_rad, self.state, guess, kinetic, tip)
 
     def _tooth(self, motor_rad, held, tip):
         """Hold until the static cone is left, jump to the kinetic one, go on from there."""
@@ -121,7 +126,7 @@ class March:
             between = self._between(held, at)
             edge = self.contact.hold(at, self.state, between, self.friction.static, tip)
             f = edge.share - self.friction.static
-            if abs(f) < 1e-6 * self.friction.static or abs(high - low) < 1e-9:
+            if abs(f) < 1e-4 * self.friction.static or abs(high - low) < 1e-9:
                 break
             if f * f_high < 0:
                 low, f_low = high, f_high
@@ -144,7 +149,11 @@ class March:
         along = np.clip(-shear / (self.friction.kinetic * press or 1e-300), -1, 1)
         way = math.copysign(1.0, held.motion_aside_mm)
         heading = math.atan2(way * math.sqrt(1 - along**2), along)
-        return self.contact.slide(motor_rad, old, self._onto_cone(held), heading, self.friction.kinetic, tip)
+        guess = self._onto_cone(held)
+        try:
+            return self.contact.slide(motor_rad, old, guess, heading, self.friction.kinetic, tip)
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return self.contact.ease(motor_rad, old, guess, self.friction.kinetic, tip)
 
     def _guess(self, motor_rad):
         """What the last two states foretell; at first, the small-angle force of a whisker held where it is."""

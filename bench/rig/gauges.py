@@ -32,7 +32,9 @@ class Gauges:
         return np.arange(len(self.times_s(end_s)) * OVERSAMPLED) / (self.rate_Hz * OVERSAMPLED)
 
     def volts(self, moments_Nmm: np.ndarray, roll_rad: float, rng: np.random.Generator) -> np.ndarray:
-        """(n, 2) as converted, from the hub's moments at `fine_times_s`, the follicle turned about the whisker by `roll_rad`."""
+        """(n, 2) as converted, from the hub's moments at `fine_times_s`, the follicle turned about the whisker by
+        `roll_rad`.
+        """
         cos, sin = np.cos(roll_rad), np.sin(roll_rad)
         own = moments_Nmm @ np.array([[cos, -sin], [sin, cos]])
         volts = self._filtered(own @ np.linalg.inv(self.matrix_Nmm_per_V).T)[::OVERSAMPLED]

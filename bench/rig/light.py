@@ -20,8 +20,9 @@ class Light:
 
 @dataclass(frozen=True)
 class Material:
-    """`matt` and `shiny` reflectances; `gloss`: the highlight's exponent; `rim`: how soon a round bar darkens to its edges,
-    as polished metal does that mirrors dark surroundings there (0: not at all)."""
+    """`matt` and `shiny` reflectances; `gloss`: the highlight's exponent; `rim`: how soon a round bar darkens to its
+    edges, as polished metal does that mirrors dark surroundings there (0: not at all).
+    """
 
     matt: float
     shiny: float = 0.0
@@ -32,8 +33,9 @@ class Material:
 def round_shade(light: Light, material: Material, across, facing, aside, mirror):
     """Brightness on a round bar at `across` (−1…1 from silhouette to silhouette).
 
-    `facing`, `aside`: the lamp's components towards the camera and across the bar; `mirror`: the same two (stacked) of the direction
-    half-way between lamp and camera, and its length without the part along the bar. All broadcast against `across`.
+    `facing`, `aside`: the lamp's components towards the camera and across the bar; `mirror`: the same two (stacked)
+    of the direction half-way between lamp and camera, and its length without the part along the bar. All broadcast
+    against `across`.
     """
     up = np.sqrt(np.maximum(1 - across**2, 0))
     lit = np.maximum(up * facing + across * aside, 0)

@@ -26,12 +26,13 @@ def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
         "whisker": {"shape": w.shape, "length_mm": w.length_mm, "diameter_mm": w.diameter_mm,
                     "youngs_modulus_GPa": w.youngs_modulus_GPa},
         "bar": {"diameter_mm": protocol.bar_diameter_mm},
-        "board": {"squares": list(b.squares), "square_mm": b.square_mm, "marker_mm": b.marker_mm, "dictionary": b.dictionary,
-                  "legacy": b.legacy, "inverted": b.inverted},
+        "board": {"squares": list(b.squares), "square_mm": b.square_mm, "marker_mm": b.marker_mm,
+                  "dictionary": b.dictionary, "legacy": b.legacy, "inverted": b.inverted},
         "rig": rig,
         **({"cameras": cameras} if cameras else {}),
-        **({"gauges": {"offset_V": list(g.offset_V), "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V]}} if g.known else {}),
     }
+    if g.known:
+        session["gauges"] = {"offset_V": list(g.offset_V), "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V]}
     return tomli_w.dumps(session)
 
 
@@ -76,28 +77,25 @@ def frames_csv(recording: Recording, clock_offset_s: float) -> str:
 
 
 def signals_csv(recording: Recording) -> str:
-    lines = ["%.6f,%.5f,%.6f,%.6f" % tuple(row) for row in recording.signals]
+    lines = [f"{time:.6f},{motor:.5f},{y:.6f},{z:.6f}" for time, motor, y, z in recording.signals.tolist()]
     return "\n".join(["time_s,motor_deg,y_V,z_V", *lines]) + "\n"
 
 
 def truth_csv(recording: Recording) -> str:
+    """A row a frame. A frame at the angle of a jump shows what came after it."""
     frames = recording.frames
-    rows = zip(frames.time_s, frames.motor_rad, frames.whisk, recording.states)
-    return "\n".join([_TRUTH, *(_truth_row(i, recording.whisks[w], t, m, s) for i, (t, m, w, s) in enumerate(rows))]) + "\n"
+    rows = enumerate(zip(frames.time_s, frames.motor_rad, frames.whisk))
+    return "\n".join([_TRUTH, *(_truth_row(i, recording.whisks[w], t, m) for i, (t, m, w) in rows)]) + "\n"
 
 
-def _truth_row(frame, whisk, time, motor, state):
-    place, slip, arc = np.full(3, np.nan), np.nan, np.nan
-    if state is not None:
-        place, slip, arc = state.point_mm, float(whisk.slip_mm(state.point_mm)), state.arc_mm
-    moments = whisk.forward.moment_Nmm[_row(whisk, motor)] if state is not None else (0.0, 0.0)
-    values = [time, math.degrees(motor)], [*place, slip, arc, *moments]
-    first, rest = (",".join(f"{v:.6f}" for v in part) for part in values)
+def _truth_row(frame, whisk, time_s, motor_rad):
+    state, row = whisk.state_at(motor_rad), whisk.row_at(motor_rad)
+    if state is None:
+        values = [*[math.nan] * 5, 0.0, 0.0]
+    else:
+        values = [*state.point_mm, float(whisk.slip_mm(state.point_mm)), state.arc_mm, *whisk.forward.moment_Nmm[row]]
+    first, rest = (",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values))
     return f"{frame},{first},{int(state is not None)},{rest}"
-
-
-def _row(whisk, motor):
-    return int(np.searchsorted(whisk.forward.motor_rad, motor + 1e-9, side="right") - 1)
 
 
 def truth_toml(recording: Recording) -> str:
@@ -112,11 +110,18 @@ def truth_toml(recording: Recording) -> str:
 
 def _whisk_truth(whisk):
     beta, psi = whisk.bar.slope(whisk.touch.motor_rad)
-    slip = whisk.slip_mm(whisk.forward.point_mm)
-    return {"touch_deg": math.degrees(whisk.touch.motor_rad), "d_x_mm": whisk.touch.d_x_mm, "beta_deg": math.degrees(beta),
-            "psi_deg": math.degrees(psi), "slip_at_3deg_mm": whisk.slip_at(math.radians(3)),
-            "slip_jump_mm": float(np.nanmax(np.abs(np.diff(slip)))),
-            "mu_static": whisk.friction.static, "mu_kinetic": whisk.friction.kinetic}
+    return {
+        "touch_deg": math.degrees(whisk.touch.motor_rad), "d_x_mm": whisk.touch.d_x_mm,
+        "beta_deg": math.degrees(beta), "psi_deg": math.degrees(psi),
+        "slip_at_3deg_mm": float(whisk.slip_at(math.radians(3))), "slip_jump_mm": _largest_jump_mm(whisk),
+        "mu_static": whisk.friction.static, "mu_kinetic": whisk.friction.kinetic,
+    }
+
+
+def _largest_jump_mm(whisk):
+    """The largest change of slip between instants 0.04° apart, so that smooth slip counts for little."""
+    theta = np.arange(0, whisk.forward.motor_rad[-1] - whisk.touch.motor_rad, math.radians(0.04))
+    return float(np.nanmax(np.abs(np.diff(whisk.slip_at(theta))), initial=0.0))
 
 
 def write(path: Path, text: str) -> None:

@@ -1,4 +1,6 @@
-"""Flat printed rectangles: the board, markers, faces of boxes. Every edge of the print is integrated, none is sampled."""
+"""Flat printed rectangles: the board, markers, faces of boxes. Every edge of the print is integrated, none is
+sampled.
+"""
 
 from dataclasses import dataclass
 
@@ -29,14 +31,15 @@ class Print:
 
     def framed(self, margin_mm: float, reflectance: float) -> "Print":
         """With a margin of one tone all round."""
-        def grown(edges):
-            return np.concatenate([[edges[0] - margin_mm], edges, [edges[-1] + margin_mm]])
-        return Print(np.pad(self.reflectance, 1, constant_values=reflectance), grown(self.x_mm), grown(self.y_mm))
+        x, y = (np.concatenate([[e[0] - margin_mm], e, [e[-1] + margin_mm]]) for e in (self.x_mm, self.y_mm))
+        return Print(np.pad(self.reflectance, 1, constant_values=reflectance), x, y)
 
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """A print in space. `pose` (3, 4), T_rig_plate: its x, y along the print, its z away from the viewer of the print."""
+    """A print in space. `pose` (3, 4), T_rig_plate: its x, y along the print, its z away from the viewer of the
+    print.
+    """
 
     print: Print
     pose: np.ndarray
@@ -80,7 +83,9 @@ def _on_plane(camera, pose, window):
 
 
 def _printed(print_, x, y, soft_x, soft_y, correlation):
-    """Coverage and mean reflectance under a Gaussian of these widths: the cell of each sample and its eight neighbours."""
+    """Coverage and mean reflectance under a Gaussian of these widths: the cell of each sample and its eight
+    neighbours.
+    """
     column, weights_x, corner_x, near_x = _cells(print_.x_mm, x, soft_x)
     row, weights_y, corner_y, near_y = _cells(print_.y_mm, y, soft_y)
     table = np.pad(print_.reflectance, 2, mode="edge").astype(np.float32)
@@ -101,7 +106,9 @@ def _printed(print_, x, y, soft_x, soft_y, correlation):
 
 
 def _cells(edges, x, soft):
-    """Cell of each sample, weights of the cell before, itself and the one after, which of its edges is nearer, and how far."""
+    """Cell of each sample, weights of the cell before, itself and the one after, which of its edges is nearer, and
+    how far.
+    """
     edges = edges.astype(np.float32)
     cell = np.clip(np.searchsorted(edges, x.ravel()).reshape(x.shape) - 1, 0, len(edges) - 2)
     low, high = (x - edges[cell]) / soft, (edges[cell + 1] - x) / soft

@@ -1,4 +1,6 @@
-"""A rig and what is to be recorded on it, as a TOML file describes them. Every key has a default; unknown keys are refused."""
+"""A rig and what is to be recorded on it, as a TOML file describes them. Every key has a default; unknown keys are
+refused.
+"""
 
 import hashlib
 import itertools
@@ -95,6 +97,22 @@ class PicturesTable(Table):
     step_deg: Positive = 0.5
     rate_Hz: Positive | None = None  # instead of step_deg
     clock_offset_s: float = 0.0  # frames.csv runs behind the signals by this
+
+    @property
+    def moving(self) -> str:
+        """Kind of a trial's frames: PNG where JPEG and film cannot hold the bits."""
+        return "png" if self.bits > 8 else self.format
+
+    @property
+    def still(self) -> str:
+        """Kind of single pictures."""
+        return "png" if self.moving == "mkv" else self.moving
+
+    def frame_angles_deg(self, speed_deg_s: float) -> list[float]:
+        """Pushing angles of a whisk's frames."""
+        step = speed_deg_s / self.rate_Hz if self.rate_Hz else self.step_deg
+        count = int((self.before_deg + self.after_deg) / step + 1e-9) + 1
+        return [i * step - self.before_deg for i in range(count)]
 
 
 class MotorTable(Table):
@@ -250,6 +268,6 @@ def _check_run(protocol, run, path):
     if not 0 < motor.after_deg <= 25 or motor.before_deg < 0.1:
         raise BadInput("motor: before_deg ≥ 0.1 and 0 < after_deg ≤ 25 are needed", file=path)
     if pictures.before_deg > motor.before_deg or pictures.after_deg > motor.after_deg:
-        raise BadInput("pictures are taken within the stroke: their before_deg and after_deg are at most the motor's", file=path)
+        raise BadInput("pictures: before_deg and after_deg are at most the motor's", file=path)
     if math.isclose(sum(abs(x) for x in protocol.light.towards), 0):
         raise BadInput("light: towards is a direction, not zero", file=path)

@@ -10,8 +10,9 @@ import numpy as np
 class Rest:
     """How the unloaded whisker lies off the straight line, in the hub frame, turning with the hub.
 
-    `sag_mm`: tip's drop (towards -z) of a cantilever under its own weight; `set_y_mm`, `set_z_mm`: tip's departure of a wire
-    that keeps a constant curvature from its spool. All small against the length: slopes are taken to first order.
+    `sag_mm`: tip's drop (towards -z) of a cantilever under its own weight; `set_y_mm`, `set_z_mm`: tip's departure of
+    a wire that keeps a constant curvature from its spool. All small against the length: slopes are taken to first
+    order.
     """
 
     length_mm: float

@@ -20,7 +20,7 @@ _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no 
 
 @dataclass(frozen=True)
 class Looks:
-    """Light and surfaces of a scene. `shadow`: how much of the light the whisker's and the bar's shadows take from the board."""
+    """Light and surfaces of a scene, and where its floor and its wall are."""
 
     light: Light
     ink: Ink
@@ -31,8 +31,7 @@ class Looks:
     wall: float
     floor_z_mm: float = -95.0
     wall_y_mm: float = 420.0
-    margin_mm: float = 7.5
-    shadow: float = 0.0
+    margin_mm: float = 7.5  # of white paper round the board's squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,8 @@ class Box:
         inward = -end * self.axes[:, axis]
         first, second = self.axes[:, i], np.cross(inward, self.axes[:, i])
         low, high = self.low_mm, self.high_mm
-        corner = self.axes[:, axis] * level + first * low[i] + self.axes[:, j] * (low[j] if second @ self.axes[:, j] > 0 else high[j])
+        from_j = low[j] if second @ self.axes[:, j] > 0 else high[j]
+        corner = self.axes[:, axis] * level + first * low[i] + self.axes[:, j] * from_j
         pose = np.column_stack([first, second, inward, self.origin_mm + corner])
         return Plate(Print.plain(high[i] - low[i], high[j] - low[j], self.reflectance), pose)
 
@@ -79,7 +79,7 @@ class Scene:
 
     def backdrop(self, window: Window) -> np.ndarray:
         """Floor, wall and board: what the rig's board picture shows."""
-        paint = _floor_and_wall(window, self.looks)
+        paint = floor_and_wall(window, self.looks)
         self.print_board(window, paint, self.T_rig_board)
         return paint
 
@@ -135,7 +135,7 @@ class Scene:
         return np.concatenate([camera.project(corners), *whisker.silhouette(camera)])
 
 
-def _floor_and_wall(window, looks):
+def floor_and_wall(window, looks):
     """A grey floor that darkens away from the rig, and the wall behind it."""
     coarse = Window(window.camera, window.left, window.top, window.right, window.bottom, 1, 1.0)
     x, y = coarse.rays()

@@ -7,7 +7,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Sensor:
-    """Noise in grey levels of an 8-bit scale: `read` of every pixel, `shot` of one level, `grain` in parts of the level.
+    """Noise in grey levels of an 8-bit scale: `read` of every pixel, `shot` of one level, `grain` in parts of the
+    level.
 
     `vignetting`: light lost in the picture's corner; `bits` 8 or 12.
     """

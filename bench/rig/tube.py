@@ -1,4 +1,4 @@
-"""Round things along a curve: the whisker, the bar, posts. Edges are the exact silhouettes, integrated over the blur."""
+"""Round things along a curve: whisker, bar, posts. Their edges are the exact silhouettes, integrated over the blur."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,9 @@ from bench.rig.window import Window
 
 @dataclass(frozen=True, eq=False)
 class Tube:
-    """Points (n, 3) of the axis in the rig frame, close enough to be joined by straight lines; radii (n,); a material."""
+    """Points (n, 3) of the axis in the rig frame, close enough to be joined by straight lines; radii (n,); a
+    material.
+    """
 
     axis_mm: np.ndarray
     radius_mm: np.ndarray
@@ -37,7 +39,9 @@ class Tube:
         return tangent / np.linalg.norm(tangent, axis=1)[:, None]
 
     def _seen_from(self, centre):
-        """Unit vectors towards the camera and across (both normal to the axis), and the distance of the camera's axis line."""
+        """Unit vectors towards the camera and across (both normal to the axis), and the distance of the camera's axis
+        line.
+        """
         tangent, towards = self._tangent(), centre - self.axis_mm
         square = towards - (towards * tangent).sum(1)[:, None] * tangent
         near = np.linalg.norm(square, axis=1)

@@ -1,81 +1,89 @@
-"""The whisker's first bending mode: free, then propped at the bar; rung by the motor's ramps, by touch and by stick–slip.
+"""The whisker's first bending mode: free, then propped at the bar; rung by the motor's ramps, by touch and by
+stick–slip.
 
-Small and linear on top of the quasi-static whisk. What rings is the moment at the base; the pictures' whisker does not shake.
+Small and linear on top of the quasi-static whisk. What rings is the moment at the base; the pictures' whisker does
+not shake.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import Polynomial
+from numpy.polynomial.legendre import Legendre, leggauss
 from scipy.linalg import eigh, null_space
 
 from bench.rig.rod import Rod
 
-_TERMS = 14
+# Each vanishes at the base with its slope; a unit of length is the whisker's.
+_CLAMPED = [Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1]) for k in range(14)]
+_BENT = [shape.deriv(2) for shape in _CLAMPED]
 
 
 @dataclass(frozen=True)
 class Mode:
-    """A first mode. `moment_Nmm`: moment on the base for a unit of the mode (the sign of a push's moment). `swing`: how much of
-    the mode a unit of angular acceleration of the hub drives (1/s² per rad/s²); `strike`: how fast the mode moves after a unit of
-    angular speed was stopped at the prop (1/s per rad/s, zero for the free mode)."""
+    """A first mode, of unit modal mass (kg m², so that its coordinate is √kg·m).
+
+    `moment_Nmm`: moment on the base for a unit of the mode, of the sign of a push's. `swing`: modal acceleration for a
+    unit of the hub's angular acceleration. `strike`: modal speed for a unit of angular speed that the prop stopped.
+    `push_Nmm`: the quasi-static moment for a radian pushed head-on against the prop. The last two are zero without one.
+    """
 
     frequency_rad_s: float
     moment_Nmm: float
     swing: float
-    strike: float
+    strike: float = 0.0
+    push_Nmm: float = 0.0
 
     @classmethod
     def of(cls, rod: Rod, prop_mm: float | None = None) -> "Mode":
         """Rayleigh–Ritz with polynomials that are clamped at the base, and zero at the prop if there is one."""
         length = rod.length_mm * 1e-3
-        x, weights = legendre.leggauss(64)
-        x, weights = 0.5 * length * (x + 1), 0.5 * length * weights
-        width = rod.width(1e3 * x)
-        stiff, mass = 1e-6 * rod.rigidity_Nmm2 * width**4, rod.mass_kg_m * width**2
-        shape, bend = _clamped(x / length), _clamped(x / length, 2) / length**2
-        free = np.eye(_TERMS) if prop_mm is None else null_space(_clamped(np.array([1e-3 * prop_mm / length])))
-        k = free.T @ (bend.T * (weights * stiff)) @ bend @ free
-        m = free.T @ (shape.T * (weights * mass)) @ shape @ free
-        squares, modes = eigh(k, m, subset_by_index=[0, 0])
-        mode = free @ modes[:, 0]  # of unit modal mass
-        moment = -1e-6 * rod.rigidity_Nmm2 * float(_clamped(np.zeros(1), 2)[0] @ mode) / length**2 * 1e3
-        values = weights * mass * (shape @ mode)
-        strike = 0.0 if prop_mm is None else float(values @ _pushed(rod, 1e3 * x, prop_mm)) * 1e-3
-        return cls(math.sqrt(squares[0]), moment, -float(values @ x), strike)
+        at, weights = leggauss(64)
+        at, weights = 0.5 * (at + 1), 0.5 * length * weights
+        width = rod.width(at * rod.length_mm)
+        mass, stiff = weights * rod.mass_kg_m * width**2, weights * 1e-6 * rod.rigidity_Nmm2 * width**4
+        shape, bend = _values(_CLAMPED, at), _values(_BENT, at) / length**2
+        free = np.eye(len(_CLAMPED)) if prop_mm is None else null_space(_values(_CLAMPED, [prop_mm / rod.length_mm]))
+        squares, modes = eigh(free.T @ (bend.T * stiff) @ bend @ free, free.T @ (shape.T * mass) @ shape @ free,
+                              subset_by_index=[0, 0])
+        mode = free @ modes[:, 0]
+        at_base = float(_values(_BENT, [0.0])[0] @ mode) / length**2
+        moment, moved = -1e-3 * rod.rigidity_Nmm2 * at_base, mass * (shape @ mode)
+        frequency, swing = math.sqrt(squares[0]), -float(moved @ at) * length
+        if prop_mm is None:
+            return cls(frequency, moment, swing)
+        lag_mm, push = _pushed(rod, at * rod.length_mm, prop_mm)
+        return cls(frequency, moment, swing, 1e-3 * float(moved @ lag_mm), push)
 
 
-def _clamped(u, derivative=0):
-    """Polynomials u²·(Legendre) on 0…1 (n, terms), or their second derivatives."""
-    basis = np.stack([np.polynomial.Polynomial([0, 0, 1])(u) * legendre.legval(2 * u - 1, e) for e in np.eye(_TERMS)], -1)
-    if not derivative:
-        return basis
-    columns = []
-    for e in np.eye(_TERMS):
-        poly = legendre.Legendre(e, domain=[0, 1]).convert(kind=np.polynomial.Polynomial) * np.polynomial.Polynomial([0, 0, 1])
-        columns.append(poly.deriv(2)(u))
-    return np.stack(columns, -1)
+def _values(shapes, at):
+    return np.stack([shape(np.asarray(at)) for shape in shapes], -1)
 
 
-def _pushed(rod, x_mm, prop_mm):
-    """Deflection (mm) of the rod held at the prop while the hub turns on by 1 rad: what it lags behind the straight line."""
-    grid = np.linspace(0, prop_mm, 401)
+def _pushed(rod, at_mm, prop_mm):
+    """How far (mm) the rod lags behind the straight line when the hub turns a radian against the prop, and the
+    moment.
+    """
+    grid = np.linspace(0, prop_mm, 801)
     curvature = (prop_mm - grid) / np.maximum(rod.width(grid), 1e-3) ** 4
-    step = grid[1]
-    slope = np.concatenate([[0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * step)])
-    lag = np.concatenate([[0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step)])
-    inside = np.interp(x_mm, grid, lag)
-    beyond = lag[-1] + slope[-1] * (x_mm - prop_mm)
-    return np.where(x_mm <= prop_mm, inside, beyond) * prop_mm / lag[-1]
+    slope = _integral(curvature, grid[1])
+    lag = _integral(slope, grid[1])
+    beyond = lag[-1] + slope[-1] * (at_mm - prop_mm)
+    whole = np.where(at_mm <= prop_mm, np.interp(at_mm, grid, lag), beyond)
+    return whole * prop_mm / lag[-1], rod.rigidity_Nmm2 * prop_mm**2 / lag[-1]
 
 
-def ring(times_s, start_s, end_s, frequency_rad_s, damping, amplitude=0.0, speed=0.0) -> np.ndarray:
+def _integral(values, step):
+    return np.concatenate([[0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
+
+
+def ring(times_s, start_s, end_s, frequency_rad_s, damping, *, value=0.0, rate=0.0) -> np.ndarray:
     """A damped oscillation from `start_s` with a first value and a first rate; zero before it and after `end_s`."""
     t = np.asarray(times_s) - start_s
     alive = (t >= 0) & (np.asarray(times_s) < end_s)
     t = np.where(alive, t, 0)
     damped = frequency_rad_s * math.sqrt(1 - damping**2)
-    rate = (speed + damping * frequency_rad_s * amplitude) / damped
-    wave = amplitude * np.cos(damped * t) + rate * np.sin(damped * t)
+    swing = (rate + damping * frequency_rad_s * value) / damped
+    wave = value * np.cos(damped * t) + swing * np.sin(damped * t)
     return np.where(alive, np.exp(-damping * frequency_rad_s * t) * wave, 0.0)

@@ -5,35 +5,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rig.bar import Bar, Touch, turned, unloaded
-from bench.rig.contact import Contact, State, moments_Nmm
+from bench.rig.contact import State, moments_Nmm
+from bench.rig.elastica import Elastica
 from bench.rig.friction import Friction, March
 from bench.rig.rod import Rod
 
 
 @dataclass(frozen=True, eq=False)
 class Instants:
-    """States in the order of the motor's way; a jump shows as two rows at one angle. Free instants have NaN contacts."""
+    """States in the order of the motor's way; a jump shows as two rows at one angle. Free ones have NaN contacts."""
 
     motor_rad: np.ndarray
-    touching: np.ndarray
-    point_mm: np.ndarray
+    point_mm: np.ndarray  # (n, 3)
     arc_mm: np.ndarray
     moment_Nmm: np.ndarray  # (n, 2): m_y, m_z
     states: tuple[State | None, ...]
 
     @classmethod
     def of(cls, path_rad, states) -> "Instants":
-        nothing = np.full(3, np.nan)
-        return cls(np.asarray(path_rad), np.array([s is not None for s in states]),
-                   np.array([nothing if s is None else s.point_mm for s in states]).reshape(-1, 3),
-                   np.array([np.nan if s is None else s.arc_mm for s in states]),
-                   np.array([(0.0, 0.0) if s is None else moments_Nmm(s) for s in states]).reshape(-1, 2), tuple(states))
+        free = np.full(3, np.nan), np.nan, (0.0, 0.0)
+        rows = [free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s)) for s in states]
+        points, arcs, moments = (np.array(column) for column in zip(*rows))
+        return cls(np.asarray(path_rad), points, arcs, moments, tuple(states))
 
     def moments_at(self, motor_rad) -> np.ndarray:
-        """(m_y, m_z) at motor angles, straight lines between instants. Angles of a back stroke fall."""
+        """(m_y, m_z) at motor angles, straight lines between instants, zero before touch."""
         way = -1 if self.motor_rad[-1] < self.motor_rad[0] else 1
-        return np.stack([np.interp(way * np.asarray(motor_rad), way * self.motor_rad, m, left=0.0, right=0.0)
-                         for m in self.moment_Nmm.T], -1)
+        at, knots = way * np.asarray(motor_rad), way * self.motor_rad
+        return np.stack([np.interp(at, knots, m) for m in self.moment_Nmm.T], -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,64 +47,64 @@ class Whisk:
     back: Instants | None
 
     @classmethod
-    def run(cls, rod: Rod, bar: Bar, friction: Friction, touch: Touch, end_rad, *, stops_rad=(), back=False, step_rad):
-        """March from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad`."""
-        grid = np.arange(touch.motor_rad + step_rad, end_rad, step_rad)
-        stops = np.asarray(stops_rad, float)
-        up = np.unique(np.concatenate([grid, stops[(stops > touch.motor_rad) & (stops < end_rad)], [end_rad]]))
-        up = up[np.append(np.diff(up) > 1e-9, True)]
+    def run(cls, rod: Rod, bar: Bar, friction: Friction, touch: Touch, end_rad, *, step_rad, stops_rad=(), back=False):
+        """March from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad` on the way there."""
         march = March(rod, bar, friction, touch)
+        up = _stations(touch.motor_rad, end_rad, step_rad, stops_rad)
         start = march.state
         path, states = march.along(up)
         forward = Instants.of(np.append(touch.motor_rad, path), [start, *states])
         if not back:
             return cls(rod, bar, touch, friction, forward, None)
-        turn = (path[-1], states[-1])
-        path, states = march.along(np.append(up[-2::-1], touch.motor_rad))
-        return cls(rod, bar, touch, friction, forward, Instants.of(np.append(turn[0], path), [turn[1], *states]))
+        down, returned = march.along(np.append(up[-2::-1], touch.motor_rad))
+        return cls(rod, bar, touch, friction, forward, Instants.of(np.append(path[-1], down), [states[-1], *returned]))
 
     def slip_mm(self, point_mm) -> np.ndarray:
         """Along the bar since first touch."""
         return (np.asarray(point_mm) - self.touch.point_mm) @ self.bar.axis
 
+    def row_at(self, motor_rad: float) -> int:
+        """Row of the forward stroke's last instant at or before a motor angle."""
+        return int(np.searchsorted(self.forward.motor_rad, motor_rad + 1e-9, side="right")) - 1
+
     def state_at(self, motor_rad: float) -> State | None:
-        """The state of the forward stroke at one of its stops (after a jump there, if any); None before touch."""
-        if motor_rad <= self.touch.motor_rad:
-            return None
-        at = np.searchsorted(self.forward.motor_rad, motor_rad + 1e-9, side="right") - 1
-        return self.forward.states[at]
+        """The state at one of the forward stroke's stops (after a jump there, if any); None before touch."""
+        row = self.row_at(motor_rad)
+        return self.forward.states[row] if row > 0 else None
 
     def state_between(self, motor_rad: float) -> State | None:
-        """The state of the forward stroke at any angle: force and arc on straight lines between instants; None before touch."""
-        if motor_rad <= self.touch.motor_rad:
+        """The forward stroke's state at any angle: force and arc on straight lines between instants."""
+        row = self.row_at(motor_rad)
+        if row < 0 or motor_rad <= self.touch.motor_rad:
             return None
-        angles, states = self.forward.motor_rad, self.forward.states
-        at = int(np.clip(np.searchsorted(angles, motor_rad), 1, len(angles) - 1))
-        before, after = states[at - 1], states[at]
-        if before is None or after is None:
+        row = min(row, len(self.forward.states) - 2)
+        (before, after), angles = self.forward.states[row:row + 2], self.forward.motor_rad[row:row + 2]
+        if before is None or after is None or angles[0] == angles[1]:
             return after
-        part = (motor_rad - angles[at - 1]) / (angles[at] - angles[at - 1])
-        force, arc = ((1 - part) * a + part * b for a, b in ((before.force_hub_N, after.force_hub_N), (before.arc_mm, after.arc_mm)))
-        return replace(after, motor_rad=motor_rad, force_hub_N=force, arc_mm=float(arc))
+        part = (motor_rad - angles[0]) / (angles[1] - angles[0])
+        force = (1 - part) * before.force_hub_N + part * after.force_hub_N
+        arc = (1 - part) * before.arc_mm + part * after.arc_mm
+        return replace(after, motor_rad=motor_rad, force_hub_N=force, arc_mm=arc)
 
-    def slip_at(self, theta_rad: float) -> float:
-        """Slip at a pushing angle, NaN where the stroke does not reach it."""
-        motor = self.touch.motor_rad + theta_rad
-        if motor > self.forward.motor_rad[-1]:
-            return float("nan")
-        return float(np.interp(motor, self.forward.motor_rad, self.slip_mm(self.forward.point_mm)))
+    def slip_at(self, theta_rad) -> np.ndarray:
+        """Slip (mm) on the forward stroke at pushing angles, NaN where it does not reach them."""
+        motor = self.touch.motor_rad + np.asarray(theta_rad)
+        return np.interp(motor, self.forward.motor_rad, self.slip_mm(self.forward.point_mm), right=np.nan)
+
+    def centreline_mm(self, motor_rad: float, state: State | None, arc_mm) -> np.ndarray:
+        """Points (n, 3) of the whisker at arc lengths (n,) in the rig frame, bent by the force of `state` or free."""
+        if state is None or not state.force_hub_N.any():
+            return unloaded(self.rod, motor_rad, arc_mm)[0]
+        force, elastica = state.force_hub_N, Elastica(self.rod)
+        across = float(np.hypot(force[1], force[2]))
+        plane = elastica.curve_mm(elastica.solve(force[0], across, state.arc_mm, state.angle), arc_mm)
+        points = np.column_stack([plane[:, 0], plane[:, 1:] * force[1:] / across])
+        return turned(points + self.rod.rest.offset_mm(arc_mm), motor_rad)
 
 
-def centreline_mm(rod: Rod, bar: Bar, motor_rad: float, state: State | None, arc_mm) -> np.ndarray:
-    """Points (n, 3) of the whisker's centreline in the rig frame, bent by `state` or free."""
-    if state is None:
-        return unloaded(rod, motor_rad, arc_mm)[0]
-    contact = Contact(rod, bar)
-    force = state.force_hub_N
-    across = float(np.hypot(force[1], force[2]))
-    bent = contact.elastica.solve(force[0], across, state.arc_mm, state.angle)
-    plane = contact.elastica.curve_mm(bent, arc_mm)
-    e = np.array([0.0, force[1], force[2]]) / across
-    points = plane[:, :1] * np.array([1.0, 0, 0]) + plane[:, 1:] * e
-    return turned(points + rod.rest.offset_mm(arc_mm), motor_rad)
-
+def _stations(start, end, step, stops):
+    """Rising angles after `start` up to `end`: an even grid and the stops, none closer than 1e-9 rad."""
+    stops = np.asarray(stops, float)
+    inner = np.concatenate([np.arange(start + step, end, step), stops[(stops > start + 1e-6) & (stops < end)], [end]])
+    inner = np.unique(inner)
+    return inner[np.append(np.diff(inner) > 1e-9, True)]

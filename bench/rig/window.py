@@ -11,7 +11,9 @@ from bench.rig.camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Pixels first…last (exclusive) of a camera, `fine` samples to a pixel each way; `soft_px` blurs every painted edge."""
+    """Pixels first…last (exclusive) of a camera, `fine` samples to a pixel each way; `soft_px` blurs every painted
+    edge.
+    """
 
     camera: Camera
     left: int
@@ -58,7 +60,9 @@ class Window:
         return self.camera.rays(self.u_px, self.v_px)
 
     def seen(self, paint: np.ndarray, blur_px: float) -> np.ndarray:
-        """The lens' blur (sigma, of which `soft_px` is there already) and the pixels' area applied to painted samples."""
+        """The lens' blur (sigma, of which `soft_px` is there already) and the pixels' area applied to painted
+        samples.
+        """
         left = np.sqrt(max(blur_px**2 - self.soft_px**2, 0.0)) * self.fine
         blurred = cv2.GaussianBlur(paint, (0, 0), left) if left > 0.2 else paint
         rows, columns = self.shape

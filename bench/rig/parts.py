@@ -1,0 +1,125 @@
+"""The parts of a session: each a folder, made by itself from the protocol and a random stream of its own."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from bench.rig import boards, build, papers
+from bench.rig.album import write_frames, write_picture
+from bench.rig.protocol import Protocol
+from bench.rig.recording import Recording
+from bench.rig.scene import HUB_FRONT_MM
+from bench.rig.studio import Moment, Studio
+from bench.rig.tube import Tube
+
+_BOARDS, _RIG, _TRIAL, _POSE = range(4)  # first words of the random streams
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that is needed to make any part of a session."""
+
+    session: Path
+    protocol: Protocol
+    seed: int
+    signals_only: bool
+
+    def stream(self, *words: int) -> np.random.Generator:
+        """A generator of its own for each piece of work, so that the order of the work does not matter."""
+        return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
+
+    def parts(self) -> Iterator["Part"]:
+        """Boards first, then trials."""
+        if not self.signals_only and self.protocol.cameras:
+            yield Part("rig", 0, self.session / "boards" / "rig")
+            for i, camera in enumerate(self.protocol.cameras):
+                yield Part("board", i, self.session / "boards" / camera.name)
+        for i, run in enumerate(self.protocol.runs()):
+            yield Part("trial", i, self.session / "trials" / run.name)
+
+    def papers(self) -> dict[str, str]:
+        """The session's own text files."""
+        stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
+        return {"session.toml": papers.session_toml(self.protocol, stated),
+                "truth.json": papers.truth_json(self.protocol, self.seed)}
+
+    @cached_property
+    def studios(self) -> list[Studio]:
+        """The cameras with their backdrops, kept while a process works on one session."""
+        return _studios(msgspec.json.encode(self.protocol))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A "rig" picture a camera, the "board" views of one camera, or one "trial"; and the folder it fills."""
+
+    kind: str
+    number: int
+    folder: Path
+
+    def write(self, job: Job, folder: Path) -> None:
+        """Fill a folder. Raises ArithmeticError where a trial's whisker cannot go on."""
+        {"rig": _rig_views, "board": _board_views, "trial": _trial}[self.kind](job, self.number, folder)
+
+
+@lru_cache(maxsize=2)
+def _studios(protocol_json):
+    protocol = msgspec.json.decode(protocol_json, type=Protocol)
+    scene, sensor = build.scene(protocol), build.sensor(protocol)
+    return [Studio(camera, scene, sensor) for camera in build.cameras(protocol)]
+
+
+def _rig_views(job, _, folder):
+    for i, studio in enumerate(job.studios):
+        picture = studio.sensor.exposed(studio.rig_brightness(), job.stream(_RIG, i))
+        write_picture(folder / f"{studio.camera.name}.png", picture)
+
+
+def _board_views(job, number, folder):
+    studio, board = job.studios[number], build.board(job.protocol)
+    poses = boards.poses(board, studio.camera, job.protocol.board.views, job.stream(_BOARDS, number))
+    for i, pose in enumerate(poses):
+        picture = studio.sensor.exposed(studio.board_brightness(pose), job.stream(_BOARDS, number, i + 1))
+        write_picture(folder / f"{i:02d}.{job.protocol.pictures.still}", picture)
+
+
+def _trial(job, number, folder):
+    run, pictures = job.protocol.runs()[number], job.protocol.pictures
+    recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
+    texts = {"trial.toml": papers.trial_toml(recording), "signals.csv": papers.signals_csv(recording),
+             "frames.csv": papers.frames_csv(recording, pictures.clock_offset_s),
+             "truth.csv": papers.truth_csv(recording), "truth.toml": papers.truth_toml(recording)}
+    for name, text in texts.items():
+        papers.write(folder / name, text)
+    if job.signals_only or not job.protocol.cameras:
+        return
+    for i, studio in enumerate(job.studios):
+        write_frames(folder, studio.camera.name, pictures.moving, _frames(job, number, i, recording))
+
+
+def _frames(job, trial, camera, recording) -> Iterator[np.ndarray]:
+    studio, frames = job.studios[camera], recording.frames
+    setting = studio.setting(recording.bar, recording.touch.point_mm)
+    for number, (motor, whisk) in enumerate(zip(frames.motor_rad, frames.whisk)):
+        moments = _moments(job.protocol, studio, recording, recording.whisks[whisk], motor)
+        yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
+
+
+def _moments(protocol, studio, recording, whisk, motor):
+    """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
+    pictures, length = protocol.pictures, recording.rod.length_mm
+    swept = np.radians(recording.run.speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0
+    near = np.linalg.norm(studio.camera.centre_mm - recording.touch.point_mm)
+    count = 1 + int(2 * swept * length * studio.camera.matrix[0, 0] / near)
+    angles = motor + swept * ((np.arange(count) + 0.5) / count - 0.5)
+    return [Moment(m, _whisker(whisk, m, studio.scene.looks.wire)) for m in angles.tolist()]
+
+
+def _whisker(whisk, motor, material):
+    arc = np.linspace(HUB_FRONT_MM, whisk.rod.length_mm, 257)
+    points = whisk.centreline_mm(motor, whisk.state_between(motor), arc)
+    return Tube(points, np.maximum(whisk.rod.radius_mm(arc), 0.01), material)
