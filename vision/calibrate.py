@@ -156,7 +156,7 @@ def _alone(name, views, rig_view, board: Board, size_px, with_rig: bool) -> Alon
     check_views(name, usable.values(), board)
     if with_rig:
         check_rig_view(name, None if rig_view is None else without_strays(rig_view, board), board)
-    settled = calibrate_alone(list(usable.values()), board, size_px)
+    settled = calibrate_alone(list(usable.values()), board, size_px, rough=True)
     state = settled.solution.state
     return Alone(state.lens[0], float(settled.error_px[0]), usable, dict(zip(usable, state.T_world_board)))
 
@@ -166,14 +166,15 @@ def _standing(rig_view: Corners, frames: Sequence[Corners], board: Board) -> Cor
     return mean_view(without_strays(rig_view, board), frames)
 
 
-def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int]) -> Settled:
-    """One camera by itself, the world being the camera's frame: the start of the joint adjustment."""
+def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, rough=False) -> Settled:
+    """One camera by itself, the world being the camera's frame. rough: robustly, as a start for more."""
     lens = first_lens(views, board.corners_mm, size_px)
     poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
     state = State(lens[None], np.eye(3, 4)[None], poses)
     known = lens_knowledge(1, len(views))
     known.free[POSE] = False
-    return settle(state, gather([(0, k, view) for k, view in enumerate(views)]), board.corners_mm, known)
+    seen = gather([(0, k, view) for k, view in enumerate(views)])
+    return settle(state, seen, board.corners_mm, known, rough=rough)
 
 
 def lens_knowledge(n_cameras: int, n_views: int) -> Knowledge:
@@ -211,7 +212,7 @@ def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Sett
     warped = solve(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, known, tolerance=1e-6)
     if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []
-    settled = settle(warped.state, layout.seen, board.corners_mm, known, error_px=flat.error_px)
+    settled = settle(warped.state, layout.seen, board.corners_mm, known, error_px=flat.error_px, rounds=1)
     x, y = settled.solution.state.board[1:]
     return settled, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
 

@@ -57,17 +57,18 @@ def settle(
     known: Knowledge,
     *,
     error_px: np.ndarray | None = None,
+    rounds: int | None = None,
     rough: bool = False,
 ) -> Settled:
     """Adjusts robustly, learns each camera's model error, drops outliers once and adjusts by least squares.
 
     Where the state has a trajectory, known.late_sigma_s is where the search for each camera's scatter of instants
-    begins. error_px (C,): model errors to begin with. rough: robustly and once only, to see
-    how large the errors are.
+    begins. error_px (C,): model errors to begin with. rounds: of learning the noise anew, where it is nearly known.
+    rough: robustly and once only, to see how large the errors are.
     """
     moving = state.trajectory is not None
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
-    for _ in range(_ROUNDS_MOVING if moving else _ROUNDS):
+    for _ in range(rounds or (_ROUNDS_MOVING if moving else _ROUNDS)):
         weighed = _weighed(seen, error)
         solution = solve(state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-4)
         _require_finite(solution)
