@@ -17,7 +17,8 @@ TIP = "tip contact: the distance came out as {:.1f} mm, longer than the whisker,
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (2): as if the whisker did not slip sideways."""
     felt = (whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
-    return _estimate(whisk, settings, distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt), alpha_est=0.0, clamp=False)
+    d_x, gradient = distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt)
+    return _estimate(whisk, settings, d_x, gradient, alpha_est=0.0, clamp=False)
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

@@ -5,7 +5,7 @@ import numpy as np
 from vision.truth import Smooth, TruthAtAngle, WhiskTruth
 
 _WINDOW_RAD = np.radians(1.6)
-_JUMP_MM = 0.04  # a slip record that leaves its local fit by more is not smooth
+_JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
 _BEYOND_RAD = np.radians(0.3)
 _NAMES = {"slip": "mm", "longitudinal_slip": "mm", "d_y": "mm", "d_z": "mm", "phi": "rad", "alpha": "rad"}
 

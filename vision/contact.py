@@ -25,9 +25,13 @@ def contact_frame_angles(direction, touch_rad: float) -> tuple[float, float]:
 
 def _from_axis(points, axis: BarAxis) -> np.ndarray:
     """Vectors (…, k, 3) from the axis to points (…, k, 3), at right angles to the axis."""
+    return _across(points - np.asarray(axis.point_mm)[..., None, :], axis)
+
+
+def _across(vectors, axis: BarAxis) -> np.ndarray:
+    """Vectors (…, k, 3) without their part along the axis."""
     a = np.asarray(axis.direction)[..., None, :]
-    away = points - np.asarray(axis.point_mm)[..., None, :]
-    return away - np.sum(away * a, axis=-1, keepdims=True) * a
+    return vectors - np.sum(vectors * a, axis=-1, keepdims=True) * a
 
 
 def closest_arc(curves: Curves, axis: BarAxis, rounds: int = 4) -> np.ndarray:
@@ -37,7 +41,7 @@ def closest_arc(curves: Curves, axis: BarAxis, rounds: int = 4) -> np.ndarray:
     for _ in range(rounds):
         point, tangent = curves.at(arc[..., None])
         away = _from_axis(point, axis)[..., 0, :]
-        across = _from_axis(tangent + np.asarray(axis.point_mm)[..., None, :], axis)[..., 0, :]
+        across = _across(tangent, axis)[..., 0, :]
         step = -np.sum(away * across, axis=-1) / np.maximum(np.sum(across**2, axis=-1), 1e-6)
         arc = np.clip(arc + step, 0.0, curves.arc_mm[-1])
     return arc

@@ -24,7 +24,7 @@ from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import first_touch, frames_by_touch, frames_that_touch
-from vision.trace import View, find_blur, observed, to_points, trace, wire_pieces
+from vision.trace import View, clear_of_bar, find_blur, observed, to_points, trace, wire_pieces
 from vision.truth import TrialTruth, WhiskTruth
 from vision.wire import Curves
 
@@ -35,6 +35,9 @@ _SEARCH_PX = 1.5
 _MEDIAN_OF, _MEAN_OF = 11, 40  # frames: more would not make bar or noise clearer
 _FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
+
+
+_USUAL = VisionSettings()
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class _Rods:
 
 def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_rad, whisks: Sequence[slice],
                   cameras: Cameras, wire: Wire, bar: Bar, background: Mapping[str, np.ndarray | None],
-                  settings: VisionSettings = VisionSettings()) -> TrialTruth:
+                  settings: VisionSettings = _USUAL) -> TrialTruth:
     """Truth of a trial: bar, first touch, contact and slip in each whisk.
 
     frames: per camera the grey pictures by frame index (a missing index is a lost frame); time_s, motor_rad (n,)
@@ -233,8 +236,6 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
                 settings: VisionSettings) -> list[Observed]:
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
-    from vision.trace import clear_of_bar
-
     pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
     if len(pieces) == 0:
         raise Refused(f"camera {view.camera.name} shows no wire clear of the bar")

@@ -14,7 +14,7 @@ from vision.scene import N_PARAMETERS
 from vision.touch import FirstTouch, first_touch
 from vision.wire import Curves, centrelines
 
-_STEP = {**dict.fromkeys((0, 1), 0.0001), **dict.fromkeys((2, 3), 1e-06), **dict.fromkeys(range(BAR, BAR + REST + 1), 0.0001)}
+_STEP = dict.fromkeys((0, 1, *range(BAR, BAR + REST + 1)), 1e-4) | dict.fromkeys((2, 3), 1e-6)
 _BEND_STEP = 1e-5
 GLOBALS = ("touch", "x", "y", "z", "d_x", "beta", "psi")
 PER_FRAME = ("x", "y", "z", "slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha", "arc")

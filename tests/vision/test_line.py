@@ -76,12 +76,12 @@ def test_bias_is_under_two_hundredths_of_a_pixel(rng, name, highlight):
 def test_scatter_is_near_the_bound_and_as_stated(rng):
     """Bound for the centre of a bar (vision notes): sigma_n/A sqrt(sqrt(pi) s / (L (1 - exp(-w²/4s²)))).
 
-    The bound knows everything but the centre; a free shading and background cost at most a fifth. 11 pieces x 40
-    pictures: the scatter's own sigma is 1/sqrt(2 · 440) = 3.4 %, so 3 of these are allowed on top.
+    The bound knows everything but the centre; a free shading and background cost at most a fifth. 10 pieces x 12
+    pictures: the scatter's own sigma is 1/sqrt(2 · 120) = 6.5 %, so two of these are allowed on top.
     """
-    noise, blur, radius, length = 3.0, 0.9, 2.8, 20
+    noise, length = 3.0, 20
     shifts, sigmas = [], []
-    for _ in range(40):
+    for _ in range(12):
         picture, behind, slope = draw_rod(rng, noise=noise, background=SQUARES["printed squares"])
         shift, sigma, slope = located(picture, behind, slope, noise=noise, length=length)
         shifts.append(shift - 0.3 * np.cos(np.arctan(slope)))

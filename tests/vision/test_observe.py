@@ -1,0 +1,97 @@
+"""A trial of the sample session as the cameras show it, against its truth; and the ways in which it has none."""
+
+import csv
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from vision.observe import observe_trial
+from vision.pictures import Frames, read_picture
+from vision.scene import Bar, Camera, Cameras, Wire
+
+WIRE, BAR = Wire("cylinder", 100.0, 1.0), Bar(6.0)
+
+
+def exact_cameras(session):
+    """The session's true cameras: what is tested here is the wire, the bar and the touch."""
+    truth = json.loads((session / "truth.json").read_text())["cameras"].values()
+    return Cameras(tuple(_camera(c) for c in truth))
+
+
+def _camera(c):
+    return Camera(c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]]))
+
+
+class Recorded:
+    """Pictures, times and truth of one trial."""
+
+    def __init__(self, session, trial):
+        folder = session / "trials" / trial
+        self.cameras = exact_cameras(session)
+        self.truth = tomllib.loads((folder / "truth.toml").read_text())
+        rows = list(csv.DictReader((folder / "truth.csv").open()))
+        self.rows = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+        self.frames = {c.name: dict(Frames.open(folder / c.name).read()) for c in self.cameras}
+        self.background = {c.name: read_picture(session / "boards" / "rig" / f"{c.name}.png").astype(float)
+                           for c in self.cameras}
+
+    def see(self, keep=slice(None)):
+        """The truth of the frames in `keep`, renumbered from 0."""
+        chosen = range(len(self.rows["time_s"]))[keep]
+        frames = {name: {k: pictures[f] for k, f in enumerate(chosen) if f in pictures}
+                  for name, pictures in self.frames.items()}
+        motor, time = np.radians(self.rows["motor_deg"][keep]), self.rows["time_s"][keep]
+        (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], self.cameras, WIRE, BAR,
+                                 self.background).whisks
+        return whisk
+
+
+@pytest.fixture(scope="module")
+def steep(steel_sample):
+    return Recorded(steel_sample, "b60_4")
+
+
+def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
+    """The requirement: d_x to 0.03 mm, slip to 0.03 mm RMS, beta to 0.3 degrees, each within three stated sigma."""
+    seen, truth = steep.see(), steep.truth
+    assert seen.status == ""
+    beta, touch = (np.degrees([seen.beta_rad, seen.beta_sigma_rad]), np.degrees([seen.touch_rad, seen.touch_sigma_rad]))
+    for error, sigma, most in ((seen.d_x_mm - truth["d_x_mm"], seen.d_x_sigma_mm, 0.03),
+                               (beta[0] - truth["beta_deg"], beta[1], 0.3),
+                               (touch[0] - truth["touch_deg"], touch[1], 0.05)):
+        assert abs(error) < most and abs(error) < 3 * sigma
+    assert seen.d_x_sigma_mm < 0.02
+    touching = seen.frames.touching
+    error = (seen.frames.slip_mm - steep.rows["slip_mm"])[touching]
+    assert np.sqrt(np.mean(error**2)) < 0.03
+    assert np.all(np.abs(error) < 3 * seen.frames.slip_sigma_mm[touching])
+    at = seen.at(np.radians(3.0))
+    assert at.slip_mm == pytest.approx(truth["slip_at_3deg_mm"], abs=3 * at.slip_sigma_mm)
+    # friction of the scene: atan(0.185339)
+    assert np.degrees(at.alpha_rad) == pytest.approx(10.5, abs=3 * np.degrees(at.alpha_sigma_rad))
+
+
+def test_a_stroke_that_ends_before_the_bar_never_touches(steep):
+    seen = steep.see(slice(0, 4))
+    assert np.isnan(seen.d_x_mm) and seen.status == "the whisker never touches"
+
+
+def test_a_stroke_that_begins_on_the_bar_has_no_truth(steep):
+    seen = steep.see(slice(5, None))
+    assert np.isnan(seen.d_x_mm) and "touches from the start" in seen.status
+
+
+def test_three_frames_are_too_few(steep):
+    seen = steep.see(slice(0, 3))
+    assert np.isnan(seen.d_x_mm) and "4 are needed" in seen.status
+
+
+def test_without_a_bar_in_view_the_trial_says_so(steep):
+    background = {name: pictures[0].astype(float) for name, pictures in steep.frames.items()}
+    motor = np.radians(steep.rows["motor_deg"][:4])
+    frames = {name: dict.fromkeys(range(4), pictures[0]) for name, pictures in steep.frames.items()}
+    (whisk,) = observe_trial(frames, steep.rows["time_s"][:4], motor, [slice(0, 4)], steep.cameras, WIRE, BAR,
+                             background).whisks
+    assert np.isnan(whisk.d_x_mm) and "no bar of diameter 6 mm is seen" in whisk.status
