@@ -17,6 +17,6 @@ class VisionSettings:
     bar_piece_px: int = 12
     wire_margin_px: int = 7
     bar_margin_px: int = 12
-    rounds: int = 2
+    rounds: int = 1
     clock_sigma_s: float = 0.0
     bar_reach_mm: float = 36.0
