@@ -85,13 +85,11 @@ class Contact:
         return state
 
     def foot_side(self, state: State) -> float:
-        """Newton's method with Deuflhard's monotonicity test: a step is halved until the next one would be smaller."""
+        """Positive where the bar's nearest point lies behind the contact along the whisker, negative ahead of it."""
         return float((state.point_mm - self.bar.foot_mm(state.point_mm)) @ state.tangent)
 
     def _solve(self, motor_rad, old, unknowns, law, tip):
-        """Newton's method with Deuflhard's monotonicity test: a step that would not bring the next one down is
-        halved.
-        """
+        """Newton's method with Deuflhard's monotonicity test: a step is halved until the next one would be smaller."""
         problem = _Problem(self, _turn(motor_rad), old, law, tip)
         here = problem.at(unknowns, old.angle)
         for _ in range(40):

@@ -160,6 +160,8 @@ class TrialTable(Table):
     friction: Zero = 0.185339  # kinetic
     static_friction: Zero | None = None  # by default the kinetic one
     bar_diameter_mm: Positive | None = None
+    before_deg: Positive | None = None  # the stroke's, where it is not the motor's
+    after_deg: Positive | None = None
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     purpose: Literal["measure", "gauge"] = "measure"
@@ -190,7 +192,7 @@ class Protocol(Table, kw_only=True):
 
     def runs(self) -> list["Run"]:
         """The trials one by one."""
-        runs = [run for table in self.trials for run in _runs(table)]
+        runs = [run for table in self.trials for run in _runs(table, self.motor)]
         return [msgspec.structs.replace(run, name=name) for run, name in zip(runs, _distinct([r.name for r in runs]))]
 
     def fingerprint(self) -> str:
@@ -199,17 +201,19 @@ class Protocol(Table, kw_only=True):
 
 
 class Run(msgspec.Struct, frozen=True):
-    """One trial."""
+    """One trial. The motor goes from `before_deg` before touch to `after_deg` after it."""
 
     name: str
     beta_deg: float
     psi_deg: float
     d_x_mm: float
     speed_deg_s: float
+    before_deg: float
+    after_deg: float
     table: TrialTable
 
 
-def _runs(table):
+def _runs(table, motor):
     combinations = itertools.product(*map(_many, (table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm)))
     for (speed, beta, psi, d_x), _ in itertools.product(combinations, range(table.repeats)):
         name = table.name or ("gauge" if table.purpose == "gauge" else table.surface)
@@ -217,7 +221,8 @@ def _runs(table):
             name = f"{name}_roll{table.follicle_roll_deg:g}"
         else:
             name += f"_b{beta:02g}" + (f"_psi{psi:g}" if psi else "") + f"_v{speed:g}"
-        yield Run(name, beta, psi, d_x, speed, table)
+        before, after = table.before_deg or motor.before_deg, table.after_deg or motor.after_deg
+        yield Run(name, beta, psi, d_x, speed, before, after, table)
 
 
 def _distinct(names):
@@ -256,7 +261,7 @@ def _check(protocol, path):
 
 
 def _check_run(protocol, run, path):
-    table, motor, pictures = run.table, protocol.motor, protocol.pictures
+    table, pictures = run.table, protocol.pictures
     if not -80 <= run.beta_deg <= 80 or not -60 <= run.psi_deg <= 60:
         raise BadInput(f"beta_deg {run.beta_deg:g}, psi_deg {run.psi_deg:g}; ±80 and ±60 are allowed", file=path)
     if not 0.1 * protocol.whisker.length_mm <= run.d_x_mm <= 1.05 * protocol.whisker.length_mm:
@@ -265,9 +270,10 @@ def _check_run(protocol, run, path):
         raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 1000 is allowed", file=path)
     if table.static_friction is not None and table.static_friction < table.friction:
         raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
-    if not 0 < motor.after_deg <= 25 or motor.before_deg < 0.1:
-        raise BadInput("motor: before_deg ≥ 0.1 and 0 < after_deg ≤ 25 are needed", file=path)
-    if pictures.before_deg > motor.before_deg or pictures.after_deg > motor.after_deg:
+    if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:
+        found = f"found {run.before_deg:g} and {run.after_deg:g}"
+        raise BadInput(f"the motor's before_deg is 0.1 to 90 and its after_deg 0.1 to 25; {found}", file=path)
+    if pictures.before_deg > run.before_deg or pictures.after_deg > run.after_deg:
         raise BadInput("pictures: before_deg and after_deg are at most the motor's", file=path)
     if math.isclose(sum(abs(x) for x in protocol.light.towards), 0):
         raise BadInput("light: towards is a direction, not zero", file=path)

@@ -68,7 +68,7 @@ def _placed(protocol, run, rod, rng):
 def _stroke(protocol, run, touch):
     motor, whisks = protocol.motor, run.table.whisks
     back = whisks > 1 if motor.back_stroke is None else motor.back_stroke or whisks > 1
-    low, high = (touch.motor_rad + math.radians(a) for a in (-motor.before_deg, motor.after_deg))
+    low, high = (touch.motor_rad + math.radians(a) for a in (-run.before_deg, run.after_deg))
     return Stroke.plan(low, high, math.radians(run.speed_deg_s), whisks=whisks, ramp_s=motor.ramp_s,
                        pause_s=motor.pause_s, back=back)
 

@@ -46,8 +46,8 @@ def forecast(job: Job, workers: int) -> str:
 
 
 def _signal_megabytes(job, run):
-    motor = job.protocol.motor
-    seconds = run.table.whisks * (2 * (motor.before_deg + motor.after_deg) / run.speed_deg_s + 2 * motor.pause_s)
+    stroke_s = (run.before_deg + run.after_deg) / run.speed_deg_s + job.protocol.motor.pause_s
+    seconds = stroke_s * (2 * run.table.whisks if run.table.whisks > 1 else 1)
     return seconds * job.protocol.gauges.rate_Hz * 38e-6
 
 
