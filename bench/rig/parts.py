@@ -103,7 +103,7 @@ def _trial(job, number, folder):
 
 def _frames(job, trial, camera, recording) -> Iterator[np.ndarray]:
     studio, frames = job.studios[camera], recording.frames
-    setting = studio.setting(recording.bar, recording.touch.point_mm)
+    setting = studio.setting(recording.bar, recording.bar.foot_mm(recording.touch.point_mm))
     for number, (motor, whisk) in enumerate(zip(frames.motor_rad, frames.whisk)):
         moments = _moments(job.protocol, studio, recording, recording.whisks[whisk], motor)
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
