@@ -58,7 +58,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_info):
+    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 
@@ -134,7 +134,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
 
 def _add_calibrate(verbs) -> None:
-    calibrate = verbs.add_parser("calibrate", help="cameras from their board views")
+    calibrate = verbs.add_parser("calibrate", help="cameras from their board views, gauges from the deflection seen")
     what = calibrate.add_subparsers(title="what", metavar="WHAT", required=True)
     cameras = _add(
         what,
@@ -145,6 +145,33 @@ def _add_calibrate(verbs) -> None:
     )
     _add_session(cameras)
     _add_out(cameras, "FILE", "cameras.toml to write; its covariance goes beside it as .npz")
+
+
+    gauges = _add(
+        what,
+        "gauges",
+        _calibrate_gauges,
+        "calibrate the gauges against the deflection seen, with a certificate",
+        "whisker-bench calibrate gauges fixtures/small-session --out gauges.toml",
+    )
+    _add_session(gauges)
+    _add_out(gauges, "FILE", "gauges.toml to write; the certificate goes beside it as .pdf")
+    gauges.add_argument("--all", action="store_true", help='all trials, not only those marked purpose = "gauge"')
+    _add_workers(gauges)
+
+
+def _calibrate_gauges(options: argparse.Namespace) -> int:
+    from bench.environment import check_environment
+    from bench.gauge_calibration import calibrate_gauges_command
+
+    check_environment()
+    return calibrate_gauges_command(
+        options.session,
+        options.out,
+        every_trial=options.all,
+        workers=options.workers,
+        progress=sys.stderr.isatty(),
+    )
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
@@ -189,6 +216,35 @@ def _figures(options: argparse.Namespace) -> int:
 
     for path in write_figure(options.number, options.out):
         print(path)
+    return DONE
+
+
+def _add_simulate(verbs) -> None:
+    verb = _add(
+        verbs,
+        "simulate",
+        _simulate,
+        "record a session with known truth on a synthetic rig",
+        "whisker-bench simulate my-session --protocol quick --seed 1 --workers 2",
+    )
+    _add_session(verb)
+    verb.add_argument("--protocol", default="quick", metavar="NAME|FILE", help="quick, paper or a TOML file")
+    verb.add_argument("--signals-only", action="store_true", help="no pictures; times, signals and truth all the same")
+    verb.add_argument("--seed", type=int, default=0, metavar="N", help="the same seed gives the same bytes (default 0)")
+    _add_workers(verb)
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    from bench.rig.simulate import simulate
+
+    simulate(
+        options.session,
+        protocol=options.protocol,
+        signals_only=options.signals_only,
+        seed=options.seed,
+        workers=options.workers,
+        progress=sys.stderr.isatty(),
+    )
     return DONE
 
 

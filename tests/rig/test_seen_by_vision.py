@@ -1,0 +1,70 @@
+"""What the rig paints, the cameras' side reads: two programs that share no code agree on where bar and wire are."""
+
+import csv
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from bench.footage import read_frames
+from bench.rig.simulate import simulate
+from bench.session import load_session
+from bench.signals import forward_strokes, frame_times, read_signals
+from vision.observe import observe_trial
+from vision.pictures import read_picture
+from vision.scene import Bar, Camera, Cameras, Wire
+
+PROTOCOL = """
+name = "one"
+[whisker]
+sag_mm = 0.2
+set_y_mm = 0.8
+set_z_mm = -0.6
+[light]
+wire_matt = 0.03
+wire_shiny = 0.05
+[[cameras]]
+name = "a"
+position_mm = [20.0, -220.0, 300.0]
+[[cameras]]
+name = "b"
+position_mm = [130.0, -330.0, 90.0]
+[board]
+views = 4
+[[trials]]
+beta_deg = 35
+psi_deg = 8.0
+d_x_mm = 70.0
+friction = 0.185339
+bar_diameter_mm = 4.0
+"""
+
+
+def exact_cameras(session):
+    """The cameras that the rig painted through."""
+    truth = json.loads((session / "truth.json").read_text())["cameras"].values()
+    return Cameras(tuple(
+        Camera(c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]])) for c in truth
+    ))
+
+
+@pytest.mark.slow
+def test_a_dark_set_wire_on_a_tilted_thin_bar(tmp_path):
+    (tmp_path / "one.toml").write_text(PROTOCOL)
+    simulate(tmp_path / "session", protocol=tmp_path / "one.toml", seed=3)
+    session = load_session(tmp_path / "session")
+    (trial,) = session.trials
+    truth = tomllib.loads((trial.folder / "truth.toml").read_text())
+    signals, times = read_signals(trial), frame_times(trial)
+    frames = {name: read_frames(source, range(len(times))) for name, source in trial.camera_sources.items()}
+    background = {name: read_picture(path).astype(float) for name, path in session.rig_pictures.items()}
+    whisks = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
+    (seen,) = observe_trial(frames, times.time_s, signals.motor_at(times.time_s), whisks,
+                            exact_cameras(session.path), Wire("cylinder", 100.0, 1.0), Bar(4.0), background).whisks
+    assert seen.d_x_mm == pytest.approx(truth["d_x_mm"], abs=0.10)
+    assert abs(seen.d_x_mm - truth["d_x_mm"]) < 3 * seen.d_x_sigma_mm
+    assert np.degrees(seen.beta_rad) == pytest.approx(truth["beta_deg"], abs=0.3)
+    slip = np.array([float(row["slip_mm"]) for row in csv.DictReader((trial.folder / "truth.csv").open())])
+    touching = seen.frames.touching
+    assert np.sqrt(np.mean((seen.frames.slip_mm - slip)[touching] ** 2)) < 0.08
