@@ -44,9 +44,11 @@ bar_diameter_mm = 4.0
 def exact_cameras(session):
     """The cameras that the rig painted through."""
     truth = json.loads((session / "truth.json").read_text())["cameras"].values()
-    return Cameras(tuple(
-        Camera(c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]])) for c in truth
-    ))
+    return Cameras(tuple(_camera(c) for c in truth))
+
+
+def _camera(c):
+    return Camera(c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]]))
 
 
 @pytest.mark.slow
