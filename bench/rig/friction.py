@@ -10,6 +10,7 @@ from bench.rig.bar import Bar, Touch, turned
 from bench.rig.contact import Contact, State
 from bench.rig.rod import Rod
 
+_ON_THE_CONE, _CLOSE_RAD = 1e-4, 1e-6
 _NO_PUSH_RAD = 1e-7  # below this (5 nm at 50 mm) there is no force to speak of
 
 
@@ -117,23 +118,27 @@ class March:
         return [edge, landed, *self._friction_step(motor_rad, tip)]
 
     def _edge(self, held, tip):
-        """Where the force leaves the static cone between the present state and `held` (Illinois method)."""
+        """Where the force leaves the static cone between the present state and `held` (Illinois method).
+
+        On a strongly tilted bar the held branch may fold before it meets the cone: then the nearest that was found.
+        """
         low, high = self.state.motor_rad, held.motor_rad
         f_low, f_high = self.state.share - self.friction.static, held.share - self.friction.static
-        edge = held
-        for _ in range(40):
+        nearest, f_nearest = held, f_high
+        while abs(f_nearest) > _ON_THE_CONE * self.friction.static and abs(high - low) > _CLOSE_RAD:
             at = high - f_high * (high - low) / (f_high - f_low)
-            between = self._between(held, at)
-            edge = self.contact.hold(at, self.state, between, self.friction.static, tip)
-            f = edge.share - self.friction.static
-            if abs(f) < 1e-4 * self.friction.static or abs(high - low) < 1e-9:
+            try:
+                edge = self.contact.hold(at, self.state, self._between(held, at), self.friction.static, tip)
+            except (ArithmeticError, np.linalg.LinAlgError):
                 break
+            f = edge.share - self.friction.static
             if f * f_high < 0:
                 low, f_low = high, f_high
             else:
                 f_low *= 0.5
             high, f_high = at, f
-        return edge
+            nearest, f_nearest = min((nearest, f_nearest), (edge, f), key=lambda pair: abs(pair[1]))
+        return nearest
 
     def _between(self, held, motor_rad):
         """Unknowns at an angle between the present state and `held`."""

@@ -10,6 +10,7 @@ from scipy.special import ndtr
 from bench.rig.light import Light
 from bench.rig.window import Window
 
+_NEVER = 1e-5  # 1/mm
 _ROOT_2PI = np.float32(np.sqrt(2 * np.pi))
 
 
@@ -73,7 +74,8 @@ def _on_plane(camera, pose, window):
     to_camera = camera.rotation @ pose[:, :2]
     place = camera.rotation @ pose[:, 3] + camera.translation_mm
     inverse = np.linalg.inv(np.column_stack([to_camera, place])).astype(np.float32)
-    scale = 1 / (inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2])
+    # The third component is one over the depth; rays that miss the plane in front of the camera get one far away on it.
+    scale = 1 / np.maximum(inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2], np.float32(_NEVER))
     across, down = ((inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2]) * scale for i in (0, 1))
     soft = np.float32(window.soft_px) / np.float32([camera.matrix[0, 0], camera.matrix[1, 1]])
     (a0, a1), (d0, d1) = (((inverse[i, 0] - p * inverse[2, 0]) * scale * soft[0],
