@@ -132,8 +132,10 @@ def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) ->
 
 
 def _answer(name: str, estimator: Estimator, whisk: Whisk, settings: Settings) -> dict:
-    assumed = EstimatorSettings(settings.alpha_est_rad)
-    estimate = estimator(whisk, assumed)
+    try:
+        estimate = estimator(whisk, EstimatorSettings(settings.alpha_est_rad))
+    except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
+        estimate = Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
     if not isinstance(estimate, Estimate):
         raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
     alpha_rad = {"no_slip": None, "frictionless": 0.0}.get(name, settings.alpha_est_rad)

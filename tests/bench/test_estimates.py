@@ -86,3 +86,12 @@ def test_an_answer_must_be_an_estimate(rng):
     _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     with pytest.raises(BadInput, match="must return an Estimate"):
         answers(whisk, {"mine:f": lambda *_: 60.0}, Settings())
+
+
+def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
+    def fails(*_):
+        raise ZeroDivisionError("no slope")
+
+    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r["estimator"] == "mine:f")
+    assert np.isnan(row["d_x_est_mm"]) and row["status"] == "mine:f raised ZeroDivisionError: no slope"
