@@ -57,8 +57,8 @@ def _rest(knots, pause_s):
 def _move(knots, way, speed, ramp_s):
     """Speed up, go, slow down; returns the times of the constant speed."""
     time, angle, _ = knots[-1]
-    if not ramp_s:
-        knots[-1] = (time, angle, speed)
+    if not ramp_s:  # the motor turns at once: one instant, two speeds
+        knots.append((time, angle, speed))
     ramped = 0.5 * speed * ramp_s
     if ramp_s:
         knots.append((time + ramp_s, angle + ramped, speed))
