@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
 
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
@@ -24,7 +23,9 @@ _FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's
 _KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
-_ROUNDS = 3
+_ROUNDS = 2
+_MOST_STEPS, _SETTLED_PX = 6, 0.01
+_STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
 _BLURS_PX = (0.5, 0.6, 0.7, 0.8, 0.9, 1.05, 1.25, 1.5, 1.9, 2.5)
 # Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/truth.md).
 _FORMAL_TO_TRUE = 2.0
@@ -40,26 +41,25 @@ class BarLine:
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                settings: VisionSettings, coarse: bool) -> BarLine | None:
+                settings: VisionSettings, *, coarse: bool, blur_px: float | None = None) -> BarLine | None:
     """The bar's line in the mean picture `grey`; None where too little of it is clear.
 
-    wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be 10 px off.
+    wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be 10 px off, and a line to a
+    tenth of a pixel is enough. blur_px: the lens blur where it is roughly known.
     """
     pieces = _pieces(view, grey, axis, radius_mm, settings)
     pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
     if len(pieces) < _FEWEST_PIECES:
         return None
     knots = np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM)
-    line = np.zeros(2)
-    if coarse:
-        line = _sweep(pieces, knots)
+    line = _sweep(pieces, knots) if coarse else np.zeros(2)
     pieces = _of_bar_alone(pieces, line, knots)
-    for _ in range(_ROUNDS):  # blur, line, and what counts as a rim depend on each other
+    for _ in range(1 if coarse else _ROUNDS):  # line, blur, and what counts as a rim depend on each other
         model = _model(pieces, line, knots)
-        line, covariance, misfit = _settle(model, line)
-        on_line = _on_line(model, line)
+        line, blur_px, covariance, misfit = _settle(model, line, blur_px or _best_blur(model, line))
+        on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
-    return BarLine(_two_points(pieces, line, covariance), model.blur_px, misfit)
+    return BarLine(_two_points(pieces, line, covariance), blur_px, misfit)
 
 
 @dataclass(frozen=True)
@@ -86,21 +86,21 @@ def _moved(pieces: Pieces, line) -> Pieces:
 
 
 def _model(pieces: Pieces, line, knots) -> _Model:
-    """Rims alone where the bar is thick, all of it where it is thin; the blur under which it is explained best."""
-    thick = float(np.median(pieces.radius_px)) > _THICK_PX
-    rims = _rims(pieces, line) if thick else pieces
-    first = _Model(rims, RIMS if thick else WAVES, knots, 1.0, None if thick else wave_prior(pieces, WAVES))
-    best = int(np.argmin([replace(first, blur_px=blur).misfit(line) for blur in _BLURS_PX]))
-    around = _BLURS_PX[max(best - 1, 0)], _BLURS_PX[min(best + 1, len(_BLURS_PX) - 1)]
-    found = minimize_scalar(lambda blur: replace(first, blur_px=blur).misfit(line), bounds=around, method="bounded",
-                            options={"xatol": 0.02})
-    return replace(first, blur_px=float(found.x))
+    """Rims alone where the bar is thick, all of it where it is thin."""
+    if float(np.median(pieces.radius_px)) > _THICK_PX:
+        return _Model(_rims(pieces, line), RIMS, knots, 1.0, None)
+    return _Model(pieces, WAVES, knots, 1.0, wave_prior(pieces, WAVES))
+
+
+def _best_blur(model: _Model, line) -> float:
+    return min(_BLURS_PX, key=lambda blur: replace(model, blur_px=blur).misfit(line))
 
 
 def _rims(pieces: Pieces, line) -> Pieces:
     """Pieces without their middle: highlights there say nothing about the edges."""
     inner = np.abs(_moved(pieces, line).offset_px) < _INNER_SHARE * pieces.radius_px[:, None]
-    return replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
+    rims = replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
+    return rims.columns(np.any(rims.weight > 0, axis=0))
 
 
 def _pieces(view: View, grey, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Pieces:
@@ -155,25 +155,47 @@ def _sweep(pieces: Pieces, knots) -> np.ndarray:
     return line
 
 
-def _settle(model: _Model, line):
-    """Shift and tilt at the least misfit, their covariance (2, 2) from its curvature, and the misfit there."""
-    simplex = line + np.array([[0.0, 0.0], [0.6, 0.0], [0.0, 0.6]])
-    found = minimize(model.misfit, line, method="Nelder-Mead",
-                     options={"initial_simplex": simplex, "xatol": 0.01, "fatol": 1e-6, "maxfev": 60})
-    curvature = _curvature(model.misfit, found.x, found.fun)
+def _settle(model: _Model, line, blur_px: float):
+    """Line and blur at the least misfit, the line's covariance (2, 2) from the curvature there, and the misfit.
+
+    Newton's method in shift, tilt and logarithm of the blur, with derivatives from differences.
+    """
+    misfit = lambda q: replace(model, blur_px=float(np.exp(q[2]))).misfit(q[:2])  # noqa: E731
+    q = np.array([*line, np.log(blur_px)])
+    here = misfit(q)
+    for _ in range(_MOST_STEPS):
+        slope, curvature = _derivatives(misfit, q, here)
+        step = _downhill(slope, curvature)
+        trials = [(misfit(q + step * part), q + step * part) for part in (1.0, 0.3)]
+        lower, there = min(trials, key=lambda trial: trial[0])
+        if lower < here:
+            here, q = lower, there
+        if lower >= here or np.max(np.abs(step[:2])) < _SETTLED_PX:
+            break
     pixels = float(np.sum(model.pieces.weight > 0))
-    values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(found.fun, 1.0))
+    values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(here, 1.0))
     inverse = vectors @ np.diag(1.0 / np.maximum(values, 4.0)) @ vectors.T
-    return found.x, inverse * _FORMAL_TO_TRUE**2, found.fun
+    return q[:2], float(np.exp(q[2])), inverse[:2, :2] * _FORMAL_TO_TRUE**2, here
 
 
-def _curvature(misfit, line, here: float, step: float = 0.15) -> np.ndarray:
-    """Second derivatives (2, 2) of the misfit by central differences."""
-    value = lambda a, b: misfit(line + np.array([a, b]))  # noqa: E731
-    xx = (value(step, 0) + value(-step, 0) - 2 * here) / step**2
-    yy = (value(0, step) + value(0, -step) - 2 * here) / step**2
-    xy = (value(step, step) - value(step, -step) - value(-step, step) + value(-step, -step)) / (4 * step**2)
-    return np.array([[xx, xy], [xy, yy]])
+def _derivatives(function, q, here: float) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (n,) and second derivatives (n, n) by central differences; 2n + n(n-1)/2 evaluations."""
+    step = np.diag(_STEPS)
+    ahead, behind = (np.array([function(q + sign * row) for row in step]) for sign in (1, -1))
+    curvature = np.diag(ahead + behind - 2.0 * here)
+    for i in range(len(q)):
+        for j in range(i):
+            both = function(q + step[i] + step[j])
+            curvature[i, j] = curvature[j, i] = both - ahead[i] - ahead[j] + here
+    return (ahead - behind) / (2.0 * _STEPS), curvature / np.outer(_STEPS, _STEPS)
+
+
+def _downhill(slope, curvature) -> np.ndarray:
+    """Newton's step, turned downhill where the curvature is not positive, and not longer than _LONGEST."""
+    values, vectors = np.linalg.eigh(curvature)
+    values = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values)))
+    step = -vectors @ ((vectors.T @ slope) / values)
+    return step / max(1.0, np.max(np.abs(step) / _LONGEST))
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:

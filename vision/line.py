@@ -8,7 +8,7 @@ Where the background is bright on one piece and dark on the next, both edges are
 or a highlight no longer pulls the position to one side.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 _NODES_PER_RADIUS_TO_BLUR = 4
 WAVES, RIMS = 8, 6  # how many functions of the angle describe a thin rod, and the rims of a thick one
 _SAME_RADIUS = 0.15
-_TABLE_STEP_PX = 0.025
+_TABLE_PER_PX = 400
 
 
 @dataclass(frozen=True)
@@ -119,19 +119,23 @@ def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _table(radius_px: float, blur_px: float, terms: int) -> tuple[float, np.ndarray]:
-    """Reach in px and values (n, terms) at steps of _TABLE_STEP_PX from minus the reach to the reach."""
+    """Reach in px and values (n, terms), _TABLE_PER_PX of them a pixel, from minus the reach to the reach.
+
+    Every tenth value is integrated, those between are interpolated: at a fortieth of a pixel an error of 1e-4.
+    """
     reach = np.ceil(radius_px + 5.0 * blur_px) + 1.0
-    offsets = np.arange(-reach, reach + 0.5 * _TABLE_STEP_PX, _TABLE_STEP_PX)
-    return reach, _integrated(offsets, np.array(radius_px), blur_px, terms)
+    offsets = np.linspace(-reach, reach, int(2 * reach * _TABLE_PER_PX) // 10 + 1)
+    values = _integrated(offsets, np.array(radius_px), blur_px, terms)
+    share = np.arange(10)[:, None] / 10.0
+    between = values[:-1, None] * (1.0 - share) + values[1:, None] * share
+    return reach, np.concatenate([between.reshape(-1, values.shape[1]), values[-1:]])
 
 
 def _from_table(offset_px, table: tuple[float, np.ndarray]) -> np.ndarray:
-    """Linear interpolation; at a step of a fortieth of a pixel it errs by 1e-4 of the contrast."""
+    """The nearest value: at most an eight-hundredth of a pixel away, 6e-4 of the contrast under a blur of 0.65 px."""
     reach, values = table
-    place = np.clip((offset_px + reach) / _TABLE_STEP_PX, 0.0, len(values) - 1.001)
-    below = place.astype(np.int32)
-    share = (place - below)[..., None]
-    return values[below] * (1.0 - share) + values[below + 1] * share
+    place = np.clip((offset_px + reach) * _TABLE_PER_PX + 0.5, 0.0, len(values) - 1)
+    return values.take(place.astype(np.int32), axis=0)
 
 
 def round_the_rod(t, terms: int) -> np.ndarray:
@@ -174,12 +178,15 @@ class Pieces:
         """The pieces where `keep` (s,) holds."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
+    def columns(self, keep) -> "Pieces":
+        """The same pieces with those of their pixels where `keep` (p,) holds."""
+        names = ("offset_px", "grey", "background", "weight")
+        return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
+
     def moved(self, shift_px) -> "Pieces":
         """The same pixels seen from curves moved by shift_px (s,) along their normals."""
-        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        values["offset_px"] = self.offset_px - shift_px[:, None]
-        values["foot_px"] = self.foot_px + shift_px[:, None] * self.normal
-        return Pieces(**values)
+        return replace(self, offset_px=self.offset_px - shift_px[:, None],
+                       foot_px=self.foot_px + shift_px[:, None] * self.normal)
 
 
 @dataclass(frozen=True)

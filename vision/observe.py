@@ -132,7 +132,7 @@ def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSetting
     """The bar's line in each camera that shows enough of it."""
     found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), _MEAN_OF))),
                                            _mean_picture(view), axis, rods.bar.radius_mm,
-                                           wires.get(view.camera.name, []), settings, coarse)
+                                           wires.get(view.camera.name, []), settings, coarse=coarse)
              for view in views}
     return {name: line for name, line in found.items() if line is not None}
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from vision.line import LinePoints, Pieces, shading_basis
 
+_WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
+
 
 @dataclass(frozen=True)
 class Shading:
@@ -37,12 +39,9 @@ def _surround(pieces: Pieces, cover) -> np.ndarray:
 
 
 def _project_out(columns, *targets):
-    """Parts of the targets (s, p, k) that the columns (s, p, c) cannot explain, piece by piece.
-
-    A weak pull keeps the background at 1 × the known picture + 0 where a piece cannot tell.
-    """
+    """Parts of the targets (s, p, k) that the columns (s, p, c) cannot explain, piece by piece."""
     turned = columns.transpose(0, 2, 1)
-    normal = turned @ columns + 1e-6 * np.eye(columns.shape[-1])
+    normal = turned @ columns + _WEAK * np.eye(columns.shape[-1])
     found = [np.linalg.solve(normal, turned @ target) for target in targets]
     return [target - columns @ x for target, x in zip(targets, found)]
 
@@ -56,26 +55,42 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots_mm, robust=Non
     The misfit is chi², and with a prior minus twice the log evidence: what a shift of the rod and a change of its
     shading explain alike is then not credited to the shading in full.
     """
-    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
-    seen = (pieces.grey * pieces.weight)[..., None]
-    columns = _surround(pieces, basis[..., 0])
-    model, rest = _project_out(columns, basis * pieces.weight[..., None], seen)
+    gram, moment, power = _normal_equations(pieces, blur_px, terms)
     robust = np.ones(len(pieces)) if robust is None else robust
     hats = _hats(pieces.place, knots_mm)
-    turned = model.transpose(0, 2, 1) * robust[:, None, None]
-    gram, moment = turned @ model, (turned @ rest)[..., 0]
     size = len(knots_mm) * terms
-    pairs = (hats[:, :, None] * hats[:, None, :]).reshape(len(pieces), -1).T @ gram.reshape(len(pieces), -1)
-    left = pairs.reshape(len(knots_mm), len(knots_mm), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
-    right = (hats.T @ moment).reshape(size)
+    pairs = (hats[:, :, None] * hats[:, None, :] * robust[:, None, None]).reshape(len(pieces), -1)
+    left = pairs.T @ gram.reshape(len(pieces), -1)
+    left = left.reshape(len(knots_mm), len(knots_mm), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
+    right = ((hats * robust[:, None]).T @ moment).reshape(size)
     stiff = np.full(size, 1e-6 * np.trace(left) / size) if prior is None else np.tile(prior, len(knots_mm)) ** -2.0
-    waves = np.linalg.solve(left + np.diag(stiff), right).reshape(len(knots_mm), terms)
-    shading = Shading(np.asarray(knots_mm, dtype=float), waves, blur_px)
-    residual = (rest - model @ shading.at(pieces.place)[..., None])[..., 0]
-    misfit = float(np.sum(np.sum(residual**2, axis=1) * robust))
+    waves = np.linalg.solve(left + np.diag(stiff), right)
+    misfit = float(robust @ power - 2.0 * right @ waves + waves @ left @ waves)
     if prior is not None:
-        misfit += float(stiff @ waves.ravel() ** 2 + np.linalg.slogdet(left + np.diag(stiff))[1])
-    return shading, misfit / max(1.0, float(np.sum((pieces.weight > 0).sum(axis=1) * robust)))
+        misfit += float(stiff @ waves**2 + np.linalg.slogdet(left + np.diag(stiff))[1])
+    pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
+    shading = Shading(np.asarray(knots_mm, dtype=float), waves.reshape(len(knots_mm), terms), blur_px)
+    return shading, misfit / max(1.0, pixels)
+
+
+def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
+    """Each piece's normal equations for its shading, the background's gain and offset eliminated.
+
+    Gram matrices (s, terms, terms), moments (s, terms), and the squares (s,) that the background leaves.
+    """
+    rows = np.empty((*pieces.offset_px.shape, terms + 3))
+    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
+    np.multiply(basis, pieces.weight[..., None], out=rows[..., :terms])
+    rows[..., terms + 1] = pieces.weight - rows[..., 0]
+    np.multiply(rows[..., terms + 1], pieces.background, out=rows[..., terms])
+    np.multiply(pieces.grey, pieces.weight, out=rows[..., terms + 2])
+    products = rows.transpose(0, 2, 1) @ rows
+    keep = np.r_[:terms, terms + 2]
+    around = slice(terms, terms + 2)
+    mixed = products[:, around][:, :, keep]
+    left = products[:, keep][:, :, keep] - mixed.transpose(0, 2, 1) @ np.linalg.solve(
+        products[:, around, around] + _WEAK * np.eye(2), mixed)
+    return left[:, :terms, :terms], left[:, :terms, terms], left[:, terms, terms]
 
 
 # How strong each wave round a thin, lit rod is beside its contrast: diffuse light fills the first three, a highlight
@@ -111,20 +126,20 @@ class Located:
 
 
 def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
-    """Gauss–Newton on the position of each piece with the rod's shading known, background gain and offset free."""
+    """Gauss–Newton on the position of each piece with the rod's shading known, background gain and offset free.
+
+    Sigma, misfit and contrast are those of the last round, before its step.
+    """
     waves = shading.at(pieces.place)
     shift = np.zeros(len(pieces))
     for _ in range(rounds):
-        residual, slope, _ = _linearise(pieces, shading, waves, shift)
-        power = np.sum(slope * slope, axis=1)
-        step = np.sum(slope * residual, axis=1) / np.maximum(power, 1e-9)
+        residual, slope, contrast = _linearise(pieces, shading, waves, shift)
+        power = np.maximum(np.sum(slope * slope, axis=1), 1e-9)
+        step = np.sum(slope * residual, axis=1) / power
         shift = np.clip(shift + np.clip(step, -0.7, 0.7), -limit_px, limit_px)
-    residual, slope, contrast = _linearise(pieces, shading, waves, shift)
-    power = np.sum(slope * slope, axis=1)
     free = np.maximum((pieces.weight > 0).sum(axis=1) - 3, 1)
     chi2 = np.sum(residual**2, axis=1) / free
-    sigma = np.sqrt(np.maximum(chi2, 1.0) / np.maximum(power, 1e-9))
-    return Located(shift, sigma, chi2, contrast)
+    return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, contrast)
 
 
 def _linearise(pieces: Pieces, shading: Shading, waves, shift, delta_px: float = 0.05):
@@ -138,7 +153,7 @@ def _linearise(pieces: Pieces, shading: Shading, waves, shift, delta_px: float =
     seen = np.stack([pieces.grey * pieces.weight, rod], axis=-1)
     (rest,) = _project_out(columns, seen)
     turned = columns.transpose(0, 2, 1)
-    around = np.linalg.solve(turned @ columns + np.diag([1e-6, 1e-6]),
+    around = np.linalg.solve(turned @ columns + _WEAK * np.eye(2),
                              turned @ (seen[..., 0] - rod)[..., None])[..., 0]
     by_cover = -(around[:, :1] * pieces.background + around[:, 1:])
     change = (ahead - behind) / (2 * delta_px)

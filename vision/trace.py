@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from vision.fit import Observed
 from vision.line import LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.scene import Camera, Wire
-from vision.shading import Located, fit_shading, line_points, locate, piece_misfit, wave_prior
+from vision.shading import Located, fit_shading, line_points, locate, wave_prior
 from vision.silhouette import outline
 from vision.wire import Curves
 
@@ -66,7 +66,7 @@ def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
     return BLURS_PX[int(np.argmin(misfit))]
 
 
-def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 4,
+def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 5,
           search_px: float = 0.0) -> tuple[Pieces, Located, float]:
     """Shading and positions by turns; the pieces come back where they were found, with what is left to move.
 
@@ -75,13 +75,11 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 4,
     """
     if search_px > 0:
         pieces = _best_common_shift(pieces, blur_px, terms, knots_mm, search_px)
-    prior = wave_prior(pieces, terms)
-    shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, prior=prior)
+    prior, robust = wave_prior(pieces, terms), None
     for _ in range(rounds):
-        robust = _robust(piece_misfit(pieces, shading))
         shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust, prior)
-        found = locate(pieces, shading)
-        pieces = pieces.moved(found.shift_px)
+        found = locate(pieces, shading, rounds=1)
+        pieces, robust = pieces.moved(found.shift_px), _robust(found.chi2)
     found = locate(pieces, shading, rounds=1)
     return pieces, found, float(np.median(found.chi2))
 
