@@ -34,10 +34,14 @@ def _across(vectors, axis: BarAxis) -> np.ndarray:
     return vectors - np.sum(vectors * a, axis=-1, keepdims=True) * a
 
 
-def closest_arc(curves: Curves, axis: BarAxis, rounds: int = 4) -> np.ndarray:
-    """Arc length (…) where each centreline is nearest to the axis, within the whisker's length."""
-    distance = np.sum(_from_axis(curves.points_mm, axis) ** 2, axis=-1)
-    arc = curves.arc_mm[np.argmin(distance, axis=-1)]
+def closest_arc(curves: Curves, axis: BarAxis, near_mm=None, rounds: int = 4) -> np.ndarray:
+    """Arc length (…) where each centreline is nearest to the axis, within the whisker's length.
+
+    near_mm (…): where it roughly is; None looks along the whole of it.
+    """
+    if near_mm is None:
+        near_mm = curves.arc_mm[np.argmin(np.sum(_from_axis(curves.points_mm, axis) ** 2, axis=-1), axis=-1)]
+    arc = near_mm
     for _ in range(rounds):
         point, tangent = curves.at(arc[..., None])
         away = _from_axis(point, axis)[..., 0, :]

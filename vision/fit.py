@@ -31,6 +31,7 @@ CONTACT_SIGMA_MM = 0.002
 # Neighbouring points of a wire share what is behind them, and so do the same points of the next frames: their
 # errors come in lumps of about four points, which halves what averaging gains.
 WIRE_LUMP = 4.0
+_STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def bends(problem: Problem, vector) -> np.ndarray:
     return angles
 
 
-def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 2) -> tuple[Curves, np.ndarray]:
+def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 1) -> tuple[Curves, np.ndarray]:
     """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
     rest = rest_shape(vector)[..., None, :, :]
     axis = bar_axis(problem, vector)
@@ -108,7 +109,7 @@ def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 2) -> tuple[Curve
     rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
     for _ in range(rounds):
         curves = centrelines(rest, angles, arcs, motor, problem.wire)
-        arcs = np.clip(closest_arc(curves, axis), 1.0, problem.wire.length_mm)
+        arcs = np.clip(closest_arc(curves, axis, arcs), 1.0, problem.wire.length_mm)
     return centrelines(rest, angles, arcs, motor, problem.wire), arcs
 
 
@@ -238,9 +239,9 @@ def _weights(linear: Linear, scale: float) -> np.ndarray:
     return np.where(linear.is_point, 1.0 / (1.0 + (linear.residual / scale) ** 2), 1.0)
 
 
-def solve(problem: Problem, state: State, *, scales: Sequence[float] = (30.0, 10.0, 4.0, 4.0, 4.0, 4.0),
-          tolerance: float = 1e-7) -> tuple[State, np.ndarray]:
-    """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say.
+def solve(problem: Problem, state: State, *,
+          scales: Sequence[float] = (30.0, 10.0, 4.0, 4.0, 4.0, 4.0)) -> tuple[State, np.ndarray]:
+    """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say; ends early once it stands still.
 
     Returns the state and its covariance (size, size) from noise and priors alone.
     """
@@ -251,7 +252,7 @@ def solve(problem: Problem, state: State, *, scales: Sequence[float] = (30.0, 10
         step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
         step = step * min(1.0, 0.3 / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
         state = replace(state, vector=state.vector + step)
-        if np.max(np.abs(step)) < tolerance:
+        if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
     linear, state = linearise(problem, state)
     jacobian = linear.jacobian * np.sqrt(_weights(linear, scales[-1]))[:, None]

@@ -19,6 +19,7 @@ from vision.wire import REST_POWERS, Curves, centrelines
 _PIECE_PX = 16
 _REACH_PX = 26
 _SIGMA_PX = 1.0
+_STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
 
 
@@ -105,8 +106,10 @@ def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire
         weight = 1.0 / (1.0 + (left / 2.0) ** 2)
         jacobian = np.stack(columns, axis=1)
         normal = jacobian.T @ (weight[:, None] * jacobian) + np.eye(2) / 0.2**2
-        bend = bend - np.linalg.solve(normal, jacobian.T @ (weight * left) + bend / 0.2**2)
-        bend = np.clip(bend, -0.5, 0.5)
+        change = np.linalg.solve(normal, jacobian.T @ (weight * left) + bend / 0.2**2)
+        bend = np.clip(bend - change, -0.5, 0.5)
+        if np.max(np.abs(change)) < _STILL_RAD:
+            break
     return bend
 
 
