@@ -33,11 +33,15 @@ _FORMAL_TO_TRUE = 2.0
 
 @dataclass(frozen=True)
 class BarLine:
-    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; lens blur in px."""
+    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; lens blur in px.
+
+    moved_px: how far they lie from there.
+    """
 
     points: LinePoints
     blur_px: float
     misfit: float
+    moved_px: float
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
@@ -59,7 +63,7 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
         line, blur_px, covariance, misfit = _settle(model, line, blur_px or _best_blur(model, line))
         on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
-    return BarLine(_two_points(pieces, line, covariance), blur_px, misfit)
+    return BarLine(_two_points(pieces, line, covariance), blur_px, misfit, float(np.sum(np.abs(line))))
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ _WIRE_KNOT_MM = 12.0
 _NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 _BESIDE_BAR_PX = 4.0
 _SEARCH_PX = 1.5
+_NEAR_PX = 3.0  # a bar found this near to where it was expected need not be looked for again
+_ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 _MEDIAN_OF, _MEAN_OF = 11, 40  # frames: more would not make bar or noise clearer
 _FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
@@ -125,6 +127,8 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
     for _ in range(2):
         lines = _bar_lines(views, axis, rods, {}, settings, coarse=True)
         axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
+        if max((line.moved_px for line in lines.values()), default=0.0) < _NEAR_PX:
+            break
     return axis
 
 
@@ -244,7 +248,7 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     if first:
         light[view.camera.name] = find_blur(pieces, WAVES, knots)
     blur = light[view.camera.name]
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots,
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_FIRST if first else _ROUNDS_AGAIN,
                                   search_px=_SEARCH_PX if first else 0.0)
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))
