@@ -20,7 +20,7 @@ ARM_MM = 20.0  # the line is handed on as two points, this far to either side
 _INNER_SHARE = 0.72
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
 _FEWEST_PIECES = 4
-_WORST_MISFIT = 3.0  # of the median piece's
+_WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
 _KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
 _ROUNDS = 2
@@ -133,7 +133,7 @@ def _of_bar_alone(pieces: Pieces, line, knots) -> Pieces:
     for _ in range(3):
         moved = _moved(pieces, line)
         misfit = piece_misfit(moved, fit_shading(moved, 1.0, WAVES, knots)[0])
-        good = misfit < _WORST_MISFIT * np.median(misfit)
+        good = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
         if np.all(good) or np.sum(good) < _FEWEST_PIECES:
             break
         pieces = pieces.select(good)
