@@ -175,7 +175,7 @@ class Pieces:
         return len(self.place)
 
     def select(self, keep) -> "Pieces":
-        """The pieces where `keep` (s,) holds."""
+        """The pieces where `keep` (s,) holds, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
     def columns(self, keep) -> "Pieces":

@@ -61,6 +61,7 @@ def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.n
 
 def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
     """The lens blur, px: the one under which the shading explains the pieces best."""
+    pieces = pieces.select(slice(None, None, 2))
     prior = wave_prior(pieces, terms)
     misfit = [fit_shading(pieces, blur, terms, knots_mm, prior=prior)[1] for blur in BLURS_PX]
     return BLURS_PX[int(np.argmin(misfit))]
@@ -95,10 +96,11 @@ def _best_common_shift(pieces: Pieces, blur_px, terms, knots_mm, search_px) -> P
     Where both edges stand before an even background, shading and shift can stand in for each other; so only the
     shift of the whole wire is looked for before its pieces are.
     """
-    prior = wave_prior(pieces, terms)
+    some = pieces.select(slice(None, None, 2))
+    prior = wave_prior(some, terms)
 
     def misfit(shift: float) -> float:
-        return fit_shading(pieces.moved(np.full(len(pieces), shift)), blur_px, terms, knots_mm, prior=prior)[1]
+        return fit_shading(some.moved(np.full(len(some), shift)), blur_px, terms, knots_mm, prior=prior)[1]
 
     shifts = np.arange(-search_px, search_px + 1e-9, 0.25)
     best = shifts[int(np.argmin([misfit(d) for d in shifts]))]
