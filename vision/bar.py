@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from scipy.ndimage import uniform_filter
-from scipy.optimize import minimize
 
 from vision.contact import BarAxis
 from vision.errors import Refused
@@ -13,18 +12,21 @@ from vision.scene import Cameras
 from vision.silhouette import outline
 from vision.wire import rotation_z
 
+HALF = 2  # a coarse look needs no more
 _ALONG_MM = np.arange(-24.0, 24.1, 6.0)
 _INSIDE = np.array([-0.75, 0.0, 0.75])
 _OUTSIDE = np.array([-1.5, 1.5])
 
 
 def changed(grey, background, noise: Noise) -> np.ndarray:
-    """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 5 × 5 pixels.
+    """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 3 × 3 pixels.
+
+    Both pictures are given at every HALF-th pixel.
 
     The scale is the median of the differences themselves: most of the picture has not changed, and a picture of
     the background may be noisier than the frames.
     """
-    difference = uniform_filter(grey - background, 5) / noise.sigma(0.5 * (grey + background))
+    difference = uniform_filter(grey - background, 3) / noise.sigma(0.5 * (grey + background))
     z = np.abs(difference) / max(float(np.median(np.abs(difference))) / 0.6745, 1e-6)
     return np.clip((z - 3.0) / 6.0, 0.0, 1.0)
 
@@ -57,24 +59,33 @@ def find_bar(changes: Mapping[str, np.ndarray], cameras: Cameras, radius_mm: flo
     psi = np.radians([-8.0, 0.0, 8.0])
     grid = np.stack(np.meshgrid(x, touch, beta, psi, indexing="ij"), axis=-1).reshape(-1, 4)
     scores = _score(grid, changes, cameras, radius_mm, reach_mm)
-    best = grid[np.argsort(scores)[-6:]]
-    refined = [minimize(lambda q: -_score(q[None] * _UNITS, changes, cameras, radius_mm, reach_mm)[0],
-                        start / _UNITS, method="Nelder-Mead",
-                        options={"xatol": 0.02, "fatol": 1e-3, "maxfev": 160, "initial_simplex": _simplex(start)})
-               for start in best]
-    winner = min(refined, key=lambda result: result.fun)
-    if -winner.fun < 0.25:
+    found, score = _climb(grid[np.argsort(scores)[-_STARTS:]], changes, cameras, radius_mm, reach_mm)
+    if score < _LEAST_SCORE:
         raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
-                      f"{-winner.fun:.2f}, needed 0.25); record with the bar in view of every camera")
-    return axis_from_angles(*(winner.x * _UNITS), reach_mm)
+                      f"{score:.2f}, needed {_LEAST_SCORE:g}); record with the bar in view of every camera")
+    return axis_from_angles(*found, reach_mm)
 
 
-_UNITS = np.array([1.0, 0.02, 0.02, 0.02])
+_STARTS, _LEAST_SCORE = 6, 0.25
+_FIRST_STEP, _SHRINKS = np.array([1.0, 0.02, 0.05, 0.07]), 5  # half a step of the grid: mm, rad, rad, rad
+_AROUND = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
+_MOST_CLIMBS = 20
 
 
-def _simplex(start) -> np.ndarray:
-    q = start / _UNITS
-    return np.concatenate([q[None], q + np.diag([1.0, 1.0, 1.5, 1.5])])
+def _climb(starts, changes, cameras, radius_mm: float, reach_mm: float) -> tuple[np.ndarray, float]:
+    """Best hypothesis (4,) and its score: from each start to the best neighbour, by ever smaller steps."""
+    best, part = starts, np.ones(len(starts))
+    score = np.full(len(starts), -np.inf)
+    for _ in range(_MOST_CLIMBS):
+        around = best[:, None] + part[:, None, None] * _FIRST_STEP * _AROUND
+        scores = _score(around.reshape(-1, 4), changes, cameras, radius_mm, reach_mm).reshape(len(best), -1)
+        chosen = np.argmax(scores, axis=1)
+        better = scores[np.arange(len(best)), chosen]
+        part = np.where(better > score + 1e-3, part, 0.5 * part)
+        best, score = around[np.arange(len(best)), chosen], better
+        if np.all(part < 0.5**_SHRINKS):
+            break
+    return best[np.argmax(score)], float(np.max(score))
 
 
 def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float) -> np.ndarray:
@@ -100,7 +111,7 @@ def _sample(picture, camera, along, sideways, offsets_mm) -> np.ndarray:
     """Values (n, t, k) of a picture at points beside each axis; 0 outside the picture."""
     points = along[:, :, None] + offsets_mm[:, None] * sideways[:, None, None]
     px = camera.project(points.reshape(-1, 3))
-    column, row = np.round(np.nan_to_num(px, nan=-9.0)).astype(int).T
+    column, row = np.round(np.nan_to_num(px, nan=-9.0) / HALF).astype(int).T
     inside = (row >= 0) & (row < picture.shape[0]) & (column >= 0) & (column < picture.shape[1])
     values = np.where(inside, picture[np.where(inside, row, 0), np.where(inside, column, 0)], 0.0)
     return values.reshape(points.shape[:-1])

@@ -204,8 +204,9 @@ class Noise:
 def measure_noise(first, second) -> Noise:
     """Noise from two pictures of the same scene: median absolute difference in classes of equal grey.
 
-    Medians leave out what moved between the two.
+    Medians leave out what moved between the two. Every third pixel of every third row is plenty.
     """
+    first, second = first[::3, ::3], second[::3, ::3]
     mean = 0.5 * (first.astype(float) + second)
     spread = np.abs(first.astype(float) - second) / (0.6745 * np.sqrt(2.0))
     edges = np.unique(np.quantile(mean, np.linspace(0, 1, 13)))

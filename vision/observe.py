@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bar import changed, find_bar, settle_axis
+from vision.bar import HALF, changed, find_bar, settle_axis
 from vision.bar_line import measure_bar
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
@@ -24,7 +24,7 @@ from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import first_touch, frames_by_touch, frames_that_touch
-from vision.trace import View, clear_of_bar, find_blur, observed, to_points, trace, wire_pieces
+from vision.trace import MEAN_OF, View, clear_of_bar, find_blur, observed, to_points, trace, wire_pieces
 from vision.truth import TrialTruth, WhiskTruth
 from vision.wire import Curves
 
@@ -34,7 +34,7 @@ _BESIDE_BAR_PX = 4.0
 _SEARCH_PX = 1.5
 _NEAR_PX = 3.0  # a bar found this near to where it was expected need not be looked for again
 _ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
-_MEDIAN_OF, _MEAN_OF = 11, 40  # frames: more would not make bar or noise clearer
+_MEDIAN_OF = 11  # frames: more would not make the bar clearer
 _FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
@@ -102,14 +102,9 @@ def _views(frames, cameras: Cameras, background) -> list[View]:
     return views
 
 
-def _spread(view: View, most: int) -> list[np.ndarray]:
-    """At most so many of the view's pictures, spread over all of them."""
-    pictures = list(view.frames.values())
-    return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
-
-
-def _mean_picture(view: View) -> np.ndarray:
-    return np.mean([picture.astype(np.float32) for picture in _spread(view, _MEAN_OF)], axis=0)
+def _median_picture(view: View) -> np.ndarray:
+    """Median of some frames at every HALF-th pixel: where the wire moves it vanishes."""
+    return np.median([picture[::HALF, ::HALF] for picture in view.some(_MEDIAN_OF)], axis=0)
 
 
 def _quieter(noise: Noise, count: int) -> Noise:
@@ -120,7 +115,7 @@ def _quieter(noise: Noise, count: int) -> Noise:
 
 def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSettings) -> BarAxis:
     """The bar's axis from the pictures of all frames, before any wire is known."""
-    changes = {view.camera.name: changed(np.median(_spread(view, _MEDIAN_OF), axis=0), view.background, view.noise)
+    changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
                for view in views}
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
@@ -134,8 +129,8 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
 
 def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, coarse: bool):
     """The bar's line in each camera that shows enough of it."""
-    found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), _MEAN_OF))),
-                                           _mean_picture(view), axis, rods.bar.radius_mm,
+    found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF))),
+                                           view.mean, axis, rods.bar.radius_mm,
                                            wires.get(view.camera.name, []), settings, coarse=coarse)
              for view in views}
     return {name: line for name, line in found.items() if line is not None}

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -14,6 +15,7 @@ from vision.silhouette import outline
 from vision.wire import Curves
 
 BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
+MEAN_OF = 40  # frames: more would not make a still thing clearer
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
 _WORST_MISFIT = 6.0
@@ -27,6 +29,16 @@ class View:
     frames: Mapping[int, np.ndarray]
     background: np.ndarray
     noise: Noise
+
+    def some(self, most: int) -> list[np.ndarray]:
+        """At most so many of the pictures, spread over all of them."""
+        pictures = list(self.frames.values())
+        return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """Mean (h, w) of the pictures, of MEAN_OF at most."""
+        return np.mean([picture.astype(np.float32) for picture in self.some(MEAN_OF)], axis=0)
 
 
 def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:
