@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from bench.errors import BadInput
@@ -244,6 +245,7 @@ def _simulate(options: argparse.Namespace) -> int:
         seed=options.seed,
         workers=options.workers,
         progress=sys.stderr.isatty(),
+        announce=partial(print, flush=True),
     )
     return DONE
 

@@ -1,7 +1,8 @@
 """Recording a whole session on the synthetic rig: folders that appear whole, the same bytes whoever does the work."""
 
 import shutil
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -10,16 +11,27 @@ from bench.errors import BadInput
 from bench.rig import build, papers
 from bench.rig.parts import Job, Part
 from bench.rig.protocol import load
+from bench.workers import Workers
 
 _MEGABYTES = {"jpg": 0.26, "png": 0.46, "mkv": 0.45}  # a picture of 1280 × 720, measured
 _PICTURE_S, _WHISK_S = 0.11, 0.7  # of one core, measured
 
 
-def simulate(session, *, protocol="quick", signals_only=False, seed=0, workers=1, progress=False) -> Path:
+def simulate(
+    session,
+    *,
+    protocol="quick",
+    signals_only=False,
+    seed=0,
+    workers=0,
+    progress=False,
+    announce: Callable[[str], object] | None = None,
+) -> Path:
     """Write the session folder that a protocol describes; go on where an interrupted one stopped.
 
-    `protocol`: "quick", "paper" or a TOML file. The same seed gives the same bytes for any number of workers. Raises
-    BadInput for a bad protocol file or seed, a whisker that slips off its bar, or a folder that holds anything else.
+    `protocol`: "quick", "paper" or a TOML file. The same seed gives the same bytes for any number of workers; with 0
+    the work is done in this process. `announce` is told size and time before the work begins. Raises BadInput for a
+    bad protocol file or seed, a whisker that slips off its bar, or a folder that holds anything else.
     """
     if seed < 0:
         raise BadInput(f"seed {seed}; a whole number from 0 is allowed")
@@ -27,9 +39,10 @@ def simulate(session, *, protocol="quick", signals_only=False, seed=0, workers=1
     _check_can_be_built(job, protocol)
     _claim(job)
     left = [part for part in job.parts() if not part.folder.exists()]
-    if progress:
-        print(forecast(job, workers), flush=True)
-    _make_all(job, left, workers, progress)
+    if announce is not None:
+        announce(forecast(job, workers))
+    with Workers(workers, progress) as pool:
+        pool.run(partial(make, job), left, "parts")
     return job.session
 
 
@@ -73,20 +86,6 @@ def _claim(job):
     for name, text in texts.items():
         if not (job.session / name).exists():
             papers.write(job.session / name, text)
-
-
-def _make_all(job, parts, workers, progress):
-    from tqdm import tqdm
-
-    with tqdm(total=len(parts), disable=None if progress else True, unit="part") as bar:
-        if workers <= 1 or len(parts) <= 1:
-            for part in parts:
-                make(job, part)
-                bar.update()
-            return
-        with ProcessPoolExecutor(workers, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
-            for _ in pool.map(make, [job] * len(parts), parts):
-                bar.update()
 
 
 def make(job: Job, part: Part) -> None:

@@ -13,7 +13,7 @@ from bench.rig.sensor import Sensor
 from bench.rig.tube import Tube
 from bench.rig.window import Window
 
-_FINE, _SOFT_PX = 3, 0.3
+_FINE, _SOFT_PX = 3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Moment:
 class Studio:
     """Takes the pictures of one camera.
 
-    Samples are a third of a pixel, their edges softened by 0.3 px. The lens blurs by more than that, so nothing finer
+    Samples are a third of a pixel, their edges softened by 0.2 px. The lens blurs by more than that, so nothing finer
     is lost, and what covers what is settled before the lens blurs it.
     """
 

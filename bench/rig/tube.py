@@ -9,6 +9,8 @@ from bench.rig.camera import Camera
 from bench.rig.light import Light, Material, round_shade
 from bench.rig.window import Window
 
+_GAUSS = 0.5 / np.sqrt(3)
+
 
 @dataclass(frozen=True, eq=False)
 class Tube:
@@ -57,11 +59,12 @@ class Tube:
         canvas, frame = paint[part.within(window)], _Frame.of(edges)
         at, u, v = _band(part, frame, edges, 4.5 * window.soft_px + 1)
         along, side = frame.of_px(np.stack([u, v], -1))
-        cover, across = frame.cover(along, side, window.soft_px)
-        tone = self._shade(window.camera, light, frame, along, across)
+        cover, across, per_px = frame.cover(along, side, window.soft_px)
+        tone = self._shade(window.camera, light, frame, along, across, per_px / window.fine)
         canvas[at] += (cover * (tone - canvas[at])).astype(np.float32)
 
-    def _shade(self, camera, light, frame, along, across):
+    def _shade(self, camera, light, frame, along, across, sample):
+        """Mean brightness over a sample's part of the tube: two Gauss points, both on the tube."""
         facing, aside, _ = self._seen_from(camera.centre_mm)
         towards = camera.centre_mm - self.axis_mm
         half = towards / np.linalg.norm(towards, axis=1)[:, None] + light.towards
@@ -70,7 +73,9 @@ class Tube:
         mirror = (facing * half).sum(1), (aside * half).sum(1)
         # Along the picture of a tube these four change slowly; across it not at all.
         lamp, mirror = ([frame.at(along, c) for c in pair] for pair in (lamp, mirror))
-        return round_shade(light, self.material, across, *lamp, mirror)
+        limit = np.maximum(1 - sample / 4, 0)
+        points = (np.clip(across + s * sample * _GAUSS, -limit, limit) for s in (-1, 1))
+        return 0.5 * sum(round_shade(light, self.material, p, *lamp, mirror) for p in points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +109,15 @@ class _Frame:
         return _straight_on(along, x, y), 1 / np.sqrt(1 + np.interp(along, x, slope) ** 2)
 
     def cover(self, along, side, soft):
-        """Coverage under the blur, and the position across the tube: −1 on one silhouette, 1 on the other."""
+        """Coverage under the blur; position across the tube, −1 on one silhouette and 1 on the other; how much a
+        pixel is.
+        """
         (low, cos_low), (high, cos_high) = self.edge(0, along), self.edge(1, along)
         sign = np.sign(high - low)
         cover = ndtr(sign * (side - low) * cos_low / soft) - ndtr(sign * (side - high) * cos_high / soft)
         start, end = (0.5 * (self.along[0][i] + self.along[1][i]) for i in (0, -1))
         cover = cover * ndtr((along - start) / soft) * ndtr((end - along) / soft)
-        return cover, np.clip(2 * (side - low) / (high - low) - 1, -1, 1)
+        return cover, np.clip(2 * (side - low) / (high - low) - 1, -1, 1), 2 / np.abs(high - low)
 
 
 def _straight_on(x, at, values):

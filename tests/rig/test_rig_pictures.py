@@ -1,0 +1,232 @@
+"""The renderer against exact projection, brute force, and OpenCV's own prints."""
+
+import itertools
+import math
+
+import cv2
+import numpy as np
+import pytest
+from scipy import ndimage
+from scipy.special import ndtr
+
+from bench.rig import boards, build
+from bench.rig.bar import Bar, unloaded
+from bench.rig.board import Board, Ink
+from bench.rig.camera import Camera
+from bench.rig.light import Light, Material
+from bench.rig.protocol import load
+from bench.rig.rod import Rod
+from bench.rig.scene import HUB_FRONT_MM
+from bench.rig.sensor import Sensor
+from bench.rig.studio import Moment, Studio
+from bench.rig.tube import Tube
+from bench.rig.window import Window
+
+DISTORTION = (-0.11, 0.14, 0.0006, -0.0004, 0.01)
+SMALL = Camera.looking("small", size_px=(320, 240), focal_px=2000.0, distortion=DISTORTION,
+                       position_mm=np.array([0.0, -400.0, 50.0]), target_mm=np.zeros(3))
+EVEN = Light(np.array([0.0, -1.0, 0.0]), lamp=0.0, soft=1.0)
+QUICK = load("quick")
+
+
+def studio(camera, blur_px=0.9, protocol=QUICK):
+    return Studio(camera, build.scene(protocol), Sensor(blur_px, 0, 0, 0, 0))
+
+
+def painted_wire(camera, wire, blur_px, fine, soft_px=0.2, ground=0.1, light=EVEN):
+    margin = math.ceil(4 * blur_px) + 1
+    window = Window.whole(camera, fine, min(soft_px, blur_px), margin)
+    paint = np.full(window.shape, ground, np.float32)
+    wire.paint(window, paint, light)
+    return window.seen(paint, blur_px)[margin:-margin, margin:-margin]
+
+
+def straight_wire(angle_deg, width_px, material):
+    """Through the picture's middle at an angle, somewhat oblique to it, of about this width."""
+    to_rig, angle = SMALL.rotation.T, math.radians(angle_deg)
+    along = to_rig @ np.array([math.cos(angle), math.sin(angle), 0.2])
+    middle = to_rig @ np.array([0.013, 0.009, 0]) * angle_deg / 10
+    radius = width_px * SMALL.in_camera(np.zeros(3))[2] / 2000 / 2
+    return Tube.straight(middle - 30 * along, middle + 30 * along, radius, material)
+
+
+def crossing(line_px, at, axis):
+    order = np.argsort(line_px[:, axis])
+    return np.interp(at, line_px[order, axis], line_px[order, 1 - axis])
+
+
+@pytest.mark.parametrize("width_px, blur_px", list(itertools.product((1.5, 5.7, 12.0), (0.6, 0.9, 2.0))))
+def test_wire_is_where_projection_says(width_px, blur_px):
+    """Centroids across an evenly bright wire are exact for any blur. Allowed: bias 0.005 px, RMS 0.01 px."""
+    errors = []
+    for angle_deg in (0, 0.5, 3, 30, 44, 46, 60, 89.7, 90, 120, 135, 170):
+        wire = straight_wire(angle_deg, width_px, Material(0.5))
+        amount = (painted_wire(SMALL, wire, blur_px, 3) - 0.1) / 0.4
+        axis = 0 if abs(math.cos(math.radians(angle_deg))) > 0.7 else 1
+        profile = (amount if axis == 0 else amount.T).astype(float)
+        at = np.arange(profile.shape[1] // 2 - 25, profile.shape[1] // 2 + 25)
+        columns = profile[:, at]
+        centroid = (columns * np.arange(len(columns))[:, None]).sum(0) / columns.sum(0)
+        low, high = (crossing(edge, at, axis) for edge in wire.silhouette(SMALL))
+        assert columns.sum(0) == pytest.approx(np.abs(high - low), abs=0.002)
+        assert abs((centroid - 0.5 * (low + high)).mean()) < 0.005
+        errors.append(centroid - crossing(SMALL.project(wire.axis_mm), at, axis))
+    errors = np.concatenate(errors)
+    assert abs(errors.mean()) < 0.005
+    assert np.sqrt((errors**2).mean()) < 0.01
+
+
+@pytest.mark.parametrize("off_px, largest, whole", [(1.5, 0.5 / 255, 0.01), (-1.5, 0.5 / 255, 0.01), (0.0, 0.03, 0.08)])
+def test_painting_finer_changes_nothing(off_px, largest, whole):
+    """A shaded wire over a step in the background along its edge, at 3 and at 12 samples a pixel.
+
+    The step is what a border of printed squares is: beside the wire or under it, nothing changes by half a grey level.
+    Exactly along the edge, coverage squared is what differs: 0.6·0.2/√π = 0.068 px·brightness across the edge.
+    Composing after the blur would be off by 0.15 at the edge in all three.
+    """
+    light, material = Light(np.array([-0.3, -0.5, 0.8]) / math.sqrt(0.98), 0.55, 0.35), Material(0.25, 0.5, 18, 0.3)
+    wire, pictures = straight_wire(7.0, 5.7, material), []
+    for fine, soft_px in ((3, 0.2), (12, 0.05)):
+        margin = 5
+        window = Window.whole(SMALL, fine, soft_px, margin)
+        border = crossing(wire.silhouette(SMALL)[0], window.u_px, 0) + off_px
+        paint = (0.05 + 0.6 * ndtr((window.v_px[:, None] - border) / soft_px)).astype(np.float32)
+        wire.paint(window, paint, light)
+        pictures.append(window.seen(paint, 0.9)[margin:-margin, margin:-margin])
+    difference = np.abs(pictures[0] - pictures[1])[40:-40, 40:-40]
+    assert difference.max() < largest
+    assert difference.sum(0).max() < whole
+
+
+def saddle(picture, near, blur_px):
+    """Where the gradient vanishes, by Newton's method on a quintic spline: exact on a point-symmetric corner."""
+    half = int(6 * blur_px + 6)
+    centre = np.round(near).astype(int)
+    cut = picture[centre[1] - half:centre[1] + half + 1, centre[0] - half:centre[0] + half + 1].astype(float)
+    spline = ndimage.spline_filter(ndimage.gaussian_filter(cut, 0.8), 5)
+
+    def value(dx, dy):
+        return ndimage.map_coordinates(spline, [[at[1] + dy], [at[0] + dx]], order=5, prefilter=False)[0]
+
+    at, h = near - centre + half, 0.05
+    for _ in range(6):
+        slope = np.array([value(h, 0) - value(-h, 0), value(0, h) - value(0, -h)]) / (2 * h)
+        mixed = (value(h, h) - value(h, -h) - value(-h, h) + value(-h, -h)) / (4 * h * h)
+        xx, yy = ((value(*d) - 2 * value(0, 0) + value(*(-d))) / h**2 for d in h * np.eye(2))
+        at = at - np.linalg.solve(np.array([[xx, mixed], [mixed, yy]]), slope)
+    return at + centre - half
+
+
+@pytest.mark.parametrize("blur_px", [0.6, 0.9, 2.0])
+def test_board_corners_are_where_projection_says(blur_px):
+    """Allowed: bias 0.005 px, RMS 0.01 px; in the rig's picture (fine samples) and in held views (edges at once)."""
+    errors, board = [], build.board(QUICK)
+    for camera in build.cameras(QUICK):
+        here = studio(camera, blur_px)
+        pose = boards.poses(board, camera, 3, np.random.default_rng(3))[2]
+        for picture, T in ((here.rig_brightness(), build.T_rig_board(QUICK)), (here.board_brightness(pose), pose)):
+            px = camera.project(board.corners_mm @ T[:, :3].T + T[:, 3])
+            inside = ((px > 25) & (px < np.array(camera.size_px) - 25)).all(1)
+            errors.append([saddle(picture, p, blur_px) - p for p in px[inside]])
+            assert np.abs(np.mean(errors[-1], 0)).max() < 0.005
+    errors = np.concatenate(errors)
+    assert len(errors) > 100
+    assert np.sqrt((errors**2).mean()) < 0.01
+
+
+def test_lens_is_inverted_over_the_picture_and_its_margin():
+    camera = build.cameras(QUICK)[0]
+    u, v = np.arange(-30, 1310, 41.0), np.arange(-25, 745, 37.0)
+    x, y = (r.astype(float) for r in camera.rays(u, v))
+    points = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3)
+    px = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0].reshape(*x.shape, 2)
+    assert px == pytest.approx(np.stack(np.meshgrid(u, v), -1), abs=1e-4)  # float32 rays: 6e-8 · 2000 px
+
+
+@pytest.mark.parametrize("legacy", [False, True])
+@pytest.mark.parametrize("inverted", [False, True])
+def test_the_print_is_opencvs(legacy, inverted):
+    board = Board((7, 6), 15.0, 11.0, "DICT_5X5_100", legacy=legacy, inverted=inverted)
+    print_ = board.printed(Ink(1.0, 0.0), 5.0)
+    per_mm = 7  # marker modules of 11/7 mm are 11 px then
+    px = (np.arange(7 * 15 * per_mm) + 0.5) / per_mm
+    column, row = (np.searchsorted(e, px[px < e[-2]]) - 1 for e in (print_.x_mm, print_.y_mm))
+    drawn = board.opencv().generateImage((7 * 15 * per_mm, 6 * 15 * per_mm), marginSize=0, borderBits=1) / 255
+    ours = print_.reflectance[np.ix_(row, column)]
+    assert np.mean(ours != (1 - drawn if inverted else drawn)) == 0
+
+
+def moment(motor_rad, material=None):
+    rod, arc = Rod("cylinder", 100.0, 1.0, 60.0), np.linspace(HUB_FRONT_MM, 100, 257)
+    return Moment(motor_rad, Tube(unloaded(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25)))
+
+
+@pytest.fixture(scope="module", params=[0, 1])
+def setting(request):
+    camera = build.cameras(QUICK)[request.param]
+    bar = Bar.placed(d_x_mm=60.0, beta_rad=0.5, psi_rad=0.1, touch_rad=0.04, radius_mm=3.0, whisker_radius_mm=0.5)
+    return studio(camera).setting(bar, bar.foot_mm(np.array([60.0, 2.4, 0.0]))), camera, bar
+
+
+def test_a_frame_is_the_still_scene_but_for_what_moves(setting):
+    still, camera, _ = setting
+    first, second = (still.brightness([moment(m)]) for m in (0.0, 0.01))
+    changed = np.abs(first - second) > 1e-4
+    px = np.concatenate([camera.project(moment(m).whisker.axis_mm) for m in (0.0, 0.01)])
+    rows, columns = np.nonzero(changed)
+    assert 500 < len(rows) < 0.1 * changed.size
+    hub = camera.project(np.array([[x, y, z] for x in (-18, 6) for y in (-10, 10) for z in (-7, 8)]))
+    low, high = np.minimum(px.min(0), hub.min(0)) - 6, np.maximum(px.max(0), hub.max(0)) + 6
+    assert columns.min() > low[0] and columns.max() < high[0]
+    assert rows.min() > low[1] and rows.max() < high[1]
+
+
+def test_whisker_covers_the_bar_where_it_touches(setting):
+    """The whisker lies on the cameras' side of the bar: at the crossing its own tone is seen, not the bar's."""
+    still, camera, _ = setting
+    bright = still.brightness([moment(0.04, Material(0.9))])
+    column, row = np.round(camera.project(60.0 * np.array([[math.cos(0.04), math.sin(0.04), 0.0]]))[0]).astype(int)
+    assert bright[row, column] > 0.6
+
+
+def test_motion_blur_is_the_mean_of_its_moments(setting):
+    still, _, _ = setting
+    angles = (0.0, 0.004, 0.008)
+    blurred = still.brightness([moment(a) for a in angles])
+    mean = np.mean([still.brightness([moment(a)]) for a in angles], 0)
+    assert np.abs(blurred - mean).max() < 1e-5  # float32 sums
+
+
+def test_lamp_from_one_side_moves_the_seen_wire_towards_it():
+    """What real metal does, by far more than noise: the dark side of the wire is lost on a dark ground."""
+    wire, shifts = straight_wire(0.0, 5.7, Material(0.25, 0.5, 18.0, 0.3)), []
+    for side in (-1, 1):
+        towards = SMALL.rotation.T @ np.array([0.0, side * 0.94, -0.34])
+        picture = painted_wire(SMALL, wire, 0.9, 3, ground=0.02, light=Light(towards, 0.9, 0.02))
+        column = picture[:, 160].astype(float) - 0.02
+        low, high = (crossing(edge, 160, 0) for edge in wire.silhouette(SMALL))
+        shifts.append((column * np.arange(len(column))).sum() / column.sum() - 0.5 * (low + high))
+    assert shifts[0] < -0.5 and shifts[1] > 0.5
+
+
+@pytest.mark.parametrize("bits, kind", [(8, np.uint8), (12, np.uint16)])
+def test_noise_has_the_spread_that_the_protocol_says(bits, kind):
+    sensor = Sensor(0.9, 0.0, read=1.5, shot=0.3, grain=0.02, bits=bits)
+    level = 0.4 * 255
+    exposed = sensor.exposed(np.full((400, 500), 0.4, np.float32), np.random.default_rng(0))
+    scale = (2**bits - 1) / 255
+    expected = scale * math.sqrt(1.5**2 + 0.3**2 * level + (0.02 * level) ** 2 + 1 / 12 / scale**2)
+    assert exposed.dtype == kind
+    assert exposed.std() == pytest.approx(expected, rel=0.01)  # of 200 000 samples: 0.2 %
+    assert exposed.mean() == pytest.approx(scale * level, abs=0.05 * scale)
+
+
+def test_vignetting_darkens_corners_by_what_it_says():
+    exposed = Sensor(0.9, 0.3, 0, 0, 0, bits=12).exposed(np.full((100, 160), 0.5, np.float32), None)
+    assert exposed[0, 0] / exposed[50, 80] == pytest.approx(0.7, abs=0.005)
+
+
+def test_a_camera_that_looks_straight_down_is_refused():
+    with pytest.raises(ValueError, match="straight"):
+        Camera.looking("c", size_px=(64, 48), focal_px=100.0, distortion=DISTORTION, position_mm=np.array([0, 0, 9.0]),
+                       target_mm=np.zeros(3))
