@@ -98,10 +98,11 @@ def _trial(job, number, folder):
     if job.signals_only or not job.protocol.cameras:
         return
     for i, studio in enumerate(job.studios):
-        write_frames(folder, studio.camera.name, pictures.moving, _frames(job, number, i, recording))
+        write_frames(folder, studio.camera.name, pictures.moving, frames_of(job, number, i, recording))
 
 
-def _frames(job, trial, camera, recording) -> Iterator[np.ndarray]:
+def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterator[np.ndarray]:
+    """Frames of one camera, over all whisks of a trial, as the sensor gives them."""
     studio, frames = job.studios[camera], recording.frames
     setting = studio.setting(recording.bar, recording.bar.foot_mm(recording.touch.point_mm))
     for number, (motor, whisk) in enumerate(zip(frames.motor_rad, frames.whisk)):

@@ -88,6 +88,9 @@ def _printed(print_, x, y, soft_x, soft_y, correlation):
     """Coverage and mean reflectance under a Gaussian of these widths: the cell of each sample and its eight
     neighbours.
     """
+    cover = _inside(print_.x_mm, x, soft_x) * _inside(print_.y_mm, y, soft_y)
+    if print_.reflectance.size == 1:
+        return cover, np.float32(print_.reflectance[0, 0])
     column, weights_x, corner_x, near_x = _cells(print_.x_mm, x, soft_x)
     row, weights_y, corner_y, near_y = _cells(print_.y_mm, y, soft_y)
     table = np.pad(print_.reflectance, 2, mode="edge").astype(np.float32)
@@ -104,7 +107,7 @@ def _printed(print_, x, y, soft_x, soft_y, correlation):
     terms = correlation * (1 + 0.5 * correlation * near_x * near_y
                            + correlation**2 / 6 * (near_x**2 - 1) * (near_y**2 - 1))
     tone += saddle * density * terms
-    return _inside(print_.x_mm, x, soft_x) * _inside(print_.y_mm, y, soft_y), tone
+    return cover, tone
 
 
 def _cells(edges, x, soft):
