@@ -1,14 +1,16 @@
-"""A simulated twin of a recorded session, seed by seed through the whole evaluation, against the session itself.
+"""A simulated twin of a recorded session: what the cameras' half of the evaluation is off by in both.
 
     python tests/ladder/twin.py RECORDED OUT [seeds]
 
-RECORDED is a session with truth files (the steel sample), OUT keeps a line of results a seed: run again, it goes on
-where it stopped. Prints RMS errors of d_x, β and slip of both and their ratio, wanted within a factor 1.5. The range
-is that of the RMS of one session alone, over the seeds (10 to 90 %): how much RECORDED's own figure is worth.
+RECORDED is a session with truth files (the steel sample), OUT keeps a file of errors a seed: run again, it goes on
+where it stopped. Cameras are calibrated from each session's own boards. Prints RMS errors of d_x, β and slip over the
+measured trials of both, and their ratio, wanted within a factor 1.5. The range is that of the RMS of one session of
+the twin alone (10 to 90 % of the seeds): how much RECORDED's own figure is worth.
 """
 
 import csv
 import json
+import math
 import sys
 import tomllib
 from collections.abc import Callable
@@ -21,35 +23,38 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.atomic import write_whole
-from bench.evaluate import evaluate
+from bench.calibration import calibrate_session
 from bench.rig.protocol import load
 from bench.rig.simulate import simulate
+from bench.seen import see_trial
+from bench.session import load_session
 from bench.settings import Settings
+from bench.signals import read_signals
 
 TWIN = Path(__file__).with_name("twin.toml")
 UNITS = {"d_x": "mm", "beta": "deg", "slip": "mm"}
 
 
-def errors_of(session: Path, out: Path) -> dict[str, list[float]]:
-    """Measured minus true: d_x and β of every whisk, slip of every touching frame."""
-    errors = {name: [] for name in UNITS}
-    for row in _rows(out / "whisks.csv"):
-        folder = session / "trials" / row["trial"]
-        truth = tomllib.loads((folder / "truth.toml").read_text())
-        for name in ("d_x", "beta"):
-            column = f"{name}_{UNITS[name]}"
-            errors[name].append(float(row[column] or "nan") - truth[column])
-        true = {int(r["frame"]): r for r in _rows(folder / "truth.csv")}
-        for seen in _rows(out / "track" / f"{row['trial']}.csv"):
-            there = true[int(seen["frame"])]
-            if seen["touching"] == there["contact"] == "1":
-                errors["slip"].append(float(seen["slip_mm"]) - float(there["slip_mm"]))
-    return errors
+def errors_of(session_path: Path, out: Path) -> dict[str, list[float]]:
+    """Seen minus true: d_x and β of every measured whisk, slip of every touching frame; NaN where nothing was seen."""
+    session, errors = load_session(session_path), {name: [] for name in UNITS}
+    calibration = calibrate_session(session, out)
+    for trial in (t for t in session.trials if t.purpose == "measure"):
+        truth = tomllib.loads((trial.folder / "truth.toml").read_text())
+        (seen,) = see_trial(session, trial, read_signals(trial), calibration, Settings())["whisks"]
+        errors["d_x"].append((seen["d_x_mm"] or math.nan) - truth["d_x_mm"])
+        errors["beta"].append(math.degrees(seen.get("beta_rad", math.nan)) - truth["beta_deg"])
+        errors["slip"].extend(_slip_errors(seen.get("frames"), trial.folder / "truth.csv"))
+    return {name: [float(e) for e in values] for name, values in errors.items()}
 
 
-def _rows(path: Path) -> list[dict]:
+def _slip_errors(frames, path):
     with path.open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+        true = {int(row["frame"]): row for row in csv.DictReader(file)}
+    if frames is not None:
+        for frame, touching, slip_mm in zip(frames.index, frames.touching, frames.slip_mm):
+            if touching and true[int(frame)]["contact"] == "1":
+                yield slip_mm - float(true[int(frame)]["slip_mm"])
 
 
 def evaluated_once(kept: Path, mark: str, session_in: Callable[[Path], Path]) -> dict[str, list[float]]:
@@ -58,7 +63,6 @@ def evaluated_once(kept: Path, mark: str, session_in: Callable[[Path], Path]) ->
         return found["errors"]
     with TemporaryDirectory() as folder:
         session = session_in(Path(folder))
-        evaluate(session, Path(folder) / "out", Settings(), workers=1)
         errors = errors_of(session, Path(folder) / "out")
     write_whole(kept, json.dumps({"mark": mark, "errors": errors}))
     return errors
@@ -83,7 +87,7 @@ def table(own: dict, twins: list[dict]) -> str:
 
 
 def _twin(folder: Path, seed: int) -> Path:
-    return simulate(folder / "session", protocol=TWIN, seed=seed, workers=1)
+    return simulate(folder / "session", protocol=TWIN, seed=seed)
 
 
 def main() -> None:

@@ -6,10 +6,10 @@ import math
 import cv2
 import numpy as np
 import pytest
-from scipy import ndimage
+from scipy.optimize import brentq
 from scipy.special import ndtr
 
-from bench.rig import boards, build
+from bench.rig import build
 from bench.rig.bar import Bar, unloaded
 from bench.rig.board import Board, Ink
 from bench.rig.camera import Camera
@@ -21,11 +21,20 @@ from bench.rig.sensor import Sensor
 from bench.rig.studio import Moment, Studio
 from bench.rig.tube import Tube
 from bench.rig.window import Window
+from tests.ladder.renderer import (
+    ANGLES_DEG,
+    BLURS_PX,
+    CAMERA,
+    WIDTHS_PX,
+    corner_errors_px,
+    crossing,
+    painted,
+    rms,
+    wire,
+    wire_errors_px,
+    wire_profiles,
+)
 
-DISTORTION = (-0.11, 0.14, 0.0006, -0.0004, 0.01)
-SMALL = Camera.looking("small", size_px=(320, 240), focal_px=2000.0, distortion=DISTORTION,
-                       position_mm=np.array([0.0, -400.0, 50.0]), target_mm=np.zeros(3))
-EVEN = Light(np.array([0.0, -1.0, 0.0]), lamp=0.0, soft=1.0)
 QUICK = load("quick")
 
 
@@ -33,47 +42,44 @@ def studio(camera, blur_px=0.9, protocol=QUICK):
     return Studio(camera, build.scene(protocol), Sensor(blur_px, 0, 0, 0, 0))
 
 
-def painted_wire(camera, wire, blur_px, fine, soft_px=0.2, ground=0.1, light=EVEN):
-    margin = math.ceil(4 * blur_px) + 1
-    window = Window.whole(camera, fine, min(soft_px, blur_px), margin)
-    paint = np.full(window.shape, ground, np.float32)
-    wire.paint(window, paint, light)
-    return window.seen(paint, blur_px)[margin:-margin, margin:-margin]
+@pytest.mark.parametrize("bent", [False, True])
+@pytest.mark.parametrize("width_px, blur_px", list(itertools.product(WIDTHS_PX, BLURS_PX)))
+def test_wire_is_where_projection_says(width_px, blur_px, bent):
+    """Allowed: bias 0.005 px, of each orientation too; RMS 0.01 px."""
+    seen, centreline = wire_errors_px(width_px, blur_px, bent)
+    assert seen.shape == (len(ANGLES_DEG), 50)
+    assert np.abs(seen.mean(1)).max() < 0.005
+    assert rms(seen) < 0.01
+    if not bent:
+        assert abs(centreline.mean()) < 0.005
+        assert rms(centreline) < 0.01
 
 
-def straight_wire(angle_deg, width_px, material):
-    """Through the picture's middle at an angle, somewhat oblique to it, of about this width."""
-    to_rig, angle = SMALL.rotation.T, math.radians(angle_deg)
-    along = to_rig @ np.array([math.cos(angle), math.sin(angle), 0.2])
-    middle = to_rig @ np.array([0.013, 0.009, 0]) * angle_deg / 10
-    radius = width_px * SMALL.in_camera(np.zeros(3))[2] / 2000 / 2
-    return Tube.straight(middle - 30 * along, middle + 30 * along, radius, material)
+@pytest.mark.parametrize("width_px", WIDTHS_PX)
+def test_silhouettes_are_where_rays_graze(width_px):
+    """And the wire's amount in a line of pixels is the way between them."""
+    for angle_deg in ANGLES_DEG:
+        tube = wire(angle_deg, width_px)
+        at, axis, lines = wire_profiles(tube, angle_deg, 0.9)
+        edges = np.sort([crossing(edge, at, axis) for edge in tube.silhouette(CAMERA)], 0)
+        for i in (0, 25, 49):
+            low, high = grazing(tube, at[i], axis)
+            assert edges[:, i] == pytest.approx([low, high], abs=0.001)
+            assert lines[:, i].sum() == pytest.approx(high - low, abs=0.002)
 
 
-def crossing(line_px, at, axis):
-    order = np.argsort(line_px[:, axis])
-    return np.interp(at, line_px[order, axis], line_px[order, 1 - axis])
+def grazing(tube, at, axis):
+    """Where a ray of a column (axis 0) or row of pixels passes the tube's axis at the distance of its radius."""
+    way = tube.axis_mm[-1] - tube.axis_mm[0]
 
+    def gap(v):
+        px = np.array([[[at, v]]] if axis == 0 else [[[v, at]]], float)
+        ray = CAMERA.rotation.T @ np.append(cv2.undistortPoints(px, CAMERA.matrix, CAMERA.distortion)[0, 0], 1)
+        normal = np.cross(ray, way)
+        return abs((tube.axis_mm[0] - CAMERA.centre_mm) @ normal) / np.linalg.norm(normal) - tube.radius_mm[0]
 
-@pytest.mark.parametrize("width_px, blur_px", list(itertools.product((1.5, 5.7, 12.0), (0.6, 0.9, 2.0))))
-def test_wire_is_where_projection_says(width_px, blur_px):
-    """Centroids across an evenly bright wire are exact for any blur. Allowed: bias 0.005 px, RMS 0.01 px."""
-    errors = []
-    for angle_deg in (0, 0.5, 3, 30, 44, 46, 60, 89.7, 90, 120, 135, 170):
-        wire = straight_wire(angle_deg, width_px, Material(0.5))
-        amount = (painted_wire(SMALL, wire, blur_px, 3) - 0.1) / 0.4
-        axis = 0 if abs(math.cos(math.radians(angle_deg))) > 0.7 else 1
-        profile = (amount if axis == 0 else amount.T).astype(float)
-        at = np.arange(profile.shape[1] // 2 - 25, profile.shape[1] // 2 + 25)
-        columns = profile[:, at]
-        centroid = (columns * np.arange(len(columns))[:, None]).sum(0) / columns.sum(0)
-        low, high = (crossing(edge, at, axis) for edge in wire.silhouette(SMALL))
-        assert columns.sum(0) == pytest.approx(np.abs(high - low), abs=0.002)
-        assert abs((centroid - 0.5 * (low + high)).mean()) < 0.005
-        errors.append(centroid - crossing(SMALL.project(wire.axis_mm), at, axis))
-    errors = np.concatenate(errors)
-    assert abs(errors.mean()) < 0.005
-    assert np.sqrt((errors**2).mean()) < 0.01
+    centre = float(crossing(CAMERA.project(tube.axis_mm), at, axis))
+    return brentq(gap, centre - 30, centre, xtol=1e-6), brentq(gap, centre, centre + 30, xtol=1e-6)
 
 
 @pytest.mark.parametrize("off_px, largest, whole", [(1.5, 0.5 / 255, 0.01), (-1.5, 0.5 / 255, 0.01), (0.0, 0.03, 0.08)])
@@ -85,51 +91,25 @@ def test_painting_finer_changes_nothing(off_px, largest, whole):
     Composing after the blur would be off by 0.15 at the edge in all three.
     """
     light, material = Light(np.array([-0.3, -0.5, 0.8]) / math.sqrt(0.98), 0.55, 0.35), Material(0.25, 0.5, 18, 0.3)
-    wire, pictures = straight_wire(7.0, 5.7, material), []
+    tube, pictures = wire(7.0, 5.7, material), []
     for fine, soft_px in ((3, 0.2), (12, 0.05)):
         margin = 5
-        window = Window.whole(SMALL, fine, soft_px, margin)
-        border = crossing(wire.silhouette(SMALL)[0], window.u_px, 0) + off_px
+        window = Window.whole(CAMERA, fine, soft_px, margin)
+        border = crossing(tube.silhouette(CAMERA)[0], window.u_px, 0) + off_px
         paint = (0.05 + 0.6 * ndtr((window.v_px[:, None] - border) / soft_px)).astype(np.float32)
-        wire.paint(window, paint, light)
+        tube.paint(window, paint, light)
         pictures.append(window.seen(paint, 0.9)[margin:-margin, margin:-margin])
     difference = np.abs(pictures[0] - pictures[1])[40:-40, 40:-40]
     assert difference.max() < largest
     assert difference.sum(0).max() < whole
 
 
-def saddle(picture, near, blur_px):
-    """Where the gradient vanishes, by Newton's method on a quintic spline: exact on a point-symmetric corner."""
-    half = int(6 * blur_px + 6)
-    centre = np.round(near).astype(int)
-    cut = picture[centre[1] - half:centre[1] + half + 1, centre[0] - half:centre[0] + half + 1].astype(float)
-    spline = ndimage.spline_filter(ndimage.gaussian_filter(cut, 0.8), 5)
-
-    def value(dx, dy):
-        return ndimage.map_coordinates(spline, [[at[1] + dy], [at[0] + dx]], order=5, prefilter=False)[0]
-
-    at, h = near - centre + half, 0.05
-    for _ in range(6):
-        slope = np.array([value(h, 0) - value(-h, 0), value(0, h) - value(0, -h)]) / (2 * h)
-        mixed = (value(h, h) - value(h, -h) - value(-h, h) + value(-h, -h)) / (4 * h * h)
-        xx, yy = ((value(*d) - 2 * value(0, 0) + value(*(-d))) / h**2 for d in h * np.eye(2))
-        at = at - np.linalg.solve(np.array([[xx, mixed], [mixed, yy]]), slope)
-    return at + centre - half
-
-
-@pytest.mark.parametrize("blur_px", [0.6, 0.9, 2.0])
+@pytest.mark.parametrize("blur_px", BLURS_PX)
 def test_board_corners_are_where_projection_says(blur_px):
     """Allowed: bias 0.005 px, RMS 0.01 px; in the rig's picture (fine samples) and in held views (edges at once)."""
-    errors, board = [], build.board(QUICK)
-    for camera in build.cameras(QUICK):
-        here = studio(camera, blur_px)
-        pose = boards.poses(board, camera, 3, np.random.default_rng(3))[2]
-        for picture, T in ((here.rig_brightness(), build.T_rig_board(QUICK)), (here.board_brightness(pose), pose)):
-            px = camera.project(board.corners_mm @ T[:, :3].T + T[:, 3])
-            inside = ((px > 25) & (px < np.array(camera.size_px) - 25)).all(1)
-            errors.append([saddle(picture, p, blur_px) - p for p in px[inside]])
-            assert np.abs(np.mean(errors[-1], 0)).max() < 0.005
-    errors = np.concatenate(errors)
+    pictures = corner_errors_px(blur_px)
+    assert all(np.abs(errors.mean(0)).max() < 0.005 for errors in pictures)
+    errors = np.concatenate(pictures)
     assert len(errors) > 100
     assert np.sqrt((errors**2).mean()) < 0.01
 
@@ -199,12 +179,12 @@ def test_motion_blur_is_the_mean_of_its_moments(setting):
 
 def test_lamp_from_one_side_moves_the_seen_wire_towards_it():
     """What real metal does, by far more than noise: the dark side of the wire is lost on a dark ground."""
-    wire, shifts = straight_wire(0.0, 5.7, Material(0.25, 0.5, 18.0, 0.3)), []
+    tube, shifts = wire(0.0, 5.7, Material(0.25, 0.5, 18.0, 0.3)), []
     for side in (-1, 1):
-        towards = SMALL.rotation.T @ np.array([0.0, side * 0.94, -0.34])
-        picture = painted_wire(SMALL, wire, 0.9, 3, ground=0.02, light=Light(towards, 0.9, 0.02))
+        towards = CAMERA.rotation.T @ np.array([0.0, side * 0.94, -0.34])
+        picture = painted(tube, 0.9, ground=0.02, light=Light(towards, 0.9, 0.02))
         column = picture[:, 160].astype(float) - 0.02
-        low, high = (crossing(edge, 160, 0) for edge in wire.silhouette(SMALL))
+        low, high = (crossing(edge, 160, 0) for edge in tube.silhouette(CAMERA))
         shifts.append((column * np.arange(len(column))).sum() / column.sum() - 0.5 * (low + high))
     assert shifts[0] < -0.5 and shifts[1] > 0.5
 
@@ -228,5 +208,5 @@ def test_vignetting_darkens_corners_by_what_it_says():
 
 def test_a_camera_that_looks_straight_down_is_refused():
     with pytest.raises(ValueError, match="straight"):
-        Camera.looking("c", size_px=(64, 48), focal_px=100.0, distortion=DISTORTION, position_mm=np.array([0, 0, 9.0]),
+        Camera.looking("c", size_px=(64, 48), focal_px=100.0, distortion=np.zeros(5), position_mm=np.array([0, 0, 9.0]),
                        target_mm=np.zeros(3))
