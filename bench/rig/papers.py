@@ -11,7 +11,7 @@ from bench.rig import build
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 
-_TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm"
+_TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"
 
 
 def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
@@ -82,20 +82,22 @@ def signals_csv(recording: Recording) -> str:
 
 
 def truth_csv(recording: Recording) -> str:
-    """A row a frame. A frame at the angle of a jump shows what came after it."""
-    frames = recording.frames
-    rows = enumerate(zip(frames.time_s, frames.motor_rad, frames.whisk))
-    return "\n".join([_TRUTH, *(_truth_row(i, recording.whisks[w], t, m) for i, (t, m, w) in rows)]) + "\n"
+    """A row a frame. A frame at the angle of a jump shows what came after it. `status`: free, held, sliding or tip."""
+    rows = (_truth_row(i, recording.whisks[w], t, m, back) for i, (t, m, w, back) in enumerate(recording.frames))
+    return "\n".join([_TRUTH, *rows]) + "\n"
 
 
-def _truth_row(frame, whisk, time_s, motor_rad):
-    state, row = whisk.state_at(motor_rad), whisk.row_at(motor_rad)
+def _truth_row(frame, whisk, time_s, motor_rad, back):
+    way = whisk.way(back)
+    state = way.state_at(motor_rad)
     if state is None:
         values = [*[math.nan] * 5, 0.0, 0.0]
     else:
-        values = [*state.point_mm, float(whisk.slip_mm(state.point_mm)), state.arc_mm, *whisk.forward.moment_Nmm[row]]
+        moment = way.moment_Nmm[way.row_at(motor_rad)]
+        values = [*state.point_mm, float(whisk.slip_mm(state.point_mm)), state.arc_mm, *moment]
     first, rest = (",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values))
-    return f"{frame},{first},{int(state is not None)},{rest}"
+    status = "free" if state is None else state.status
+    return f"{frame},{first},{int(state is not None)},{rest},{status}"
 
 
 def truth_toml(recording: Recording) -> str:

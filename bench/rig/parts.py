@@ -105,22 +105,22 @@ def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterat
     """Frames of one camera, over all whisks of a trial, as the sensor gives them."""
     studio, frames = job.studios[camera], recording.frames
     setting = studio.setting(recording.bar, recording.bar.foot_mm(recording.touch.point_mm))
-    for number, (motor, whisk) in enumerate(zip(frames.motor_rad, frames.whisk)):
-        moments = _moments(job.protocol, studio, recording, recording.whisks[whisk], motor)
+    for number, (_, motor, whisk, back) in enumerate(frames):
+        moments = _moments(job.protocol, studio, recording, recording.whisks[whisk], motor, back)
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
 
 
-def _moments(protocol, studio, recording, whisk, motor):
+def _moments(protocol, studio, recording, whisk, motor, back):
     """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
     pictures, length = protocol.pictures, recording.rod.length_mm
     swept = np.radians(recording.run.speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0
     near = np.linalg.norm(studio.camera.centre_mm - recording.touch.point_mm)
     count = 1 + int(2 * swept * length * studio.camera.matrix[0, 0] / near)
     angles = motor + swept * ((np.arange(count) + 0.5) / count - 0.5)
-    return [Moment(m, _whisker(whisk, m, studio.scene.looks.wire)) for m in angles.tolist()]
+    return [Moment(m, _whisker(whisk, m, back, studio.scene.looks.wire)) for m in angles.tolist()]
 
 
-def _whisker(whisk, motor, material):
+def _whisker(whisk, motor, back, material):
     arc = np.linspace(HUB_FRONT_MM, whisk.rod.length_mm, 257)
-    points = whisk.centreline_mm(motor, whisk.state_between(motor), arc)
+    points = whisk.centreline_mm(motor, whisk.way(back).state_between(motor), arc)
     return Tube(points, np.maximum(whisk.rod.radius_mm(arc), 0.01), material)

@@ -96,6 +96,7 @@ class PicturesTable(Table):
     after_deg: Zero = 4.6  # … to after it
     step_deg: Positive = 0.5
     rate_Hz: Positive | None = None  # instead of step_deg
+    back_stroke: bool = False  # frames on the way back too
     clock_offset_s: float = 0.0  # frames.csv runs behind the signals by this
 
     @property
@@ -109,10 +110,15 @@ class PicturesTable(Table):
         return "png" if self.moving == "mkv" else self.moving
 
     def frame_angles_deg(self, speed_deg_s: float) -> list[float]:
-        """Pushing angles of a whisk's frames."""
+        """Pushing angles of the frames of one stroke."""
         step = speed_deg_s / self.rate_Hz if self.rate_Hz else self.step_deg
         count = int((self.before_deg + self.after_deg) / step + 1e-9) + 1
         return [i * step - self.before_deg for i in range(count)]
+
+    def frames_a_whisk(self, speed_deg_s: float) -> int:
+        """The furthest angle once, the others on both ways where the way back is seen."""
+        count = len(self.frame_angles_deg(speed_deg_s))
+        return 2 * count - 1 if self.back_stroke else count
 
 
 class MotorTable(Table):
@@ -120,7 +126,7 @@ class MotorTable(Table):
     after_deg: Zero = 4.6  # … to after it
     ramp_s: Zero = 0.0  # to reach the speed and to lose it again
     pause_s: Zero = 0.0  # at either end
-    back_stroke: bool | None = None  # recorded too; by default where there are several whisks
+    back_stroke: bool = False  # recorded too; where there are several whisks it always is
     encoder_step_deg: Zero = 0.005  # 0: no steps
 
 
@@ -194,6 +200,10 @@ class Protocol(Table, kw_only=True):
         """The trials one by one."""
         runs = [run for table in self.trials for run in _runs(table, self.motor)]
         return [msgspec.structs.replace(run, name=name) for run, name in zip(runs, _distinct([r.name for r in runs]))]
+
+    def goes_back(self, run: "Run") -> bool:
+        """Whether a trial's recording holds back strokes."""
+        return run.table.whisks > 1 or self.motor.back_stroke or self.pictures.back_stroke
 
     def fingerprint(self) -> str:
         """Changes with any value."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from bench.rig import build
 from bench.rig.bar import Bar, Touch, first_touch
-from bench.rig.contact import State
 from bench.rig.friction import Friction
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
 from bench.rig.protocol import Protocol, Run
@@ -20,16 +19,23 @@ _STEP_RAD = math.radians(0.1)
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """The middles of the cameras' exposures, over all whisks: times, motor angles, number of the whisk."""
+    """The middles of the cameras' exposures, over all whisks: times, motor angles, number of the whisk, and whether on
+    its way back.
+    """
 
     time_s: np.ndarray
     motor_rad: np.ndarray
     whisk: np.ndarray
+    back: np.ndarray
+
+    def __iter__(self):
+        """(time_s, motor_rad, number of the whisk, back) of each."""
+        return zip(self.time_s.tolist(), self.motor_rad.tolist(), self.whisk.tolist(), self.back.tolist())
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A trial. `states`: the contact at each frame, None where free; `signals` (n, 4): time_s, motor_deg, y_V, z_V."""
+    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V."""
 
     run: Run
     rod: Rod
@@ -38,7 +44,6 @@ class Recording:
     stroke: Stroke
     whisks: tuple[Whisk, ...]
     frames: Frames
-    states: tuple[State | None, ...]
     signals: np.ndarray
 
     @classmethod
@@ -49,8 +54,7 @@ class Recording:
         stroke = _stroke(protocol, run, touch)
         frames = _frames(protocol, run, touch, stroke)
         whisks = _whisks(protocol, run, rod, bar, touch, stroke, frames, rng)
-        states = tuple(whisks[w].state_at(m) for w, m in zip(frames.whisk, frames.motor_rad))
-        return cls(run, rod, bar, touch, stroke, whisks, frames, states, _signals(protocol, run, stroke, whisks, rng))
+        return cls(run, rod, bar, touch, stroke, whisks, frames, _signals(protocol, run, stroke, whisks, rng))
 
 
 def _placed(protocol, run, rod, rng):
@@ -66,27 +70,33 @@ def _placed(protocol, run, rod, rng):
 
 
 def _stroke(protocol, run, touch):
-    motor, whisks = protocol.motor, run.table.whisks
-    back = whisks > 1 if motor.back_stroke is None else motor.back_stroke or whisks > 1
+    motor = protocol.motor
     low, high = (touch.motor_rad + math.radians(a) for a in (-run.before_deg, run.after_deg))
-    return Stroke.plan(low, high, math.radians(run.speed_deg_s), whisks=whisks, ramp_s=motor.ramp_s,
-                       pause_s=motor.pause_s, back=back)
+    return Stroke.plan(low, high, math.radians(run.speed_deg_s), whisks=run.table.whisks, ramp_s=motor.ramp_s,
+                       pause_s=motor.pause_s, back=protocol.goes_back(run))
 
 
 def _frames(protocol, run, touch, stroke):
-    """The camera is triggered anew in each whisk."""
-    angles = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
-    count, whisks = len(angles), range(len(stroke.forward))
-    times = np.concatenate([stroke.time_s(w, angles) for w in whisks])
-    return Frames(times, np.tile(angles, len(whisks)), np.repeat(whisks, count))
+    """The camera is triggered anew in each whisk; on the way back, where that is wanted, at the same angles but the
+    furthest, where the motor may turn.
+    """
+    up = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
+    ways = [(up, False), (up[-2::-1], True)] if protocol.pictures.back_stroke else [(up, False)]
+    taken = [(w, angles, back) for w in range(len(stroke.forward)) for angles, back in ways]
+    return Frames(
+        np.concatenate([stroke.time_s(w, angles, back) for w, angles, back in taken]),
+        np.concatenate([angles for _, angles, _ in taken]),
+        np.concatenate([np.full(len(angles), w) for w, angles, _ in taken]),
+        np.concatenate([np.full(len(angles), back) for _, angles, back in taken]),
+    )
 
 
 def _whisks(protocol, run, rod, bar, touch, stroke, frames, rng):
     """The whisks of a recording; without scatter of the friction each is like the first."""
     table, friction = run.table, protocol.friction
     static = table.friction if table.static_friction is None else table.static_friction
-    end, back = float(stroke.angles_rad.max()), bool((stroke.speeds_rad_s < 0).any())
-    stops = frames.motor_rad[frames.whisk == 0]
+    end, back = float(stroke.angles_rad.max()), bool(stroke.back)
+    stops = frames.motor_rad[(frames.whisk == 0) & ~frames.back]
     factors = np.exp(friction.scatter * rng.standard_normal(len(stroke.forward)))
     found = {}
     for factor in factors:

@@ -50,7 +50,7 @@ def forecast(job: Job, workers: int) -> str:
     """What a session will hold, how big it will be and how long it will take."""
     runs, pictures, cameras = job.protocol.runs(), job.protocol.pictures, job.protocol.cameras
     whisks = sum(run.table.whisks for run in runs)
-    frames = sum(run.table.whisks * len(pictures.frame_angles_deg(run.speed_deg_s)) for run in runs)
+    frames = sum(run.table.whisks * pictures.frames_a_whisk(run.speed_deg_s) for run in runs)
     seen = 0 if job.signals_only else (frames + job.protocol.board.views + 1) * len(cameras)
     scale = sum(c.size_px[0] * c.size_px[1] for c in cameras) / (1280 * 720 * max(len(cameras), 1))
     size = seen * scale * _MEGABYTES[pictures.format] + sum(_signal_megabytes(job, run) for run in runs)
@@ -60,7 +60,7 @@ def forecast(job: Job, workers: int) -> str:
 
 def _signal_megabytes(job, run):
     stroke_s = (run.before_deg + run.after_deg) / run.speed_deg_s + job.protocol.motor.pause_s
-    seconds = stroke_s * (2 * run.table.whisks if run.table.whisks > 1 else 1)
+    seconds = stroke_s * run.table.whisks * (2 if job.protocol.goes_back(run) else 1)
     return seconds * job.protocol.gauges.rate_Hz * 38e-6
 
 

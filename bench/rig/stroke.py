@@ -13,11 +13,13 @@ class Stroke:
     angles_rad: np.ndarray
     speeds_rad_s: np.ndarray
     forward: tuple[tuple[float, float], ...]  # times of each forward stroke at constant speed
+    back: tuple[tuple[float, float], ...] = ()  # and of each back stroke
 
     @classmethod
     def plan(cls, low_rad, high_rad, speed_rad_s, *, whisks=1, ramp_s=0.0, pause_s=0.0, back=False) -> "Stroke":
         """`whisks` strokes from below `low_rad` to above `high_rad`, at constant speed between the two."""
         knots, forward = [(0.0, low_rad - 0.5 * speed_rad_s * ramp_s, 0.0 if ramp_s else speed_rad_s)], []
+        backward = []
         for whisk in range(whisks):
             _rest(knots, pause_s)
             if whisk and not back:
@@ -25,8 +27,8 @@ class Stroke:
             forward.append(_move(knots, high_rad - low_rad, speed_rad_s, ramp_s))
             _rest(knots, pause_s)
             if back:
-                _move(knots, low_rad - high_rad, -speed_rad_s, ramp_s)
-        return cls(*(np.array(c) for c in zip(*knots)), tuple(forward))
+                backward.append(_move(knots, low_rad - high_rad, -speed_rad_s, ramp_s))
+        return cls(*(np.array(c) for c in zip(*knots)), tuple(forward), tuple(backward))
 
     @property
     def end_s(self) -> float:
@@ -41,9 +43,9 @@ class Stroke:
         straight = self.angles_rad[i] + self.speeds_rad_s[i] * part + 0.5 * gained * part**2
         return straight
 
-    def time_s(self, whisk: int, angle_rad) -> np.ndarray:
-        """When a whisk's forward stroke passes angles (at constant speed)."""
-        start, end = self.forward[whisk]
+    def time_s(self, whisk: int, angle_rad, back: bool = False) -> np.ndarray:
+        """When a whisk's forward (or back) stroke passes angles (at constant speed)."""
+        start, end = (self.back if back else self.forward)[whisk]
         first, last = self.angle_rad(start), self.angle_rad(end)
         return start + (np.asarray(angle_rad) - first) / (last - first) * (end - start)
 

@@ -28,11 +28,41 @@ class Instants:
         points, arcs, moments = (np.array(column) for column in zip(*rows))
         return cls(np.asarray(path_rad), points, arcs, moments, tuple(states))
 
+    @property
+    def _way(self) -> int:
+        return -1 if self.motor_rad[-1] < self.motor_rad[0] else 1
+
     def moments_at(self, motor_rad) -> np.ndarray:
         """(m_y, m_z) at motor angles, straight lines between instants, zero before touch."""
-        way = -1 if self.motor_rad[-1] < self.motor_rad[0] else 1
-        at, knots = way * np.asarray(motor_rad), way * self.motor_rad
+        at, knots = self._way * np.asarray(motor_rad), self._way * self.motor_rad
         return np.stack([np.interp(at, knots, m) for m in self.moment_Nmm.T], -1)
+
+    def row_at(self, motor_rad: float) -> int:
+        """Row of the last instant on the way to a motor angle, −1 where the way has not begun."""
+        at, knots = self._way * motor_rad, self._way * self.motor_rad
+        return int(np.searchsorted(knots, at + 1e-9, side="right")) - 1
+
+    def state_at(self, motor_rad: float) -> State | None:
+        """The state at one of the stops (after a jump there, if any); None where nothing is pushed."""
+        row = self.row_at(motor_rad)
+        state = self.states[row] if row >= 0 else None
+        return state if state is not None and state.force_hub_N.any() else None
+
+    def state_between(self, motor_rad: float) -> State | None:
+        """The state at any angle: force and arc on straight lines between instants."""
+        row = self.row_at(motor_rad)
+        if row < 0 or self.states[row] is None:
+            return None
+        row = min(row, len(self.states) - 2)
+        (before, after), angles = self.states[row:row + 2], self.motor_rad[row:row + 2]
+        if before is None or angles[0] == angles[1]:
+            return after
+        part = (motor_rad - angles[0]) / (angles[1] - angles[0])
+        if after is None:
+            return replace(before, motor_rad=motor_rad, force_hub_N=(1 - part) * before.force_hub_N)
+        force = (1 - part) * before.force_hub_N + part * after.force_hub_N
+        arc = (1 - part) * before.arc_mm + part * after.arc_mm
+        return replace(after, motor_rad=motor_rad, force_hub_N=force, arc_mm=arc)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,28 +93,11 @@ class Whisk:
         """Along the bar since first touch."""
         return (np.asarray(point_mm) - self.touch.point_mm) @ self.bar.axis
 
-    def row_at(self, motor_rad: float) -> int:
-        """Row of the forward stroke's last instant at or before a motor angle."""
-        return int(np.searchsorted(self.forward.motor_rad, motor_rad + 1e-9, side="right")) - 1
-
-    def state_at(self, motor_rad: float) -> State | None:
-        """The state at one of the forward stroke's stops (after a jump there, if any); None before touch."""
-        row = self.row_at(motor_rad)
-        return self.forward.states[row] if row > 0 else None
-
-    def state_between(self, motor_rad: float) -> State | None:
-        """The forward stroke's state at any angle: force and arc on straight lines between instants."""
-        row = self.row_at(motor_rad)
-        if row < 0 or motor_rad <= self.touch.motor_rad:
-            return None
-        row = min(row, len(self.forward.states) - 2)
-        (before, after), angles = self.forward.states[row:row + 2], self.forward.motor_rad[row:row + 2]
-        if before is None or after is None or angles[0] == angles[1]:
-            return after
-        part = (motor_rad - angles[0]) / (angles[1] - angles[0])
-        force = (1 - part) * before.force_hub_N + part * after.force_hub_N
-        arc = (1 - part) * before.arc_mm + part * after.arc_mm
-        return replace(after, motor_rad=motor_rad, force_hub_N=force, arc_mm=arc)
+    def way(self, back: bool) -> Instants:
+        """The forward or the back stroke. Raises ValueError where there was no back stroke."""
+        if back and self.back is None:
+            raise ValueError("this whisk has no back stroke")
+        return self.back if back else self.forward
 
     def slip_at(self, theta_rad) -> np.ndarray:
         """Slip (mm) on the forward stroke at pushing angles, NaN where it does not reach them."""
