@@ -3,8 +3,8 @@
     python tests/ladder/twin.py RECORDED OUT [seeds]
 
 RECORDED is a session with truth files (the steel sample), OUT keeps a file of errors a seed: run again, it goes on
-where it stopped. Cameras are calibrated from each session's own boards. Prints RMS errors of d_x, β and slip over the
-measured trials of both, and their ratio, wanted within a factor 1.5. The range is that of the RMS of one session of
+where it stopped. Cameras are calibrated from each session's own boards. Prints RMS errors of d_x, β and slip over all
+trials of both, and their ratio, wanted within a factor 1.5. The range is that of the RMS of one session of
 the twin alone (10 to 90 % of the seeds): how much RECORDED's own figure is worth.
 """
 
@@ -36,10 +36,10 @@ UNITS = {"d_x": "mm", "beta": "deg", "slip": "mm"}
 
 
 def errors_of(session_path: Path, out: Path) -> dict[str, list[float]]:
-    """Seen minus true: d_x and β of every measured whisk, slip of every touching frame; NaN where nothing was seen."""
+    """Seen minus true: d_x and β of every whisk, slip of every touching frame; NaN where nothing was seen."""
     session, errors = load_session(session_path), {name: [] for name in UNITS}
     calibration = calibrate_session(session, out)
-    for trial in (t for t in session.trials if t.purpose == "measure"):
+    for trial in session.trials:
         truth = tomllib.loads((trial.folder / "truth.toml").read_text())
         (seen,) = see_trial(session, trial, read_signals(trial), calibration, Settings())["whisks"]
         errors["d_x"].append((seen["d_x_mm"] or math.nan) - truth["d_x_mm"])
