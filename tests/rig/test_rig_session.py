@@ -516,3 +516,13 @@ def test_size_and_time_are_said_before_and_progress_after(tmp_path, capsys):
     assert "parts" in bar and "4/4" in bar
     size = sum(len(data) for name, data in contents(session).items() if name.endswith("signals.csv")) / 1e6
     assert float(line.split("about ")[1].split(" MB")[0]) == pytest.approx(size, abs=0.6)
+
+
+def test_the_documents_example_loads(tmp_path):
+    """And it names each table."""
+    document = (Path(__file__).resolve().parents[2] / "docs" / "rig.md").read_text()
+    text = document.split("```toml\n")[1].split("```")[0]
+    protocol = load(protocol_file(tmp_path, text))
+    assert len(protocol.runs()) == 7
+    tables = {"whisker", "board", "cameras", "light", "pictures", "motor", "friction", "gauges", "trials"}
+    assert tables < set(tomllib.loads(text))
