@@ -10,6 +10,7 @@ from bench.errors import BadInput
 from bench.footage import frame_count, read_frames
 from bench.session import Session
 from bench.table import forward_in_time, read_table, require_columns
+from bench.threads import in_threads
 from vision.board_settings import why_not_found
 from vision.corners import Corners, find_corners, refine_corners
 from vision.errors import Refused
@@ -78,9 +79,14 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
     """A view a frame; frames that are not looked at or damaged count as without a board."""
     views, chosen, samples = [], sampled_frames(frames.count), []
     every = max(1, len(chosen) // _SAMPLES)
-    for index, grey in frames.read():
-        views.append(Corners.none() if grey is None or index not in chosen else find_corners(grey, board))
-        if grey is not None and len(views[-1]) == 0 and len(samples) < _SAMPLES and index % every == 0:
+
+    def look(frame: tuple[int, np.ndarray | None]):
+        index, grey = frame
+        return index, grey, find_corners(grey, board) if grey is not None and index in chosen else Corners.none()
+
+    for index, grey, view in in_threads(look, frames.read()):
+        views.append(view)
+        if grey is not None and len(view) == 0 and len(samples) < _SAMPLES and index % every == 0:
             samples.append(grey)
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
         reason = why_not_found(samples, board) if samples else None
@@ -130,11 +136,9 @@ def _trial_views(session: Session, name: str, rig_view: Corners) -> tuple[list[C
 def _views_of(source: Path, each: int, rig_view: Corners, board: Board) -> Iterator[Corners]:
     count = frame_count(source)
     chosen = np.unique(np.linspace(0, count - 1, min(each, count)).astype(int)) if count else []
-    for grey in read_frames(source, (int(k) for k in chosen)).values():
-        if grey is not None:
-            view = refine_corners(grey, rig_view.px, rig_view.ids, board)
-            if len(view):
-                yield view
+    greys = (grey for grey in read_frames(source, (int(k) for k in chosen)).values() if grey is not None)
+    views = in_threads(lambda grey: refine_corners(grey, rig_view.px, rig_view.ids, board), greys)
+    return filter(len, views)
 
 
 def _shift_px(view: Corners, rig_view: Corners) -> float:

@@ -1,6 +1,7 @@
 """`whisker-bench calibrate cameras`: cameras.toml from a session's board views, and how far to trust it."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from vision.cameras_file import write_cameras
 from vision.cameras_import import import_cameras, place_on_rig
 from vision.corners import Corners
 from vision.errors import Refused
-from vision.held_out import HeldOut, held_out
+from vision.held_out import Agreement, HeldOut, held_out
 from vision.lens import LENS_TERMS
 from vision.scene import Camera, Cameras
 
@@ -111,7 +112,7 @@ def measure_held_out(session: Session, views: BoardViews) -> HeldOut | None:
     alone = held_out(made, views.boards, is_held, session.board).alone_px
     odd = {name: [_rows(view, session, 1)] for name, view in views.rig.items()}
     on_rig = held_out(made, odd, [True], session.board, together=True)
-    return HeldOut(alone, **{k: getattr(on_rig, k) for k in HeldOut.__dataclass_fields__ if k != "alone_px"})
+    return replace(on_rig, alone_px=alone)
 
 
 def _with_even_rows(views: BoardViews, session: Session) -> BoardViews:
@@ -153,14 +154,17 @@ def held_out_lines(measured: HeldOut | None, calibration: Calibration) -> Iterat
     yield f"held out, views with index % 4 == 3, each camera with its own board pose: {alone}"
     if not measured.corners:
         return
-    what = "board views" if calibration.together else "view of the board on the rig, every other row of corners,"
-    yield f"held out, {measured.views} {what} one board pose for all cameras: {measured.joint_px:.3f} px joint"
-    if calibration.timing is not None:
-        yield f"  (with each picture's instant; {measured.at_once_px:.3f} px if a view's pictures were of one instant)"
-    yield (
-        f"held out, distances of neighbouring corners in space less the pitch: RMS {measured.pitch_rms_mm:.4f} mm, "
-        f"mean {measured.pitch_mean_mm:+.4f} mm, {measured.pitches} pitches"
-    )
+    what = "board views" if calibration.together else "view of the board on the rig, every other row of corners"
+    how = "" if measured.offsets is None else ", each camera late by its one offset as the other views have it"
+    yield f"held out, {measured.views} {what}, one board pose for all cameras{how}: {_agreement(measured.joint)}"
+    if measured.instants is not None:
+        yield f"  with each picture's own instant fitted besides: {_agreement(measured.instants)}"
+        yield f"  with all pictures of a view taken as of one instant: {_agreement(measured.at_once)}"
+
+
+def _agreement(found: Agreement) -> str:
+    pitch = f"RMS {found.pitch_rms_mm:.4f} mm, mean {found.pitch_mean_mm:+.4f} mm over {found.pitches} pitches"
+    return f"{found.joint_px:.3f} px joint; distances of neighbouring corners in space less the pitch: {pitch}"
 
 
 def _doubts(calibration: Calibration) -> Iterator[str]:

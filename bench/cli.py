@@ -146,8 +146,12 @@ def _add_calibrate(verbs) -> None:
     )
     _add_session(cameras)
     _add_out(cameras, "FILE", "cameras.toml to write; its covariance goes beside it as .npz")
-
-
+    cameras.add_argument(
+        "--lenses",
+        type=Path,
+        metavar="FILE",
+        help="camera TOML of caliscope or aniposelib: its lenses are taken as exact and only placed in the rig",
+    )
     gauges = _add(
         what,
         "gauges",
@@ -180,7 +184,7 @@ def _calibrate_cameras(options: argparse.Namespace) -> int:
     from bench.environment import check_environment
 
     check_environment()
-    return calibrate_cameras_command(options.session, options.out)
+    return calibrate_cameras_command(options.session, options.out, options.lenses)
 
 
 def _add_check(verbs) -> None:

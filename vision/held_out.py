@@ -3,6 +3,10 @@
 Three figures, each more telling than the one before. A board pose fitted to one camera by itself takes up much of what
 is wrong. One pose for all cameras asks whether they agree. Distances between neighbouring corners brought into space
 ask for millimetres, against the printed pitch.
+
+Of cameras that are not triggered together, the last two are taken three ways, in the order of what is fitted to the
+held-out pictures themselves: nothing but the board's pose, the pictures being as of one instant; the same with each
+camera late by its one offset, known from the other views; and with the instant of each picture fitted too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,22 +29,36 @@ _ROBUST_WIDTH = 3.0
 
 
 @dataclass(frozen=True)
-class HeldOut:
-    """Measured on views (how many) with corners and pitches (how many). NaN where there is nothing to measure.
+class Agreement:
+    """How cameras agree: joint_px with one board pose for all, root mean square; pitch_rms_mm, pitch_mean_mm: distance
+    of neighbouring corners in space less the pitch, of so many pitches. NaN where there is nothing to measure."""
 
-    alone_px: per camera, a pose for each view of that camera. joint_px: one pose for all cameras, root mean square.
-    at_once_px: the same with all pictures of a view taken as of one instant. pitch_rms_mm, pitch_mean_mm: distance of
-    neighbouring corners in space less the pitch.
+    joint_px: float = np.nan
+    pitch_rms_mm: float = np.nan
+    pitch_mean_mm: float = np.nan
+    pitches: int = 0
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Measured on views (how many) with corners (how many) that more than one camera has.
+
+    alone_px: per camera, a pose for each view of that camera. at_once: all pictures of a view taken as of one instant.
+    offsets: each camera late by its one offset, none of it fitted here. instants: each picture's instant fitted along
+    with the board's pose. The last two are None where cameras count as triggered together.
     """
 
     alone_px: Mapping[str, float]
-    joint_px: float = np.nan
-    at_once_px: float = np.nan
-    pitch_rms_mm: float = np.nan
-    pitch_mean_mm: float = np.nan
+    at_once: Agreement = Agreement()
+    offsets: Agreement | None = None
+    instants: Agreement | None = None
     views: int = 0
     corners: int = 0
-    pitches: int = 0
+
+    @property
+    def joint(self) -> Agreement:
+        """What stands for the calibration: by its own account of when pictures were taken, nothing of it fitted."""
+        return self.offsets or self.at_once
 
 
 def held_out(
@@ -66,14 +84,21 @@ def held_out(
     rows = np.array([is_held[k] for k in layout.index])[layout.seen.view] & _shared(layout)
     if not rows.any():
         return HeldOut(alone)
-    at_once = _fit_boards(layout, calibration, board)
-    fitted = at_once if calibration.timing is None else _fit_moving_board(layout, calibration, board)
+    views_held, corners = len(np.unique(layout.seen.view[rows])), int(rows.sum())
+    at_once = _agreement(cameras, layout, _fit_boards(layout, calibration, board), rows, board)
+    if calibration.timing is None:
+        return HeldOut(alone, at_once, views=views_held, corners=corners)
+    offsets, instants = (
+        _agreement(cameras, layout, _fit_moving_board(layout, calibration, board, fit_instants=fitted), rows, board)
+        for fitted in (False, True)
+    )
+    return HeldOut(alone, at_once, offsets, instants, views_held, corners)
+
+
+def _agreement(cameras: Cameras, layout: Layout, fitted: Solution, rows: np.ndarray, board: Board) -> Agreement:
     off = _pitch_errors_mm(cameras, layout, _still(layout, fitted, board), rows, board)
-    views_held = len(np.unique(layout.seen.view[rows]))
-    return HeldOut(
-        alone, _rms(fitted.residual_px[rows]), _rms(at_once.residual_px[rows]),
-        _rms(off[:, None]), float(off.mean()) if len(off) else np.nan, views_held, int(rows.sum()), len(off),
-    )  # fmt: skip
+    mean = float(off.mean()) if len(off) else np.nan
+    return Agreement(_rms(fitted.residual_px[rows]), _rms(off[:, None]), mean, len(off))
 
 
 def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
@@ -121,16 +146,18 @@ def _fit_boards(layout: Layout, calibration: Calibration, board: Board) -> Solut
     return solve(first, even, board.corners_mm, known)
 
 
-def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board) -> Solution:
-    """One pose a view for all cameras, on the board's path, with each picture's instant."""
+def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board, *, fit_instants: bool) -> Solution:
+    """One pose a view for all cameras, on the board's path, each camera late by its offset; with or without each
+    picture's own instant."""
     timing = calibration.timing
+    known = _held(lens_knowledge(len(layout.first.lens), len(layout.index)))
+    first = replace(layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory)
+    if not fit_instants:
+        even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
+        return solve(first, even, board.corners_mm, known)
     error = np.array([report.error_px for report in calibration.report])
     seen = replace(layout.seen, sigma_px=np.hypot(layout.seen.sigma_px, error[layout.seen.camera]))
-    known = _held(lens_knowledge(len(layout.first.lens), len(layout.index)))
     known = replace(known, late_sigma_s=timing.scatter_s)
-    first = replace(
-        layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory
-    )
     return solve(first, seen, board.corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-5)
 
 

@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from bench.board_views import read_board_views
 from bench.calibrate_cameras import calibrate_from
 from bench.session import load_session
+from bench.threads import in_threads
 from vision.calibrate import calibrate_cameras
 from vision.corners import Corners, detect, find_corners
 from vision.held_out import held_out
@@ -44,7 +45,8 @@ def real_video(folder: Path, names: list[str], find, **how) -> str:
     """One line of figures for a set of videos, in the manner of a comparison of tools."""
     begin = time.perf_counter()
     series = {name: Frames.open(folder / f"{name}.mp4") for name in names}
-    views = {name: [find(grey, WEBCAM_BOARD) for _, grey in frames.read()] for name, frames in series.items()}
+    views = {name: list(in_threads(lambda shot: find(shot[1], WEBCAM_BOARD), frames.read()))
+             for name, frames in series.items()}
     found = time.perf_counter()
     is_held = np.arange(len(views[names[0]])) % 4 == 3
     kept = {n: [Corners.none() if out else v for v, out in zip(vs, is_held)] for n, vs in views.items()}
@@ -56,10 +58,13 @@ def real_video(folder: Path, names: list[str], find, **how) -> str:
     seconds = f"{found - begin:.1f} s corners, {done - found:.1f} s adjustment"
     if not got.corners:
         return f"alone {alone:.3f} px; {seconds}"
-    return (
-        f"alone {alone:.3f} px, joint {got.joint_px:.3f} px (at once {got.at_once_px:.3f}), pitch RMS "
-        f"{got.pitch_rms_mm:.3f} mm, mean {got.pitch_mean_mm:+.3f} mm; {seconds}"
-    )
+    ways = {"at once": got.at_once, "offset a camera": got.offsets, "instant a picture": got.instants}
+    figures = [
+        f"{how}: joint {one.joint_px:.3f} px, pitch RMS {one.pitch_rms_mm:.3f} mm, mean {one.pitch_mean_mm:+.3f} mm"
+        for how, one in ways.items()
+        if one is not None
+    ]
+    return "; ".join([f"alone {alone:.3f} px", *figures, seconds])
 
 
 def steel(session_folder: Path) -> list[str]:
