@@ -14,6 +14,7 @@ from bench.threads import in_threads
 from vision.board_settings import why_not_found
 from vision.corners import Corners, find_corners, refine_corners
 from vision.errors import Refused
+from vision.marker_size import check_marker_size
 from vision.pictures import Frames, read_picture
 from vision.recording import MIN_VIEWS, fixes_pose
 from vision.scene import Board
@@ -77,7 +78,7 @@ def _open(source: Path, name: str) -> Frames:
 
 def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
     """A view a frame; frames that are not looked at or damaged count as without a board."""
-    views, chosen, samples = [], sampled_frames(frames.count), []
+    views, chosen, samples, found = [], sampled_frames(frames.count), [], []
     every = max(1, len(chosen) // _SAMPLES)
 
     def look(frame: tuple[int, np.ndarray | None]):
@@ -88,10 +89,16 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
         views.append(view)
         if grey is not None and len(view) == 0 and len(samples) < _SAMPLES and index % every == 0:
             samples.append(grey)
+        if len(view) and len(found) < _SAMPLES and (not found or index % every == 0):
+            found.append(grey)
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
         reason = why_not_found(samples, board) if samples else None
         if reason:
             raise BadInput(reason, file=f"boards/{name}")
+    try:
+        check_marker_size(found, board)
+    except Refused as problem:
+        raise BadInput(str(problem), file=f"boards/{name}") from None
     return views
 
 

@@ -3,7 +3,7 @@
 Kept in OUT/calibration with the hash of what it was made from, and made again only where that changed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,10 @@ class SessionCalibration:
     background: dict[str, np.ndarray | None]
     hash: str
     notes: tuple[str, ...] = ()
+
+    def with_notes(self, *notes: str) -> "SessionCalibration":
+        """The same with more to say."""
+        return replace(self, notes=(*self.notes, *notes))
 
 
 def calibrate_session(session: Session, out: Path) -> SessionCalibration:

@@ -1,6 +1,7 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from bench.gauge_fit import fit_gauges
 from bench.gauge_readings import Pairs, pairs_of
 from bench.gauges import Gauges
 from bench.gauges_file import given_gauges
+from bench.placing import place_rig
 from bench.results import hash_of_files, read_result
 from bench.session import Session
 from bench.settings import Settings
@@ -40,6 +42,8 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
     with lock_output(out), Workers(workers, progress) as pool:
         calibration = calibrate_session(session, out)
         units = [Unit(session, t, hash_of_files([t.folder]), calibration, settings, out) for t in trials]
+        calibration = place_rig(session, calibration, units, pool, doubts)
+        units = [replace(unit, calibration=calibration) for unit in units]
         rate = session_drift(trials, settings, pool)
         gauges = session_gauges(units, rate, pool, doubts)
         units = [unit.with_gauges(rate, gauges) for unit in units]

@@ -29,7 +29,7 @@ OWN_GAUGES = "not judged: without this trial the gauges are not known"
 @dataclass(frozen=True)
 class Unit:
     """What one trial's result is made from. files: hash of the trial's files. drift_rate: (2,), of the channels per
-    second; gauges: None where volts cannot become moments."""
+    second; gauges: None where volts cannot become moments. stage: folder of what is seen before all is known."""
 
     session: Session
     trial: Trial
@@ -39,6 +39,7 @@ class Unit:
     out: Path
     drift_rate: np.ndarray | None = None
     gauges: Gauges | None = None
+    stage: str = "seen"
 
     @property
     def path(self) -> Path:
@@ -47,8 +48,8 @@ class Unit:
 
     @property
     def seen_path(self) -> Path:
-        """Where the seen half of a gauge trial stands: it is part of the session's calibration."""
-        return self.out / "calibration" / "seen" / f"{self.trial.name}.json"
+        """Where the seen half of a trial stands that is part of the session's calibration."""
+        return self.out / "calibration" / self.stage / f"{self.trial.name}.json"
 
     @property
     def seen_hash(self) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 
 from vision.bar import HALF, changed, find_bar, settle_axis
 from vision.bar_line import measure_bar
+from vision.base_line import base_lines
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
@@ -152,8 +153,9 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
                           status="the whisker never touches" if state is None else state)
     measured, by_parameter = jacobians(problem, state)
     lens = calibration_share(problem, state, covariance)
-    return to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
-                    lens, views, rods.bar.radius_mm, settings)
+    whisk = to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
+                     lens, views, rods.bar.radius_mm, settings)
+    return replace(whisk, base=base_lines(problem, state, lens))
 
 
 def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], settings: VisionSettings):

@@ -9,8 +9,8 @@ rig frame (conventions: origin, z, x) by itself, as a turn w and shift v of the 
 A narrow fan fixes its apex well across the whisker and badly along it; covariances say how well, and weigh the two.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -25,6 +25,8 @@ _FALSE_ALARM = 1e-3
 # Without a board the swing alone must fix the centre at least this well, a tenth of what the truth may err by.
 _MOST_CENTRE_SIGMA_MM = 0.05
 _MIN_FRAMES = 4
+# Beyond this a swing's word on the axis is none: a narrow fan may lean any way about the whisker.
+_MOST_AXIS_SIGMA_DEG = 3.0
 # A board is at the wrong scale where known lengths say so by this many sigmas and by more than a print's stretch.
 _SCALE_SIGMAS = 4.0
 _SCALE_TOLERANCE = 0.005
@@ -36,7 +38,8 @@ class BaseLines:
     """The whisker's straight piece near its base on free strokes, a row a frame, in the rig frame as the board has it.
 
     motor_rad (n,); point_mm (n, 3) anywhere on the line and its covariance (n, 3, 3), mm²; direction (n, 3), unit, from
-    the base outward, and its covariance (n, 3, 3). Errors of different frames count as independent.
+    the base outward, and its covariance (n, 3, 3): errors of each frame by itself. shared_covariance (6, 6): of a turn
+    w about the base and a shift v, rad and mm, that all lines have in common (light on the wire, lenses).
     """
 
     motor_rad: np.ndarray
@@ -44,11 +47,12 @@ class BaseLines:
     point_covariance: np.ndarray
     direction: np.ndarray
     direction_covariance: np.ndarray
+    shared_covariance: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
 
     def __post_init__(self):
         n = len(self.motor_rad)
         vectors, matrices = ("point_mm", "direction"), ("point_covariance", "direction_covariance")
-        shapes = dict.fromkeys(vectors, (n, 3)) | dict.fromkeys(matrices, (n, 3, 3))
+        shapes = dict.fromkeys(vectors, (n, 3)) | dict.fromkeys(matrices, (n, 3, 3)) | {"shared_covariance": (6, 6)}
         for name, shape in shapes.items():
             found = np.shape(getattr(self, name))
             if found != shape:
@@ -57,7 +61,10 @@ class BaseLines:
     @property
     def width_rad(self) -> float:
         """How far the motor turned over the frames."""
-        return float(np.ptp(self.motor_rad))
+        return float(np.ptp(self.motor_rad)) if len(self.motor_rad) else 0.0
+
+
+_NO_LINES = BaseLines(np.zeros(0), *(np.zeros((0, 3)), np.zeros((0, 3, 3))) * 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,17 +107,42 @@ def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Plac
     return Placement(np.zeros(6), lever @ np.diag(np.repeat([sigma_rad**2, sigma_mm**2], 3)) @ lever.T)
 
 
+def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
+    """What several free strokes say together. Raises Refused where none of them is wide enough to say anything.
+
+    What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it as one.
+    """
+    usable = [lines for lines in strokes if len(lines.motor_rad) >= _MIN_FRAMES and lines.width_rad > 0]
+    if not usable:
+        by_swing(max(strokes, key=lambda lines: len(lines.motor_rad), default=_NO_LINES))
+    each = [by_swing(lines) for lines in usable]
+    information = [np.linalg.inv(one.covariance) for one in each]
+    whole = np.linalg.inv(sum(information))
+    gains = [whole @ own for own in information]
+    step = sum(gain @ one.step for gain, one in zip(gains, each))
+    own = sum(g @ (one.covariance - lines.shared_covariance) @ g.T for g, one, lines in zip(gains, each, usable))
+    covariance = own + np.mean([lines.shared_covariance for lines in usable], axis=0)
+    made = Placement(step, 0.5 * (covariance + covariance.T), float(np.mean([one.rise_rad for one in each])))
+    return replace(made, notes=(_learnt([lines.width_rad for lines in usable], made),))
+
+
 def by_swing(lines: BaseLines) -> Placement:
-    """What the swing alone says. Raises Refused with fewer than four frames or a motor that stood still."""
+    """What one swing says. Raises Refused with fewer than four frames or a motor that stood still."""
     if len(lines.motor_rad) < _MIN_FRAMES or lines.width_rad == 0:
         raise Refused(
             f"{len(lines.motor_rad)} frames of free stroke over {np.degrees(lines.width_rad):.2f} degrees: the centre "
             f"of rotation needs {_MIN_FRAMES} frames at different motor angles"
         )
     fitted = least_squares(_residuals, _first(lines), args=(lines,), x_scale="jac", method="lm")
-    covariance = _covariance(fitted.jac)
-    made = Placement(fitted.x[:6], covariance[:6, :6], float(fitted.x[6]))
-    return replace(made, notes=(_learnt(lines.width_rad, made),))
+    covariance = _excess(fitted) * _covariance(fitted.jac)[:6, :6] + lines.shared_covariance
+    made = Placement(fitted.x[:6], covariance, float(fitted.x[6]))
+    return replace(made, notes=(_learnt([lines.width_rad], made),))
+
+
+def _excess(fitted) -> float:
+    """By how much frames scatter more than they say (a motor angle's own noise), as variances; 1 where chance may."""
+    square, left = 2 * fitted.cost, len(fitted.fun) - len(fitted.x)
+    return square / left if square > chi2.isf(_FALSE_ALARM, left) else 1.0
 
 
 def _first(lines: BaseLines) -> np.ndarray:
@@ -195,16 +227,22 @@ def _alarm(apart: np.ndarray, sigma: np.ndarray) -> str:
     )
 
 
-def _learnt(width_rad: float, made: Placement) -> str:
-    return f"A free stroke of {np.degrees(width_rad):.1f} degrees gives: {_spread(made)}."
+def _learnt(widths_rad: Sequence[float], made: Placement) -> str:
+    narrow, wide = np.degrees([min(widths_rad), max(widths_rad)])
+    strokes = f"A free stroke of {wide:.1f} degrees gives"
+    if len(widths_rad) > 1:
+        strokes = f"{len(widths_rad)} free strokes of {narrow:.1f} to {wide:.1f} degrees give"
+    return f"{strokes}: {_spread(made)}."
 
 
 def _spread(made: Placement) -> str:
     sigma = np.sqrt(np.maximum(np.diag(made.covariance), 0.0))
     across = np.hypot(sigma[4], sigma[5]) / np.sqrt(2)
+    axis = np.degrees(max(sigma[0], sigma[1]))
+    lean = f"axis ± {axis:.3f} degrees" if axis < _MOST_AXIS_SIGMA_DEG else "axis not told"
     return (
-        f"centre of rotation ± {across:.4f} mm across and ± {sigma[3]:.4f} mm along the whisker, axis ± "
-        f"{np.degrees(max(sigma[0], sigma[1])):.3f} degrees, encoder's zero {np.degrees(made.step[2]):+.3f} ± "
+        f"centre of rotation ± {across:.4f} mm across and ± {sigma[3]:.4f} mm along the whisker, {lean}, "
+        f"encoder's zero {np.degrees(made.step[2]):+.3f} ± "
         f"{np.degrees(sigma[2]):.3f} degrees"
     )
 

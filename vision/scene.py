@@ -5,7 +5,7 @@ Lengths in mm, angles in rad, picture coordinates in px with pixel centres at in
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
@@ -128,11 +128,7 @@ class Board:
         """The same board as OpenCV's object, with no more of its dictionary than the board has: comparing what is seen
         with a thousand markers took 40 % of detection. (Others are as far from the board's as before: not taken.)
         """
-        whole = self._opencv_dictionary()
-        own = cv2.aruco.Dictionary(whole.bytesList[: self.marker_count], whole.markerSize, whole.maxCorrectionBits)
-        board = cv2.aruco.CharucoBoard(self.squares, float(self.square_mm), float(self.marker_mm), own)
-        board.setLegacyPattern(self.legacy)
-        return board
+        return _opencv_board(self)
 
     @cached_property
     def corners_mm(self) -> np.ndarray:
@@ -142,6 +138,16 @@ class Board:
         corners = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x)), np.zeros(len(x) * len(y))])
         corners.setflags(write=False)
         return corners
+
+
+@lru_cache(maxsize=32)
+def _opencv_board(board: Board) -> cv2.aruco.CharucoBoard:
+    """Made once: OpenCV warns of narrow borders each time."""
+    whole = board._opencv_dictionary()
+    own = cv2.aruco.Dictionary(whole.bytesList[: board.marker_count], whole.markerSize, whole.maxCorrectionBits)
+    made = cv2.aruco.CharucoBoard(board.squares, float(board.square_mm), float(board.marker_mm), own)
+    made.setLegacyPattern(board.legacy)
+    return made
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vision.place import BaseLines
+
 NAN = float("nan")
 
 
@@ -74,7 +76,7 @@ class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
     d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
-    budget: shares of d_x's variance by cause.
+    budget: shares of d_x's variance by cause. base: the whisker's base in the frames before touch.
     """
 
     whisk: int
@@ -95,6 +97,7 @@ class WhiskTruth:
     overlay: dict = field(default_factory=dict)
     smooth: Smooth | None = None
     budget: dict = field(default_factory=dict)
+    base: BaseLines | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""
