@@ -223,7 +223,8 @@ def _alarm(apart: np.ndarray, sigma: np.ndarray) -> str:
     scale, unit = (np.degrees(1.0), "degrees") if worst < 3 else (1.0, "mm")
     return (
         f"board and free stroke disagree: by the stroke {words[_COMPONENTS[worst]]} by {scale * apart[worst]:+.3f} ± "
-        f"{scale * sigma[worst]:.3f} {unit} from where T_rig_board has it; check T_rig_board and the encoder"
+        f"{scale * sigma[worst]:.3f} {unit} from where T_rig_board has it; check T_rig_board, the board's square_mm "
+        "and the encoder"
     )
 
 
@@ -231,7 +232,8 @@ def _learnt(widths_rad: Sequence[float], made: Placement) -> str:
     narrow, wide = np.degrees([min(widths_rad), max(widths_rad)])
     strokes = f"A free stroke of {wide:.1f} degrees gives"
     if len(widths_rad) > 1:
-        strokes = f"{len(widths_rad)} free strokes of {narrow:.1f} to {wide:.1f} degrees give"
+        span = f"{narrow:.1f} to {wide:.1f}" if wide - narrow > 0.05 else f"{wide:.1f}"
+        strokes = f"{len(widths_rad)} free strokes of {span} degrees give"
     return f"{strokes}: {_spread(made)}."
 
 

@@ -1,0 +1,70 @@
+"""Where the rig is: free strokes against T_rig_board, and what becomes of the cameras."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.calibration import SessionCalibration
+from bench.doubts import Doubts
+from bench.placing import place_rig
+from bench.results import plain
+from bench.session import load_session
+from bench.settings import Settings
+from bench.unit import Unit
+from bench.workers import Workers
+from tests.vision.test_fit import CAMERAS
+from tests.vision.test_place import some_lines
+
+OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.8, 0.0])  # the centre 0.8 mm across the whisker from where the board has it
+
+
+@pytest.fixture
+def place(small_copy, monkeypatch):
+    """A function (step of the true rig, T_rig_board's sigma in mm) that gives the placed calibration, the doubts and
+    the stages at which trials were looked at."""
+
+    def placed(step, sigma_mm=0.0, frames=30):
+        rng, stages, lines = np.random.default_rng(5), [], {}
+
+        def see(unit):
+            stages.append(unit.stage)
+            made = some_lines(8.0, step, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
+            base = plain(lines.setdefault(unit.trial.name, made))
+            return {"whisks": [{"base": base}, {"base": None}, {"status": "no pictures"}]}
+
+        monkeypatch.setattr("bench.placing.see_unit", see)
+        session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)
+        before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",))
+        units = [Unit(session, t, "", before, Settings(), small_copy) for t in session.trials]
+        doubts = Doubts()
+        return place_rig(session, before, units, Workers(0), doubts), doubts.notes, set(stages)
+
+    return placed
+
+
+def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
+    made, doubts, stages = place(0 * OFF)
+    assert made.cameras is CAMERAS and made.hash == "before" and not doubts
+    assert stages == {"seen"}  # what was looked at is the trial's own result and is not looked at again
+    assert any("free strokes of 8.0 degrees give: centre of rotation ± " in note for note in made.notes)
+
+
+def test_a_disagreement_is_an_alarm(place):
+    made, doubts, _ = place(OFF)
+    assert made.cameras is CAMERAS
+    assert len(doubts) == 1 and "board and free stroke disagree" in doubts[0]
+    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubts[0])[1]) == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_board_with_a_sigma_gives_way(place):
+    made, doubts, stages = place(OFF, sigma_mm=0.5)
+    assert not doubts and made.hash != "before" and stages == {"swing"}
+    moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
+    np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ OFF[3:], atol=0.05)
+
+
+def test_strokes_too_short_to_tell_are_no_doubt(place):
+    made, doubts, _ = place(OFF, frames=3)
+    assert not doubts and "needs 4 frames" in made.notes[-1]
