@@ -205,22 +205,42 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _add_figures(verbs) -> None:
-    verb = _add(
-        verbs,
-        "figures",
-        _figures,
-        "figures 5 and 6 of the paper, from its equations, as PNG, SVG and CSV",
-        "whisker-bench figures 6 --out figures",
+    figures = verbs.add_parser("figures", help="the paper's figures from its equations or from evaluated runs")
+    what = figures.add_subparsers(title="what", metavar="WHAT", required=True)
+    for number in (5, 6):
+        figure = _add(
+            what,
+            str(number),
+            _theory_figure,
+            f"figure {number} of the paper, from its equations, as PNG, SVG and CSV",
+            f"whisker-bench figures {number} --out figures",
+        )
+        _add_out(figure, "DIR", "folder for the files")
+        figure.set_defaults(number=number)
+    pooled = _add(
+        what,
+        "8",
+        _figure_8,
+        "figure 8 of the paper, from one or more evaluated runs, as PNG, SVG and CSV",
+        "whisker-bench figures 8 monday-out tuesday-out --out figures",
     )
-    verb.add_argument("number", type=int, choices=(5, 6), metavar="5|6", help="which figure")
-    _add_out(verb, "DIR", "folder for the files")
+    pooled.add_argument("runs", type=Path, nargs="+", metavar="OUT", help="folder that `evaluate --out` wrote")
+    _add_out(pooled, "DIR", "folder for the files")
 
 
-def _figures(options: argparse.Namespace) -> int:
+def _theory_figure(options: argparse.Namespace) -> int:
     from bench.theory_figures import write_figure
 
     for path in write_figure(options.number, options.out):
         print(path)
+    return DONE
+
+
+def _figure_8(options: argparse.Namespace) -> int:
+    from bench.runs import write_figure_8
+
+    paths, lines = write_figure_8(options.runs, options.out)
+    print(*lines, *paths, sep="\n")
     return DONE
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -21,6 +22,7 @@ _STYLE = {
     "axes.linewidth": 0.8,
 }
 _STAMP = "Source"
+SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
 
 
 def style():
@@ -42,6 +44,16 @@ def save(figure: Figure, path: Path, stamp: str, dpi: int = 160) -> None:
     """Write a PNG whole, with the hash of what it shows."""
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=dpi, metadata={"Software": None, _STAMP: stamp})
+
+
+def publish(figure: Figure, stem: Path) -> list[Path]:
+    """Write <stem>.png and <stem>.svg, each whole; the same figure gives the same bytes. The paths written."""
+    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+    with matplotlib.rc_context({"svg.hashsalt": stem.name}):
+        for path, metadata in zip(paths, ({"Software": None}, {"Date": None})):
+            with whole_file(path) as temporary:
+                figure.savefig(temporary, dpi=150, metadata=metadata)
+    return paths
 
 
 def is_drawn(path: Path, stamp: str) -> bool:

@@ -1,4 +1,4 @@
-"""Figures over the whole session: Fig. 8, and error against slope. Planes and overlays draw single trials."""
+"""Figures of an evaluated session: Fig. 8, error against slope, and each trial's planes and overlays."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,21 +8,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.compare import Judged, judge
-from bench.drawing import colour_of, is_drawn, label_of, save, style
+from bench.drawing import SLOPES_DEG, colour_of, is_drawn, label_of, save, style
+from bench.figure_8 import figure_8
 from bench.overlays import draw_overlays
 from bench.planes import draw_planes
 from bench.results import hash_of, hash_of_code
 from bench.session import Session
 from bench.settings import Settings
-from bench.surfaces import Point, Surface, surfaces
+from bench.surfaces import Surface, surfaces
 from bench.trial import Trial
 from bench.workers import Workers
-from estimator.beam import moment_in_EI_per_metre
-from estimator.friction import curves
 from estimator.threshold import distance_error
 
-_SLOPES_DEG = np.linspace(0.0, 82.0, 329)
-_MOST_COLUMNS = 4
 _MARKERS = "osD^vP"
 
 
@@ -61,68 +58,6 @@ def draw_trial(task: tuple[Trial, dict, tuple[float, str], Path]) -> list[str]:
         return [*draw_planes(result, friction, out, stamp), *draw_overlays(trial, result, out, stamp)]
 
 
-def figure_8(fitted: Sequence[Surface]) -> Figure:
-    """|m| in EI/metre and φ against β in the manner of Fig. 8, a column for each surface and speed."""
-    columns = min(len(fitted), _MOST_COLUMNS)
-    blocks = -(-len(fitted) // columns)
-    figure = Figure(figsize=(1.2 + 3.2 * columns, 5.2 * blocks), layout="constrained")
-    grid = figure.subplots(2 * blocks, columns, sharex=True, sharey="row", squeeze=False)
-    for axes in grid.flat[len(fitted) * 2 :] if blocks == 1 else []:
-        axes.set_visible(False)
-    for number, surface in enumerate(fitted):
-        top, bottom = grid[2 * (number // columns) : 2 * (number // columns) + 2, number % columns]
-        _panel(top, bottom, surface, f"({'abcdefghijklmnopqrstuvwxyz'[number % 26]})")
-    for number in range(len(fitted), blocks * columns):
-        for axes in grid[2 * (number // columns) : 2 * (number // columns) + 2, number % columns]:
-            axes.set_visible(False)
-    for axes in grid[::2, 0]:
-        axes.set_ylabel("|m|  [EI/m]")
-    for axes in grid[1::2, 0]:
-        axes.set_ylabel("slip angle φ  [°]")
-    return figure
-
-
-def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
-    """|m| above, φ below; negative slopes are drawn at their mirror image's place."""
-    points, EI = surface.points(), surface.C_Nmm2 / 3.0
-    beta = [abs(p.beta_deg) for p in points]
-    look = {"fmt": "o", "ms": 4, "color": "black", "capsize": 2.5, "elinewidth": 1.0, "lw": 0, "zorder": 3}
-    top.errorbar(
-        beta,
-        [moment_in_EI_per_metre(p.m_Nmm, EI) for p in points],
-        [moment_in_EI_per_metre(p.m_sd_Nmm, EI) for p in points],
-        **look,
-        label=_what(points),
-    )
-    bottom.errorbar(beta, [abs(p.phi_deg) for p in points], [p.phi_sd_deg for p in points], **look)
-    if surface.fit is not None:
-        theta = float(np.median([f.theta_rad for f in surface.felt]))
-        m, phi = curves(surface.alpha_rad, np.radians(_SLOPES_DEG), surface.common_d_x_mm, theta, surface.C_Nmm2)
-        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
-        line = {"color": colour_of("with_friction"), "lw": 1.4}
-        label = f"(13), (14): α = {alpha:.2f} ± {sigma:.2f}°"
-        top.plot(_SLOPES_DEG, moment_in_EI_per_metre(m, EI), **line, label=label)
-        bottom.plot(_SLOPES_DEG, np.degrees(phi), **line)
-    top.set_title(f"{letter} {surface.title}", loc="left")
-    top.legend(loc="lower left", handlelength=1.4)
-    top.set_ylim(bottom=0)
-    bottom.set(xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""), xlim=(-2, 82), ylim=(-3, 82))
-    top.annotate(
-        f"|m| scaled to d$_x$ = {surface.common_d_x_mm:.1f} mm",
-        (0.97, 0.95),
-        xycoords="axes fraction",
-        fontsize=7,
-        color="0.35",
-        ha="right",
-        va="top",
-    )
-
-
-def _what(points: Sequence[Point]) -> str:
-    most = max(p.whisks for p in points)
-    return "one whisk each, ± its sigma" if most == 1 else f"mean ± SD of up to {most} whisks"
-
-
 def error_against_slope(judged: Sequence[Judged], fitted: Sequence[Surface], settings: Settings) -> Figure:
     """Error of d_x against slope: every estimator, and on the right without (2), whose error dwarfs the others'."""
     figure = Figure(figsize=(9.6, 4.3), layout="constrained")
@@ -157,9 +92,9 @@ def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], se
     equation = "no_slip" if name == "no_slip" else "with_friction"
     for surface in fitted if assumed is not None else ():
         if surface.fit is not None:
-            error = distance_error(np.radians(_SLOPES_DEG), surface.alpha_rad, assumed, equation=equation)
+            error = distance_error(np.radians(SLOPES_DEG), surface.alpha_rad, assumed, equation=equation)
             axes.plot(
-                _SLOPES_DEG,
+                SLOPES_DEG,
                 100.0 * error,
                 color=colour_of(name, number),
                 lw=1.2,

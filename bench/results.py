@@ -13,7 +13,10 @@ import numpy as np
 from bench.atomic import write_whole
 
 _TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
-_NO_RESULTS = ("cli.py", "environment.py", "theory_figures.py", "summary.py", "score.py")  # they only parse and tell
+_NO_RESULTS = (  # they only parse and tell
+    *("cli.py", "environment.py", "theory_figures.py", "error_maps.py", "map_figures.py"),
+    *("runs.py", "summary.py", "score.py"),
+)
 _MANY = 1000  # values; larger arrays are hashed by their bytes
 
 

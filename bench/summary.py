@@ -13,7 +13,7 @@ from bench.results import number
 from bench.seen import NO_PICTURES
 from bench.session import Session
 from bench.settings import Settings
-from bench.surfaces import Surface, surfaces
+from bench.surfaces import friction_lines, surfaces
 from bench.unit import OWN_GAUGES
 
 DONE, DOUBTFUL = 0, 1
@@ -46,7 +46,7 @@ def write_summary(
                 _error_lines(judged),
             ),
             *_titled(
-                "Friction: α that (13), (14) fit best", _friction_lines(surfaces(results, session.whisker.C_Nmm2))
+                "Friction: α that (13), (14) fit best", friction_lines(surfaces(results, session.whisker.C_Nmm2))
             ),
             *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
             *_titled("Cameras", cameras),
@@ -133,16 +133,6 @@ def _error_lines(judged: Sequence[Judged]) -> Iterator[str]:
 
 def _error(j: Judged | None) -> str:
     return "-" if j is None else f"{j.error_percent:+.2f} ± {j.error_sigma_percent:.2f}"
-
-
-def _friction_lines(fitted: Sequence[Surface]) -> Iterator[str]:
-    for surface in fitted:
-        if surface.fit is None:
-            yield f"{surface.title}: {len(surface.felt)} whisks do not hold it (two slopes above α are needed)"
-            continue
-        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
-        doubt = f"; {surface.fit.status}" if surface.fit.status else ""
-        yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {len(surface.felt)} whisks{doubt}"
 
 
 def _gauge_lines(gauges: Gauges | None) -> Iterator[str]:

@@ -75,6 +75,11 @@ class Surface:
         """The distance to which moments are scaled for the figure, by (13), (14): |m| goes as 1/d_x."""
         return float(np.median([f.d_x_mm for f in self.felt]))
 
+    @property
+    def theta_rad(self) -> float:
+        """The pushing angle of the moments."""
+        return float(np.median([f.theta_rad for f in self.felt]))
+
     def points(self) -> list[Point]:
         """Means and standard deviations over whisks of alike slope, moments scaled to the common distance."""
         groups: list[list[Felt]] = []
@@ -92,6 +97,17 @@ def surfaces(results: Iterable[dict], C_Nmm2: float) -> list[Surface]:
     for key, felt in _felt(results):
         groups.setdefault(key, []).append(felt)
     return [Surface(*key, tuple(felt), _fit(felt, C_Nmm2), C_Nmm2) for key, felt in groups.items()]
+
+
+def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
+    """A line a surface and speed: the fitted α, or why there is none."""
+    for surface in fitted:
+        if surface.fit is None:
+            yield f"{surface.title}: {len(surface.felt)} whisks do not hold it (two slopes above α are needed)"
+            continue
+        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+        doubt = f"; {surface.fit.status}" if surface.fit.status else ""
+        yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {len(surface.felt)} whisks{doubt}"
 
 
 def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:

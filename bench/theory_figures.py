@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
-from bench.atomic import whole_file, write_whole
+from bench.atomic import write_whole
+from bench.drawing import publish
 from estimator.curvature import slope_threshold
 
 NUMBERS = (5, 6)
@@ -50,10 +53,11 @@ def write_figure(number: int, out: Path) -> list[Path]:
     if number not in NUMBERS:
         raise ValueError(f"figure {number}: the figures from the equations are {' and '.join(map(str, NUMBERS))}")
     curves = list(figure_5() if number == 5 else figure_6())
-    paths = [Path(out) / f"figure_{number}.{suffix}" for suffix in ("png", "svg", "csv")]
-    _draw(number, curves, paths[:2])
-    write_whole(paths[2], _table(number, curves))
-    return paths
+    stem = Path(out) / f"figure_{number}"
+    with matplotlib.rc_context({"font.size": 9}):
+        paths = publish(_figure(number, curves), stem)
+    write_whole(stem.with_suffix(".csv"), _table(number, curves))
+    return [*paths, stem.with_suffix(".csv")]
 
 
 def figure_5() -> Iterator[Curve]:
@@ -106,20 +110,7 @@ def _table(number, curves) -> str:
     return text.getvalue()
 
 
-def _draw(number, curves, paths) -> None:
-    import matplotlib
-
-    with matplotlib.rc_context({"svg.hashsalt": f"figure {number}", "font.size": 9}):
-        figure = _figure(number, curves)
-        for path in paths:
-            with whole_file(path) as temporary:
-                metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-                figure.savefig(temporary, dpi=150, metadata=metadata)
-
-
 def _figure(number, curves):
-    from matplotlib.figure import Figure
-
     rows = sorted({curve.row for curve in curves}, reverse=True)
     figure = Figure(figsize=(11, 3.8 * len(rows)), layout="constrained")
     grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)

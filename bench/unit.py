@@ -20,6 +20,7 @@ from bench.session import Session
 from bench.settings import Settings
 from bench.signals import Signals, read_signals
 from bench.trial import Trial
+from bench.whisker import Whisker
 from estimator.beam import Beam
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
@@ -109,6 +110,7 @@ def trial_result(unit: Unit) -> dict:
         seen = plain(see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings))
     return {
         "trial": _described(unit.trial),
+        "whisker": _whisker(unit.session.whisker),
         "theta_deg": unit.settings.theta_deg,
         "seen": seen,
         "felt": feel_trial(unit, signals),
@@ -123,6 +125,16 @@ def _described(trial: Trial) -> dict:
         "speed_deg_s": trial.speed_deg_s,
         "d_x_nominal_mm": trial.d_x_mm,
         "beta_nominal_deg": trial.beta_deg,
+    }
+
+
+def _whisker(whisker: Whisker) -> dict:
+    """What must be alike in results that are pooled."""
+    return {
+        "shape": whisker.shape,
+        "length_mm": whisker.length_mm,
+        "diameter_mm": whisker.diameter_mm,
+        "EI_Nmm2": whisker.EI_Nmm2,
     }
 
 

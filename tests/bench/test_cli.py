@@ -10,7 +10,7 @@ import pytest
 from bench import cli
 from bench.errors import BadInput
 
-VERBS = ["check", "calibrate cameras", "calibrate gauges", "evaluate", "figures", "simulate", "info"]
+VERBS = ["check", "calibrate cameras", "calibrate gauges", "evaluate", "figures 5", "figures 8", "simulate", "info"]
 
 
 @pytest.mark.parametrize("verb", VERBS)

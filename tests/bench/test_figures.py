@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from bench.compare import Judged
 from bench.drawing import is_drawn, save
-from bench.figures import error_against_slope, figure_8
+from bench.figure_8 import figure_8
+from bench.figures import error_against_slope
 from bench.planes import contact_path, sensing_plane
 from bench.results import plain
 from bench.session import load_session
