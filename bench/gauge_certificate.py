@@ -159,5 +159,5 @@ def page(certificate: Certificate):
 def _draw_residuals(axes, pairs: Sequence[Pairs], matrix, axis: int) -> None:
     for p in pairs:
         off = (p.volts @ matrix.T - p.moments)[:, axis]
-        sigma = np.sqrt(np.diag(p.moments_covariance))[axis::2]
+        sigma = np.hypot(np.sqrt(np.diag(p.moments_covariance))[axis::2], p.scale_sigma * p.moments[:, axis])
         axes.errorbar(p.moments[:, axis], off, sigma, fmt="o", ms=3, lw=0.8, label=f"{p.trial}, whisk {p.whisk}")

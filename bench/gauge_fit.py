@@ -98,8 +98,13 @@ def _rows(p: Pairs) -> np.ndarray:
 
 
 def _weight(p: Pairs, matrix) -> np.ndarray:
-    through = np.kron(np.eye(len(p)), matrix)
-    return np.linalg.inv(p.moments_covariance + through @ p.volts_covariance @ through.T)
+    """Inverse covariance (2n, 2n) of the residuals.
+
+    What scales all moments of a whisk counts as a share of the fitted moments: a share of the known ones would draw the
+    coefficients towards zero, the more so the wider the residuals (Peelle's puzzle).
+    """
+    through, fitted = np.kron(np.eye(len(p)), matrix), p.scale_sigma * (p.volts @ matrix.T).ravel()
+    return np.linalg.inv(p.moments_covariance + np.outer(fitted, fitted) + through @ p.volts_covariance @ through.T)
 
 
 def widening(pairs: Sequence[Pairs], matrix) -> float:

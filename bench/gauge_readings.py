@@ -24,14 +24,17 @@ _FRICTION, _FRICTION_SIGMA = 0.2, 0.4 / np.sqrt(12.0)
 _LEAST_THETA_RAD = np.radians(0.3)
 _NOMINAL_SHARE = 0.01  # a distance set by a ruler
 _NOMINAL_SLOPE_DEG = 5.0
-_NOMINAL_POINTS = 6
+# Within 1.3° of touch the low-pass, whose cut-off goes with the speed, bends the corner of the rise: 0.7 % at 1°,
+# 0.1 % at 1.3°, less beyond.
+_NOMINAL_THETA_RAD = np.radians(np.linspace(1.5, 4.0, 6))
 _MOST_HALF_WINDOW_RAD = np.radians(0.5)
 
 
 @dataclass(frozen=True)
 class Pairs:
     """n pairs of one whisk. moments, volts (n, 2), in the follicle's axes and above the free stroke; their covariances
-    (2n, 2n), of y and z pair by pair, with everything that the pairs share; theta_rad (n,).
+    (2n, 2n), of y and z pair by pair, with everything that the pairs share but scale_sigma, their common share of error
+    (that of the distance); theta_rad (n,).
 
     paper_moment, paper_volts (2,): the one pair that the paper takes, (2) at one pushing angle; NaN where not reached.
     """
@@ -46,6 +49,7 @@ class Pairs:
     volts_covariance: np.ndarray
     paper_moment: np.ndarray
     paper_volts: np.ndarray
+    scale_sigma: float = 0.0
 
     def __len__(self) -> int:
         return len(self.theta_rad)
@@ -53,7 +57,10 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Known:
-    """Moments (n, 2) in the hub's axes at motor angles motor_rad (n,), with covariance (2n, 2n); touch and distance."""
+    """Moments (n, 2) in the hub's axes at motor angles motor_rad (n,), with covariance (2n, 2n); touch and distance.
+
+    scale_sigma: share by which all moments may be wrong together; not in the covariance.
+    """
 
     touch_rad: float
     d_x_mm: float
@@ -61,6 +68,7 @@ class Known:
     theta_rad: np.ndarray
     moments: np.ndarray
     covariance: np.ndarray
+    scale_sigma: float
 
 
 def pairs_of(trial: Trial, seen: dict, stroke: Stroke, drift_rate, whisker: Whisker, theta_rad: float) -> Pairs | None:
@@ -91,9 +99,10 @@ def known_from_pictures(seen: dict, whisker: Whisker) -> Known | None:
     stiffness = np.repeat(moments_per_mm(moments, across), 2)
     rows = np.repeat(good, 2)
     covariance = np.array(d["covariance"])[np.ix_(rows, rows)] * np.outer(stiffness, stiffness)
-    by_distance = 2.0 * number(seen["d_x_sigma_mm"]) / d_x * moments
-    covariance = covariance + _shared(by_distance) + _shared(_FRICTION_SIGMA * by_friction)
-    return Known(number(seen["touch_rad"]), d_x, np.array(d["motor_rad"])[good], theta[good], moments, covariance)
+    covariance = covariance + _shared(_FRICTION_SIGMA * by_friction)
+    by_distance = 2.0 * number(seen["d_x_sigma_mm"]) / d_x
+    motor = np.array(d["motor_rad"])[good]
+    return Known(number(seen["touch_rad"]), d_x, motor, theta[good], moments, covariance, by_distance)
 
 
 def _drawn_share(across, along, slip) -> np.ndarray:
@@ -130,14 +139,14 @@ def known_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Known | 
     """Moments of a bar at right angles to the push, at the distance that a ruler gave; None where there is none."""
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
-    theta = np.radians(np.linspace(1.0, 4.0, _NOMINAL_POINTS))
+    theta = _NOMINAL_THETA_RAD
     along, across = trial.d_x_mm * np.cos(theta), trial.d_x_mm * np.sin(theta)
     deflection = np.stack([np.zeros_like(across), across], axis=1)
     moments, by_friction = _with_friction(along, deflection, np.ones_like(theta), whisker)
-    by_distance = (trial.d_x_sigma_mm or _NOMINAL_SHARE * trial.d_x_mm) / trial.d_x_mm * moments
+    by_distance = trial.d_x_sigma_mm / trial.d_x_mm or _NOMINAL_SHARE
     by_touch = touch.sigma_rad * moments / theta[:, None]
-    covariance = _shared(by_distance) + _shared(by_touch) + _shared(_FRICTION_SIGMA * by_friction)
-    return Known(touch.motor_rad, trial.d_x_mm, touch.motor_rad + theta, theta, moments, covariance)
+    covariance = _shared(by_touch) + _shared(_FRICTION_SIGMA * by_friction)
+    return Known(touch.motor_rad, trial.d_x_mm, touch.motor_rad + theta, theta, moments, covariance, by_distance)
 
 
 def _paired(
@@ -164,6 +173,7 @@ def _paired(
         _volts_covariance(read, theta[kept], touch),
         to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
         at.values,
+        known.scale_sigma,
     )
 
 

@@ -56,6 +56,19 @@ def test_noiseless_readings_give_the_coefficients_back():
     assert gauges.at_angle.matrix == pytest.approx(TRUE, rel=1e-9)
 
 
+def test_a_distance_that_is_hardly_known_draws_no_coefficient_towards_zero():
+    """A scale that is common to all readings is no reason to prefer small moments, however wide the residuals.
+
+    One follicle position each, readings 3 % apart, a distance known to 5 %. With one scale a channel the factor is that
+    of the readings alone; as a share of the known moments it would draw the factor down by χ² · 0.05², here a quarter.
+    """
+    uneven = 1.0 + 0.03 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])[:, None]
+    sound = [pairs(trial, roll, distance=0.0, point_Nmm=0.05) for trial, roll in (("a", 0.0), ("b", 90.0))]
+    exact = [Pairs(**(vars(p) | {"volts": p.volts * uneven})) for p in sound]
+    loose = [Pairs(**(vars(p) | {"scale_sigma": 0.05})) for p in exact]
+    assert np.diag(fit_matrix(loose).matrix) == pytest.approx(np.diag(fit_matrix(exact).matrix), rel=1e-3)
+
+
 def test_one_factor_a_channel_leaves_cross_talk_out():
     """Each factor is moment over volts where that channel senses the push, so it holds the other's cross-talk: the
     inverse of the inverse matrix's diagonal."""

@@ -65,7 +65,8 @@ def test_a_nominal_bar_gives_the_moments_of_2(session):
     trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0)
     known = known_from_nominal(trial, Touch(0.04, 1e-4), WHISKER)
     assert known.moments[:, 1] == pytest.approx(WHISKER.C_Nmm2 * known.theta_rad / 50.0, rel=5e-3)
-    sigma = np.sqrt(np.diag(known.covariance))[1::2] / known.moments[:, 1]
+    own = np.sqrt(np.diag(known.covariance))[1::2] / known.moments[:, 1]
+    sigma = np.hypot(own, known.scale_sigma)
     assert np.all(sigma > 0.01) and np.all(sigma < 0.013)
 
 
