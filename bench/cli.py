@@ -204,8 +204,14 @@ def _check(options: argparse.Namespace) -> int:
     return report_doubts(options.session, progress=sys.stderr.isatty())
 
 
+_MAPS = {
+    "tilt": "map of the error of (10) over slope and tilt of the bar, by exact mechanics, as PNG, SVG and CSV",
+    "radius": "map of the error of (10) over distance and radius of the bar, by exact mechanics, as PNG, SVG and CSV",
+}
+
+
 def _add_figures(verbs) -> None:
-    figures = verbs.add_parser("figures", help="the paper's figures from its equations or from evaluated runs")
+    figures = verbs.add_parser("figures", help="the paper's figures, and maps of the error that it left open")
     what = figures.add_subparsers(title="what", metavar="WHAT", required=True)
     for number in (5, 6):
         figure = _add(
@@ -226,6 +232,11 @@ def _add_figures(verbs) -> None:
     )
     pooled.add_argument("runs", type=Path, nargs="+", metavar="OUT", help="folder that `evaluate --out` wrote")
     _add_out(pooled, "DIR", "folder for the files")
+    for name, summary in _MAPS.items():
+        drawn = _add(what, name, _error_map, summary, f"whisker-bench figures {name} --out figures")
+        _add_out(drawn, "DIR", "folder for the files")
+        _add_workers(drawn)
+        drawn.set_defaults(name=name)
 
 
 def _theory_figure(options: argparse.Namespace) -> int:
@@ -241,6 +252,14 @@ def _figure_8(options: argparse.Namespace) -> int:
 
     paths, lines = write_figure_8(options.runs, options.out)
     print(*lines, *paths, sep="\n")
+    return DONE
+
+
+def _error_map(options: argparse.Namespace) -> int:
+    from bench.map_figures import write_map
+
+    for path in write_map(options.name, options.out, workers=options.workers, progress=sys.stderr.isatty()):
+        print(path)
     return DONE
 
 

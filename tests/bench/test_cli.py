@@ -10,7 +10,8 @@ import pytest
 from bench import cli
 from bench.errors import BadInput
 
-VERBS = ["check", "calibrate cameras", "calibrate gauges", "evaluate", "figures 5", "figures 8", "simulate", "info"]
+VERBS = ["check", "calibrate cameras", "calibrate gauges", "evaluate", "simulate", "info"]
+VERBS += ["figures 5", "figures 6", "figures 8", "figures tilt", "figures radius"]
 
 
 @pytest.mark.parametrize("verb", VERBS)
