@@ -9,14 +9,15 @@ from bench.compare import slope_deg, whisks
 from bench.results import number
 from estimator.friction import FrictionFit, fit_alpha
 
-# From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas.
+# From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
+# many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
 _MANY = 8
 _SAME_SLOPE_DEG = 2.5
 
 
 @dataclass(frozen=True)
 class Felt:
-    """What was felt of one whisk: slope and distance as seen (else nominal), moments with sigma."""
+    """What was felt of one whisk: slope and distance as seen (else nominal), moments with sigma; which recording."""
 
     beta_deg: float
     d_x_mm: float
@@ -28,6 +29,7 @@ class Felt:
     phi_deg: float
     phi_sigma_deg: float
     nominal: bool
+    recording: int = 0
 
     @property
     def m_Nmm(self) -> float:
@@ -111,7 +113,8 @@ def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
 
 
 def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:
-    for result, seen, felt in whisks(results):
+    every = ((place, *whisk) for place, result in enumerate(results) for whisk in whisks([result]))
+    for recording, result, seen, felt in every:
         trial = result["trial"]
         d_x = number(seen.get("d_x_mm"))
         nominal = not np.isfinite(d_x)
@@ -121,14 +124,17 @@ def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:
             values = [felt[k] for k in ("m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")]
             phi = [float(np.degrees(felt[k])) for k in ("phi_felt_rad", "phi_felt_sigma_rad")]
             theta = float(np.radians(result["theta_deg"]))
-            yield (trial["surface"], number(trial["speed_deg_s"])), Felt(beta, d_x, theta, *values, *phi, nominal)
+            key = trial["surface"], number(trial["speed_deg_s"])
+            yield key, Felt(beta, d_x, theta, *values, *phi, nominal, recording)
 
 
 def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
     if len(felt) < 2:
         return None
     columns = {name: np.array([getattr(f, name) for f in felt]) for name in Felt.__dataclass_fields__}
-    sigmas = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
+    how = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
+    if len(set(columns["recording"])) >= _MANY:
+        how = {"recording": columns["recording"]}
     fit = fit_alpha(
         np.radians(columns["beta_deg"]),
         columns["m_y_Nmm"],
@@ -136,7 +142,7 @@ def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
         columns["d_x_mm"],
         columns["theta_rad"],
         C_Nmm2,
-        **sigmas,
+        **how,
     )
     return fit if np.isfinite(fit.alpha_rad) else None
 

@@ -51,7 +51,9 @@ class FrictionFit:
     status: str
 
 
-def fit_alpha(beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None, sigma_z=None) -> FrictionFit:
+def fit_alpha(
+    beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None, sigma_z=None, recording=None
+) -> FrictionFit:
     """Friction cone angle that fits moments over slopes best, as in Fig. 8.
 
     beta (n,), m_y and m_z (..., n) with any leading axes, each run fitted by itself; d_x, theta and C
@@ -61,8 +63,9 @@ def fit_alpha(beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None,
     sigma_y and sigma_z (..., n) are the moments' own standard deviations; with them the interval is that
     of the normal distribution. Without them the sigma comes from each residual's square and leverage, so
     that it holds as well for noise that grows with the moment, and the interval takes Student's t; below
-    about 30 residuals it is somewhat short. The fit weighs all points alike, as the paper's. NaN among
-    the data raises ValueError.
+    about 30 residuals it is somewhat short. recording (n,) names what was set up once: its points share what
+    is wrong with the slope and the distance, and count as one in the sigma. The fit weighs all points alike,
+    as the paper's. NaN among the data raises ValueError.
     """
     if reading not in READINGS:
         raise ValueError(f"reading = {reading!r}: must be one of {', '.join(READINGS)}")
@@ -73,7 +76,7 @@ def fit_alpha(beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None,
     residuals = data - _model(alpha, beta, scale, reading)
     slopes = _derivative(alpha, beta, scale, reading)
     if sigma_y is None or sigma_z is None:
-        sigma, freedom = _sigma_of_residuals(residuals, slopes)
+        sigma, freedom = _sigma_of_residuals(residuals, slopes, recording)
     else:
         sigma, freedom = _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading), np.inf
     return _fit(alpha, sigma, freedom, residuals, _fits_as_well_without_slip(residuals, beta, data, scale, reading))
@@ -133,16 +136,23 @@ def _least_squares(beta, data, scale, reading):
     return (low + high) / 2
 
 
-def _sigma_of_residuals(residuals, slopes):
-    """(sigma, degrees of freedom) of α, after MacKinnon & White's HC2.
+def _sigma_of_residuals(residuals, slopes, recording):
+    """(sigma, degrees of freedom) of α, after MacKinnon & White's HC2, and Bell & McCaffrey's for what comes together.
 
-    σ² = Σ J² e² / (1 − h) over (Σ J²)², with the residuals e, the slopes J and the leverages h = J²/Σ J².
+    σ² = Σ (Σ J e)² / (1 − h) over (Σ J²)², with the residuals e, the slopes J and the leverages h = Σ J² / Σ J². The
+    inner sums are over each recording, or over the single residual where none is given.
     """
+    n = residuals.shape[-1]
+    if recording is None:
+        together = np.eye(n)
+    else:
+        together = np.asarray(recording)[:, None] == np.unique(recording)
+        together = np.tile(together, (n // len(together), 1)).astype(float)
     with np.errstate(all="ignore"):
         total = (slopes**2).sum(axis=-1)
-        leverage = slopes**2 / total[..., None]
-        sigma = np.sqrt((slopes**2 * residuals**2 / (1 - leverage)).sum(axis=-1)) / total
-    return sigma, residuals.shape[-1] - 1
+        leverage = slopes**2 @ together / total[..., None]
+        sigma = np.sqrt((((slopes * residuals) @ together) ** 2 / (1 - leverage)).sum(axis=-1)) / total
+    return sigma, n - 1 if recording is None else (leverage > 0).sum(axis=-1) - 1
 
 
 def _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading):

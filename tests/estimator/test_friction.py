@@ -48,6 +48,33 @@ def test_interval_holds_it_with_the_noise_found_from_the_residuals(noise, whisks
     assert 0.93 <= coverage(fit, alpha) <= 0.97
 
 
+def test_interval_holds_it_where_each_slope_is_set_up_once():
+    """Ten whisks a slope that share 0.4° of slope and 0.7 % of distance, beside 0.5 % of their own. Counted one by one
+    they would promise too much: √10 of the sigma."""
+    alpha, rng = np.radians(18.7), np.random.default_rng(8)
+    recording = np.repeat(np.arange(len(SLOPES)), 10)
+    covered, apart = [], []
+    for _ in range(400):
+        beta = SLOPES + np.radians(0.4) * rng.normal(size=len(SLOPES))
+        d_x = D_X * (1 + 0.007 * rng.normal(size=len(SLOPES)))
+        m_y, m_z = slip.moments(d_x[recording], THETA, beta[recording], alpha, C)
+        m_y, m_z = (m * (1 + 0.005 * rng.normal(size=m.shape)) for m in (m_y, m_z))
+        fit = fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C, recording=recording)
+        covered.append(coverage(fit, alpha))
+        apart.append(coverage(fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C), alpha))
+    assert 0.91 <= np.mean(covered) <= 0.98  # 95 % of 400 is good to 1.1 %, and few slopes carry most of the weight
+    assert np.mean(apart) < 0.7
+
+
+def test_a_recording_of_one_point_each_differs_by_the_pairing_of_its_moments():
+    """m_y and m_z of a whisk share its slope's error; with independent noise the two sigmas agree on average."""
+    (m_y, m_z), _ = noisy_moments(SLOPES, 0.2, "of the largest", np.random.default_rng(9))
+    plain = fit_alpha(SLOPES, m_y, m_z, D_X, THETA, C)
+    paired = fit_alpha(SLOPES, m_y, m_z, D_X, THETA, C, recording=np.arange(len(SLOPES)))
+    assert paired.alpha_rad == pytest.approx(plain.alpha_rad)
+    assert np.sqrt((paired.sigma_rad**2).mean()) == pytest.approx(np.sqrt((plain.sigma_rad**2).mean()), rel=0.03)
+
+
 def test_the_other_reading_is_as_honest_and_much_less_sure():
     """|m|² alone hardly changes with α: ∂|m|²/∂α ∝ tan α. Its interval still holds."""
     alpha = np.radians(12.3)
