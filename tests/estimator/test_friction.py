@@ -51,19 +51,16 @@ def test_interval_holds_it_with_the_noise_found_from_the_residuals(noise, whisks
 def test_interval_holds_it_where_each_slope_is_set_up_once():
     """Ten whisks a slope that share 0.4° of slope and 0.7 % of distance, beside 0.5 % of their own. Counted one by one
     they would promise too much: √10 of the sigma."""
-    alpha, rng = np.radians(18.7), np.random.default_rng(8)
+    alpha, rng, runs = np.radians(18.7), np.random.default_rng(8), (400, len(SLOPES))
     recording = np.repeat(np.arange(len(SLOPES)), 10)
-    covered, apart = [], []
-    for _ in range(400):
-        beta = SLOPES + np.radians(0.4) * rng.normal(size=len(SLOPES))
-        d_x = D_X * (1 + 0.007 * rng.normal(size=len(SLOPES)))
-        m_y, m_z = slip.moments(d_x[recording], THETA, beta[recording], alpha, C)
-        m_y, m_z = (m * (1 + 0.005 * rng.normal(size=m.shape)) for m in (m_y, m_z))
-        fit = fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C, recording=recording)
-        covered.append(coverage(fit, alpha))
-        apart.append(coverage(fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C), alpha))
-    assert 0.91 <= np.mean(covered) <= 0.98  # 95 % of 400 is good to 1.1 %, and few slopes carry most of the weight
-    assert np.mean(apart) < 0.7
+    beta = SLOPES + np.radians(0.4) * rng.normal(size=runs)
+    d_x = D_X * (1 + 0.007 * rng.normal(size=runs))
+    moments = slip.moments(d_x[:, recording], THETA, beta[:, recording], alpha, C)
+    m_y, m_z = (m * (1 + 0.005 * rng.normal(size=m.shape)) for m in moments)
+    together = fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C, recording=recording)
+    apart = fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C)
+    assert 0.91 <= coverage(together, alpha) <= 0.98  # 400 runs are good to 1.1 %; few slopes weigh most
+    assert coverage(apart, alpha) < 0.7
 
 
 def test_a_recording_of_one_point_each_differs_by_the_pairing_of_its_moments():
