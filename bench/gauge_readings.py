@@ -136,11 +136,16 @@ def _shared(effect) -> np.ndarray:
 
 
 def known_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Known | None:
-    """Moments of a bar at right angles to the push, at the distance that a ruler gave; None where there is none."""
+    """Moments of a bar at right angles to the push, at the distance that a ruler gave; None where there is none.
+
+    The bent whisker leans by half the pushing angle where it touches, and rolls that far over the bar towards its base.
+    """
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
     theta = _NOMINAL_THETA_RAD
-    along, across = trial.d_x_mm * np.cos(theta), trial.d_x_mm * np.sin(theta)
+    radii_mm = 0.5 * (trial.bar_diameter_mm + whisker.diameter_mm)
+    x, y = trial.d_x_mm - radii_mm * np.sin(theta / 2), radii_mm * (1.0 - np.cos(theta / 2))
+    along, across = x * np.cos(theta) + y * np.sin(theta), x * np.sin(theta) - y * np.cos(theta)
     deflection = np.stack([np.zeros_like(across), across], axis=1)
     moments, by_friction = _with_friction(along, deflection, np.ones_like(theta), whisker)
     by_distance = trial.d_x_sigma_mm / trial.d_x_mm or _NOMINAL_SHARE

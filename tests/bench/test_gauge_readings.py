@@ -62,7 +62,7 @@ def test_coefficients_of_the_sample_session(session, exactly_seen):
 
 def test_a_nominal_bar_gives_the_moments_of_2(session):
     """Without pictures: (2) at small angles, a distance known to 1 %, and the touch's sigma in all of it."""
-    trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0)
+    trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=6.0)
     known = known_from_nominal(trial, Touch(0.04, 1e-4), WHISKER)
     assert known.moments[:, 1] == pytest.approx(WHISKER.C_Nmm2 * known.theta_rad / 50.0, rel=5e-3)
     own = np.sqrt(np.diag(known.covariance))[1::2] / known.moments[:, 1]

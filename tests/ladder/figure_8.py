@@ -43,7 +43,7 @@ class Panel:
     def line(self) -> str:
         return (
             f"{self.title:<20}{self.kinetic_deg:8.2f}{self.static_deg:8.2f}{self.alpha_deg:9.2f} ± {self.sigma_deg:.2f}"
-            f"{self.alpha_deg - self.kinetic_deg:+9.2f}{self.whisks:7d}"
+            f"{self.alpha_deg - self.kinetic_deg:+11.2f}{self.whisks:8d}"
         )
 
 
@@ -77,12 +77,12 @@ def _require(code: int) -> None:
         raise SystemExit(code)
 
 
-def panels(folder: Path, tables: dict) -> list[Panel]:
+def panels(folder: Path) -> list[Panel]:
     """What the fits of an evaluated session return, a panel each."""
     return [
         Panel(
             surface.title,
-            *_angles_deg(tables, surface.name, surface.speed_deg_s),
+            *_angles_deg(folder / "session" / "trials", surface.name, surface.speed_deg_s),
             *np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad]),
             len(surface.felt),
         )
@@ -90,9 +90,15 @@ def panels(folder: Path, tables: dict) -> list[Panel]:
     ]
 
 
-def _angles_deg(tables: dict, surface: str, speed_deg_s: float) -> tuple[float, float]:
-    table = next(t for t in tables["trials"] if (t.get("surface"), t.get("speed_deg_s")) == (surface, speed_deg_s))
-    return tuple(float(np.degrees(np.arctan(table[name]))) for name in ("friction", "static_friction"))
+def _angles_deg(trials: Path, surface: str, speed_deg_s: float) -> np.ndarray:
+    """Friction angles, kinetic and static, of the whisks as they were simulated: mean over their truth files."""
+    coefficients = []
+    for trial in sorted(trials.iterdir()):
+        stated = tomllib.loads((trial / "trial.toml").read_text(encoding="utf-8"))
+        truth = tomllib.loads((trial / "truth.toml").read_text(encoding="utf-8"))
+        if (stated["purpose"], stated["surface"], stated["speed_deg_s"]) == ("measure", surface, speed_deg_s):
+            coefficients.append(np.array([truth["mu_kinetic"], truth["mu_static"]]).reshape(2, -1))
+    return np.degrees(np.arctan(np.concatenate(coefficients, axis=1))).mean(axis=1)
 
 
 def main() -> None:
@@ -109,8 +115,8 @@ def main() -> None:
         tables, folder = protocol(static_by_kinetic, options.slopes, options.whisks), options.folder / name
         took = record(folder, tables, options.seed, options.workers)
         lines += ["", f"{name}: simulate {took[0]:.0f} s, evaluate {took[1]:.0f} s, {took[2]:.0f} MB"]
-        lines += [f"{'':<20}{'kinetic':>8}{'static':>8}{'fitted α':>16}{'less kin.':>9}{'whisks':>7}"]
-        lines += [panel.line() for panel in panels(folder, tables)]
+        lines += [f"{'':<20}{'kinetic':>8}{'static':>8}{'fitted α':>16}{'less kin.':>11}{'whisks':>8}"]
+        lines += [panel.line() for panel in panels(folder)]
     print("\n".join(lines))
     if options.picture:
         _require(cli.main(["figures", "8", str(folder / "out"), "--out", str(folder / "figures")]))
