@@ -1,11 +1,12 @@
 """Fig. 8 on the paper's protocol, signals only: the α that the fits return, beside the α that was simulated.
 
-    python tests/ladder/figure_8.py FOLDER [--seed N] [--workers N] [--slopes N] [--whisks N] [--picture FILE]
+    python tests/ladder/figure_8.py FOLDER [--only one|stick-slip] [--slopes N] [--whisks N] [--seed N] [--workers N]
+        [--picture FILE]
 
 FOLDER keeps sessions and results, and is taken up again where it stopped. Once with one friction coefficient and once
 with a static one a quarter above the kinetic one (stick–slip). Prints a table, with times and sizes; the command's
-own simulate, evaluate and `figures 8` make everything. --slopes and --whisks leave out most of the protocol; --picture
-writes the figure with stick–slip small enough for a repository.
+own simulate, evaluate and `figures 8` make everything. --slopes and --whisks leave out part of the protocol; --picture
+writes the last figure, small enough for a repository.
 """
 
 import argparse
@@ -104,6 +105,7 @@ def _angles_deg(trials: Path, surface: str, speed_deg_s: float) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", choices=tuple(STATIC_BY_KINETIC))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--slopes", type=int, default=16)
@@ -111,8 +113,8 @@ def main() -> None:
     parser.add_argument("--picture", type=Path)
     options = parser.parse_args()
     lines = []
-    for name, static_by_kinetic in STATIC_BY_KINETIC.items():
-        tables, folder = protocol(static_by_kinetic, options.slopes, options.whisks), options.folder / name
+    for name in [options.only] if options.only else STATIC_BY_KINETIC:
+        tables, folder = protocol(STATIC_BY_KINETIC[name], options.slopes, options.whisks), options.folder / name
         took = record(folder, tables, options.seed, options.workers)
         lines += ["", f"{name}: simulate {took[0]:.0f} s, evaluate {took[1]:.0f} s, {took[2]:.0f} MB"]
         lines += [f"{'':<20}{'kinetic':>8}{'static':>8}{'fitted α':>16}{'less kin.':>11}{'whisks':>8}"]
