@@ -52,12 +52,18 @@ def read_run(out: Path) -> list[dict]:
     """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run."""
     if not (out / TABLE).is_file():
         raise BadInput(f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out)
-    with (out / TABLE).open(newline="", encoding="utf-8") as file:
-        trials = list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
-    results = [_result(out, trial) for trial in trials]
+    results = [_result(out, trial) for trial in _trials(out / TABLE)]
     if not results:
         raise BadInput(f"holds no whisk ({TABLE} has no rows)", file=out)
     return results
+
+
+def _trials(table: Path) -> list[str | None]:
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            return list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
+    except (UnicodeDecodeError, csv.Error) as problem:
+        raise BadInput(f"is damaged ({problem}); evaluate the session again into this folder", file=table) from None
 
 
 def _result(out: Path, trial: str | None) -> dict:

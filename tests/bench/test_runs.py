@@ -119,7 +119,10 @@ def test_what_is_no_evaluated_run_is_refused(run, tmp_path, small_session):
     for folder in (tmp_path / "nowhere", small_session):
         with pytest.raises(BadInput, match="is no evaluated run"):
             pooled([folder])
-    damaged, old = run("damaged"), run("old")
+    garbled, damaged, old = run("garbled"), run("damaged"), run("old")
+    (garbled / "whisks.csv").write_bytes(b"trial,whisk\n\xff\xfe")
+    with pytest.raises(BadInput, match=r"whisks.csv: is damaged"):
+        pooled([garbled])
     (damaged / "trials" / "b30.json").write_text("{")
     with pytest.raises(BadInput, match=r"b30.json is not there or damaged; evaluate the session again"):
         pooled([damaged])
