@@ -9,9 +9,21 @@ from PIL import Image
 
 from bench.atomic import whole_file
 
-COLOURS = {"no_slip": "#b2182b", "with_friction": "#2166ac", "frictionless": "#e08214"}
+COLOURS = {
+    "no_slip": "#b2182b",
+    "with_friction": "#2166ac",
+    "frictionless": "#e08214",
+    "with_friction_fitted": "#67a9cf",
+    "with_friction_seen": "#35978f",
+}
 OTHER_COLOURS = ("#1b7837", "#762a83", "#8c510a", "#01665e")
-LABELS = {"no_slip": "(2) no slip", "with_friction": "(10) with friction", "frictionless": "(12) frictionless"}
+LABELS = {
+    "no_slip": "(2) no slip",
+    "with_friction": "(10) with friction",
+    "frictionless": "(12) frictionless",
+    "with_friction_fitted": "(10), α fitted",
+    "with_friction_seen": "(10), α seen",
+}
 _STYLE = {
     "font.size": 9,
     "axes.spines.top": False,

@@ -116,6 +116,8 @@ def as_felt(touch: Touch, whisk: Whisk | None) -> dict:
         "m_z_sigma_Nmm": sigma_z,
         "phi_felt_rad": phi,
         "phi_felt_sigma_rad": phi_sigma,
+        "covariance_at": whisk.covariance_at,
+        "theta_moment_covariance_at": whisk.theta_moment_covariance_at,
     }
 
 

@@ -16,6 +16,7 @@ from bench.errors import BadInput
 from bench.estimates import estimators
 from bench.explained import write_explained
 from bench.felt import strokes_of
+from bench.friction_runs import with_runs
 from bench.gauge_checks import Undetermined, check_alive
 from bench.gauge_fit import fit_gauges
 from bench.gauge_readings import Pairs, pairs_of
@@ -48,7 +49,7 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         gauges = session_gauges(units, rate, pool, doubts)
         units = [unit.with_gauges(rate, gauges) for unit in units]
         pool.run(evaluate_unit, units, "trials")
-        results = [read_result(unit.path) for unit in units]
+        results = with_runs([read_result(unit.path) for unit in units], session.whisker)
         write_tables(out, results)
         write_explained(out, results, session.whisker)
         return report(session, out, results, gauges, doubts, calibration.notes, settings, pool)

@@ -1,4 +1,4 @@
-"""Friction as seen in each whisk, and where the error of (10) comes from: explained.csv, assembled from the results.
+"""Where the error of (10) comes from: explained.csv, assembled from the results.
 
 (10) is taken again with what was felt or assumed replaced by what was seen, one thing at a time, in this order: touch,
 moments, friction angle. Each share is the change of d_x that its replacement makes, with the sign that it has in the
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.alphas import seen_friction
 from bench.assembly import write_table
 from bench.compare import whisks
 from bench.gauge_readings import known_from_pictures
@@ -21,8 +22,6 @@ COLUMNS = (
     *("trial", "whisk", "alpha_seen_deg", "alpha_seen_sigma_deg", "error_mm", "by_touch_mm", "by_moments_mm"),
     *("by_alpha_mm", "remainder_mm"),
 )
-_LEAST_SLIP_MM = 0.1
-_LEAST_POINTS = 3
 
 
 def write_explained(out: Path, results: Iterable[dict], whisker: Whisker) -> None:
@@ -40,26 +39,6 @@ def explained_rows(results: Iterable[dict], whisker: Whisker) -> Iterator[dict]:
         row = {"trial": result["trial"]["name"], "whisk": seen["whisk"]}
         row |= {"alpha_seen_deg": float(np.degrees(alpha)), "alpha_seen_sigma_deg": float(np.degrees(sigma))}
         yield row | _shares(result, seen, felt, answer, alpha, whisker)
-
-
-def seen_friction(seen: dict) -> tuple[float, float]:
-    """α and its sigma, rad, from the slope of d_z against d_y over the frames of a slipping whisk, and β.
-
-    A line's slope is free of what offsets all deflections alike. NaN where the whisker hardly slips: then the force may
-    lie anywhere within the friction cone.
-    """
-    d = seen["deflection"]
-    if len(d["theta_rad"]) < _LEAST_POINTS or np.ptp(d["slip_mm"]) < _LEAST_SLIP_MM:
-        return float("nan"), float("nan")
-    y, z = np.array(d["across_y_mm"]), np.array(d["across_z_mm"])
-    weights = (y - y.mean()) / np.sum((y - y.mean()) ** 2)
-    slope = float(weights @ z)
-    n = len(y)
-    by_z, by_y = np.eye(2 * n)[0::2], np.eye(2 * n)[1::2]
-    through = weights @ (by_z - slope * by_y)  # to first order an error of d_y acts as one of d_z times the slope
-    slope_sigma = float(np.sqrt(through @ np.array(d["covariance"]) @ through))
-    alpha = abs(seen["beta_rad"]) - abs(np.arctan(slope))
-    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen["beta_sigma_rad"]))
 
 
 def _shares(result: dict, seen: dict, felt: dict, answer: dict, alpha_seen: float, whisker: Whisker) -> dict:

@@ -13,6 +13,7 @@ from estimator.friction import FrictionFit, fit_alpha
 # many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
 _MANY = 8
 _SAME_SLOPE_DEG = 2.5
+_FITTED = ("beta_deg", "d_x_mm", "theta_rad", "m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Felt:
     phi_sigma_deg: float
     nominal: bool
     recording: int = 0
+    trial: str = ""
+    whisk: int = 0
 
     @property
     def m_Nmm(self) -> float:
@@ -82,6 +85,10 @@ class Surface:
         """The pushing angle of the moments."""
         return float(np.median([f.theta_rad for f in self.felt]))
 
+    def fit_without(self, trial: str, whisk: int) -> FrictionFit | None:
+        """The fit without one whisk; None where the others do not hold α."""
+        return _fit([f for f in self.felt if (f.trial, f.whisk) != (trial, whisk)], self.C_Nmm2)
+
     def points(self) -> list[Point]:
         """Means and standard deviations over whisks of alike slope, moments scaled to the common distance."""
         groups: list[list[Felt]] = []
@@ -124,17 +131,18 @@ def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:
             values = [felt[k] for k in ("m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")]
             phi = [float(np.degrees(felt[k])) for k in ("phi_felt_rad", "phi_felt_sigma_rad")]
             theta = float(np.radians(result["theta_deg"]))
-            key = trial["surface"], number(trial["speed_deg_s"])
-            yield key, Felt(beta, d_x, theta, *values, *phi, nominal, recording)
+            key, name = (trial["surface"], number(trial["speed_deg_s"])), (trial["name"], seen["whisk"])
+            yield key, Felt(beta, d_x, theta, *values, *phi, nominal, recording, *name)
 
 
 def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
     if len(felt) < 2:
         return None
-    columns = {name: np.array([getattr(f, name) for f in felt]) for name in Felt.__dataclass_fields__}
+    columns = {name: np.array([getattr(f, name) for f in felt]) for name in _FITTED}
     how = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
-    if len(set(columns["recording"])) >= _MANY:
-        how = {"recording": columns["recording"]}
+    recording = np.array([f.recording for f in felt])
+    if len(set(recording)) >= _MANY:
+        how = {"recording": recording}
     fit = fit_alpha(
         np.radians(columns["beta_deg"]),
         columns["m_y_Nmm"],

@@ -5,6 +5,7 @@ redoing only what changed are this one mechanism. What is seen has a hash of its
 look at the pictures.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from bench.calibration import SessionCalibration
 from bench.estimates import Hand, answers, as_felt, estimators, felt_whisk
 from bench.felt import Stroke, strokes_of
 from bench.gauges import Gauges
+from bench.phases import NO_PHASES, Phases, felt_phases, slips
 from bench.results import hash_of, hash_of_code, plain, read_result, write_result
 from bench.seen import see_trial
 from bench.session import Session
@@ -22,6 +24,7 @@ from bench.signals import Signals, read_signals
 from bench.trial import Trial
 from bench.whisker import Whisker
 from estimator.beam import Beam
+from estimator.signal import Touch
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
 OWN_GAUGES = "not judged: without this trial the gauges are not known"
@@ -113,7 +116,7 @@ def trial_result(unit: Unit) -> dict:
         "whisker": _whisker(unit.session.whisker),
         "theta_deg": unit.settings.theta_deg,
         "seen": seen,
-        "felt": feel_trial(unit, signals),
+        "felt": feel_trial(unit, signals, seen["whisks"]),
     }
 
 
@@ -138,13 +141,14 @@ def _whisker(whisker: Whisker) -> dict:
     }
 
 
-def feel_trial(unit: Unit, signals: Signals) -> dict:
-    """Felt touch, moments and estimates of each whisk."""
+def feel_trial(unit: Unit, signals: Signals, seen: Sequence[dict]) -> dict:
+    """Felt touch, moments and estimates of each whisk; and its phases of stick and slip, which take the slope as seen
+    and are no estimate."""
     strokes = strokes_of(signals, unit.trial, unit.settings)
-    return {"whisks": [{"whisk": k} | _feel(unit, signals.kind, stroke) for k, stroke in enumerate(strokes)]}
+    return {"whisks": [{"whisk": k} | _feel(unit, signals.kind, s, seen[k]) for k, s in enumerate(strokes)]}
 
 
-def _feel(unit: Unit, kind: str, stroke: Stroke) -> dict:
+def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     hand, missing = _hand(unit, kind)
     beam, theta_rad = _beam(unit.session), unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
@@ -155,8 +159,17 @@ def _feel(unit: Unit, kind: str, stroke: Stroke) -> dict:
     felt = as_felt(touch, known) | {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
     if known is None:
         return felt
+    felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.C_Nmm2)
     asked = estimators(unit.settings.estimators)
     return felt | {"estimates": answers(known, asked, unit.settings), "one_factor": _one_factor(unit, kind, stroke)}
+
+
+def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: dict, C_Nmm2: float) -> Phases:
+    if not slips(seen):
+        return NO_PHASES
+    moments = (stroke.channels - touch.offset) @ hand.matrix.T
+    theta = stroke.motor_rad - touch.motor_rad
+    return felt_phases(stroke.time_s, theta, moments, seen["beta_rad"], seen["d_x_mm"], C_Nmm2)
 
 
 def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
+from bench.alphas import seen_friction
 from bench.evaluate import evaluate
-from bench.explained import seen_friction
 from bench.results import plain
 from bench.session import load_session
 from bench.settings import Settings

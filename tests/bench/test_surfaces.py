@@ -24,8 +24,9 @@ def result(
         "phi_felt_rad": np.arctan2(m_y, m_z),
         "phi_felt_sigma_rad": 0.002,
     }
-    truth = {"d_x_mm": d_x, "beta_rad": np.radians(beta_deg)} if seen else {"d_x_mm": None}
+    truth = {"whisk": 0, "d_x_mm": None} | ({"d_x_mm": d_x, "beta_rad": np.radians(beta_deg)} if seen else {})
     trial = {
+        "name": f"b{beta_deg}",
         "surface": surface,
         "speed_deg_s": speed,
         "purpose": purpose,

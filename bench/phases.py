@@ -1,0 +1,185 @@
+"""Stick and slip: where the contact rests on the bar, where it jumps, and the friction angles at both ends of a rest.
+
+The record is the slip over the pushing angle: frame by frame as the cameras show it, and sample by sample from the
+moments felt, with the bar's slope as seen. A rest ends when the force leaves the static cone, so |β| − |φ| just before
+the jump is the static angle. A jump ends where the force is back on the kinetic cone; a whisker that swings beyond it
+would show too large an angle, as nothing tells the two apart.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+STATIC, KINETIC = "static", "kinetic"
+_LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3
+_FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
+_REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it the contact rests
+_LONGEST_JUMP = 2  # intervals between frames
+_SIGMAS = 3.0
+_JUMP_SIGMAS = 6.0  # in thousands of samples noise reaches 4
+_WINDOW_RAD, _WINDOW_S, _FEWEST, _MOST = np.radians(0.12), 0.012, 4, 40
+_GUARD = 3  # samples at a jump that the gauges' own filter smears
+
+
+@dataclass(frozen=True)
+class Angle:
+    """One friction angle, rad: kind "static" or "kinetic", at which pushing angle, and its own sigma (not β's)."""
+
+    kind: str
+    theta_rad: float
+    alpha_rad: float
+    sigma_rad: float
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Of one whisk: how many rests and jumps its record shows, and the angles at their ends."""
+
+    rests: int
+    jumps: int
+    angles: tuple[Angle, ...]
+
+    def mean(self, kind: str) -> tuple[float, float]:
+        """Weighted mean of the angles of one kind and its sigma from their scatter, rad; NaN without two of them."""
+        chosen = [a for a in self.angles if a.kind == kind]
+        if len(chosen) < 2:
+            return float("nan"), float("nan")
+        values, sigmas = np.array([(a.alpha_rad, a.sigma_rad) for a in chosen]).T
+        weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
+        mean = float(weights @ values)
+        scatter = np.sqrt(len(values) / (len(values) - 1) * np.sum(weights**2 * (values - mean) ** 2))
+        return mean, float(max(scatter, np.sum(sigmas**-2.0) ** -0.5))
+
+
+NO_PHASES = Phases(0, 0, ())
+
+
+def seen_phases(frames: dict, beta_rad: float, d_x_mm: float) -> Phases:
+    """Phases from the slip of each touching frame, with its sigma.
+
+    A jump lies anywhere between its two frames: its angles are carried half the way to it, as a contact at rest has
+    them, and the other half goes into their sigma.
+    """
+    theta, slip, sigma, d_y, d_z, alpha, alpha_sigma = _touching(frames)
+    if len(theta) < _LEAST_FRAMES:
+        return NO_PHASES
+    step, freely = np.diff(slip) * np.sign(beta_rad), np.abs(slip[:-1]) / theta[:-1] * np.diff(theta)
+    rests = np.abs(step) < _REST_SHARE * freely
+    known = freely * _REST_SHARE > _SIGMAS * np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
+    turning = np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)  # dα/dθ of a contact at rest
+    angles, jumps = [], 0
+    for first, last in _runs(~rests & known):
+        if first == 0 or last == len(rests) or last - first > _LONGEST_JUMP or not (known & rests)[[first - 1, last]].all():
+            continue
+        jumps += 1
+        way, middle = theta[last] - theta[first], 0.5 * (theta[first] + theta[last])
+        for kind, k, turn in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
+            spread = turning[k] * way / np.sqrt(12.0)
+            angles.append(Angle(kind, middle, alpha[k] + turn * way * turning[k], float(np.hypot(alpha_sigma[k], spread))))
+    return Phases(len(list(_runs(rests & known))), jumps, tuple(angles)) if jumps else NO_PHASES
+
+
+def _touching(frames: dict) -> np.ndarray:
+    """Rows (7, n): θ, slip, its sigma, d_y, d_z, α, its sigma, of the frames that touch and are known."""
+    names = ("theta_rad", "slip_mm", "slip_sigma_mm", "d_y_mm", "d_z_mm", "alpha_rad", "alpha_sigma_rad")
+    rows = np.array([frames[name] for name in names], dtype=float)
+    return rows[:, np.array(frames["touching"], dtype=bool) & np.isfinite(rows).all(axis=0) & (rows[0] > _FIRST_RAD)]
+
+
+def _runs(mask) -> Iterator[tuple[int, int]]:
+    """(first, one past the last) of each unbroken stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist())
+
+
+def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, C_Nmm2: float) -> Phases:
+    """Phases from the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left out.
+
+    Between two jumps both moments are lines, whose ends give the friction angles.
+    """
+    good = np.isfinite(moments_Nmm).all(axis=1)
+    time, theta, moments = time_s[good], theta_rad[good], moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
+    slope = abs(beta_rad)
+    slip = d_x_mm**2 / C_Nmm2 * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
+    jumps = _jumps(time, theta, slip)
+    if not len(jumps):
+        return NO_PHASES
+    ends = [(a, b, b < len(theta)) for a, b in zip(jumps, [*jumps[1:], len(theta)])]
+    found = [_rest(theta[a:b], moments[a:b], slip[a:b], slope, jumps_off) for a, b, jumps_off in ends]
+    rests = [angles for angles in found if angles is not None]
+    return Phases(len(rests), len(jumps), tuple(angle for angles in rests for angle in angles))
+
+
+def _jumps(time, theta, slip) -> list[int]:
+    """Samples at which the slip steps up, against a line before and after it."""
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    speed = np.ptp(theta) / np.ptp(time)
+    half = int(np.clip(min(_WINDOW_RAD / speed, _WINDOW_S) * rate, _FEWEST, _MOST))
+    at = np.arange(-half, half) + 0.5
+    kernel = np.linalg.pinv(np.stack([np.ones_like(at), at, at > 0], axis=1))[2]
+    step = np.convolve(slip, kernel[::-1], mode="same")
+    free = step[theta < -_FIRST_RAD / 2][half:-half]
+    if len(free) < 4 * half:
+        return []
+    candidates = np.flatnonzero((step > _JUMP_SIGMAS * free.std()) & (theta > _FIRST_RAD))
+    candidates = candidates[(candidates >= half) & (candidates < len(step) - half)]
+    return _without_ringing([int(k) for k in candidates if step[k] == step[k - half : k + half + 1].max()], theta, slip)
+
+
+def _without_ringing(jumps: list[int], theta, slip) -> list[int]:
+    """The jumps that carry the contact on: those between whose sides the mean slip grows. A whisker that rings after a
+    jump steps to and fro about one place."""
+    while jumps:
+        edges = [0, *jumps, len(theta)]
+        edges[0] = max(0, 2 * jumps[0] - (jumps[1] if len(jumps) > 1 else len(theta)))
+        middle, mean = np.array([(theta[a:b].mean(), slip[a:b].mean()) for a, b in zip(edges, edges[1:])]).T
+        share = np.diff(mean) / np.diff(middle) * middle[1:] / mean[1:]  # 1: as a slip that never rests
+        if share.min() >= _REST_SHARE:
+            break
+        jumps = [k for i, k in enumerate(jumps) if i != int(np.argmin(share))]
+    return jumps
+
+
+def _rest(theta, moments, slip, slope: float, jumps_off: bool) -> list[Angle] | None:
+    """Angles at both ends of what lies between two jumps; None where the contact does not rest there."""
+    inner = slice(_GUARD, len(theta) - _GUARD)
+    if len(theta[inner]) < 2 * _FEWEST:
+        return None
+    middle = theta.mean()
+    design = np.stack([np.ones_like(theta[inner]), theta[inner] - middle], axis=1)
+    columns = np.column_stack([moments[inner], slip[inner]])
+    lines, _, _, _ = np.linalg.lstsq(design, columns, rcond=None)
+    if lines[1, 2] > _REST_SHARE * lines[0, 2] / middle:
+        return None
+    variances = np.sum((columns - design @ lines) ** 2, axis=0)[:2] / (len(design) - 2)
+    shape = np.linalg.inv(design.T @ design)
+    wanted = [(KINETIC, theta[0])] + ([(STATIC, theta[-1])] if jumps_off else [])
+    return [_angle(kind, at, np.array([1.0, at - middle]), lines[:, :2], shape, variances, slope) for kind, at in wanted]
+
+
+def _angle(kind: str, at: float, row, lines, shape, variances, slope: float) -> Angle:
+    """|β| − |φ| at one end of the lines of m_y and m_z."""
+    m_y, m_z = row @ lines
+    share = row @ shape @ row
+    gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
+    return Angle(kind, at, slope - float(np.arctan2(m_y, m_z)), float(np.sqrt(share * gradient**2 @ variances)))
+
+
+def slips(seen: dict) -> bool:
+    """Does the contact move along the bar? Else the force may lie anywhere within the friction cone."""
+    d = seen.get("deflection")
+    return bool(d) and len(d["theta_rad"]) >= _LEAST_FRAMES and np.ptp(d["slip_mm"]) >= _LEAST_SLIP_MM
+
+
+def from_plain(phases: dict | None) -> Phases:
+    """Phases read back from a result."""
+    if not phases:
+        return NO_PHASES
+    return Phases(phases["rests"], phases["jumps"], tuple(Angle(**angle) for angle in phases["angles"]))
+
+
+def mean_angle(many: Iterable[Phases], kind: str) -> tuple[float, float]:
+    """Mean over all angles of several whisks."""
+    many = list(many)
+    return Phases(0, 0, tuple(angle for p in many for angle in p.angles)).mean(kind)
