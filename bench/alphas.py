@@ -1,6 +1,6 @@
 """The friction angle α of each whisk: seen (no gauge) and felt (β seen, φ from the moments), rad with one sigma."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,8 +100,3 @@ def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:
     mean = float(weights @ values)
     scatter = np.sqrt(np.sum(weights**2 * (values - mean) ** 2)) if len(known) > 1 else 0.0
     return mean, float(max(weights @ sigmas, scatter))
-
-
-def known_alphas(alphas: Iterable[WhiskAlphas], kind: str) -> Iterator[tuple[float, float]]:
-    """The pairs of one kind, "seen" or "felt", of whisks that are measured."""
-    return (getattr(a, kind) for a in alphas if a.purpose == "measure")

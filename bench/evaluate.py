@@ -17,6 +17,7 @@ from bench.estimates import estimators
 from bench.explained import write_explained
 from bench.felt import strokes_of
 from bench.friction_runs import with_runs
+from bench.friction_tables import SurfaceFriction, friction_of, write_friction
 from bench.gauge_checks import Undetermined, check_alive
 from bench.gauge_fit import fit_gauges
 from bench.gauge_readings import Pairs, pairs_of
@@ -52,7 +53,9 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         results = with_runs([read_result(unit.path) for unit in units], session.whisker)
         write_tables(out, results)
         write_explained(out, results, session.whisker)
-        return report(session, out, results, gauges, doubts, calibration.notes, settings, pool)
+        friction = friction_of(results, session.whisker.C_Nmm2, settings.alpha_est_rad)
+        write_friction(out, results, friction, settings.alpha_est_rad)
+        return report(session, out, results, gauges, doubts, calibration.notes, settings, pool, friction)
 
 
 def judged(session: Session) -> list[Trial]:
@@ -110,6 +113,7 @@ def report(
     cameras: Sequence[str],
     settings: Settings,
     pool: Workers,
+    friction: Sequence[SurfaceFriction],
 ) -> int:
     """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
     from bench.figures import write_figures
@@ -118,4 +122,4 @@ def report(
 
     figures = write_figures(session, out, results, settings, pool)
     scores = score(session, out, gauges)
-    return write_summary(session, out, results, gauges, doubts.notes, cameras, settings, scores, figures)
+    return write_summary(session, out, results, gauges, doubts.notes, cameras, settings, scores, figures, friction)

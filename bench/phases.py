@@ -6,8 +6,9 @@ the jump is the static angle. A jump ends where the force is back on the kinetic
 would show too large an angle, as nothing tells the two apart.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,16 +69,19 @@ def seen_phases(frames: dict, beta_rad: float, d_x_mm: float) -> Phases:
     rests = np.abs(step) < _REST_SHARE * freely
     known = freely * _REST_SHARE > _SIGMAS * np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
     turning = np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)  # dα/dθ of a contact at rest
-    angles, jumps = [], 0
-    for first, last in _runs(~rests & known):
-        if first == 0 or last == len(rests) or last - first > _LONGEST_JUMP or not (known & rests)[[first - 1, last]].all():
-            continue
-        jumps += 1
+    angles = []
+    jumps = [run for run in _runs(~rests & known) if _is_jump(*run, rests & known)]
+    for first, last in jumps:
         way, middle = theta[last] - theta[first], 0.5 * (theta[first] + theta[last])
-        for kind, k, turn in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
-            spread = turning[k] * way / np.sqrt(12.0)
-            angles.append(Angle(kind, middle, alpha[k] + turn * way * turning[k], float(np.hypot(alpha_sigma[k], spread))))
-    return Phases(len(list(_runs(rests & known))), jumps, tuple(angles)) if jumps else NO_PHASES
+        for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
+            spread = float(np.hypot(alpha_sigma[k], turning[k] * way / np.sqrt(12.0)))
+            angles.append(Angle(kind, float(middle), float(alpha[k] + half * way * turning[k]), spread))
+    return Phases(sum(1 for _ in _runs(rests & known)), len(jumps), tuple(angles)) if jumps else NO_PHASES
+
+
+def _is_jump(first: int, last: int, rests) -> bool:
+    """Is this short stretch of intervals enclosed by rests?"""
+    return first > 0 and last < len(rests) and last - first <= _LONGEST_JUMP and bool(rests[first - 1] and rests[last])
 
 
 def _touching(frames: dict) -> np.ndarray:
@@ -133,7 +137,7 @@ def _without_ringing(jumps: list[int], theta, slip) -> list[int]:
     while jumps:
         edges = [0, *jumps, len(theta)]
         edges[0] = max(0, 2 * jumps[0] - (jumps[1] if len(jumps) > 1 else len(theta)))
-        middle, mean = np.array([(theta[a:b].mean(), slip[a:b].mean()) for a, b in zip(edges, edges[1:])]).T
+        middle, mean = np.array([(theta[a:b].mean(), slip[a:b].mean()) for a, b in pairwise(edges)]).T
         share = np.diff(mean) / np.diff(middle) * middle[1:] / mean[1:]  # 1: as a slip that never rests
         if share.min() >= _REST_SHARE:
             break
@@ -155,7 +159,8 @@ def _rest(theta, moments, slip, slope: float, jumps_off: bool) -> list[Angle] | 
     variances = np.sum((columns - design @ lines) ** 2, axis=0)[:2] / (len(design) - 2)
     shape = np.linalg.inv(design.T @ design)
     wanted = [(KINETIC, theta[0])] + ([(STATIC, theta[-1])] if jumps_off else [])
-    return [_angle(kind, at, np.array([1.0, at - middle]), lines[:, :2], shape, variances, slope) for kind, at in wanted]
+    rows = [(kind, at, np.array([1.0, at - middle])) for kind, at in wanted]
+    return [_angle(*row, lines[:, :2], shape, variances, slope) for row in rows]
 
 
 def _angle(kind: str, at: float, row, lines, shape, variances, slope: float) -> Angle:
@@ -177,9 +182,3 @@ def from_plain(phases: dict | None) -> Phases:
     if not phases:
         return NO_PHASES
     return Phases(phases["rests"], phases["jumps"], tuple(Angle(**angle) for angle in phases["angles"]))
-
-
-def mean_angle(many: Iterable[Phases], kind: str) -> tuple[float, float]:
-    """Mean over all angles of several whisks."""
-    many = list(many)
-    return Phases(0, 0, tuple(angle for p in many for angle in p.angles)).mean(kind)

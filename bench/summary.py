@@ -8,17 +8,19 @@ import numpy as np
 from bench.atomic import write_whole
 from bench.compare import Judged, judge, whisks
 from bench.drawing import label_of
+from bench.friction_runs import RUNS
+from bench.friction_tables import SurfaceFriction, friction_lines
 from bench.gauges import GaugeMatrix, Gauges
 from bench.results import number
 from bench.seen import NO_PICTURES
 from bench.session import Session
 from bench.settings import Settings
-from bench.surfaces import friction_lines, surfaces
 from bench.unit import OWN_GAUGES
 
 DONE, DOUBTFUL = 0, 1
 _SILENT = ("", NO_PICTURES, OWN_GAUGES)
-_WRONG_BY_DESIGN = ("no_slip", "frictionless")  # what they miss is the result, no fault of the run
+# (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
+_UNTOLD = ("no_slip", "frictionless", *RUNS)
 _U95 = 1.96
 
 
@@ -32,6 +34,7 @@ def write_summary(
     settings: Settings,
     scores: Sequence[str],
     figures: Sequence[str],
+    friction: Sequence[SurfaceFriction],
 ) -> int:
     """Write and print the summary. Returns 0, or 1 where something is doubtful."""
     judged = judge(results)
@@ -45,9 +48,7 @@ def write_summary(
                 f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
                 _error_lines(judged),
             ),
-            *_titled(
-                "Friction: α that (13), (14) fit best", friction_lines(surfaces(results, session.whisker.C_Nmm2))
-            ),
+            *_titled("Friction angle α (± one sigma)", friction_lines(friction)),
             *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
             *_titled("Cameras", cameras),
             *_titled("Doubtful", doubtful),
@@ -168,7 +169,7 @@ def _whisk_doubts(results) -> Iterator[str]:
         if felt.get("saturated"):
             yield f"{name}: {felt['saturated']} saturated samples left out"
         for answer in felt["estimates"]:
-            if answer["status"] and answer["estimator"] not in _WRONG_BY_DESIGN:
+            if answer["status"] and answer["estimator"] not in _UNTOLD:
                 yield f"{name}, {answer['estimator']}: {answer['status']}"
     for result in results:
         yield from (f"{result['trial']['name']}: {note}" for note in result["seen"]["notes"])
@@ -194,6 +195,5 @@ def _exact(session: Session) -> Iterator[str]:
 def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    return [
-        f"{', '.join(['whisks.csv', 'estimates.csv', 'explained.csv', 'track/', *single, *(f + '/' for f in folders)])}"
-    ]
+    tables = ["whisks.csv", "estimates.csv", "friction.csv", "phases.csv", "surfaces.csv", "explained.csv"]
+    return [", ".join([*tables, "track/", *single, *(f"{folder}/" for folder in folders)])]

@@ -1,0 +1,122 @@
+"""(10) with α fitted by the other whisks and with α seen; and what a session tells of α, by every way."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from bench.alphas import mean_alpha
+from bench.assembly import estimate_rows
+from bench.friction_runs import FITTED, SEEN, with_runs
+from bench.friction_tables import friction_lines, friction_of, write_friction
+from bench.results import plain
+from bench.section_vii import Contact, by_consistency, by_tilting, weights
+from bench.whisker import Whisker
+from estimator import slip
+from estimator.distance import with_friction
+
+WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
+C, THETA, ALPHA = WHISKER.C_Nmm2, np.radians(3.0), np.radians(14.0)
+PHI_SIGMA = np.radians(0.3)
+
+
+def deflection(d_x, beta):
+    """Of a whisker that slides, frame by frame, small angles."""
+    theta = np.radians([1.0, 2.0, 3.0, 4.0])
+    phi = slip.slip_angle(beta, ALPHA)
+    size = d_x * theta * np.cos(beta) / np.cos(beta - phi)
+    y, z = size * np.cos(phi), size * np.sin(phi)
+    rows = {"theta_rad": theta, "slip_mm": z / max(np.cos(beta), 1e-9), "across_y_mm": y, "across_z_mm": z}
+    return rows | {"covariance": 1e-6 * np.eye(8)}
+
+
+def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> dict:
+    """One whisk, (13) and (14) exactly, seen and felt."""
+    beta = np.radians(beta_deg)
+    m_y, m_z = slip.moments(d_x, THETA, beta, alpha, C)
+    felt = {"m_y_Nmm": m_y, "m_z_Nmm": m_z, "m_y_sigma_Nmm": 0.02, "m_z_sigma_Nmm": 0.02, "touch_felt_sigma_rad": 1e-4}
+    felt |= {"phi_felt_rad": np.arctan2(m_y, m_z), "phi_felt_sigma_rad": PHI_SIGMA, "one_factor": [], "status": ""}
+    felt |= {"covariance_at": 4e-4 * np.eye(2), "theta_moment_covariance_at": np.zeros(2)}
+    given = {"estimator": "with_friction", "alpha_est_rad": np.radians(10.0), "d_x_est_sigma_mm": 0.1, "status": ""}
+    given |= {"d_x_est_mm": with_friction(THETA, m_y, m_z, np.radians(10.0), C), "beta_est_rad": 0.0}
+    seen = {"whisk": 0, "d_x_mm": d_x, "d_x_sigma_mm": 0.01, "beta_rad": beta, "beta_sigma_rad": np.radians(0.1)}
+    names = ("theta_rad", "slip_mm", "slip_sigma_mm", "d_y_mm", "d_z_mm", "alpha_rad", "alpha_sigma_rad", "touching")
+    seen |= {"deflection": deflection(d_x, beta), "frames": {name: [] for name in names}, "status": ""}
+    trial = {"name": name or f"b{beta_deg:g}", "surface": "steel", "speed_deg_s": 10.0, "purpose": "measure"}
+    trial |= {"beta_nominal_deg": beta_deg, "d_x_nominal_mm": nominal_mm}
+    whole = {"trial": trial, "theta_deg": 3.0, "seen": {"whisks": [seen]}}
+    return plain(whole | {"felt": {"whisks": [felt | {"estimates": [given]}]}})
+
+
+SLOPES = (30, 45, 60, 70)
+
+
+def errors(results, name) -> dict[str, float]:
+    return {r["trial"]: r["error_percent"] for r in estimate_rows(results) if r["estimator"] == name}
+
+
+def test_with_the_right_friction_nothing_is_left_of_the_error():
+    results = with_runs([result(b) for b in SLOPES], WHISKER)
+    assert abs(errors(results, "with_friction")["b70"]) > 5.0
+    for name in (FITTED, SEEN):
+        assert list(errors(results, name)) == [f"b{b}" for b in SLOPES]
+        assert np.allclose(list(errors(results, name).values()), 0.0, atol=1e-3)
+
+
+def test_the_fit_leaves_out_the_whisk_that_it_judges():
+    """One whisk whose friction is its own: its own run has the others' α, theirs are spoilt by it."""
+    odd = result(60, alpha=np.radians(25.0), name="odd")
+    results = with_runs([*(result(b) for b in SLOPES), odd], WHISKER)
+    alphas = {r["trial"]: r["alpha_est_deg"] for r in estimate_rows(results) if r["estimator"] == FITTED}
+    assert alphas["odd"] == pytest.approx(14.0, abs=1e-4)
+    assert alphas["b30"] > 15.0
+
+
+def test_a_whisk_alone_on_its_surface_has_no_fitted_run_but_a_seen_one():
+    results = with_runs([result(60)], WHISKER)
+    assert errors(results, FITTED) == {}
+    assert list(errors(results, SEEN)) == ["b60"]
+
+
+def test_doubt_about_friction_is_in_the_sigma():
+    row = next(r for r in estimate_rows(with_runs([result(70)], WHISKER)) if r["estimator"] == SEEN)
+    by_alpha = (np.tan(np.radians(70.0)) - np.tan(ALPHA)) * np.radians(0.1)  # ∂ln d_x/∂α_est times β's sigma, at least
+    assert row["d_x_est_sigma_mm"] > 60.0 * by_alpha
+
+
+def test_every_way_finds_the_friction_angle(tmp_path):
+    results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER)
+    found = friction_of(results, C, np.radians(10.0))
+    (surface,) = found
+    for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
+        assert np.degrees(surface.alpha(name)[0]) == pytest.approx(14.0, abs=0.06), name
+    assert surface.error_rms_weighted_percent < 0.5 * surface.error_rms_percent
+    write_friction(tmp_path, results, found, np.radians(10.0))
+    with (tmp_path / "surfaces.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["alpha_felt_deg"]) == pytest.approx(14.0, abs=1e-6)
+    assert row["alpha_static_felt_deg"] == ""  # it only slides
+    assert any("tilting" in line for line in friction_lines(found))
+
+
+def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
+    m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
+    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, np.arctan2(m_y, m_z), PHI_SIGMA)
+
+
+def test_ways_say_what_they_lack():
+    assert "both signs" in by_tilting([contact(30), contact(60)]).status
+    assert "one nominal distance" in by_consistency([contact(30), contact(50, 61.0), contact(60)], C).status
+    assert "two slip angles" in by_consistency([contact(0), contact(5), contact(10)], C).status
+
+
+def test_confidence_falls_with_the_slip_angle():
+    shares = weights([0.0, 0.3, 0.6], np.radians(10.0))
+    assert shares[0] == 1.0
+    assert np.all(np.diff(shares) < 0)
+
+
+def test_mean_does_not_shrink_a_shared_sigma():
+    assert mean_alpha([(0.2, 0.01)] * 16) == pytest.approx((0.2, 0.01))
+    assert np.isnan(mean_alpha([(np.nan, np.nan)])).all()
+    assert mean_alpha([(0.1, 0.001), (0.3, 0.001)])[1] == pytest.approx(0.1 / np.sqrt(2))
