@@ -12,6 +12,7 @@ from bench.calibration import calibrate_session
 from bench.check import checked_session
 from bench.doubts import Doubts
 from bench.drift import drift_rate, free_slope
+from bench.error_map import write_error_map
 from bench.errors import BadInput
 from bench.estimates import estimators
 from bench.explained import write_explained
@@ -52,10 +53,11 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         pool.run(evaluate_unit, units, "trials")
         results = with_runs([read_result(unit.path) for unit in units], session.whisker)
         write_tables(out, results)
-        write_explained(out, results, session.whisker)
+        figures = write_explained(out, results, session.whisker)
         friction = friction_of(results, session.whisker.C_Nmm2, settings.alpha_est_rad)
         write_friction(out, results, friction, settings.alpha_est_rad)
-        return report(session, out, results, gauges, doubts, calibration.notes, settings, pool, friction)
+        figures += write_error_map(out, results, friction, settings.alpha_est_rad)
+        return report(session, out, results, gauges, doubts, calibration.notes, settings, pool, friction, figures)
 
 
 def judged(session: Session) -> list[Trial]:
@@ -114,12 +116,13 @@ def report(
     settings: Settings,
     pool: Workers,
     friction: Sequence[SurfaceFriction],
+    figures: Sequence[str],
 ) -> int:
     """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
     from bench.figures import write_figures
     from bench.score import score
     from bench.summary import write_summary
 
-    figures = write_figures(session, out, results, settings, pool)
+    figures = [*write_figures(session, out, results, settings, pool), *figures]
     scores = score(session, out, gauges)
     return write_summary(session, out, results, gauges, doubts.notes, cameras, settings, scores, figures, friction)

@@ -196,4 +196,5 @@ def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
     tables = ["whisks.csv", "estimates.csv", "friction.csv", "phases.csv", "surfaces.csv", "explained.csv"]
+    tables.append("error_map.csv")
     return [", ".join([*tables, "track/", *single, *(f"{folder}/" for folder in folders)])]
