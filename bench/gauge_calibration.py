@@ -16,6 +16,8 @@ from bench.gauge_certificate import Certificate, page
 from bench.gauge_checks import check_alive
 from bench.gauge_fit import fit_gauges
 from bench.gauge_readings import pairs_of
+from bench.gauge_reversal import reversals
+from bench.gauge_weights import scale_by_weights
 from bench.gauges_file import write_gauges
 from bench.results import hash_of_files
 from bench.session import Session
@@ -37,9 +39,8 @@ def calibrate_gauges_command(
     doubts = Doubts()
     loaded = checked_session(session, doubts)
     certificate = calibrate_gauges(loaded, chosen_trials(loaded, every_trial), workers, progress)
-    zero, zero_sigma = zeros(certificate.strokes)
     header = certificate.lines()
-    write_gauges(out, certificate.gauges, zero, zero_sigma, certificate.whisker.C_Nmm2, header)
+    write_gauges(out, certificate.gauges, zeros(certificate.strokes), certificate.stiffness, header)
     with whole_file(out.with_suffix(".pdf")) as temporary:
         page(certificate).savefig(temporary, metadata={"CreationDate": None, "Producer": None, "Creator": None})
     print("\n".join([*header, "", *(f"doubtful: {note}" for note in doubts.notes), f"written: {out}, {out.stem}.pdf"]))
@@ -73,7 +74,9 @@ def calibrate_gauges(session: Session, trials: list[Trial], workers: int, progre
     ]
     used = tuple(p for p in pairs if p is not None)
     every_stroke = tuple(stroke for many in strokes.values() for stroke in many)
-    return Certificate(session.name, session.whisker, fit_gauges(used), used, every_stroke, rate)
+    back = tuple(r for trial in trials for r in reversals(trial, read_signals(trial), settings))
+    made = Certificate(session.name, session.whisker, fit_gauges(used), used, every_stroke, rate, back)
+    return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(every_stroke)))
 
 
 def zeros(strokes: tuple[Stroke, ...]) -> tuple[np.ndarray, np.ndarray]:

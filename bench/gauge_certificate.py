@@ -1,12 +1,14 @@
 """The certificate of a gauge calibration, in the manner of ISO 376: what was found with U95, and what was not."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.felt import Stroke
 from bench.gauge_readings import Pairs
+from bench.gauge_reversal import Reversal, in_percent
+from bench.gauge_weights import Scale
 from bench.gauges import GaugeMatrix, Gauges
 from bench.whisker import Whisker
 
@@ -25,6 +27,25 @@ class Certificate:
     pairs: tuple[Pairs, ...]
     strokes: tuple[Stroke, ...]
     drift_rate: np.ndarray
+    reversals: tuple[Reversal, ...] = ()
+    scale: Scale | None = None
+
+    def in_newtons_of(self, scale: Scale | None) -> "Certificate":
+        """The same, all moments in the newtons of the weights; as it is where there were none."""
+        if scale is None:
+            return self
+        f = scale.factor
+        pairs = tuple(
+            replace(p, moments=f * p.moments, moments_covariance=f**2 * p.moments_covariance) for p in self.pairs
+        )
+        return replace(self, gauges=self.gauges.scaled(f), pairs=pairs, scale=scale)
+
+    @property
+    def stiffness(self) -> tuple[float, float]:
+        """C, N·mm², in whose unit the coefficients are, and its sigma."""
+        if self.scale is None:
+            return self.whisker.C_Nmm2, self.whisker.C_sigma_Nmm2
+        return self.scale.of(self.whisker.C_Nmm2)
 
     @property
     def moments(self) -> np.ndarray:
@@ -105,8 +126,9 @@ class Certificate:
         yield "Repeatability of the gain: " + (
             f"{NOT_MEASURED} (no second whisk in one position)" if again is None else f"{again:.2f} % (one SD)"
         )
-        yield f"Hysteresis: {NOT_MEASURED} (vision follows forward strokes only)"
-        yield f"Zero return: {NOT_MEASURED}"
+        hysteresis, returned = in_percent(self.reversals, self.gauges.all.matrix, self.gauges.full_scale_Nmm)
+        yield f"Hysteresis, friction along the rod included: {_of_full_scale(hysteresis)}"
+        yield f"Zero return: {_of_full_scale(returned)}"
         rms = np.sqrt(np.mean(self.residuals**2, axis=0))
         share = 100.0 * rms / self.gauges.full_scale_Nmm
         yield f"Residuals, RMS: m_y {rms[0]:.4f} N·mm ({share[0]:.2f} %), m_z {rms[1]:.4f} N·mm ({share[1]:.2f} %)"
@@ -125,11 +147,32 @@ class Certificate:
         yield ""
 
     def _assumed(self) -> Iterator[str]:
+        if self.scale is not None:
+            yield from self._by_weights(self.scale)
+            return
         sigma = self.whisker.C_sigma_Nmm2
         stated = f"± {sigma:.1f}" if sigma else "taken as exact"
         yield f"Assumed: C = 3EI = {self.whisker.C_Nmm2:.1f} N·mm² ({stated}). C cancels between calibration and"
         yield "estimate: an error of E moves these newtons, never a distance. The rod is held by one"
         yield "force; friction along it is anything from 0 to 0.4 of the normal force. Temperature was not recorded."
+
+    def _by_weights(self, scale: Scale) -> Iterator[str]:
+        """The absolute scale, and the stiffness that it amounts to."""
+        C, C_sigma = scale.of(self.whisker.C_Nmm2)
+        by_diameter = 4.0 * self.whisker.diameter_sigma_mm / self.whisker.diameter_mm
+        E, E_sigma = scale.of(self.whisker.implied_modulus_GPa, by_diameter)
+        yield f"Absolute scale, by weights ({', '.join(scale.trials)}): {scale.factor:.4f} ± {U95 * scale.sigma:.4f} of"
+        yield "what the stated stiffness gives; all coefficients are in these newtons. So C = 3EI ="
+        yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between calibration"
+        yield "and estimate: an error of E never shows in a distance. The rod is held by one force; friction along it"
+        yield "is anything from 0 to 0.4 of the normal force."
+
+
+def _of_full_scale(percent) -> str:
+    """Largest values (2,) of m_y and m_z."""
+    if percent is None:
+        return f"{NOT_MEASURED} (no back stroke)"
+    return f"m_y {percent[0]:.2f} %, m_z {percent[1]:.2f} % of full scale at most"
 
 
 def matrix_lines(made: GaugeMatrix | None) -> Iterator[str]:

@@ -25,6 +25,10 @@ class GaugeMatrix:
         """One standard deviation of each coefficient, (2, 2)."""
         return np.sqrt(np.diag(self.covariance)).reshape(2, 2)
 
+    def scaled(self, factor: float) -> "GaugeMatrix":
+        """In another unit of stiffness."""
+        return GaugeMatrix(factor * self.matrix, factor**2 * self.covariance)
+
     def covariance_at(self, volts) -> np.ndarray:
         """Covariance (2, 2) that the coefficients' uncertainty gives the moment of `volts` (2,)."""
         rows = np.kron(np.eye(2), np.asarray(volts)[None, :])
@@ -49,6 +53,13 @@ class Gauges:
     at_angle: GaugeMatrix | None = None
     full_scale_Nmm: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+
+    def scaled(self, factor: float) -> "Gauges":
+        """The same gauges in another unit of stiffness: everything in N·mm times `factor`."""
+        without = {name: matrix and matrix.scaled(factor) for name, matrix in self.without.items()}
+        one, four = (matrix and matrix.scaled(factor) for matrix in (self.one_factor, self.at_angle))
+        most = None if self.full_scale_Nmm is None else factor * self.full_scale_Nmm
+        return Gauges(self.all.scaled(factor), self.source, without, one, four, most, self.notes)
 
     def for_trial(self, name: str) -> GaugeMatrix | None:
         """The coefficients that this trial may be judged by; None where there are none."""

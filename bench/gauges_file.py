@@ -32,6 +32,7 @@ class FileKeys(manifest.GaugeKeys, kw_only=True):
 
     covariance: Rows4 | None = None
     C_Nmm2: float | None = None
+    C_sigma_Nmm2: float | None = None
     full_scale_Nmm: manifest.Pair | None = None
     one_factor_Nmm_per_V: list[float] | None = None
     without: dict[str, WithoutKeys] | None = None
@@ -69,15 +70,19 @@ def read_gauges(path: Path, C_Nmm2: float) -> Gauges:
     )
 
 
-def write_gauges(path: Path, gauges: Gauges, zero_V, zero_sigma_V, C_Nmm2: float, header: list[str]) -> None:
-    """Write gauges.toml whole; `header` goes before it as comments."""
+def write_gauges(path: Path, gauges: Gauges, zero, C: tuple[float, float], header: list[str]) -> None:
+    """Write gauges.toml whole; `header` goes before it as comments.
+
+    zero: volts (2,) and their sigma (2,); C: the stiffness in whose unit the coefficients are, with its sigma.
+    """
     document = {
-        "offset_V": _listed(zero_V),
-        "offset_sigma_V": _listed(zero_sigma_V),
+        "offset_V": _listed(zero[0]),
+        "offset_sigma_V": _listed(zero[1]),
         "matrix_Nmm_per_V": _listed(gauges.all.matrix),
         "matrix_sigma_Nmm_per_V": _listed(gauges.all.sigma),
         "covariance": _listed(gauges.all.covariance),
-        "C_Nmm2": float(C_Nmm2),
+        "C_Nmm2": float(C[0]),
+        "C_sigma_Nmm2": float(C[1]),
         "full_scale_Nmm": _listed(gauges.full_scale_Nmm),
     }
     if gauges.one_factor is not None and np.isfinite(gauges.one_factor.matrix).all():

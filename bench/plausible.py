@@ -55,7 +55,7 @@ SPEED = Window(1e-3, 1e5)
 RATE = Window(1e-2, 1e6)
 CLOCK = Window(-1e7, 1e7)
 EXPOSURE = Window(1e-7, 1.0, (MILLISECONDS, MICROSECONDS))
-FORCE = Window(1e-6, 1e3)
+FORCE = Window(0.0, 1e3)
 SIGMA = Window(0.0, math.inf)
 
 

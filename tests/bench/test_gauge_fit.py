@@ -80,8 +80,7 @@ def test_one_factor_a_channel_leaves_cross_talk_out():
 def test_stated_intervals_hold():
     """95 % intervals of the four coefficients over 1000 simulated calibrations of four whisks, noise of every kind.
 
-    The share scatters by 0.7 % (binomial) and coefficients of one calibration are correlated; the scatter of the
-    residuals only ever widens an interval, which is why more than 95 % may hold.
+    The share scatters by 0.7 % (binomial): 2 % are three of that.
     """
     rng = np.random.default_rng(7)
     held = []
@@ -89,7 +88,7 @@ def test_stated_intervals_hold():
         made = fit_matrix([pairs(name, roll, rng) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))])
         held.append(np.abs(made.matrix - TRUE) < 1.959964 * made.sigma)
     share = np.mean(held, axis=0)
-    assert np.all(share > 0.93) and np.all(share < 0.98)
+    assert np.all(share > 0.93) and np.all(share < 0.97)
 
 
 def test_wider_scatter_than_stated_widens_the_result():

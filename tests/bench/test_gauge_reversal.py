@@ -1,0 +1,47 @@
+"""Hysteresis and zero return from a simulated back stroke; not measured without one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bench.gauge_reversal import in_percent, reversals
+from bench.settings import Settings
+from bench.signals import Signals
+
+TRIAL = SimpleNamespace(name="gauge", speed_deg_s=10.0)
+LAG_V, LEFT_V = 0.03, 0.008
+
+
+def recording(*, back: bool) -> Signals:
+    """A push of 1 V over 4°, there and perhaps back, on which a lag and a zero that does not return are laid."""
+    there = np.radians(np.linspace(-1.6, 4.6, 1240))
+    motor = np.concatenate([there, there[::-1]]) if back else there
+    is_back = np.arange(len(motor)) >= len(there)
+    volts = np.where(motor > 0, motor / np.radians(4.0), 0.0)
+    volts = volts + np.where(is_back & (motor > 0), LAG_V, 0.0) + np.where(is_back, LEFT_V, 0.0)
+    noise = 0.001 * np.random.default_rng(0).standard_normal((2, len(motor)))
+    return Signals(np.arange(len(motor)) / 2000, motor, noise[0], volts + noise[1], "V")
+
+
+def test_what_was_put_in_comes_out():
+    found = reversals(TRIAL, recording(back=True), Settings())
+    hysteresis, returned = in_percent(found, 10.0 * np.eye(2), np.array([11.5, 11.5]))
+    # noise of 1 mV over 60 samples a line: 0.15 mV; 0.1 % of 11.5 N·mm is 1.2 mV, largest of fifteen
+    assert hysteresis == pytest.approx([0.0, 100 * 10 * (LAG_V + LEFT_V) / 11.5], abs=0.15)
+    assert returned == pytest.approx([0.0, 100 * 10 * LEFT_V / 11.5], abs=0.05)
+
+
+def test_without_a_back_stroke_nothing_is_measured():
+    assert reversals(TRIAL, recording(back=False), Settings()) == []
+    assert in_percent([], np.eye(2), np.ones(2)) == (None, None)
+
+
+def test_a_motor_that_stops_short_of_the_free_stroke_shows_no_return():
+    signals = recording(back=True)
+    cut = slice(0, len(signals.motor_rad) - 400)
+    cut_short = Signals(*(a[cut] for a in (signals.time_s, signals.motor_rad, signals.y, signals.z)), "V")
+    found = reversals(TRIAL, cut_short, Settings())
+    hysteresis, returned = in_percent(found, 10.0 * np.eye(2), np.array([11.5, 11.5]))
+    assert hysteresis is not None
+    assert returned is None
