@@ -1,5 +1,6 @@
 """`whisker-bench calibrate gauges`: gauges.toml from a session's gauge trials, with its certificate."""
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -49,6 +50,8 @@ def calibrate_gauges_command(
 
 def chosen_trials(session: Session, every_trial: bool) -> list[Trial]:
     """Trials with volts that the coefficients may rest on. Raises BadInput where there is none."""
+    if all(read_signals(trial).kind == "Nmm" for trial in session.trials):
+        raise BadInput("every signals.csv holds moments already (m_y_Nmm,m_z_Nmm): no gauge to calibrate", file="trials")
     wanted = ("gauge", "measure") if every_trial else ("gauge",)
     trials = [t for t in session.trials if t.purpose in wanted and read_signals(t).kind == "V"]
     if not trials:
@@ -76,6 +79,7 @@ def calibrate_gauges(session: Session, trials: list[Trial], workers: int, progre
     every_stroke = tuple(stroke for many in strokes.values() for stroke in many)
     back = tuple(r for trial in trials for r in reversals(trial, read_signals(trial), settings))
     made = Certificate(session.name, session.whisker, fit_gauges(used), used, every_stroke, rate, back)
+    made = replace(made, roll_sigma_deg=max(trial.follicle_roll_sigma_deg for trial in trials))
     return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(every_stroke)))
 
 

@@ -19,7 +19,10 @@ _LEAST_POINTS = 4  # for a curvature beside a line, with something left over
 
 @dataclass(frozen=True)
 class Certificate:
-    """All that the certificate states. pairs and strokes: what the coefficients rest on; drift_rate (2,): V/s."""
+    """All that the certificate states. pairs and strokes: what the coefficients rest on; drift_rate (2,): V/s.
+
+    roll_sigma_deg: how well the follicle's turn is known, the least well of the trials.
+    """
 
     session: str
     whisker: Whisker
@@ -29,6 +32,7 @@ class Certificate:
     drift_rate: np.ndarray
     reversals: tuple[Reversal, ...] = ()
     scale: Scale | None = None
+    roll_sigma_deg: float = 0.0
 
     def in_newtons_of(self, scale: Scale | None) -> "Certificate":
         """The same, all moments in the newtons of the weights; as it is where there were none."""
@@ -147,6 +151,8 @@ class Certificate:
         yield ""
 
     def _assumed(self) -> Iterator[str]:
+        turn = f"± {U95 * self.roll_sigma_deg:.2f}°, which is in U95" if self.roll_sigma_deg else "taken as exact"
+        yield f"The follicle's turn: {turn}; 1° of it would look like 1.75 points of cross-talk."
         if self.scale is not None:
             yield from self._by_weights(self.scale)
             return
@@ -163,9 +169,9 @@ class Certificate:
         E, E_sigma = scale.of(self.whisker.implied_modulus_GPa, by_diameter)
         yield f"Absolute scale, by weights ({', '.join(scale.trials)}): {scale.factor:.4f} ± {U95 * scale.sigma:.4f} of"
         yield "what the stated stiffness gives; all coefficients are in these newtons. So C = 3EI ="
-        yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between calibration"
-        yield "and estimate: an error of E never shows in a distance. The rod is held by one force; friction along it"
-        yield "is anything from 0 to 0.4 of the normal force."
+        yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between"
+        yield "calibration and estimate: an error of E never shows in a distance. The rod is held by one force;"
+        yield "friction along it is anything from 0 to 0.4 of the normal force."
 
 
 def _of_full_scale(percent) -> str:

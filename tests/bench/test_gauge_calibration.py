@@ -1,5 +1,6 @@
 """`calibrate gauges`: a file that `evaluate` takes, a certificate that says what was not measured, refusals."""
 
+import csv
 import json
 import re
 import shutil
@@ -10,9 +11,11 @@ import pytest
 
 from bench.calibration import SessionCalibration
 from bench.errors import BadInput
+from bench.evaluate import evaluate
 from bench.gauge_calibration import calibrate_gauges_command
 from bench.gauges_file import read_gauges
 from bench.results import hash_of
+from bench.settings import Settings
 
 
 @pytest.fixture
@@ -104,3 +107,37 @@ def test_a_weight_that_the_gauges_do_not_feel_is_refused(calibrate, steel_sample
     hang(session, "weight", 0.15, hung_volts(steel_sample, -0.15, 1.0))
     with pytest.raises(BadInput, match="hang along rig −z"):
         calibrate(session, tmp_path / "gauges.toml")
+
+
+def test_evaluate_and_calibrate_agree_on_what_cannot_be_calibrated(calibrate, small_copy, tmp_path, capsys):
+    """One refuses; the other goes on without estimates, in the same words, and says so of each whisk."""
+    trial = small_copy / "trials" / "gauge_roll90" / "trial.toml"
+    trial.write_text(trial.read_text().replace('"gauge"', '"measure"'))
+    with pytest.raises(BadInput, match="turned by 90°") as refusal:
+        calibrate(small_copy, tmp_path / "gauges.toml")
+    assert evaluate(small_copy, tmp_path / "out", Settings(), workers=0) == 1
+    assert str(refusal.value) in capsys.readouterr().out
+    assert (tmp_path / "out" / "estimates.csv").read_text().count("\n") == 1
+    with (tmp_path / "out" / "whisks.csv").open(newline="") as file:
+        rows = {row["trial"]: row for row in csv.DictReader(file)}
+    assert all("no gauges" in row["status"] and row["d_x_mm"] for row in rows.values())
+
+
+def test_the_turn_of_the_follicle_is_an_input_with_sigma(calibrate, small_copy, tmp_path, capsys):
+    """1.75 points of cross-talk a degree: half a degree's sigma makes the U95 of y into m_z at least 1.7 points."""
+    calibrate(small_copy, tmp_path / "exact.toml")
+    assert "The follicle's turn: taken as exact" in capsys.readouterr().out
+    trial = small_copy / "trials" / "gauge_roll90" / "trial.toml"
+    trial.write_text(trial.read_text() + "\nfollicle_roll_sigma_deg = 0.5\n")
+    calibrate(small_copy, tmp_path / "turned.toml")
+    said = capsys.readouterr().out
+    assert "The follicle's turn: ± 0.98°" in said
+    cross = re.search(r"y into m_z ([+-][\d.]+) ± ([\d.]+)", said)
+    assert 1.7 < float(cross[2]) < 2.6
+
+
+def test_moments_need_no_gauges(calibrate, small_copy, tmp_path):
+    for file in small_copy.glob("trials/*/signals.csv"):
+        file.write_text(file.read_text().replace("y_V,z_V", "m_y_Nmm,m_z_Nmm", 1))
+    with pytest.raises(BadInput, match="holds moments already"):
+        calibrate(small_copy, tmp_path / "gauges.toml")
