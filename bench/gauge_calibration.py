@@ -51,7 +51,7 @@ def calibrate_gauges_command(
 def chosen_trials(session: Session, every_trial: bool) -> list[Trial]:
     """Trials with volts that the coefficients may rest on. Raises BadInput where there is none."""
     if all(read_signals(trial).kind == "Nmm" for trial in session.trials):
-        raise BadInput("every signals.csv holds moments already (m_y_Nmm,m_z_Nmm): no gauge to calibrate", file="trials")
+        raise BadInput("all signals.csv hold moments already (m_y_Nmm,m_z_Nmm): no gauge to calibrate", file="trials")
     wanted = ("gauge", "measure") if every_trial else ("gauge",)
     trials = [t for t in session.trials if t.purpose in wanted and read_signals(t).kind == "V"]
     if not trials:
