@@ -14,6 +14,7 @@ from bench.whisker import Whisker
 
 U95 = 1.96
 NOT_MEASURED = "not measured"
+_MOST_NAMED = 6  # trials or whisks; more names than that have no room on the page
 _LEAST_POINTS = 4  # for a curvature beside a line, with something left over
 
 
@@ -145,9 +146,9 @@ class Certificate:
         yield f"Range of validity: |m_y| up to {most[0]:.2f} N·mm, |m_z| up to {most[1]:.2f} N·mm (full scale)"
         yield f"Points used: {len(self.moments)} frames of {len(self.pairs)} whisks"
         yield f"Saturated samples left out: {sum(stroke.saturated for stroke in self.strokes)}"
-        for name, rest in self.gauges.without.items():
-            known = "known" if rest is not None else "not known: whisks of this trial are not judged"
-            yield f"Without trial {name} the coefficients are {known}"
+        missing = [name for name, rest in self.gauges.without.items() if rest is None]
+        rest = f"all but {_named(missing)}, which are not judged by them" if missing else "each of them"
+        yield f"Trials used: {len(self.gauges.without)}; coefficients without it are known for {rest}"
         yield ""
 
     def _assumed(self) -> Iterator[str]:
@@ -172,6 +173,10 @@ class Certificate:
         yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between"
         yield "calibration and estimate: an error of E never shows in a distance. The rod is held by one force;"
         yield "friction along it is anything from 0 to 0.4 of the normal force."
+
+
+def _named(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= _MOST_NAMED else f"{len(names)} of them"
 
 
 def _of_full_scale(percent) -> str:
@@ -201,7 +206,8 @@ def page(certificate: Certificate):
         _draw_residuals(axes, certificate.pairs, certificate.gauges.all.matrix, axis)
         axes.set(xlabel=f"{name} seen  [N·mm]", ylabel="gauge less seen  [N·mm]")
         axes.axhline(0.0, color="0.6", lw=0.7)
-    grid[0].legend(fontsize=6)
+    if len(certificate.pairs) <= _MOST_NAMED:
+        grid[0].legend(fontsize=6)
     return figure
 
 

@@ -1,0 +1,26 @@
+"""certificate.png for docs/gauges.md: the certificate of a session's gauge calibration.
+
+    python docs/pictures/take_certificate.py SESSION
+"""
+
+import argparse
+from pathlib import Path
+
+from bench.check import checked_session
+from bench.gauge_calibration import calibrate_gauges, chosen_trials
+from bench.gauge_certificate import page
+
+HERE = Path(__file__).resolve().parent
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("session", type=Path)
+    session = checked_session(parser.parse_args().session)
+    certificate = calibrate_gauges(session, chosen_trials(session, every_trial=False), workers=1, progress=False)
+    page(certificate).savefig(HERE / "certificate.png", dpi=90)
+    print("\n".join(certificate.lines()))
+
+
+if __name__ == "__main__":
+    main()
