@@ -8,7 +8,7 @@ import numpy as np
 from bench.atomic import write_whole
 from bench.compare import Judged, judge, whisks
 from bench.drawing import label_of
-from bench.friction_runs import RUNS
+from bench.friction_runs import FITTED, RUNS, SEEN
 from bench.friction_tables import SurfaceFriction, friction_lines
 from bench.gauges import GaugeMatrix, Gauges
 from bench.results import number
@@ -48,7 +48,7 @@ def write_summary(
                 f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
                 _error_lines(judged),
             ),
-            *_titled("Friction angle α (± one sigma)", friction_lines(friction)),
+            *_titled("Friction angle α (± one sigma)", [*friction_lines(friction), *_run_lines(judged, settings)]),
             *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
             *_titled("Cameras", cameras),
             *_titled("Doubtful", doubtful),
@@ -68,10 +68,10 @@ def _titled(title: str, lines: Iterable[str]) -> list[str]:
 
 
 def _verdict(session: Session, results, judged: Sequence[Judged], settings: Settings, doubtful) -> Iterator[str]:
-    measured = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)]
+    measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result["trial"]["purpose"] == "measure"]
     known = sum(s.get("d_x_mm") is not None for s in seen)
-    for name in dict.fromkeys(j.estimator for j in measured):
+    for name in dict.fromkeys(j.estimator for j in measured if j.estimator not in RUNS):
         yield _verdict_on(name, [j for j in measured if j.estimator == name], settings)
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
@@ -81,6 +81,18 @@ def _verdict(session: Session, results, judged: Sequence[Judged], settings: Sett
         if pictures
         else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
     ) + (f"; {len(doubtful)} doubtful, see below." if doubtful else "; nothing doubtful.")
+
+
+def _measured(judged: Sequence[Judged]) -> list[Judged]:
+    return [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)]
+
+
+def _run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
+    """(10) once more with what is known of the friction, where that is anything."""
+    for name, what in ((FITTED, "to the other whisks of the surface"), (SEEN, "which no robot has; what is left then")):
+        mine = [j for j in _measured(judged) if j.estimator == name]
+        if mine:
+            yield _verdict_on(name, mine, settings).replace(label_of(name), f"{label_of(name)} ({what}),", 1)
 
 
 def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
