@@ -3,7 +3,7 @@
 Everything is in the channels' own unit. Touch and zero need no gauge factors, and moments are linear in the channels.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from bench.settings import Settings
 from bench.signals import Signals, forward_strokes
 from bench.trial import Trial
 from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
+
+_GUARD_RAD = np.radians(0.2)
+_LEAST_FREE = 50  # samples
 
 
 @dataclass(frozen=True)
@@ -42,22 +45,46 @@ class Stroke:
         return moment_at(theta_rad, self.motor_rad, self.filtered, touch, time_s=self.time_s, **window)
 
 
-def strokes_of(signals: Signals, trial: Trial, settings: Settings) -> list[Stroke]:
+def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: bool = True) -> list[Stroke]:
     """The forward strokes of a trial, each a whisk.
 
     The whole recording goes through the zero-phase low-pass of section V, so that a stroke's ends are no edges of it.
+    level: take out the drift that shows between the free stroke before touch and the one after the way back, if both
+    were recorded.
     """
     channels, places = np.stack([signals.y, signals.z], axis=1), forward_strokes(signals)
     if signals.kind == "V":
         for where in places:  # elsewhere the motor may rest, and a channel stand still with it
             channels[where] = off_the_rails(channels[where])
     found = []
-    for where in places:
+    for where, end in zip(places, [*(place.start for place in places[1:]), len(signals.time_s)]):
         time, motor = signals.time_s[where], signals.motor_rad[where]
         cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
         filtered = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
-        found.append(Stroke(time, motor, channels[where], filtered[where]))
+        stroke, back = Stroke(time, motor, channels[where], filtered[where]), slice(where.stop, end)
+        way_back = signals.time_s[back], signals.motor_rad[back], channels[back]
+        found.append(_levelled(stroke, *way_back) if level else stroke)
     return found
+
+
+def _levelled(stroke: Stroke, time_s, motor_rad, channels) -> Stroke:
+    """The stroke without the drift of its zero from before the touch to after the way back (time_s, motor_rad (b,),
+    channels (b, 2)); as it is where either is too short."""
+    if len(time_s) < _LEAST_FREE:
+        return stroke
+    touch = stroke.touch()
+    if touch.status:
+        return stroke
+    free = touch.motor_rad - _GUARD_RAD
+    before, after = (
+        (t[m < free], c[m < free])
+        for t, m, c in ((stroke.time_s, stroke.motor_rad, stroke.channels), (time_s, motor_rad, channels))
+    )
+    if min(len(before[0]), len(after[0])) < _LEAST_FREE:
+        return stroke
+    (start, zero), (end, returned) = ((t.mean(), np.nanmean(c, axis=0)) for t, c in (before, after))
+    drift = np.outer(stroke.time_s - start, (returned - zero) / (end - start))
+    return replace(stroke, channels=stroke.channels - drift, filtered=stroke.filtered - drift)
 
 
 def _lowpass(channels, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:

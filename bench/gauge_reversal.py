@@ -31,7 +31,7 @@ def reversals(trial: Trial, signals: Signals, settings: Settings) -> list[Revers
     """A Reversal for each whisk whose way back was recorded."""
     places = forward_strokes(signals)
     ends = [*(place.start for place in places[1:]), len(signals.motor_rad)]
-    strokes = strokes_of(signals, trial, settings)
+    strokes = strokes_of(signals, trial, settings, level=False)
     motor, _ = without_spikes(signals.motor_rad)
     channels = np.stack([signals.y, signals.z], axis=1)
     found = [

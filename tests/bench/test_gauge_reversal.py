@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bench.felt import strokes_of
 from bench.gauge_reversal import in_percent, reversals
 from bench.settings import Settings
 from bench.signals import Signals
@@ -45,3 +46,17 @@ def test_a_motor_that_stops_short_of_the_free_stroke_shows_no_return():
     hysteresis, returned = in_percent(found, 10.0 * np.eye(2), np.array([11.5, 11.5]))
     assert hysteresis is not None
     assert returned is None
+
+
+@pytest.mark.parametrize("back", [True, False])
+def test_drift_is_taken_out_where_both_free_strokes_show_it(back):
+    """50 mV/s over 0.6 s. With the way back the slope is known to some 0.2 mV/s; without, nothing may be taken out."""
+    signals = recording(back=back)
+    level = LEFT_V if back else 0.0
+    sound = signals.z - np.where(np.arange(len(signals.z)) >= 1240, level, 0.0)
+    drifting = Signals(signals.time_s, signals.motor_rad, signals.y, sound + 0.05 * signals.time_s, "V")
+    (stroke,) = strokes_of(drifting, TRIAL, Settings())
+    pushed = stroke.motor_rad > np.radians(4.0)
+    off = stroke.channels[pushed, 1] - stroke.motor_rad[pushed] / np.radians(4.0) - stroke.touch().offset[1]
+    gained = 0.05 * stroke.time_s[pushed].mean()
+    assert off.mean() == pytest.approx(0.0 if back else gained, abs=0.012 if not back else 0.003)
