@@ -10,8 +10,8 @@ from bench.atomic import whole_file
 from bench.calibration import calibrate_session
 from bench.check import checked_session
 from bench.doubts import Doubts
-from bench.drift import drift_rate, free_slope
 from bench.errors import BadInput
+from bench.evaluate import judged, session_drift
 from bench.felt import Stroke, strokes_of
 from bench.gauge_certificate import Certificate, page
 from bench.gauge_checks import check_alive
@@ -64,9 +64,8 @@ def calibrate_gauges(session: Session, trials: list[Trial], workers: int, progre
     settings = Settings()
     strokes = {trial.name: strokes_of(read_signals(trial), trial, settings) for trial in trials}
     check_alive([stroke for many in strokes.values() for stroke in many])
-    slopes = [free_slope(stroke) for many in strokes.values() for stroke in many]
-    rate = drift_rate([slope for slope in slopes if slope is not None])
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
+        rate = session_drift(judged(session), settings, pool)
         calibration = calibrate_session(session, Path(folder))
         units = [Unit(session, t, hash_of_files([t.folder]), calibration, settings, Path(folder)) for t in trials]
         seen = pool.run(see_unit, units, "trials")

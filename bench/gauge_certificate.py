@@ -147,8 +147,9 @@ class Certificate:
         yield f"Points used: {len(self.moments)} frames of {len(self.pairs)} whisks"
         yield f"Saturated samples left out: {sum(stroke.saturated for stroke in self.strokes)}"
         missing = [name for name, rest in self.gauges.without.items() if rest is None]
-        rest = f"all but {_named(missing)}, which are not judged by them" if missing else "each of them"
-        yield f"Trials used: {len(self.gauges.without)}; coefficients without it are known for {rest}"
+        yield f"Trials used: {len(self.gauges.without)}, each judged by coefficients fitted without it"
+        if missing:
+            yield f"Not known without one of these, so that they are not judged: {_named(missing)}"
         yield ""
 
     def _assumed(self) -> Iterator[str]:

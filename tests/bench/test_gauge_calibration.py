@@ -141,3 +141,15 @@ def test_moments_need_no_gauges(calibrate, small_copy, tmp_path):
         file.write_text(file.read_text().replace("y_V,z_V", "m_y_Nmm,m_z_Nmm", 1))
     with pytest.raises(BadInput, match="hold moments already"):
         calibrate(small_copy, tmp_path / "gauges.toml")
+
+
+def test_evaluate_takes_the_same_coefficients(calibrate, small_copy, tmp_path, capsys):
+    """Fitted on the way or beforehand and copied into the session: the same estimates to the last digit written."""
+    evaluate(small_copy, tmp_path / "one", Settings(), workers=0)
+    calibrate(small_copy, small_copy / "gauges.toml")
+    evaluate(small_copy, tmp_path / "two", Settings(), workers=0)
+    rows = [list(csv.reader((tmp_path / name / "estimates.csv").open(newline=""))) for name in ("one", "two")]
+    assert len(rows[0]) == len(rows[1]) > 3
+    for one, two in zip(*rows):
+        assert one[:3] == two[:3]
+        assert one[4:6] == two[4:6] or [float(x) for x in one[4:6]] == pytest.approx([float(x) for x in two[4:6]], 1e-6)
