@@ -160,7 +160,8 @@ def _paired(
     """Volts at the same motor angles, each from a short line through the samples around it."""
     theta = known.motor_rad - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(known.motor_rad), initial=np.inf))
-    read = [stroke.at(t, touch, half_window_rad=half) if t > 0.5 * _LEAST_THETA_RAD else None for t in theta]
+    after = theta > 0.5 * _LEAST_THETA_RAD
+    read = [stroke.at_as_recorded(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
     kept = np.array([r is not None and not r.status for r in read], dtype=bool)
     if not kept.any():
         return None
