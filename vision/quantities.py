@@ -129,15 +129,20 @@ def calibration_share(problem: Problem, state: State, covariance) -> np.ndarray:
     The parameters answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees.
     """
     linear, _ = linearise(problem, state)
-    by_camera = np.concatenate([_by_cameras(problem, seen, state) for seen in problem.seen])
-    answer = -covariance @ (linear.jacobian[linear.is_point].T @ by_camera)
+    answer = -covariance @ (linear.jacobian[linear.is_point].T @ camera_rows(problem, state))
     return answer @ problem.cameras.covariance @ answer.T
 
 
-def _by_cameras(problem: Problem, seen: Observed, state: State) -> np.ndarray:
+def camera_rows(problem: Problem, state: State) -> np.ndarray:
+    """Derivatives (n, 15 cameras) of the line points' residuals by the cameras' parameters."""
+    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
+    return np.concatenate([_by_cameras(problem, seen, _on_rod(problem, seen, state, curves)) for seen in problem.seen])
+
+
+def _by_cameras(problem: Problem, seen: Observed, on_rod_mm) -> np.ndarray:
     """Derivatives (n, 15 cameras) of one camera's residuals by the cameras' parameters."""
     points = seen.points
-    _, _, by_camera = problem.cameras.cameras[seen.camera].project_with_jacobians(_on_rod(problem, seen, state))
+    _, _, by_camera = problem.cameras.cameras[seen.camera].project_with_jacobians(on_rod_mm)
     rows = np.zeros((len(points), N_PARAMETERS * len(problem.cameras)))
     first = N_PARAMETERS * seen.camera
     rows[:, first:first + N_PARAMETERS] = (np.einsum("ni,nij->nj", points.normal, by_camera)
@@ -145,11 +150,10 @@ def _by_cameras(problem: Problem, seen: Observed, state: State) -> np.ndarray:
     return rows
 
 
-def _on_rod(problem: Problem, seen: Observed, state: State) -> np.ndarray:
+def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
     """Points (n, 3) of the rods' axes that the line points are pictures of."""
     if seen.frame < 0:
         axis = bar_axis(problem, state.vector)
         return axis.point_mm + seen.points.place[:, None] * axis.direction
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
     return one.at(seen.points.place)[0]
