@@ -1,0 +1,146 @@
+"""Do the stated 95 % intervals hold? Independent scenes, from line points or from painted pictures.
+
+    python tests/ladder/coverage.py points FOLDER --count 1000
+    python tests/ladder/coverage.py pictures FOLDER --count 300
+    python tests/ladder/coverage.py hard FOLDER --count 100
+
+Every scene is drawn anew (slope, distance, cameras, noise, friction, sag, tilt of the bar, light) and its cameras are
+calibrated anew from noisy corners. `points` fits line points with every error that the fit allows for; `pictures` has
+the rig paint each frame and looks at it with `observe_trial`; `hard` does so with wires and bars of any brightness. A
+scene is a row of FOLDER/points.csv, pictures.csv or hard.csv; one that is there is not seen again: interrupt it and go
+on at will. Prints the coverage of all rows.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from bench.rig.parts import Job, frames_of
+from tests.ladder.rows import HALF_WIDTH_95, all_rows
+from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
+from vision.fit import Problem, State, honest, solve
+from vision.observe import observe_trial
+from vision.quantities import calibration_share, jacobians
+
+QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}
+# Slip of a scene is that of the frame nearest this pushing angle; its frames share most of their error.
+SLIP_AT_RAD = math.radians(3.0)
+# Line points start from no bend at all: first as plain least squares, then more and more robust.
+SCALES = (1e9,) * 4 + (10.0, 4.0, 4.0)
+COLUMNS = ("seed", "beta_true_deg", "d_x_true_mm", "cameras", "plane_angle_deg", "status",
+           *(f"{name}_{what}" for name in QUANTITIES for what in ("error", "sigma")), "slip_rms_mm", "slip_worst_z")
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Values and sigmas by name (touch, d_x, beta: floats; slip: (f,)), or the reason why there are none."""
+
+    value: Mapping
+    sigma: Mapping
+    status: str = ""
+
+
+def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
+    """What the fit says of line points, done as on a trial: fitted once, then again with honest sigmas."""
+    state, _ = solve(problem, start, scales=scales)
+    problem = honest(problem, state)
+    state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
+    covariance = lines + calibration_share(problem, state, lines)
+    measured, by = jacobians(problem, state)
+    sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by.whisk.items()}
+    sigma["slip"] = np.sqrt(np.einsum("fi,ij,fj->f", by.frame["slip"], covariance, by.frame["slip"]))
+    return Seen({**measured.whisk, "slip": measured.frame["slip"]}, sigma)
+
+
+def see_points(scene: Scene) -> Seen:
+    """What the fit says of the scene's noisy line points."""
+    rng = np.random.default_rng([scene.seed, 22])
+    problem = as_problem(scene, calibrated(scene, rng), *given(scene, rng), line_points(scene, rng))
+    return see_lines(problem, begin(problem))
+
+
+def see_pictures(scene: Scene) -> Seen:
+    """What `observe_trial` says of painted pictures."""
+    rng = np.random.default_rng([scene.seed, 23])
+    cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
+    job = Job(Path(), scene.protocol, scene.seed, False)
+    frames = {studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
+              for k, studio in enumerate(job.studios)}
+    background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
+    (whisk,) = observe_trial(frames, scene.recording.frames.time_s, scene.motor_rad,
+                             [slice(0, len(scene.motor_rad))], cameras, wire, bar, background).whisks
+    if math.isnan(whisk.d_x_mm):
+        return Seen({}, {}, whisk.status)
+    rows = whisk.frames
+    return Seen({"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": rows.slip_mm},
+                {"touch": whisk.touch_sigma_rad, "d_x": whisk.d_x_sigma_mm, "beta": whisk.beta_sigma_rad,
+                 "slip": rows.slip_sigma_mm}, whisk.status)
+
+
+def see_hard(scene: Scene) -> Seen:
+    """The same in light that hides edges."""
+    return see_pictures(draw_scene(scene.seed, light=hard_light(scene.seed)))
+
+
+def row_of(scene: Scene, seen: Seen) -> dict:
+    """A line of the table; errors are empty where there is no truth."""
+    truth = scene.truth
+    row = {"seed": scene.seed, "beta_true_deg": math.degrees(truth.beta), "d_x_true_mm": truth.d_x,
+           "cameras": len(scene.cameras), "plane_angle_deg": scene.plane_angle_deg, "status": seen.status}
+    if not seen.value:
+        return row
+    error = {name: seen.value[name] - getattr(truth, name) for name in ("touch", "d_x", "beta", "slip")}
+    touching = np.isfinite(error["slip"]) & (scene.motor_rad > truth.touch + math.radians(0.2))
+    at = int(np.argmin(np.where(touching, np.abs(scene.motor_rad - truth.touch - SLIP_AT_RAD), np.inf)))
+    row |= {"slip_rms_mm": float(np.sqrt(np.mean(error["slip"][touching] ** 2))),
+            "slip_worst_z": float(np.max(np.abs(error["slip"] / seen.sigma["slip"])[touching]))}
+    for column, unit in QUANTITIES.items():
+        name = column.rpartition("_")[0]
+        pair = (values[name][at] if name == "slip" else values[name] for values in (error, seen.sigma))
+        row |= {f"{column}_{what}": unit * float(v) for what, v in zip(("error", "sigma"), pair)}
+    return row
+
+
+def scene_row(seed: int, see: Callable[[Scene], Seen]) -> dict:
+    """The row of a drawn scene."""
+    scene = draw_scene(seed)
+    return row_of(scene, see(scene))
+
+
+def summary(rows: list[dict]) -> Iterable[str]:
+    """Lines: what share of the intervals holds, typical sigma and error, the largest z and its seed."""
+    seen = [row for row in rows if math.isfinite(row.get("d_x_mm_sigma", math.nan))]
+    yield f"{len(rows)} scenes, {len(seen)} with a truth"
+    for column in QUANTITIES if seen else ():
+        error, sigma = (np.array([row[f"{column}_{what}"] for row in seen]) for what in ("error", "sigma"))
+        z = np.abs(error / sigma)
+        worst = int(np.argmax(z))
+        yield (f"{column:10s} 95 % intervals hold in {100 * np.mean(z < HALF_WIDTH_95):5.1f} %, z RMS "
+               f"{np.sqrt(np.mean(z**2)):.2f}, largest {z[worst]:.2f} (seed {seen[worst]['seed']}); error RMS "
+               f"{np.sqrt(np.mean(error**2)):.4f}, sigma median {np.median(sigma):.4f}")
+
+
+WAYS = {"points": see_points, "pictures": see_pictures, "hard": see_hard}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=WAYS)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first scene")
+    parser.add_argument("--count", type=int, default=1000)
+    options = parser.parse_args()
+    table = options.folder / f"{options.what}.csv"
+    seeds = range(options.first, options.first + options.count)
+    print(*summary(all_rows(table, COLUMNS, seeds, lambda seed: scene_row(seed, WAYS[options.what]))), sep="\n")
+
+
+if __name__ == "__main__":
+    main()

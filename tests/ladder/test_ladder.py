@@ -1,0 +1,89 @@
+"""Each rung of the ladder at a size that takes seconds; the scripts beside this file climb it whole."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bench.rig.protocol import PicturesTable, WhiskerTable
+from tests.ladder.coverage import COLUMNS, Seen, scene_row, see_points, summary
+from tests.ladder.exactness import model_errors, own_errors, scenes
+from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
+from tests.ladder.precision import repeat
+from tests.ladder.rows import all_rows, read_rows
+from tests.ladder.scenes import draw_scene, lumpy_noise
+from vision.fit import WIRE_LUMP
+
+FEW = PicturesTable(step_deg=1.5)  # five frames a whisk
+
+
+def test_rung_1_the_fit_gives_its_own_model_back():
+    (scene,) = scenes(1, whisker=WhiskerTable())
+    errors = own_errors(scene)
+    assert max(abs(errors[name]) for name in ("d_x_mm", "touch_mm", "slip_mm")) < 1e-6
+
+
+def test_rung_1_of_exact_mechanics_the_model_misses_two_micrometres_at_most():
+    errors = [model_errors(scene) for scene in scenes(2)]
+    assert max(abs(e[name]) for e in errors for name in ("d_x_mm", "touch_mm", "slip_mm")) < 2e-3
+
+
+def test_rung_2_gradients_are_finite_differences():
+    case = off_solution(draw_scene(1, pictures=FEW))
+    assert of_residuals(*case) < 1e-4
+    # the reported derivatives are one-sided differences, off by half their step times the curvature
+    assert of_quantities(*case) < 5e-3
+    # the bar's rows are those of its axis instead of its two edges: lens terms differ by 2 (half-width / radius in the
+    # picture), 5 to 7 percent
+    assert of_cameras(*case) < 0.1
+
+
+def test_rung_3_predicted_deviations_are_those_of_repeated_trials(tmp_path):
+    samples = repeat(draw_scene(0, pictures=FEW), 12, tmp_path / "trials.csv")
+    for name, sample in samples.items():
+        # a standard deviation of twelve is known to 21 %; three of these either way
+        assert 0.37 < sample.ratio < 1.63, name
+        assert np.all(np.abs(sample.error) < 5 * sample.sigma), name
+
+
+def test_rung_4_intervals_hold():
+    rows = [scene_row(seed, see_points) for seed in range(3)]
+    for row in rows:
+        for name in ("d_x_mm", "touch_deg", "beta_deg", "slip_mm"):
+            assert abs(row[f"{name}_error"]) < 5 * row[f"{name}_sigma"]
+    assert next(iter(summary(rows))) == "3 scenes, 3 with a truth"
+
+
+def test_a_table_goes_on_where_it_stopped(tmp_path):
+    table, made = tmp_path / "points.csv", []
+
+    def make(key):
+        made.append(key)
+        return {"seed": key, "status": "", "value": 0.1 * key}
+
+    columns = ("seed", "status", "value")
+    all_rows(table, columns, range(3), make)
+    table.write_text(table.read_text() + "3,un")  # interrupted in the middle of a row
+    rows = all_rows(table, columns, range(5), make)
+    assert made == [0, 1, 2, 3, 4]
+    assert rows == read_rows(table, columns) == [{"seed": k, "status": "", "value": 0.1 * k} for k in range(5)]
+
+
+def test_a_scene_without_truth_is_a_row_with_its_reason(tmp_path):
+    row = scene_row(0, lambda _: Seen({}, {}, "no bar is seen"))
+    all_rows(tmp_path / "pictures.csv", COLUMNS, [0], lambda _: row)
+    (again,) = read_rows(tmp_path / "pictures.csv", COLUMNS)
+    assert again["status"] == "no bar is seen" and math.isnan(again["d_x_mm_error"]) and set(again) == set(COLUMNS)
+    assert next(iter(summary([again]))) == "1 scenes, 0 with a truth"
+
+
+def test_the_same_seed_draws_the_same_scene():
+    one, other, third = draw_scene(4), draw_scene(4), draw_scene(5)
+    assert one.protocol == other.protocol and one.truth.d_x == other.truth.d_x
+    assert one.protocol != third.protocol
+
+
+def test_lumps_make_a_mean_as_uncertain_as_the_fit_believes(rng):
+    """2000 means of 400 points tell their variance to 3 %; three of these."""
+    means = [np.mean(lumpy_noise(400, rng)) for _ in range(2000)]
+    assert 400 * np.var(means) == pytest.approx(WIRE_LUMP, rel=0.1)
