@@ -233,26 +233,41 @@ def given(scene: Scene, rng: np.random.Generator) -> tuple[Wire, Bar]:
 def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Observed]:
     """Line points of wire and bar in all frames and cameras; exact without a generator.
 
-    With one, each point has its noise, the wire's in lumps, and each camera's lines are off as a whole by as much as
-    the fit's priors say.
+    With one, each point has its noise, the wire's in lumps; each camera's lines are off as a whole; wire and bar are
+    out of round at each frame's contact, by as much as the fit's priors say.
     """
+    frames = len(scene.motor_rad)
+    not_round = np.zeros(frames) if rng is None else fit.CONTACT_SIGMA_MM * rng.standard_normal(frames)
     return [seen for number, camera in enumerate(scene.cameras)
-            for seen in [*_wire_points(scene, number, camera, rng), _bar_points(scene, number, camera, rng)]]
+            for seen in [*_wire_points(scene, number, camera, not_round, rng), _bar_points(scene, number, camera, rng)]]
 
 
-def _wire_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observed]:
-    whisk, length = scene.recording.whisks[0], scene.wire.length_mm
+def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> list[Observed]:
+    length, sigma, seen = scene.wire.length_mm, scene.sigmas.wire_px, []
     offset, tilt = _whole(rng, fit.WIRE_OFFSET_PX, fit.WIRE_TILT_PX)
-    bar, sigma, seen = outline_of_bar(camera, scene.axis, scene.bar.radius_mm), scene.sigmas.wire_px, []
-    for frame, (motor, state) in enumerate(zip(scene.motor_rad, scene.recording.states)):
-        place = np.arange(FIRST_POINT_MM, length - 1.0, POINT_STEP_MM)
-        px = camera.project(whisk.centreline_mm(motor, state, place))
+    bar = outline_of_bar(camera, scene.axis, scene.bar.radius_mm)
+    place = np.arange(FIRST_POINT_MM, length - 1.0, POINT_STEP_MM)
+    for frame, more_mm in enumerate(not_round):
+        px = camera.project(_centreline_mm(scene, frame, place, more_mm))
         normal = normals(px)
         off = offset + tilt * (2.0 * place / length - 1.0) + sigma * lumpy_noise(len(place), rng)
         keep = _clear(px, *bar) & np.all((px > 3) & (px < np.array(camera.size_px) - 4), axis=1)
         points = LinePoints(px + off[:, None] * normal, normal, np.full(len(px), sigma), place)
         seen.append(Observed(frame, number, points.select(keep)))
     return seen
+
+
+def _centreline_mm(scene: Scene, frame: int, arc_mm, more_mm: float) -> np.ndarray:
+    """Points (n, 3) of the whisker, pushed a little further where the bar's radius is `more_mm` larger: as a rod that
+    is clamped and pushed at its contact, with (3 u² - u³)/2 up to there and straight beyond."""
+    motor, state = scene.motor_rad[frame], scene.recording.states[frame]
+    points = scene.recording.whisks[0].centreline_mm(motor, state, arc_mm)
+    if state is None or more_mm == 0.0:
+        return points
+    away = state.point_mm - scene.recording.bar.foot_mm(state.point_mm)
+    u = arc_mm / state.arc_mm
+    pushed = np.where(u < 1.0, 0.5 * (3.0 - u) * u**2, 1.5 * u - 0.5)
+    return points + more_mm * pushed[:, None] * away / np.linalg.norm(away)
 
 
 def _bar_points(scene: Scene, number: int, camera: Camera, rng) -> Observed:
