@@ -76,6 +76,13 @@ def noisy(view, sigma_px: float, rng: np.random.Generator) -> Corners:
     return Corners(ids, px + sigma_px * rng.standard_normal(px.shape), np.full(len(ids), max(sigma_px, 1e-9)))
 
 
+def measured_pose(T: np.ndarray, sigma_mm: float, sigma_rad: float, rng: np.random.Generator) -> np.ndarray:
+    """The board's pose as someone measured it."""
+    turn = np.column_stack([exp_rotation(sigma_rad * rng.standard_normal(3)), np.zeros(3)])
+    shift = np.column_stack([np.eye(3), sigma_mm * rng.standard_normal(3)])
+    return np.column_stack([compose(turn, T)[:, :3], compose(shift, T)[:, 3]])
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Exact views of a session: cameras, views by camera, the board on the rig by camera."""

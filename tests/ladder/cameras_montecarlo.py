@@ -18,14 +18,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, Recording, a_recording
+from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, Recording, a_recording, measured_pose
+from tests.ladder.rows import HALF_WIDTH_95
 from vision.calibrate import calibrate_cameras
-from vision.rotation import compose, exp_rotation
 from vision.scene import Cameras
 from vision.triangulate import triangulate
 
 SIGMA_PX = 0.05
-HALF_WIDTH_95 = 1.959964
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,17 +56,10 @@ def sample_calibrations(count: int, seed: int = 0, *, views: int = 10, rig_sigma
 def _one(recording: Recording, rng: np.random.Generator, rig_sigma_mm: float, rig_sigma_rad: float):
     boards, rig = recording.seen(SIGMA_PX, rng)
     sizes = dict.fromkeys(boards, SIZE_PX)
-    T_measured = _measured(T_RIG_BOARD, rig_sigma_mm, rig_sigma_rad, rng)
+    T_measured = measured_pose(T_RIG_BOARD, rig_sigma_mm, rig_sigma_rad, rng)
     made = calibrate_cameras(boards, rig, BOARD, sizes, T_measured,
                              T_rig_board_sigma_mm=rig_sigma_mm, T_rig_board_sigma_rad=rig_sigma_rad)  # fmt: skip
     return _projected(made.cameras, recording.cameras), _triangulated(made.cameras, recording.cameras, rng)
-
-
-def _measured(T: np.ndarray, sigma_mm: float, sigma_rad: float, rng: np.random.Generator) -> np.ndarray:
-    """The board's pose as someone measured it."""
-    turn = np.column_stack([exp_rotation(sigma_rad * rng.standard_normal(3)), np.zeros(3)])
-    shift = np.column_stack([np.eye(3), sigma_mm * rng.standard_normal(3)])
-    return np.column_stack([compose(turn, T)[:, :3], compose(shift, T)[:, 3]])
 
 
 def _projected(made: Cameras, true: Cameras) -> tuple[np.ndarray, np.ndarray]:

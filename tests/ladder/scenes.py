@@ -18,13 +18,12 @@ import numpy as np
 from bench.rig import build
 from bench.rig.protocol import BoardTable, CameraTable, LightTable, PicturesTable, Protocol, TrialTable, WhiskerTable
 from bench.rig.recording import Recording
-from tests.ladder.board_scenes import BOARD, board_views, noisy, rig_view
+from tests.ladder.board_scenes import BOARD, board_views, measured_pose, noisy, rig_view
 from vision import fit
 from vision.calibrate import calibrate_cameras
 from vision.contact import BarAxis
 from vision.fit import Observed, Problem, State
 from vision.line import LinePoints
-from vision.rotation import compose, exp_rotation
 from vision.scene import Bar, Camera, Cameras, Wire
 from vision.silhouette import normals, outline
 from vision.swing import outline_of_bar
@@ -211,16 +210,10 @@ def calibrated(scene: Scene, rng: np.random.Generator, views: int = 10) -> Camer
     corner, T = scene.sigmas.corner_px, build.T_rig_board(scene.protocol)
     held = {c.name: [noisy(view, corner, rng) for view in board_views(c, views, rng)] for c in scene.cameras}
     standing = {c.name: noisy(rig_view(c, T), corner, rng) for c in scene.cameras}
-    stated = _measured(T, scene.sigmas, rng)
+    stated = measured_pose(T, scene.sigmas.rig_mm, scene.sigmas.rig_rad, rng)
     return calibrate_cameras(held, standing, BOARD, {c.name: c.size_px for c in scene.cameras}, stated,
                              T_rig_board_sigma_mm=scene.sigmas.rig_mm,
                              T_rig_board_sigma_rad=scene.sigmas.rig_rad).cameras
-
-
-def _measured(T, sigmas: Sigmas, rng) -> np.ndarray:
-    """The rig board's pose as someone measured it."""
-    turn = np.column_stack([exp_rotation(sigmas.rig_rad * rng.standard_normal(3)), np.zeros(3)])
-    return np.column_stack([compose(turn, T)[:, :3], T[:, 3] + sigmas.rig_mm * rng.standard_normal(3)])
 
 
 def given(scene: Scene, rng: np.random.Generator) -> tuple[Wire, Bar]:
