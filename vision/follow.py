@@ -17,17 +17,19 @@ from scipy.optimize import minimize
 from skimage.graph import route_through_array
 
 from vision.errors import Refused
-from vision.line import LinePoints, Noise, Pieces, cut_pieces, read_band
+from vision.line import LinePoints, Noise, Pieces, cut_pieces, noise_by_level, read_band
 from vision.shading import fit_shading, piece_misfit, wave_prior
 from vision.trace import to_points, trace
 
 _AROUND_PX = 25  # a line bends no farther than this out of the rectangle of its ends
 _SNAP_PX = 3  # the given ends are taken from a screen by hand
 _RIDGE_PX = 1.5
-_LEAST_RIDGE = 0.05  # of the strongest: what a pixel that shows no line costs, turned over
+_PLAIN = 0.9  # share of pixels less curved than one that plainly shows a line
+_LEAST_RIDGE = 0.05  # what a pixel that shows no line costs, turned over
 _BESIDE_PX = 5  # background read on either side of the edges
 _KNOT_PX = 25.0
 _HIDES = 1.5  # half-widths over blur from which what is behind the axis is hidden
+_FIRST_RADII_PX = (0.6, 1.2, 2.4, 4.0)
 _EVEN = 1  # one brightness across: where neither width nor background is known, more would stand in for a shift
 _ROUNDS = 3
 _PATH_SIGMA_PX = 0.5  # a path goes from pixel to pixel
@@ -118,15 +120,8 @@ def noise_of(grey) -> Noise:
 
     Medians in classes of equal grey, so that edges and lines do not count (Immerkær's filter, 1996).
     """
-    ripple = np.abs(convolve(grey, np.outer([1, -2, 1], [1, -2, 1]) / 6.0))[1:-1, 1:-1] / 0.6745
-    level = gaussian_filter(grey, 1.5)[1:-1, 1:-1]
-    classes = np.digitize(level, np.unique(np.quantile(level, np.linspace(0, 1, 13)))[1:-1])
-    rows = [(np.median(level[classes == k]), np.median(ripple[classes == k]) ** 2) for k in np.unique(classes)]
-    grey_level, variance = np.array(rows).T
-    if np.ptp(grey_level) < 1.0:
-        return Noise(max(float(np.mean(variance)), 0.1), 0.0)
-    gain, floor = np.polyfit(grey_level, variance, 1)
-    return Noise(max(float(floor), 0.1), max(float(gain), 0.0))
+    ripple = np.abs(convolve(grey, np.outer([1, -2, 1], [1, -2, 1]) / 6.0))
+    return noise_by_level(gaussian_filter(grey, 1.5)[1:-1, 1:-1], ripple[1:-1, 1:-1])
 
 
 def _refuse_nothing(count: int, contrast: float, start_px, end_px) -> None:
@@ -146,7 +141,8 @@ def _cheapest_path(grey, start_px, end_px) -> np.ndarray:
     low = np.maximum(np.floor(ends.min(axis=0)) - _AROUND_PX, 0).astype(int)
     high = np.minimum(np.ceil(ends.max(axis=0)) + _AROUND_PX + 1, size).astype(int)
     ridge = _ridge(grey[low[1]:high[1], low[0]:high[0]])
-    cost = 1.0 / (ridge / max(np.quantile(ridge, 0.98), 1e-9) + _LEAST_RIDGE)
+    plain = np.minimum(ridge / max(np.quantile(ridge, _PLAIN), 1e-9), 1.0)  # a darker neighbour is not a better one
+    cost = 1.0 / (plain + _LEAST_RIDGE)
     first, last = (_snap(ridge, end - low) for end in ends)
     path, _ = route_through_array(cost, first, last, fully_connected=True, geometric=True)
     return np.array(path)[:, ::-1] + low
@@ -242,7 +238,8 @@ def _best_width(pieces: Pieces, begin: _Width) -> _Width:
         shading, _ = fit_shading(wide, blur, _EVEN, knots, prior=wave_prior(wide, _EVEN))
         return float(np.mean(np.log(piece_misfit(wide, shading))))  # what crosses a few pieces counts little
 
-    middle = np.log([begin.start_px, begin.end_px, begin.blur_px])
+    starts = [(begin.start_px, begin.end_px, begin.blur_px), *((radius, radius, 1.0) for radius in _FIRST_RADII_PX)]
+    middle = min((np.log(start) for start in starts), key=misfit)  # a thick line and a blurred one are two minima
     bounds = [np.log(_RADII_PX)] * 2 + [np.log(_BLURS_PX)]
     found = minimize(misfit, middle, method="Nelder-Mead", bounds=bounds,
                      options={"initial_simplex": middle + 0.4 * np.eye(4, 3, -1), "xatol": 0.03, "maxfev": 60})

@@ -208,16 +208,21 @@ def measure_noise(first, second) -> Noise:
     """
     first, second = first[::3, ::3], second[::3, ::3]
     mean = 0.5 * (first.astype(float) + second)
-    spread = np.abs(first.astype(float) - second) / (0.6745 * np.sqrt(2.0))
-    edges = np.unique(np.quantile(mean, np.linspace(0, 1, 13)))
-    classes = np.digitize(mean, edges[1:-1])
-    rows = [(np.median(mean[classes == k]), np.median(spread[classes == k]) ** 2, np.sum(classes == k))
+    return noise_by_level(mean, np.abs(first.astype(float) - second) / np.sqrt(2.0))
+
+
+def noise_by_level(level, deviation) -> Noise:
+    """Noise from absolute deviations at grey levels (both of any one shape), by medians in classes of equal grey."""
+    edges = np.unique(np.quantile(level, np.linspace(0, 1, 13)))
+    classes = np.digitize(level, edges[1:-1])
+    rows = [(np.median(level[classes == k]), (np.median(deviation[classes == k]) / 0.6745) ** 2, np.sum(classes == k))
             for k in range(len(edges) - 1) if np.any(classes == k)]
-    level, variance, count = np.array(rows).T
-    if len(level) < 2 or np.ptp(level) < 1.0:
-        return Noise(max(float(np.mean(variance)), 0.1), 0.0)
-    gain, floor = np.polyfit(level, variance, 1, w=np.sqrt(count) / np.maximum(variance, 0.1))
-    return Noise(max(float(floor), 0.1), max(float(gain), 0.0))
+    middle, variance, count = np.array(rows).T
+    if len(middle) > 1 and np.ptp(middle) >= 1.0:
+        gain, floor = np.polyfit(middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, 0.1))
+        if gain > 0:
+            return Noise(max(float(floor), 0.1), float(gain))
+    return Noise(max(float(np.average(variance, weights=count)), 0.1), 0.0)
 
 
 def cut_pieces(bands, length_px: int, noise: Noise) -> Pieces:

@@ -9,7 +9,8 @@ overlays. There are no traces of others with these pictures, so what is printed 
 - sigma: median of what a point states of itself;
 - scatter: of neighbouring points over their sigmas before these were widened by it (1: white noise as measured);
 - z: of points left out against a parabola through the two on either side, over the stated sigmas; share beyond 3;
-- again: RMS between the line and the same one followed backwards, from ends 2 px off.
+- again: between the line and the same one followed backwards from ends 2 px off, median over 0.6745, and RMS;
+- kinks: lines with a point more than 1 px off the parabola through its neighbours: the path has changed whiskers.
 """
 
 import sys
@@ -28,6 +29,7 @@ from vision.pictures import Frames, read_picture
 
 PIECE_PX = 6
 ZOOM = 3
+_KINK_PX = 1.0
 
 # Ends by eye, to about 2 px: (near the face), (near the tip), whiskiwrap/test_video2.mp4, by frame.
 MIDDLE = {
@@ -40,23 +42,23 @@ MIDDLE = {
 }  # fmt: skip
 LOWER = {
     395: ((40, 199), (150, 212)), 396: ((40, 199), (168, 229)), 397: ((40, 199), (168, 229)),
-    398: ((40, 199), (168, 231)), 399: ((40, 199), (165, 226)), 400: ((40, 199), (163, 224)),
+    398: ((40, 199), (168, 231)), 399: ((40, 199), (165, 226)), 400: ((40, 199), (163, 228)),
     401: ((40, 199), (158, 223)), 402: ((40, 199), (155, 219)), 403: ((40, 200), (168, 225)),
     404: ((40, 200), (168, 227)), 405: ((40, 200), (168, 228)), 406: ((40, 199), (168, 229)),
-    407: ((40, 199), (168, 229)), 408: ((40, 198), (165, 226)), 409: ((40, 197), (163, 228)),
-    410: ((40, 197), (163, 228)),
+    407: ((40, 199), (168, 229)), 408: ((40, 198), (165, 226)), 409: ((40, 197), (168, 221)),
+    410: ((40, 197), (168, 223)),
 }  # fmt: skip
 ON_BAR = {  # the tip lies against the bar's face
-    402: ((52, 169), (143, 135)), 403: ((50, 171), (145, 140)), 404: ((50, 171), (145, 138)),
-    405: ((50, 171), (145, 132)), 406: ((50, 170), (144, 130)), 407: ((50, 168), (144, 129)),
-    408: ((50, 166), (143, 124)), 409: ((50, 165), (145, 114)), 410: ((50, 165), (145, 111)),
+    402: ((58, 167), (143, 135)), 403: ((58, 167), (144, 141)), 404: ((58, 166), (144, 138)),
+    405: ((58, 165), (144, 132)), 406: ((58, 164), (144, 130)), 407: ((58, 164), (144, 130)),
+    408: ((58, 160), (143, 124)), 409: ((60, 155), (144, 114)), 410: ((58, 154), (144, 111)),
 }  # fmt: skip
-BENT_OVER_BAR = {
-    402: ((45, 164), (136, 109)), 403: ((45, 165), (138, 109)), 404: ((45, 163), (138, 109)),
-    405: ((45, 163), (138, 109)), 406: ((45, 161), (138, 109)), 407: ((45, 161), (138, 109)),
-    408: ((45, 158), (138, 109)),
+OVER_BAR = {  # bent over the bar's upper side
+    402: ((52, 149), (136, 109)), 403: ((52, 149), (138, 109)), 404: ((52, 147), (138, 109)),
+    405: ((52, 148), (138, 109)), 406: ((52, 148), (138, 109)), 407: ((52, 146), (138, 109)),
+    408: ((52, 146), (138, 109)),
 }  # fmt: skip
-VIDEO_LINES = {"middle": MIDDLE, "lower": LOWER, "on the bar": ON_BAR, "bent over the bar": BENT_OVER_BAR}
+VIDEO_LINES = {"middle": MIDDLE, "lower": LOWER, "on the bar": ON_BAR, "over the bar": OVER_BAR}
 STILL_LINES = {
     "testFRONT1.png": [((950, 750), (710, 782)), ((978, 770), (745, 915)), ((985, 805), (870, 920)),
                        ((1138, 690), (1243, 606)), ((1140, 610), (1230, 405))],
@@ -84,16 +86,16 @@ def follow_both_ways(grey, ends) -> Seen:
         return Seen(None, None, str(reason))
 
 
-def left_out_z(points: LinePoints) -> np.ndarray:
-    """Deviation of each inner point from the parabola through two neighbours on either side, over its sigma."""
-    z = []
+def left_out(points: LinePoints) -> tuple[np.ndarray, np.ndarray]:
+    """Deviation in px of each inner point from the parabola through two neighbours on either side, and its sigma."""
+    found = []
     for k in range(2, len(points) - 2):
         at = [k - 2, k - 1, k + 1, k + 2]
         place = points.place[at] - points.place[k]
         off = (points.px[at] - points.px[k]) @ points.normal[k]
         weight = np.linalg.pinv(np.stack([np.ones(4), place, place**2], axis=1))[0]
-        z.append(weight @ off / np.hypot(points.sigma_px[k], np.linalg.norm(weight * points.sigma_px[at])))
-    return np.array(z)
+        found.append((weight @ off, np.hypot(points.sigma_px[k], np.linalg.norm(weight * points.sigma_px[at]))))
+    return tuple(np.array(found).T)
 
 
 def apart_px(line: Followed, back: Followed) -> np.ndarray:
@@ -133,13 +135,15 @@ def row(name: str, lines) -> str:
     good = [s for s in seen if s.line is not None]
     if not good:
         return f"{name:<20} 0/{len(seen)}"
-    z = np.concatenate([left_out_z(s.line.points) for s in good])
+    off = [left_out(s.line.points) for s in good]
+    z = np.concatenate([deviation / sigma for deviation, sigma in off])
+    kinks = sum(bool(np.any(np.abs(deviation) > _KINK_PX)) for deviation, _ in off)
     apart = np.concatenate([apart_px(s.line, s.back) for s in good])
     return (f"{name:<20} {len(good):>2}/{len(seen):<2} {sum(len(s.line.points) for s in good):>6} "
             f"{np.median(np.concatenate([s.line.points.sigma_px for s in good])):>9.3f} "
             f"{np.median([s.line.scatter for s in good]):>8.2f} {np.median(np.abs(z)) / 0.6745:>6.2f} "
             f"{100 * np.mean(np.abs(z) > 3):>6.1f} {np.sqrt(np.median(apart**2)) / 0.6745:>9.3f} "
-            f"{np.sqrt(np.mean(apart**2)):>9.3f}")
+            f"{np.sqrt(np.mean(apart**2)):>9.3f} {kinks:>6}")
 
 
 def draw(out: Path, groups) -> None:
@@ -170,7 +174,7 @@ def main() -> None:
     folder, out = Path(sys.argv[1]), Path(sys.argv[2])
     groups = video_lines(folder) | still_lines(folder)
     print(f"{'':<20} {'lines':>5} {'points':>6} {'sigma px':>9} {'scatter':>8} {'z':>6} {'>3 %':>6} "
-          f"{'again px':>9} {'(RMS)':>9}")
+          f"{'again px':>9} {'(RMS)':>9} {'kinks':>6}")
     for name, lines in groups.items():
         print(row(name, lines))
         for picture, _, seen in lines:
