@@ -16,6 +16,8 @@ from vision.wire import Curves
 
 BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
+_ENOUGH_PIECES = 160
+_STILL_SIGMAS = 0.7  # of a piece's own, below which another round would only trade its shift for shading
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
 _WORST_MISFIT = 6.0
@@ -73,10 +75,15 @@ def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.n
 
 def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
     """The lens blur, px: the one under which the shading explains the pieces best."""
-    pieces = pieces.select(slice(None, None, 2))
+    pieces = _some(pieces)
     prior = wave_prior(pieces, terms)
     misfit = [fit_shading(pieces, blur, terms, knots_mm, prior=prior)[1] for blur in BLURS_PX]
     return BLURS_PX[int(np.argmin(misfit))]
+
+
+def _some(pieces: Pieces) -> Pieces:
+    """At most _ENOUGH_PIECES of them, spread over all: what a camera's pieces have in common shows in these."""
+    return pieces.select(slice(None, None, max(1, round(len(pieces) / _ENOUGH_PIECES))))
 
 
 def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 5,
@@ -93,6 +100,8 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 5,
         shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust, prior)
         found = locate(pieces, shading, rounds=1)
         pieces, robust = pieces.moved(found.shift_px), _robust(found.chi2)
+        if np.quantile(np.abs(found.shift_px) / found.sigma_px, 0.9) < _STILL_SIGMAS:
+            break
     found = locate(pieces, shading, rounds=1)
     return pieces, found, float(np.median(found.chi2))
 
@@ -108,7 +117,7 @@ def _best_common_shift(pieces: Pieces, blur_px, terms, knots_mm, search_px) -> P
     Where both edges stand before an even background, shading and shift can stand in for each other; so only the
     shift of the whole wire is looked for before its pieces are.
     """
-    some = pieces.select(slice(None, None, 2))
+    some = _some(pieces)
     prior = wave_prior(some, terms)
 
     def misfit(shift: float) -> float:
