@@ -25,7 +25,7 @@ from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import first_touch, frames_by_touch, frames_that_touch
-from vision.trace import MEAN_OF, View, clear_of_bar, find_blur, observed, to_points, trace, wire_pieces
+from vision.trace import MEAN_OF, View, clear_of_bar, observed, settle, to_points, trace, wire_pieces
 from vision.truth import TrialTruth, WhiskTruth
 from vision.wire import Curves
 
@@ -243,7 +243,7 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
     first = view.camera.name not in light
     if first:
-        light[view.camera.name] = find_blur(pieces, WAVES, knots)
+        pieces, light[view.camera.name] = settle(pieces, knots, _SEARCH_PX)
     blur = light[view.camera.name]
     pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_FIRST if first else _ROUNDS_AGAIN,
                                   search_px=_SEARCH_PX if first else 0.0)

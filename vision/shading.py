@@ -94,8 +94,8 @@ def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
 
 
 # How strong each wave round a thin, lit rod is beside its contrast: diffuse light fills the first three, a highlight
-# a quarter of the rod wide reaches the seventh (its Fourier series).
-_WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.3, 0.3, 0.15, 0.15, 0.08])
+# a quarter of the rod wide reaches the eleventh (its Fourier series).
+_WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
 
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
 
 from vision.fit import Observed
-from vision.line import LinePoints, Noise, Pieces, cut_pieces, read_band
+from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.scene import Camera, Wire
 from vision.shading import Located, fit_shading, line_points, locate, wave_prior
 from vision.silhouette import outline
@@ -16,7 +16,8 @@ from vision.wire import Curves
 
 BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
-_ENOUGH_PIECES = 160
+_ALL_WAVES = 11
+_FEW_PIECES, _ENOUGH_PIECES = 60, 160
 _STILL_SIGMAS = 0.7  # of a piece's own, below which another round would only trade its shift for shading
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
@@ -81,9 +82,38 @@ def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
     return BLURS_PX[int(np.argmin(misfit))]
 
 
-def _some(pieces: Pieces) -> Pieces:
-    """At most _ENOUGH_PIECES of them, spread over all: what a camera's pieces have in common shows in these."""
-    return pieces.select(slice(None, None, max(1, round(len(pieces) / _ENOUGH_PIECES))))
+def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
+    """Pieces brought from a rough curve to where they are, all within search_px, and the lens blur in px.
+
+    A rough curve passes for a wider blur, and a blur that is wrong by a sixth moves the whole wire by up to a pixel
+    before an even wall, where shading takes up the rest. So the pieces are first brought in line with each other;
+    then blur and what all frames share, shift, tilt and bow, are looked for together, with all waves that a narrow
+    highlight has: what they lack
+    passes for blur.
+    """
+    pieces, _, _ = trace(pieces, find_blur(pieces, WAVES, knots_mm), WAVES, knots_mm, rounds=2)
+    prior = wave_prior(pieces, _ALL_WAVES)
+
+    lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
+    bow = np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
+
+    def misfit(moves_and_blur, every: int) -> float:
+        some = pieces.select(slice(None, None, every)).moved(bow[::every] @ moves_and_blur[:3])
+        return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots_mm, prior=prior)[1]
+
+    few, enough = (max(1, round(len(pieces) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
+    starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.3)
+              for blur in BLURS_PX[1:9]]
+    best = min(starts, key=lambda start: misfit(start, few))
+    simplex = best + np.concatenate([np.zeros((1, 4)), np.diag([0.15, 0.1, 0.1, 0.08])])
+    found = minimize(misfit, best, (enough,), method="Nelder-Mead",
+                     options={"initial_simplex": simplex, "xatol": 0.01, "maxfev": 120})
+    return pieces.moved(bow @ found.x[:3]), float(np.exp(found.x[3]))
+
+
+def _some(pieces: Pieces, count: int = _ENOUGH_PIECES) -> Pieces:
+    """About `count` of them, spread over all: what a camera's pieces have in common shows in these."""
+    return pieces.select(slice(None, None, max(1, round(len(pieces) / count))))
 
 
 def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 5,
