@@ -33,9 +33,21 @@ def _hats(place_mm, knots_mm) -> np.ndarray:
     return np.clip(1.0 - np.abs(position[:, None] - np.arange(len(knots_mm))), 0.0, None)
 
 
-def _surround(pieces: Pieces, cover) -> np.ndarray:
+def _surround(pieces: Pieces, offset_px, cover, blur_px: float) -> np.ndarray:
     """The two columns (s, p, 2) of the visible background: the known picture and a constant, where not hidden."""
-    return np.stack([(1.0 - cover) * pieces.background, 1.0 - cover], axis=-1) * pieces.weight[..., None]
+    visible = (1.0 - cover) * pieces.background + _not_leaked(pieces, offset_px, blur_px)
+    return np.stack([visible, 1.0 - cover], axis=-1) * pieces.weight[..., None]
+
+
+def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
+    """What the blurred known picture holds (s, p) of light that the rod hides, near a border in the background.
+
+    The lens blurs what is left when the rod has hidden its part; the known picture was blurred whole. To second
+    order in the blur the picture of a product is the product of the pictures and blur² times that of their slopes.
+    """
+    z = (offset_px[..., None] + pieces.radius_px[:, None, None] * np.array([1.0, -1.0])) / blur_px
+    bells = np.exp(-0.5 * z * z)
+    return (blur_px / np.sqrt(2 * np.pi)) * pieces.slope * (bells[..., 1] - bells[..., 0])
 
 
 def _project_out(columns, *targets):
@@ -83,6 +95,7 @@ def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
     np.multiply(basis, pieces.weight[..., None], out=rows[..., :terms])
     rows[..., terms + 1] = pieces.weight - rows[..., 0]
     np.multiply(rows[..., terms + 1], pieces.background, out=rows[..., terms])
+    rows[..., terms] += _not_leaked(pieces, pieces.offset_px, blur_px) * pieces.weight
     np.multiply(pieces.grey, pieces.weight, out=rows[..., terms + 2])
     products = rows.transpose(0, 2, 1) @ rows
     keep = np.r_[:terms, terms + 2]
@@ -148,7 +161,7 @@ def _linearise(pieces: Pieces, shading: Shading, waves, shift, delta_px: float =
     ahead, behind = (shading_basis(pieces.offset_px - (shift + d)[:, None], radius, shading.blur_px,
                                    waves.shape[1]) for d in (delta_px, -delta_px))
     cover = 0.5 * (ahead + behind)[..., 0]
-    columns = _surround(pieces, cover)
+    columns = _surround(pieces, pieces.offset_px - shift[:, None], cover, shading.blur_px)
     rod = (0.5 * (ahead + behind) @ waves[..., None])[..., 0] * pieces.weight
     seen = np.stack([pieces.grey * pieces.weight, rod], axis=-1)
     (rest,) = _project_out(columns, seen)
