@@ -42,12 +42,15 @@ def _surround(pieces: Pieces, offset_px, cover, blur_px: float) -> np.ndarray:
 def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
     """What the blurred known picture holds (s, p) of light that the rod hides, near a border in the background.
 
-    The lens blurs what is left when the rod has hidden its part; the known picture was blurred whole. To second
-    order in the blur the picture of a product is the product of the pictures and blur² times that of their slopes.
+    The lens blurs what is left when the rod has hidden its part; the known picture was blurred whole. The blurred
+    product of two pictures is the product of the blurred ones, and blur² times that of their slopes, and blur⁴/2
+    times that of their curvatures, and so on.
     """
     z = (offset_px[..., None] + pieces.radius_px[:, None, None] * np.array([1.0, -1.0])) / blur_px
-    bells = np.exp(-0.5 * z * z)
-    return (blur_px / np.sqrt(2 * np.pi)) * pieces.slope * (bells[..., 1] - bells[..., 0])
+    bells = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
+    bent = z * bells
+    return (blur_px * pieces.slope * (bells[..., 1] - bells[..., 0])
+            + 0.5 * blur_px**2 * pieces.curvature * (bent[..., 0] - bent[..., 1]))
 
 
 def _project_out(columns, *targets):
