@@ -12,11 +12,11 @@ from bench.calibration import calibrate_session
 from bench.check import checked_session
 from bench.doubts import Doubts
 from bench.drift import drift_rate, free_slope
-from bench.error_map import write_error_map
 from bench.errors import BadInput
 from bench.estimates import estimators
 from bench.explained import write_explained
 from bench.felt import strokes_of
+from bench.friction_map import write_error_map
 from bench.friction_runs import with_runs
 from bench.friction_tables import SurfaceFriction, friction_of, write_friction
 from bench.gauge_checks import Undetermined, check_alive

@@ -135,7 +135,7 @@ def _cells(name: str, pair: tuple[float, float]) -> dict:
     return {column: float(np.degrees(pair[0])), sigma_name(column): float(np.degrees(pair[1]))}
 
 
-def friction_lines(found: Sequence[SurfaceFriction]) -> Iterator[str]:
+def alpha_lines(found: Sequence[SurfaceFriction]) -> Iterator[str]:
     """The summary's table: α by every way, a line a surface; then stick–slip and section VII."""
     if not found:
         return

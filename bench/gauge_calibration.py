@@ -20,6 +20,7 @@ from bench.gauge_readings import pairs_of
 from bench.gauge_reversal import reversals
 from bench.gauge_weights import scale_by_weights
 from bench.gauges_file import write_gauges
+from bench.placing import place_rig
 from bench.results import hash_of_files
 from bench.session import Session
 from bench.settings import Settings
@@ -39,7 +40,9 @@ def calibrate_gauges_command(
     """
     doubts = Doubts()
     loaded = checked_session(session, doubts)
-    certificate = calibrate_gauges(loaded, chosen_trials(loaded, every_trial), workers, progress)
+    certificate = calibrate_gauges(
+        loaded, chosen_trials(loaded, every_trial), doubts, workers=workers, progress=progress
+    )
     header = certificate.lines()
     write_gauges(out, certificate.gauges, zeros(certificate.strokes), certificate.stiffness, header)
     with whole_file(out.with_suffix(".pdf")) as temporary:
@@ -59,7 +62,9 @@ def chosen_trials(session: Session, every_trial: bool) -> list[Trial]:
     return trials
 
 
-def calibrate_gauges(session: Session, trials: list[Trial], workers: int, progress: bool) -> Certificate:
+def calibrate_gauges(
+    session: Session, trials: list[Trial], doubts: Doubts, *, workers: int = 1, progress: bool = False
+) -> Certificate:
     """Coefficients from what the cameras and the gauges show of these trials. Raises BadInput."""
     settings = Settings()
     strokes = {trial.name: strokes_of(read_signals(trial), trial, settings) for trial in trials}
@@ -67,8 +72,12 @@ def calibrate_gauges(session: Session, trials: list[Trial], workers: int, progre
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
         rate = session_drift(judged(session), settings, pool)
         calibration = calibrate_session(session, Path(folder))
-        units = [Unit(session, t, hash_of_files([t.folder]), calibration, settings, Path(folder)) for t in trials]
-        seen = pool.run(see_unit, units, "trials")
+        every = [
+            Unit(session, t, hash_of_files([t.folder]), calibration, settings, Path(folder)) for t in judged(session)
+        ]
+        calibration = place_rig(session, calibration, every, pool, doubts)
+        chosen = {unit.trial.name: replace(unit, calibration=calibration) for unit in every}
+        seen = pool.run(see_unit, [chosen[trial.name] for trial in trials], "trials")
     pairs = [
         pairs_of(trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
         for trial, of_trial in zip(trials, seen)

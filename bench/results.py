@@ -16,7 +16,7 @@ _TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
 _NO_RESULTS = (  # they only parse and tell, or gather finished results anew in every run
     *("cli.py", "environment.py", "theory_figures.py", "error_maps.py", "map_figures.py"),
     *("runs.py", "summary.py", "score.py"),
-    *("alphas.py", "friction_runs.py", "friction_tables.py", "section_vii.py", "explained.py", "error_map.py"),
+    *("alphas.py", "friction_runs.py", "friction_tables.py", "section_vii.py", "explained.py", "friction_map.py"),
     *("gauge_calibration.py", "gauge_certificate.py"),
 )
 _MANY = 1000  # values; larger arrays are hashed by their bytes

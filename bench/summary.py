@@ -9,7 +9,7 @@ from bench.atomic import write_whole
 from bench.compare import Judged, judge, whisks
 from bench.drawing import label_of
 from bench.friction_runs import FITTED, RUNS, SEEN
-from bench.friction_tables import SurfaceFriction, friction_lines
+from bench.friction_tables import SurfaceFriction, alpha_lines
 from bench.gauges import GaugeMatrix, Gauges
 from bench.results import number
 from bench.seen import NO_PICTURES
@@ -48,7 +48,7 @@ def write_summary(
                 f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
                 _error_lines(judged),
             ),
-            *_titled("Friction angle α (± one sigma)", [*friction_lines(friction), *_run_lines(judged, settings)]),
+            *_titled("Friction angle α (± one sigma)", [*alpha_lines(friction), *_run_lines(judged, settings)]),
             *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
             *_titled("Cameras", cameras),
             *_titled("Doubtful", doubtful),

@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from bench.check import checked_session
+from bench.doubts import Doubts
 from bench.gauge_calibration import calibrate_gauges, chosen_trials
 from bench.gauge_certificate import page
 
@@ -17,7 +18,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("session", type=Path)
     session = checked_session(parser.parse_args().session)
-    certificate = calibrate_gauges(session, chosen_trials(session, every_trial=False), workers=1, progress=False)
+    certificate = calibrate_gauges(session, chosen_trials(session, every_trial=False), Doubts())
     page(certificate).savefig(HERE / "certificate.png", dpi=90)
     print("\n".join(certificate.lines()))
 

@@ -8,7 +8,7 @@ import pytest
 from bench.alphas import mean_alpha
 from bench.assembly import estimate_rows
 from bench.friction_runs import FITTED, SEEN, with_runs
-from bench.friction_tables import friction_lines, friction_of, write_friction
+from bench.friction_tables import alpha_lines, friction_of, write_friction
 from bench.results import plain
 from bench.section_vii import Contact, by_consistency, by_tilting, weights
 from bench.whisker import Whisker
@@ -96,7 +96,7 @@ def test_every_way_finds_the_friction_angle(tmp_path):
         (row,) = csv.DictReader(file)
     assert float(row["alpha_felt_deg"]) == pytest.approx(14.0, abs=1e-6)
     assert row["alpha_static_felt_deg"] == ""  # it only slides
-    assert any("tilting" in line for line in friction_lines(found))
+    assert any("tilting" in line for line in alpha_lines(found))
 
 
 def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
