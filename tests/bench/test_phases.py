@@ -1,10 +1,19 @@
 """Stick and slip from a saw-tooth of known angles, and none where the whisker only slides."""
 
+import json
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from bench.felt import strokes_of
 from bench.phases import KINETIC, NO_PHASES, STATIC, felt_phases, from_plain, seen_phases
 from bench.results import plain
+from bench.rig.simulate import simulate
+from bench.session import load_session
+from bench.settings import Settings
+from bench.signals import read_signals
 
 C, D_X, BETA = 8835.7, 60.0, np.radians(50.0)
 ALPHA_STATIC, ALPHA_KINETIC = np.radians(23.0), np.radians(18.5)
@@ -109,3 +118,21 @@ def test_frames_too_far_apart_show_no_phases():
     fine = np.radians(np.arange(0.0, 4.6, 0.001))
     found = seen_phases(frames(theta, np.interp(theta, fine, saw_tooth(fine))), BETA, D_X)
     assert not any(a.kind == STATIC and abs(np.degrees(a.alpha_rad) - 23.0) > 3.0 for a in found.angles)
+
+
+def test_the_rig_s_sandpaper(tmp_path):
+    """Exact mechanics, ringing, hum and noise; gauges and slope as they are. The requirement is 1°."""
+    protocol = Path(__file__).parents[1] / "ladder" / "protocols" / "sandpaper.toml"
+    simulate(tmp_path / "session", protocol=protocol, signals_only=True, seed=5, workers=1, progress=False)
+    session = load_session(tmp_path / "session")
+    true = json.loads((tmp_path / "session" / "truth.json").read_text())
+    for trial in (trial for trial in session.trials if trial.purpose == "measure"):
+        told = tomllib.loads((trial.folder / "truth.toml").read_text())
+        (stroke,) = strokes_of(read_signals(trial), trial, Settings())
+        touch = stroke.touch()
+        felt = (stroke.channels - touch.offset) @ np.array(true["gauge_matrix_Nmm_per_V"]).T
+        theta, beta = stroke.motor_rad - touch.motor_rad, np.radians(told["beta_deg"])
+        found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.C_Nmm2)
+        assert found.jumps >= 7
+        for kind, mu in ((STATIC, told["mu_static"]), (KINETIC, told["mu_kinetic"])):
+            assert np.degrees(found.mean(kind)[0] - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)
