@@ -54,7 +54,7 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         results = with_runs([read_result(unit.path) for unit in units], session.whisker)
         write_tables(out, results)
         figures = write_explained(out, results, session.whisker)
-        friction = friction_of(results, session.whisker.C_Nmm2, settings.alpha_est_rad)
+        friction = friction_of(results, session.whisker, settings.alpha_est_rad)
         write_friction(out, results, friction, settings.alpha_est_rad)
         figures += write_error_map(out, results, friction, settings.alpha_est_rad)
         return report(session, out, results, gauges, doubts, calibration.notes, settings, pool, friction, figures)

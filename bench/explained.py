@@ -18,7 +18,7 @@ from bench.drawing import is_drawn, save, style
 from bench.gauge_readings import known_from_pictures
 from bench.results import hash_of, number
 from bench.whisker import Whisker
-from estimator.distance import with_friction
+from estimator.distance import taper, with_friction
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
 COLUMNS = ("trial", "whisk", "d_x_mm", "alpha_seen_deg", "alpha_seen_sigma_deg", "error_mm", *SHARES)
@@ -70,10 +70,16 @@ def _shares(result: dict, seen: dict, felt: dict, answer: dict, alpha_seen: floa
     alpha_used = alpha_seen if np.isfinite(alpha_seen) else alpha_est
     steps = [(theta, m_felt, alpha_est), (theta + late, m_felt, alpha_est), (theta + late, m_seen, alpha_est)]
     steps.append((theta + late, m_seen, max(alpha_used, 0.0)))
-    d_x = [with_friction(t, *m, a, whisker.C_Nmm2) for t, m, a in steps]
+    d_x = [by_10(t, *m, a, whisker) for t, m, a in steps]
     truth = number(seen["d_x_mm"])
     by = {name: d_x[k] - d_x[k + 1] for k, name in enumerate(("by_touch_mm", "by_moments_mm", "by_alpha_mm"))}
     return {"d_x_mm": truth, "error_mm": d_x[0] - truth, **by, "remainder_mm": d_x[3] - truth}
+
+
+def by_10(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker: Whisker):
+    """d_x of (10), mm, of a cylinder or a cone; arrays or floats."""
+    d_x = with_friction(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker.C_Nmm2)
+    return taper(d_x, whisker.length_mm) if whisker.shape == "cone" else d_x
 
 
 def _moments_seen(seen: dict, theta: float, whisker: Whisker) -> tuple[float, float]:

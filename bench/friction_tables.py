@@ -12,6 +12,7 @@ from bench.compare import judge
 from bench.phases import KINETIC, STATIC
 from bench.section_vii import Way, by_consistency, by_tilting, contacts, weights
 from bench.surfaces import Surface, surfaces
+from bench.whisker import Whisker
 
 RECORDS = ("seen", "felt")
 _APART = tuple((kind, record) for kind in (STATIC, KINETIC) for record in RECORDS)
@@ -62,17 +63,17 @@ class SurfaceFriction:
         return way.alpha_rad, way.sigma_rad
 
 
-def friction_of(results: Sequence[dict], C_Nmm2: float, alpha_est_rad: float) -> list[SurfaceFriction]:
+def friction_of(results: Sequence[dict], whisker: Whisker, alpha_est_rad: float) -> list[SurfaceFriction]:
     """Every surface and speed among the measure trials."""
     alphas = alphas_of(results)
-    return [_friction(surface, results, alphas, C_Nmm2, alpha_est_rad) for surface in surfaces(results, C_Nmm2)]
+    return [_friction(s, results, alphas, whisker, alpha_est_rad) for s in surfaces(results, whisker.C_Nmm2)]
 
 
-def _friction(surface: Surface, results, alphas, C_Nmm2: float, alpha_est_rad: float) -> SurfaceFriction:
+def _friction(surface: Surface, results, alphas, whisker: Whisker, alpha_est_rad: float) -> SurfaceFriction:
     key = (surface.name, surface.speed_deg_s)
     mine = tuple(a for a in alphas if a.purpose == "measure" and _same(key, (a.surface, a.speed_deg_s)))
     felt = contacts(results, *key)
-    ways = (by_tilting(felt), by_consistency(felt, C_Nmm2))
+    ways = (by_tilting(felt), by_consistency(felt, whisker))
     errors = {(j.trial, j.whisk): j.error_percent for j in judge(results) if _is_given(j)}
     phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for f in surface.felt}
     known = [k for k in phi if np.isfinite(errors.get(k, np.nan))]

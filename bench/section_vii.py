@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.compare import whisks
+from bench.explained import by_10
 from bench.results import number
-from estimator.distance import with_friction
+from bench.whisker import Whisker
 from estimator.friction import alpha_from_tilts, confidence
 
 _ALPHA_EST_SIGMA_RAD = np.radians(5.0)  # steel's 10.5° to sandpaper's 23.3° (Fig. 8) about an assumed 10° or 15°
@@ -72,7 +73,7 @@ def by_tilting(of_surface: Sequence[Contact]) -> Way:
     return Way("tilting", fit.alpha_rad, fit.sigma_rad, fit.status)
 
 
-def by_consistency(of_surface: Sequence[Contact], C_Nmm2: float) -> Way:
+def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     """Way 2: the α under which distances scatter least as shares of their mean; sigma by leaving out each contact."""
     nominal = {c.d_x_nominal_mm for c in of_surface}
     spread = np.ptp([abs(np.tan(c.phi_rad)) for c in of_surface]) if of_surface else 0.0
@@ -80,17 +81,13 @@ def by_consistency(of_surface: Sequence[Contact], C_Nmm2: float) -> Way:
         return Way("consistency", np.nan, np.nan, f"needs {_FEWEST} whisks or more at one nominal distance (d_x_mm)")
     if spread < _LEAST_SPREAD:
         return Way("consistency", np.nan, np.nan, "the whisks do not span two slip angles")
-    distances = np.array([_distances(c, C_Nmm2) for c in of_surface])
+    distances = np.array([by_10(c.theta_rad, c.m_y_Nmm, c.m_z_Nmm, _GRID_RAD, whisker) for c in of_surface])
     if not np.isfinite(distances[:, 0]).all():
         return Way("consistency", np.nan, np.nan, "a whisk is no push against an object")
     best = _least_scatter(distances)
     without = [_least_scatter(np.delete(distances, k, axis=0)) for k in range(len(distances))]
     sigma = float(np.sqrt((len(without) - 1) * np.var(without)))
     return Way("consistency", best, sigma, "at the bound of the search" if best in _GRID_RAD[[0, -1]] else "")
-
-
-def _distances(c: Contact, C_Nmm2: float) -> np.ndarray:
-    return with_friction(c.theta_rad, c.m_y_Nmm, c.m_z_Nmm, _GRID_RAD, C_Nmm2)
 
 
 def _least_scatter(distances) -> float:

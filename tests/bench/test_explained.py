@@ -7,9 +7,14 @@ import pytest
 
 from bench.alphas import seen_friction
 from bench.evaluate import evaluate
+from bench.explained import by_10
 from bench.results import plain
 from bench.session import load_session
 from bench.settings import Settings
+from bench.whisker import Whisker
+from estimator.beam import Beam
+from estimator.builtin import with_friction
+from estimator.whisk import EstimatorSettings, Whisk
 
 
 @pytest.mark.parametrize("trial", ["b30_3", "b60_4"])
@@ -44,3 +49,14 @@ def test_shares_add_up_and_what_remains_is_small(steel_sample, exact_vision, tmp
         assert abs(row["remainder_mm"]) < 0.65
     steep = rows["b60_4"]
     assert abs(steep["by_alpha_mm"]) > 3 * max(abs(steep["by_touch_mm"]), abs(steep["by_moments_mm"]))
+
+
+def test_a_cone_is_a_cone_here_too():
+    """(10) as the estimator has it, for both shapes."""
+    theta, m_y, m_z, alpha = np.radians(3.0), 2.0, 7.0, np.radians(10.0)
+    for shape in ("cylinder", "cone"):
+        whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0)
+        beam, nothing = Beam(whisker.C_Nmm2, 100.0, shape), np.zeros(0)
+        felt = Whisk(nothing, nothing, nothing, nothing, theta, m_y, m_z, np.eye(2), 0.0, beam)
+        expected = with_friction(felt, EstimatorSettings(alpha)).d_x_mm
+        assert by_10(theta, m_y, m_z, alpha, whisker) == pytest.approx(expected, rel=1e-12)

@@ -8,7 +8,7 @@ import pytest
 from bench.explained import SHARES, draw_explained, mean_row
 from bench.friction_map import draw_error_map, measured_cells, write_error_map
 from bench.friction_tables import friction_of
-from tests.bench.test_friction_runs import C, result
+from tests.bench.test_friction_runs import WHISKER, result
 
 ALPHA_EST = np.radians(10.0)
 
@@ -16,7 +16,7 @@ ALPHA_EST = np.radians(10.0)
 def test_cells_hold_what_was_measured_and_agree_with_theory(tmp_path):
     """Whisks made by (13), (14) are wrong by just what (13), (14) predict, at the same α (14°) and α_est."""
     results = [result(b, name=f"{b} {k}") for b in (30, 60, -60) for k in range(2)]
-    found = friction_of(results, C, ALPHA_EST)
+    found = friction_of(results, WHISKER, ALPHA_EST)
     cells = measured_cells(results, found, ALPHA_EST)
     assert [(c.beta_deg, len(c.errors)) for c in cells] == [(27.5, 2), (57.5, 4)]
     assert all(c.errors == pytest.approx(c.predicted, abs=0.02) for c in cells)
@@ -28,7 +28,7 @@ def test_cells_hold_what_was_measured_and_agree_with_theory(tmp_path):
 
 def test_cells_without_a_whisk_stay_empty():
     results = [result(30), result(60)]
-    cells = measured_cells(results, friction_of(results, C, ALPHA_EST), ALPHA_EST)
+    cells = measured_cells(results, friction_of(results, WHISKER, ALPHA_EST), ALPHA_EST)
     drawn = draw_error_map(cells, ALPHA_EST).axes[0].collections[0].get_array()
     assert np.isfinite(np.ma.filled(drawn, np.nan)).sum() == 2
 

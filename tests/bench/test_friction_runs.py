@@ -86,7 +86,7 @@ def test_doubt_about_friction_is_in_the_sigma():
 
 def test_every_way_finds_the_friction_angle(tmp_path):
     results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER)
-    found = friction_of(results, C, np.radians(10.0))
+    found = friction_of(results, WHISKER, np.radians(10.0))
     (surface,) = found
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
         assert np.degrees(surface.alpha(name)[0]) == pytest.approx(14.0, abs=0.06), name
@@ -106,8 +106,8 @@ def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
 
 def test_ways_say_what_they_lack():
     assert "both signs" in by_tilting([contact(30), contact(60)]).status
-    assert "one nominal distance" in by_consistency([contact(30), contact(50, 61.0), contact(60)], C).status
-    assert "two slip angles" in by_consistency([contact(0), contact(5), contact(10)], C).status
+    assert "one nominal distance" in by_consistency([contact(30), contact(50, 61.0), contact(60)], WHISKER).status
+    assert "two slip angles" in by_consistency([contact(0), contact(5), contact(10)], WHISKER).status
 
 
 def test_confidence_falls_with_the_slip_angle():
