@@ -104,7 +104,7 @@ def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float) -> Figure:
     look = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
     measured, beta, alpha = _field(cells, top)
     mesh = left.pcolormesh(beta, alpha, measured, **look)
-    _tell(left, cells)
+    _tell(left, cells, most)
     slopes, angles = np.meshgrid(np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121))
     predicted = 100.0 * distance_error(np.radians(slopes), np.radians(angles), alpha_est_rad)
     right.pcolormesh(slopes, angles, np.clip(predicted, -most, most), shading="nearest", **look)
@@ -127,7 +127,9 @@ def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, n
     return field, beta, alpha
 
 
-def _tell(axes: Axes, cells: Sequence[Cell]) -> None:
+def _tell(axes: Axes, cells: Sequence[Cell], most: float) -> None:
+    """Each cell's mean error in figures, light on the dark ends of the scale."""
     for cell in cells:
+        colour = "white" if abs(cell.errors.mean()) > 0.6 * most else "black"
         middle = cell.beta_deg + 0.5 * _BETA_DEG, cell.alpha_deg + 0.5 * _ALPHA_DEG
-        axes.text(*middle, f"{cell.errors.mean():+.1f}", ha="center", va="center", fontsize=6)
+        axes.text(*middle, f"{cell.errors.mean():+.1f}", ha="center", va="center", fontsize=6, color=colour)
