@@ -68,12 +68,29 @@ def _scores(session: Session, out: Path) -> Iterator[Score]:
     yield from _compared("slip_mm", at_3, "slip_mm at 3 deg")
     for column in ("x_mm", "y_mm", "z_mm", "slip_mm"):
         yield from _compared(column, list(_frames(session, out, column)), f"{column}, touching frames")
+    yield from _friction(session, out)
     measured = {trial.name for trial in session.trials if trial.purpose == "measure"}
     exact = {(row["trial"], row["whisk"]): truth.get("d_x_mm") for row, truth in paired if row["trial"] in measured}
     estimates = _read(out / "estimates.csv")
     for estimator in dict.fromkeys(row["estimator"] for row in estimates):
         mine = [(row, exact.get((row["trial"], row["whisk"]))) for row in estimates if row["estimator"] == estimator]
         yield from _compared("d_x_est_mm", mine, f"d_x by {estimator}")
+
+
+def _friction(session: Session, out: Path) -> Iterator[Score]:
+    """Friction angles: one where the coefficient at rest is that in motion, else the two apart."""
+    path = out / "friction.csv"
+    rows = [(row, _truth_of(session, row)) for row in (_read(path) if path.is_file() else ())]
+    known = [(row, truth) for row, truth in rows if truth is not None and "mu_kinetic" in truth]
+    alike = {True: [], False: []}
+    for row, truth in known:
+        angles = {key: float(np.degrees(np.arctan(truth[f"mu_{key}"]))) for key in ("static", "kinetic")}
+        alike[truth["mu_static"] == truth["mu_kinetic"]].append((row, angles))
+    for record in ("seen", "felt"):
+        yield from _compared(f"alpha_{record}_deg", [(row, angles["kinetic"]) for row, angles in alike[True]])
+        for kind in ("static", "kinetic"):
+            pairs = [(row, angles[kind]) for row, angles in alike[False]]
+            yield from _compared(f"alpha_{kind}_{record}_deg", pairs)
 
 
 def _compared(column: str, pairs, name: str = "") -> Iterator[Score]:

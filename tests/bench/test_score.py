@@ -1,11 +1,13 @@
 """The score against truth files: right numbers, and no word where there is nothing to score against."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
 
 from bench.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS, write_table
+from bench.friction_tables import WHISK_COLUMNS as FRICTION_COLUMNS
 from bench.gauges import GaugeMatrix, Gauges
 from bench.score import Score, score
 from bench.session import load_session
@@ -82,3 +84,23 @@ def test_unreadable_truth_is_said_and_stops_nothing(finished, small_copy):
 
 def test_sigmas_that_are_not_stated_are_not_scored():
     assert Score("x", "mm", np.array([0.1]), np.array([np.nan])).line().split()[-1] == "-"
+
+
+def test_friction_is_scored_as_one_angle_or_as_two(finished, small_session):
+    """The sample's surfaces have one coefficient, 10.5°; with another at rest the two angles are scored instead."""
+    row = {"trial": "b60_4", "whisk": 0, "alpha_seen_deg": 10.7, "alpha_seen_sigma_deg": 0.2}
+    row |= {"alpha_static_felt_deg": 15.0, "alpha_static_felt_sigma_deg": 0.5}
+    write_table(finished / "friction.csv", FRICTION_COLUMNS, [row])
+    lines = score(load_session(small_session), finished)
+    assert line(lines, "alpha_seen_deg") == ["1", "+0.2000", "0.2000", "deg", "100", "%", "1.00"]
+    assert not any(text.startswith("alpha_static_felt_deg") for text in lines)
+
+
+def test_static_and_kinetic_are_scored_where_they_differ(finished, small_copy):
+    truth = small_copy / "trials" / "b60_4" / "truth.toml"
+    truth.write_text(re.sub("mu_static = .*", "mu_static = 0.267949", truth.read_text()))  # 15°
+    row = {"trial": "b60_4", "whisk": 0, "alpha_static_felt_deg": 15.5, "alpha_static_felt_sigma_deg": 0.5}
+    write_table(finished / "friction.csv", FRICTION_COLUMNS, [row | {"alpha_seen_deg": 12.0}])
+    lines = score(load_session(small_copy), finished)
+    assert line(lines, "alpha_static_felt_deg")[1] == "+0.5000"
+    assert not any(text.startswith("alpha_seen_deg") for text in lines)
