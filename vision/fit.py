@@ -31,6 +31,7 @@ CONTACT_SIGMA_MM = 0.002
 # Neighbouring points of a wire share what is behind them, and so do the same points of the next frames: their
 # errors come in lumps of about four points, which halves what averaging gains.
 WIRE_LUMP = 4.0
+LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
 _STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
 
 
@@ -240,7 +241,7 @@ def _weights(linear: Linear, scale: float) -> np.ndarray:
 
 
 def solve(problem: Problem, state: State, *,
-          scales: Sequence[float] = (30.0, 10.0, 4.0, 4.0, 4.0, 4.0)) -> tuple[State, np.ndarray]:
+          scales: Sequence[float] = (30.0, 10.0, *[LAST_SCALE] * 4)) -> tuple[State, np.ndarray]:
     """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say; ends early once it stands still.
 
     Returns the state and its covariance (size, size) from noise and priors alone.
@@ -254,9 +255,14 @@ def solve(problem: Problem, state: State, *,
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
-    linear, state = linearise(problem, state)
-    jacobian = linear.jacobian * np.sqrt(_weights(linear, scales[-1]))[:, None]
+    jacobian = weighted_jacobian(problem, state, scales[-1])
     return state, np.linalg.inv(jacobian.T @ jacobian)
+
+
+def weighted_jacobian(problem: Problem, state: State, scale: float = LAST_SCALE) -> np.ndarray:
+    """All observations' rows (n, size) over their sigma and robustly weighted: line points, touching, priors."""
+    linear, _ = linearise(problem, state)
+    return linear.jacobian * np.sqrt(_weights(linear, scale))[:, None]
 
 
 def honest(problem: Problem, state: State) -> Problem:

@@ -18,7 +18,7 @@ from vision.base_line import base_lines
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
-from vision.fit import Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
+from vision.fit import LAST_SCALE, Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
 from vision.line import WAVES, Noise, measure_noise
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
@@ -37,6 +37,7 @@ _NEAR_PX = 3.0  # a bar found this near to where it was expected need not be loo
 _ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
 _FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
+_FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 
@@ -78,6 +79,9 @@ def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_
         axis = _see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
+    if len(views) == 1:
+        return _nothing(whisks, f"camera {views[0].camera.name} alone does not tell how far away the bar is; two are "
+                                "needed")
     rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, axis, time_s, motor_rad,
                        settings) for number, where in enumerate(whisks)]
     return TrialTruth(axis.point_mm, axis.direction, np.full((4, 4), np.nan), tuple(rows))
@@ -140,14 +144,18 @@ def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSetting
 def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis, time_s, motor_rad,
                settings: VisionSettings) -> WhiskTruth:
     """Truth of one whisk; its status where there is none."""
+    views, left_out = _with_frames(views, indices)
+    cameras = cameras.subset([view.camera.name for view in views])
     seen = [f for f in indices if all(f in view.frames for view in views)]
-    if len(seen) < 4:
-        return WhiskTruth(number, None, status=f"{len(seen)} frames seen by all cameras, 4 are needed")
+    if len(seen) < 4 or len(views) < 2:
+        return WhiskTruth(number, None, status=f"{len(seen)} frames seen by two cameras or more, 4 are needed")
     motor = {f: float(motor_rad[f]) for f in seen}
     try:
         problem, state, covariance = _fit_whisk(views, cameras, rods, axis, motor, settings)
     except Refused as reason:
         return WhiskTruth(number, None, status=str(reason))
+    except np.linalg.LinAlgError:
+        return WhiskTruth(number, None, status="the fit of wire and bar does not settle")
     if problem is None:
         return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
                           status="the whisker never touches" if state is None else state)
@@ -155,7 +163,16 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
     lens = calibration_share(problem, state, covariance)
     whisk = to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
                      lens, views, rods.bar.radius_mm, settings)
-    return replace(whisk, base=base_lines(problem, state, lens))
+    return replace(whisk, base=base_lines(problem, state, lens), status="; ".join(filter(None, [whisk.status, left_out])))
+
+
+def _with_frames(views, indices) -> tuple[list[View], str]:
+    """The views that have most of the frames, and a line on those left out: one camera's gaps are not all cameras'."""
+    counts = [sum(f in view.frames for f in indices) for view in views]
+    kept = [view for view, count in zip(views, counts) if count > _FEWEST_SHARE * max(counts)]
+    lost = [f"camera {view.camera.name} was left out: {count} frames of {len(indices)}"
+            for view, count in zip(views, counts) if count <= _FEWEST_SHARE * max(counts)]
+    return kept, "; ".join(lost)
 
 
 def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], settings: VisionSettings):
@@ -183,7 +200,7 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         begin = _begin(problem, rest, bend, arcs)
         fitted, _ = solve(problem, begin)
         problem = honest(problem, fitted)
-        fitted, covariance = solve(problem, fitted, scales=(4.0, 4.0, 4.0))
+        fitted, covariance = solve(problem, fitted, scales=[LAST_SCALE] * 3)
         state = (problem, fitted)
         rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
         touch = float(first_touch(problem, fitted.vector).motor_rad)
@@ -230,6 +247,8 @@ def _trace_all(views, rods: _Rods, axis: BarAxis, curves, light: dict, settings:
         seen += _trace_wire(number, view, rods, axis, curves, light, settings)
         if name in lines:
             seen.append(Observed(-1, number, lines[name].points))
+    if not any(one.frame >= 0 for one in seen):
+        raise Refused("no camera shows the wire clear of the bar")
     return seen
 
 
@@ -239,7 +258,7 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
     if len(pieces) == 0:
-        raise Refused(f"camera {view.camera.name} shows no wire clear of the bar")
+        return []
     knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
     first = view.camera.name not in light
     if first:

@@ -9,7 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.contact import BarAxis, clearance, contact_frame_angles
-from vision.fit import BAR, REST, Observed, Problem, State, bar_axis, curves_of, linearise, rest_shape
+from vision.fit import (
+    BAR,
+    REST,
+    Observed,
+    Problem,
+    State,
+    bar_axis,
+    curves_of,
+    linearise,
+    rest_shape,
+    weighted_jacobian,
+)
 from vision.scene import N_PARAMETERS
 from vision.touch import FirstTouch, first_touch
 from vision.wire import Curves, centrelines
@@ -131,6 +142,24 @@ def calibration_share(problem: Problem, state: State, covariance) -> np.ndarray:
     linear, _ = linearise(problem, state)
     answer = -covariance @ (linear.jacobian[linear.is_point].T @ camera_rows(problem, state))
     return answer @ problem.cameras.covariance @ answer.T
+
+
+def variance_by_cause(problem: Problem, state: State, covariance, lens, gradient) -> dict[str, float]:
+    """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
+
+    covariance, lens (size, size): of the parameters, by the fit and by the cameras. The fit's covariance is the
+    inverse of the sum of all observations' information, so each observation's part is its row's.
+    """
+    weighed = weighted_jacobian(problem, state)
+    parts = (weighed @ (covariance @ gradient)) ** 2
+    on_wire = np.concatenate([np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen])
+    touch = len(on_wire) + int(np.sum(problem.touching))
+    reach = touch + BAR + REST
+    light = slice(reach + 1, touch + problem.first_bend)
+    causes = {"wire": parts[:len(on_wire)][on_wire], "bar": parts[:len(on_wire)][~on_wire],
+              "touch": parts[len(on_wire):touch], "diameters": parts[reach], "light": parts[light],
+              "beliefs": [parts[touch:reach].sum(), parts[touch + problem.first_bend:].sum()]}
+    return {name: float(np.sum(part)) for name, part in causes.items()} | {"cameras": float(gradient @ lens @ gradient)}
 
 
 def camera_rows(problem: Problem, state: State) -> np.ndarray:

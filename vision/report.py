@@ -6,7 +6,7 @@ import numpy as np
 
 from vision.effort import VisionSettings
 from vision.fit import Problem, State, bar_axis, curves_of
-from vision.quantities import Jacobians, Measured
+from vision.quantities import Jacobians, Measured, variance_by_cause
 from vision.silhouette import normals, outline
 from vision.truth import FrameTruth, Smooth, WhiskTruth
 from vision.wire import Curves
@@ -30,8 +30,9 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
     frames = _frames(indices, seen, time_s, motor_rad, problem, measured, by_parameter, covariance, value["touch"],
                      sigma["touch"])
     lost = _lost_at_touch(indices, seen, motor_rad, value["touch"])
-    status = "; ".join(filter(None, [lost, _outside(problem, value), _slope_untold(sigma["beta"])]))
-    truth = {} if lost else {
+    outside = _outside(problem, value)
+    status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"])]))
+    truth = {} if lost or outside else {
         "d_x_mm": value["d_x"], "d_x_sigma_mm": sigma["d_x"], "touch_rad": value["touch"],
         "touch_sigma_rad": sigma["touch"], "beta_rad": value["beta"], "beta_sigma_rad": sigma["beta"],
         "psi_rad": value["psi"], "psi_sigma_rad": sigma["psi"],
@@ -39,8 +40,8 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
         "point_sigma_mm": np.array([sigma[k] for k in _VECTORS])}
     return WhiskTruth(number, frames, cameras=len(views), frames_used=len(seen), status=status,
                       overlay=_overlay(problem, state, measured, seen, views, bar_radius_mm),
-                      smooth=None if lost else _smooth(problem, measured, by_parameter, covariance),
-                      budget=_budget(by_parameter.whisk["d_x"], noise, lens), **truth)
+                      smooth=None if lost or outside else _smooth(problem, measured, by_parameter, covariance),
+                      budget=_budget(problem, state, noise, lens, by_parameter.whisk["d_x"]), **truth)
 
 
 def _speed(time_s, motor_rad, at_rad: float) -> float:
@@ -114,11 +115,10 @@ def _frames(indices, seen, time_s, motor_rad, problem: Problem, measured: Measur
         arc_mm=column(measured.frame["arc"]), status=status, **plain)
 
 
-def _budget(jacobian, noise, lens) -> dict[str, float]:
-    """Shares of d_x's variance: lines in the pictures, and lens with rig board."""
-    parts = {"lines": float(jacobian @ noise @ jacobian), "cameras": float(jacobian @ lens @ jacobian)}
-    total = max(sum(parts.values()), 1e-30)
-    return {name: part / total for name, part in parts.items()}
+def _budget(problem: Problem, state: State, noise, lens, gradient) -> dict[str, float]:
+    """Shares of the variance by cause; they add up to 1."""
+    parts = variance_by_cause(problem, state, noise, lens, gradient)
+    return {name: part / sum(parts.values()) for name, part in parts.items()}
 
 
 def _overlay(problem: Problem, state: State, measured: Measured, seen, views, bar_radius_mm: float) -> dict:
