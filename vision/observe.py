@@ -163,7 +163,8 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
     lens = calibration_share(problem, state, covariance)
     whisk = to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
                      lens, views, rods.bar.radius_mm, settings)
-    return replace(whisk, base=base_lines(problem, state, lens), status="; ".join(filter(None, [whisk.status, left_out])))
+    status = "; ".join(filter(None, [whisk.status, left_out]))
+    return replace(whisk, base=base_lines(problem, state, lens), status=status)
 
 
 def _with_frames(views, indices) -> tuple[list[View], str]:
