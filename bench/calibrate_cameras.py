@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.board_views import BoardViews, read_board_views, rig_view
 from bench.errors import BadInput
+from bench.scale import check_scale
 from bench.session import Session, load_session
 from vision.calibrate import Calibration, CameraReport, calibrate_cameras
 from vision.cameras_file import write_cameras
@@ -23,6 +24,8 @@ HOLD_EVERY = 4
 # A distortion term this many sigmas from zero is one that the views ask for.
 _ASKED_SIGMAS = 2.0
 _MOST_LEFT_OUT = 0.1
+# Bars stand beyond this share of the whisker, and are looked at by so much on either side of it.
+_NEAREST_BAR, _BAR_REACH_MM = 0.4, 20.0
 
 
 def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = None) -> int:
@@ -36,8 +39,9 @@ def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = No
         return _write(out, place_imported(loaded, lenses), [f"lenses as in {lenses.name}, taken as exact"], [])
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
+    length = check_scale(loaded, calibration.cameras)
     measured = measure_held_out(loaded, views)
-    lines = [*report_lines(calibration), *held_out_lines(measured, calibration)]
+    lines = [*report_lines(calibration), *filter(None, [length]), *held_out_lines(measured, calibration)]
     return _write(out, calibration.cameras, lines, [*views.notes, *_doubts(calibration)])
 
 
@@ -87,10 +91,13 @@ def calibrate_from(session: Session, views: BoardViews) -> Calibration:
 
 
 def _work_points(session: Session) -> np.ndarray | None:
-    """The unbent whisker, by the session's own word: where cameras must know their lens."""
+    """The unbent whisker, and bars across it, by the session's own word: where cameras must know their lens."""
     if session.whisker is None or session.T_rig_board is None:
         return None
-    return np.linspace(0, session.whisker.length_mm, 21)[:, None] * np.array([1.0, 0.0, 0.0])
+    along, across = np.linspace(0, session.whisker.length_mm, 21), np.array([-_BAR_REACH_MM, 0.0, _BAR_REACH_MM])
+    touched = along[along > _NEAREST_BAR * session.whisker.length_mm]
+    bars = [[x, 0.0, z] for x in touched for z in across]
+    return np.array([*([x, 0.0, 0.0] for x in along), *bars])
 
 
 def measure_held_out(session: Session, views: BoardViews) -> HeldOut | None:

@@ -12,6 +12,7 @@ from bench.board_views import read_board_views
 from bench.calibrate_cameras import calibrate_from, report_lines
 from bench.errors import BadInput
 from bench.results import hash_of, hash_of_code, hash_of_files, read_result, write_result
+from bench.scale import check_scale
 from bench.session import Session
 from vision.cameras_file import read_cameras, write_cameras
 from vision.corners import refine_corners
@@ -63,9 +64,10 @@ def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...]]:
     key, kept = _key(session), read_result(folder / "cameras.json")
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
         made = calibrate_from(session, read_board_views(session))
+        lengths = check_scale(session, made.cameras)
         folder.mkdir(parents=True, exist_ok=True)
         write_cameras(folder / "cameras.toml", made.cameras)
-        kept = {"hash": key, "notes": list(report_lines(made))}
+        kept = {"hash": key, "notes": [*report_lines(made), *filter(None, [lengths])]}
         write_result(folder / "cameras.json", kept)
     return read_cameras(folder / "cameras.toml"), tuple(kept["notes"])
 

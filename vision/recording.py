@@ -156,28 +156,46 @@ def _reach(camera: Camera, px: np.ndarray) -> float:
 
 
 def check_work(cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm) -> None:
-    """Refuses a camera whose board views leave out where the whisker will be."""
+    """Refuses a camera whose board views leave out where whisker and bar will be, saying on which side."""
     if work_points_mm is None:
         return
     for camera in cameras:
         corners = [v.px for v in alone[camera.name].views.values()] + [standing[camera.name].px] * bool(standing)
-        outside = _outside(np.concatenate(corners), camera.project(work_points_mm), camera.size_px)
-        if outside > _MOST_UNCOVERED:
+        work_px = camera.project(work_points_mm)
+        in_picture = work_px[np.all((work_px >= 0) & (work_px < camera.size_px), axis=1)]
+        if not len(in_picture):
             raise Refused(
-                f"camera {camera.name}: {100 * outside:.0f} % of where the whisker will be lies outside all board "
-                "views: record views there"
+                f"camera {camera.name}: neither whisker nor bar will be in its picture, by T_rig_board: check "
+                "T_rig_board, or turn the camera"
+            )
+        missed = _outside(np.concatenate(corners), in_picture, camera.size_px)
+        if np.mean(missed) > _MOST_UNCOVERED:
+            raise Refused(
+                f"camera {camera.name}: {100 * np.mean(missed):.0f} % of where whisker and bar will be lies outside "
+                f"all board views, {100 * _MOST_UNCOVERED:.0f} % is allowed: record views of the board at the "
+                f"{_side(np.concatenate(corners), in_picture[missed])} of the picture, {_span(in_picture[missed])}"
             )
 
 
-def _outside(corners_px: np.ndarray, work_px: np.ndarray, size_px: tuple[int, int]) -> float:
-    """Share of the points in the picture that lie farther outside the corners' hull than a margin."""
-    inside_picture = np.all((work_px >= 0) & (work_px < size_px), axis=1)
-    if not inside_picture.any():
-        return 1.0
+def _outside(corners_px: np.ndarray, work_px: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
+    """Which points lie farther outside the corners' hull than a margin, (n,) bool."""
     hull = cv2.convexHull(corners_px.astype(np.float32))
     margin = -_HULL_MARGIN * max(size_px)
-    depth = [cv2.pointPolygonTest(hull, tuple(map(float, p)), True) for p in work_px[inside_picture]]
-    return float(np.mean(np.array(depth) < margin))
+    return np.array([cv2.pointPolygonTest(hull, tuple(map(float, p)), True) for p in work_px]) < margin
+
+
+def _side(corners_px: np.ndarray, missed_px: np.ndarray) -> str:
+    """Where the points lie as seen from the middle of all corners: the side that a person would name."""
+    across, down = missed_px.mean(axis=0) - 0.5 * (corners_px.min(axis=0) + corners_px.max(axis=0))
+    far = 0.5 * max(abs(across), abs(down))
+    down_name = ("bottom" if down > 0 else "top") if abs(down) > far else ""
+    across_name = ("right" if across > 0 else "left") if abs(across) > far else ""
+    return f"{down_name} {across_name}".strip()
+
+
+def _span(px: np.ndarray) -> str:
+    (left, top), (right, bottom) = px.min(axis=0), px.max(axis=0)
+    return f"x {left:.0f} to {right:.0f}, y {top:.0f} to {bottom:.0f} px"
 
 
 def coverage(views: Sequence[Corners], size_px: tuple[int, int]) -> float:

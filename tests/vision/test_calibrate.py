@@ -162,7 +162,7 @@ def test_work_outside_all_views_is_refused(recording, rng):
     boards, rig = recording.seen(SIGMA_PX, rng)
     left = {n: [v.chosen(v.px[:, 0] < 700) for v in views] for n, views in boards.items()}
     rig = {n: v.chosen(v.px[:, 0] < 700) for n, v in rig.items()}
-    with pytest.raises(Refused, match="of where the whisker will be lies outside"):
+    with pytest.raises(Refused, match=r"whisker and bar will be lies outside .* at the right of the picture"):
         calibrated(left, rig, work_points_mm=aside)
 
 

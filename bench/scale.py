@@ -1,0 +1,67 @@
+"""A second known length in the session, against a board whose squares were entered wrong: the bar's diameter."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bench.errors import BadInput
+from bench.footage import read_frames
+from bench.frame_times import frame_times
+from bench.session import Session
+from bench.signals import read_signals
+from bench.trial import Trial
+from vision.bar_width import SIGMA_SHARE, bar_diameter_mm
+from vision.errors import Refused
+from vision.pictures import read_picture
+from vision.place import check_known_lengths
+from vision.scene import Bar, Cameras, Wire
+
+_MOST_TRIALS, _MOST_PICTURES = 3, 11
+
+
+def check_scale(session: Session, cameras: Cameras) -> str | None:
+    """A note on how thick the bars look, None where the session shows none. Raises BadInput at the wrong scale."""
+    if session.whisker is None or session.T_rig_board is None or session.board is None:
+        return None
+    trials = [t for t in session.trials if t.bar_diameter_mm and set(t.camera_sources) & set(session.rig_pictures)]
+    shares = np.array(list(_seen_over_given(session, cameras, trials[:: max(1, len(trials) // _MOST_TRIALS)])))
+    if not len(shares):
+        return None
+    share, sigma, given_mm = float(np.median(shares)), SIGMA_SHARE / np.sqrt(len(shares)), trials[0].bar_diameter_mm
+    given_sigma_mm = max(t.bar_diameter_sigma_mm for t in trials)
+    try:
+        check_known_lengths({"bar diameter": (share * given_mm, sigma * share * given_mm, given_mm, given_sigma_mm)})
+    except Refused as reason:
+        square_mm = session.board.square_mm
+        found = f"square_mm is {square_mm:g}, some {square_mm / share:.2g} would fit the bar"
+        raise BadInput(f"{reason}; {found}", file="session.toml") from None
+    return f"Second length: bars look {share:.2f} ± {sigma:.2f} times as thick as given; square_mm can be right."
+
+
+def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:
+    w = session.whisker
+    wire = Wire(w.shape, w.length_mm, w.diameter_mm)
+    background = {n: read_picture(p) for n, p in session.rig_pictures.items() if n in cameras}
+    for trial in trials:
+        try:
+            pictures = {n: _spread(trial, n) for n in trial.camera_sources if n in cameras}
+            bar = Bar(trial.bar_diameter_mm)
+            share = bar_diameter_mm(pictures, background, _motor_span(trial), cameras, wire, bar) / bar.diameter_mm
+        except Refused:
+            continue
+        if np.isfinite(share):
+            yield share
+
+
+def _spread(trial: Trial, camera: str) -> list[np.ndarray]:
+    """Some pictures of a camera, spread over the trial."""
+    shown = frame_times(trial).picture[camera]
+    shown = shown[shown >= 0]
+    chosen = shown[np.unique(np.linspace(0, len(shown) - 1, _MOST_PICTURES).astype(int))] if len(shown) else []
+    return [grey for grey in read_frames(trial.camera_sources[camera], map(int, chosen)).values() if grey is not None]
+
+
+def _motor_span(trial: Trial) -> tuple[float, float]:
+    signals, times = read_signals(trial), frame_times(trial).time_s
+    motor = np.interp(times, signals.time_s, signals.motor_rad)
+    return float(motor.min()), float(motor.max())
