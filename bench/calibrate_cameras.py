@@ -17,6 +17,7 @@ from vision.corners import Corners
 from vision.errors import Refused
 from vision.held_out import Agreement, HeldOut, held_out
 from vision.lens import LENS_TERMS
+from vision.place import by_board, placed
 from vision.scene import Camera, Cameras
 
 # Every fourth view (index % 4 == 3) measures a calibration from the other three quarters.
@@ -34,7 +35,7 @@ def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = No
     lenses: a camera TOML of caliscope or aniposelib to take the lenses from; the session then only places the cameras.
     Raises BadInput or Refused, saying what to record, before anything is written.
     """
-    loaded = load_session(session)
+    loaded = load_session(session, lenses_known=lenses is not None)
     if lenses is not None:
         return _write(out, place_imported(loaded, lenses), [f"lenses as in {lenses.name}, taken as exact"], [])
     views = read_board_views(loaded)
@@ -62,9 +63,11 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
             return cameras
         views = {name: rig_view(session, name, cameras[name].size_px) for name in cameras.names
                  if name in session.rig_pictures}  # fmt: skip
-        return place_on_rig(cameras, views, session.board, session.T_rig_board)
+        exact = place_on_rig(cameras, views, session.board, session.T_rig_board)
     except Refused as reason:
         raise BadInput(str(reason), file=lenses.name) from None
+    board = by_board(session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
+    return placed(exact, replace(board, covariance=np.zeros((6, 6))), board)
 
 
 def calibrate_from(session: Session, views: BoardViews) -> Calibration:

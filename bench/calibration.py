@@ -27,12 +27,14 @@ _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
 @dataclass(frozen=True)
 class SessionCalibration:
     """Cameras (None where the session has no pictures), the scene without whisker and bar by camera (None where there
-    is no such picture), a hash of both, and lines that say what they rest on."""
+    is no such picture), a hash of both, lines that say what they rest on, and where the board on the rig stands in the
+    cameras' frame, (3, 4) mm, None where not told."""
 
     cameras: Cameras | None
     background: dict[str, np.ndarray | None]
     hash: str
     notes: tuple[str, ...] = ()
+    T_rig_board: np.ndarray | None = None
 
     def with_notes(self, *notes: str) -> "SessionCalibration":
         """The same with more to say."""
@@ -49,7 +51,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
         raise BadInput(f"has no camera {missing[0]}, which has frames; calibrate it", file="cameras.toml")
     background = _backgrounds(session, cameras)
     content = [[c, cameras.covariance] for c in cameras.cameras], list(background.values())
-    return SessionCalibration(cameras, background, hash_of(*content), notes)
+    return SessionCalibration(cameras, background, hash_of(*content), notes, session.T_rig_board)
 
 
 def _given(session: Session) -> tuple[Cameras, tuple[str, ...]]:
@@ -92,7 +94,7 @@ def moved_cameras(session: Session, calibration: SessionCalibration, frames) -> 
     A camera that does not see the rig board is not checked.
     """
     found = {}
-    if session.board is None or session.T_rig_board is None:
+    if session.board is None or calibration.T_rig_board is None:
         return found
     for name, pictures in frames.items():
         if pictures and calibration.background.get(name) is not None:
@@ -104,7 +106,7 @@ def moved_cameras(session: Session, calibration: SessionCalibration, frames) -> 
 
 def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -> str:
     """Sentence on a camera that moved, or ''."""
-    camera, T = calibration.cameras[name], session.T_rig_board
+    camera, T = calibration.cameras[name], calibration.T_rig_board
     points = session.board.corners_mm @ T[:, :3].T + T[:, 3]
     corners = refine_corners(grey, camera.project(points), np.arange(len(points)), session.board)
     try:

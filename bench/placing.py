@@ -13,10 +13,13 @@ from bench.unit import Unit, see_unit
 from bench.workers import Workers
 from vision.errors import Refused
 from vision.place import BaseLines, Placement, by_board, by_strokes, combine, placed
+from vision.rotation import compose, invert_transform
 
 # Strokes beyond these say little more: what they share (light, lenses) no average makes smaller.
 _MOST_TRIALS = 6
-_STAGE = "swing"
+# A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
+_SMALL_STEP = np.repeat([2e-3, 0.2], 3)
+_MOST_ROUNDS = 3
 _STAYS = "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
 
 
@@ -30,23 +33,43 @@ def place_rig(
     """
     if calibration.cameras is None:
         return calibration
-    board = _by_board(session)
+    board, chosen = _by_board(session), _chosen(units)
     stays = session.cameras_toml is not None or not board.covariance.any()
-    chosen = _chosen(units) if stays else [replace(unit, stage=_STAGE) for unit in _chosen(units)]
-    pool.run(see_unit, chosen, "free strokes")
     try:
-        swing = by_strokes(_base_lines(see_unit(unit) for unit in chosen))
+        if stays:
+            both = combine(board, _by_strokes(chosen, pool))
+            placed_here = calibration
+        else:
+            placed_here, both = _settled(calibration, board, chosen, pool)
     except Refused as reason:
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
-    # The cameras' uncertainty, T_rig_board's in it, is in the swing too: it counts for less than it could.
-    both = combine(board, swing)
     if both.alarm:
         doubts.note(both.alarm)
-    if stays:
-        return calibration.with_notes(*swing.notes, _STAYS)
-    cameras = placed(calibration.cameras, board, both)
+    return placed_here.with_notes(*(both.notes[:1] if stays else both.notes), *[_STAYS] * stays)
+
+
+def _settled(calibration: SessionCalibration, board: Placement, chosen: Sequence[Unit], pool: Workers):
+    """The calibration moved to where board and strokes together have the rig, and that placement.
+
+    The strokes are read by cameras whose uncertainty leaves out T_rig_board's, which is weighed on the other side.
+    """
+    exact = replace(board, covariance=np.zeros((6, 6)))
+    here = _moved(calibration, board, exact)
+    for round_number in range(_MOST_ROUNDS):
+        units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
+        both = combine(board, _by_strokes(units, pool))
+        if np.all(np.abs(both.step) < _SMALL_STEP):
+            break
+        here = _moved(here, exact, replace(both, covariance=exact.covariance))
+        board, both = replace(board, step=board.step - both.step), replace(both, step=exact.step)
+    return _moved(here, exact, both), both
+
+
+def _moved(calibration: SessionCalibration, before: Placement, after: Placement) -> SessionCalibration:
+    cameras = placed(calibration.cameras, before, after)
+    T_rig_board = compose(invert_transform(after.T_board_rig), calibration.T_rig_board)
     made = hash_of([[camera, cameras.covariance] for camera in cameras], calibration.hash)
-    return replace(calibration, cameras=cameras, hash=made).with_notes(*both.notes)
+    return replace(calibration, cameras=cameras, T_rig_board=T_rig_board, hash=made)
 
 
 def _by_board(session: Session) -> Placement:
@@ -60,7 +83,8 @@ def _chosen(units: Sequence[Unit]) -> list[Unit]:
     return [seen[k] for k in np.unique(np.linspace(0, len(seen) - 1, _MOST_TRIALS).astype(int))] if seen else []
 
 
-def _base_lines(seen) -> list[BaseLines]:
-    """Of every whisk whose base is seen before touch."""
-    found = [whisk["base"] for trial in seen for whisk in trial["whisks"] if whisk.get("base")]
-    return [BaseLines(*(np.array(base[field.name]) for field in fields(BaseLines))) for base in found]
+def _by_strokes(units: Sequence[Unit], pool: Workers) -> Placement:
+    """What the free strokes of these trials say, of every whisk whose base is seen before touch."""
+    pool.run(see_unit, units, "free strokes")
+    bases = [whisk["base"] for unit in units for whisk in see_unit(unit)["whisks"] if whisk.get("base")]
+    return by_strokes([BaseLines(*(np.array(base[field.name]) for field in fields(BaseLines))) for base in bases])

@@ -71,8 +71,10 @@ class Session:
         raise BadInput(f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}", file="trials")
 
 
-def load_session(path: Path | str, doubts: Doubts | None = None) -> Session:
+def load_session(path: Path | str, doubts: Doubts | None = None, *, lenses_known: bool = False) -> Session:
     """Read the manifests and find every file of a session. Signals and frames are not read here.
+
+    lenses_known: board views of each camera are not asked for.
 
     Raises BadInput at the first thing that is wrong; with a collecting `doubts`, reads on where it can.
     """
@@ -103,7 +105,7 @@ def load_session(path: Path | str, doubts: Doubts | None = None) -> Session:
         cameras_toml=_if_there(path / "cameras.toml"),
         gauges_toml=_if_there(path / "gauges.toml"),
     )
-    _check_cameras(session, [c.name for c in keys.cameras], doubts)
+    _check_cameras(session, [c.name for c in keys.cameras], doubts, lenses_known)
     return session
 
 
@@ -202,14 +204,14 @@ def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tu
     return tuple(sorted(names, key=lambda name: natural_order(Path(name))))
 
 
-def _check_cameras(session: Session, named: list[str], doubts: Doubts) -> None:
+def _check_cameras(session: Session, named: list[str], doubts: Doubts, lenses_known: bool) -> None:
     for name in named:
         if session.camera_names and name not in session.camera_names:
             doubts.note(f"{MANIFEST}: [[cameras]] {name!r} has no pictures in boards/ or trials/")
     for trial in session.trials:
         with doubts.guard():
             _check_trial_cameras(trial, session.camera_names)
-    if any(t.camera_sources for t in session.trials) and session.cameras_toml is None:
+    if any(t.camera_sources for t in session.trials) and session.cameras_toml is None and not lenses_known:
         for name in session.camera_names:
             with doubts.guard():
                 _check_camera_boards(session, name)

@@ -104,6 +104,11 @@ def _parse(path: Path) -> dict:
 def _camera(name: str, table: dict) -> Camera:
     if not isinstance(table, dict):
         raise Refused(f"cameras.{name} must be a table with {', '.join(_KEYS)}")
+    if "translation" in table:
+        raise Refused(
+            f"cameras.{name} is as caliscope and aniposelib write it, in a world of its own: place it in the rig with "
+            "`whisker-bench calibrate cameras SESSION --lenses FILE --out cameras.toml`"
+        )
     missing, unknown = sorted(set(_KEYS) - set(table)), sorted(set(table) - set(_KEYS) - {"covariance"})
     if missing:
         raise Refused(f"cameras.{name}: {', '.join(missing)} missing")

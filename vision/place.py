@@ -263,7 +263,15 @@ def placed(cameras: Cameras, before: Placement, after: Placement) -> Cameras:
         for part in (0, 3):
             first = N_PARAMETERS * k + 9 + part
             shared[first : first + 3, part : part + 3] = camera.T_camera_rig[:, :3]
-    return Cameras(moved, cameras.covariance + shared @ (after.covariance - before.covariance) @ shared.T)
+    change = shared @ (after.covariance - before.covariance) @ shared.T
+    return Cameras(moved, _positive(cameras.covariance + change, np.sqrt(np.diag(cameras.covariance))))
+
+
+def _positive(covariance: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Without what rounding left below zero where nearly all of a variance was taken off; scale: of each parameter."""
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
 
 
 def check_known_lengths(lengths: Mapping[str, tuple[float, float, float, float]]) -> None:

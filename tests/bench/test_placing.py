@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from bench.workers import Workers
 from tests.vision.test_fit import CAMERAS
 from tests.vision.test_place import some_lines
 
+SMALL = Path(__file__).resolve().parents[2] / "fixtures" / "small-session"
+T_RIG_BOARD = load_session(SMALL).T_rig_board
 OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.8, 0.0])  # the centre 0.8 mm across the whisker from where the board has it
 
 
@@ -30,13 +33,15 @@ def place(small_copy, monkeypatch):
 
         def see(unit):
             stages.append(unit.stage)
-            made = some_lines(8.0, step, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
-            base = plain(lines.setdefault(unit.trial.name, made))
+            now = unit.calibration.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
+            left = step - np.append(np.zeros(3), CAMERAS["one"].T_camera_rig[:, :3].T @ now)
+            made = some_lines(8.0, left, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
+            base = plain(lines.setdefault((unit.stage, unit.trial.name), made))
             return {"whisks": [{"base": base}, {"base": None}, {"status": "no pictures"}]}
 
         monkeypatch.setattr("bench.placing.see_unit", see)
         session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)
-        before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",))
+        before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",), session.T_rig_board)
         units = [Unit(session, t, "", before, Settings(), small_copy) for t in session.trials]
         doubts = Doubts()
         return place_rig(session, before, units, Workers(0), doubts), doubts.notes, set(stages)
@@ -60,9 +65,13 @@ def test_a_disagreement_is_an_alarm(place):
 
 def test_a_board_with_a_sigma_gives_way(place):
     made, doubts, stages = place(OFF, sigma_mm=0.5)
-    assert not doubts and made.hash != "before" and stages == {"swing"}
+    assert not doubts and made.hash != "before" and stages == {"swing0", "swing1"}
     moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
     np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ OFF[3:], atol=0.05)
+    # The board on the rig has not moved in the pictures: it stands elsewhere in the rig's frame.
+    before, after = (c.project(T[:, 3][None]) for c, T in ((CAMERAS["one"], T_RIG_BOARD),
+                                                           (made.cameras["one"], made.T_rig_board)))  # fmt: skip
+    np.testing.assert_allclose(after, before, atol=1e-6)
 
 
 def test_strokes_too_short_to_tell_are_no_doubt(place):
