@@ -241,7 +241,8 @@ def _timing_note(names, timing: Timing) -> str:
         f"{name} {scale * offset:+.3g} ± {scale * scatter:.2g} {unit}"
         for name, offset, scatter in zip(names, timing.offset_s, timing.scatter_s)
     )
-    return f"Pictures of one view were not taken at one instant; later than the view by {', '.join(late)}; taken into account."
+    said = f"later than the view by {', '.join(late)} (below 0: earlier)"
+    return f"Pictures of one view were not taken at one instant: {said}; taken into account."
 
 
 def allow_lateness(known: Knowledge, trajectory: Trajectory) -> Knowledge:
