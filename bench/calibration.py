@@ -22,6 +22,11 @@ from vision.scene import Cameras
 from vision.static_board import camera_moved
 
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
+_NO_POSE = (
+    "[rig] T_rig_board is missing, so nothing says where whisker and motor are: measure where the board stands (2 mm "
+    "by ruler will do, with T_rig_board_sigma_mm = 2 and T_rig_board_sigma_deg = 2: the free strokes then place the "
+    "rig, and must be some 5 to 10 degrees wide)"
+)
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,8 @@ def _given(session: Session) -> tuple[Cameras, tuple[str, ...]]:
 
 def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...]]:
     """Cameras as kept in `folder`, or calibrated there. What is used is what the file holds, in every run."""
+    if session.T_rig_board is None:
+        raise BadInput(_NO_POSE, file="session.toml")
     key, kept = _key(session), read_result(folder / "cameras.json")
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
         made = calibrate_from(session, read_board_views(session))

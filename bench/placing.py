@@ -7,12 +7,13 @@ import numpy as np
 
 from bench.calibration import SessionCalibration
 from bench.doubts import Doubts
+from bench.errors import BadInput
 from bench.results import hash_of
 from bench.session import Session
 from bench.unit import Unit, see_unit
 from bench.workers import Workers
 from vision.errors import Refused
-from vision.place import BaseLines, Placement, by_board, by_strokes, combine, placed
+from vision.place import BaseLines, Placement, by_board, by_strokes, check_swing_suffices, combine, placed
 from vision.rotation import compose, invert_transform
 
 # Strokes beyond these say little more: what they share (light, lenses) no average makes smaller.
@@ -20,6 +21,8 @@ _MOST_TRIALS = 6
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
 _SMALL_STEP = np.repeat([2e-3, 0.2], 3)
 _MOST_ROUNDS = 3
+# A T_rig_board known no better is a first guess: the strokes alone must then do.
+_BY_RULER_MM = 1.0
 _STAYS = "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
 
 
@@ -43,9 +46,18 @@ def place_rig(
             placed_here, both = _settled(calibration, board, chosen, pool)
     except Refused as reason:
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
+    if not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM:
+        _check_suffices(both)
     if both.alarm:
         doubts.note(both.alarm)
     return placed_here.with_notes(*(both.notes[:1] if stays else both.notes), *[_STAYS] * stays)
+
+
+def _check_suffices(both: Placement) -> None:
+    try:
+        check_swing_suffices(both)
+    except Refused as reason:
+        raise BadInput(str(reason), file="trials") from None
 
 
 def _settled(calibration: SessionCalibration, board: Placement, chosen: Sequence[Unit], pool: Workers):

@@ -22,8 +22,8 @@ from vision.scene import N_PARAMETERS, Cameras
 
 # Chance by which swing and board, both right, would disagree as much as calls for an alarm.
 _FALSE_ALARM = 1e-3
-# Without a board the swing alone must fix the centre at least this well, a tenth of what the truth may err by.
-_MOST_CENTRE_SIGMA_MM = 0.05
+# Where the swing alone places the rig it must fix the centre along the whisker at least this well.
+_MOST_ALONG_SIGMA_MM = 0.05
 _MIN_FRAMES = 4
 # Beyond this a swing's word on the axis is none: a narrow fan may lean any way about the whisker.
 _MOST_AXIS_SIGMA_DEG = 3.0
@@ -71,13 +71,14 @@ _NO_LINES = BaseLines(np.zeros(0), *(np.zeros((0, 3)), np.zeros((0, 3, 3))) * 2)
 class Placement:
     """The rig frame against the board's word of it: step (6,) = w rad, v mm, with its covariance (6, 6).
 
-    rise_rad: elevation of the whisker's base above the plane of rotation (None where no swing was seen). notes: what
-    was learnt. alarm: how swing and board disagree, None where they do not.
+    rise_rad: elevation of the whisker's base above the plane of rotation (None where no swing was seen). width_rad: of
+    the widest stroke. notes: what was learnt. alarm: how swing and board disagree, None where they do not.
     """
 
     step: np.ndarray
     covariance: np.ndarray
     rise_rad: float | None = None
+    width_rad: float = 0.0
     notes: tuple[str, ...] = ()
     alarm: str | None = None
 
@@ -122,8 +123,9 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
     step = sum(gain @ one.step for gain, one in zip(gains, each))
     own = sum(g @ (one.covariance - lines.shared_covariance) @ g.T for g, one, lines in zip(gains, each, usable))
     covariance = own + np.mean([lines.shared_covariance for lines in usable], axis=0)
-    made = Placement(step, 0.5 * (covariance + covariance.T), float(np.mean([one.rise_rad for one in each])))
-    return replace(made, notes=(_learnt([lines.width_rad for lines in usable], made),))
+    widths, rise = [lines.width_rad for lines in usable], float(np.mean([one.rise_rad for one in each]))
+    made = Placement(step, 0.5 * (covariance + covariance.T), rise, max(widths))
+    return replace(made, notes=(_learnt(widths, made),))
 
 
 def by_swing(lines: BaseLines) -> Placement:
@@ -135,7 +137,7 @@ def by_swing(lines: BaseLines) -> Placement:
         )
     fitted = least_squares(_residuals, _first(lines), args=(lines,), x_scale="jac", method="lm")
     covariance = _excess(fitted) * _covariance(fitted.jac)[:6, :6] + lines.shared_covariance
-    made = Placement(fitted.x[:6], covariance, float(fitted.x[6]))
+    made = Placement(fitted.x[:6], covariance, float(fitted.x[6]), lines.width_rad)
     return replace(made, notes=(_learnt([lines.width_rad], made),))
 
 
@@ -195,21 +197,24 @@ def combine(board: Placement, swing: Placement) -> Placement:
     apart = swing.step - board.step
     square = float(apart @ np.linalg.solve(both, apart))
     alarm = _alarm(apart, np.sqrt(np.diag(both))) if square > chi2.isf(_FALSE_ALARM, 6) else None
-    made = Placement(step, 0.5 * (covariance + covariance.T), swing.rise_rad, swing.notes, alarm)
+    made = replace(swing, step=step, covariance=0.5 * (covariance + covariance.T), alarm=alarm)
     return replace(made, notes=(*swing.notes, f"With the board: {_spread(made)}."))
 
 
-def swing_alone(swing: Placement, lines: BaseLines) -> Placement:
-    """The swing as the only source, without a board. Raises Refused, saying how wide a stroke would do."""
-    worst = np.sqrt(np.diag(swing.covariance)[3:].max())
-    if worst > _MOST_CENTRE_SIGMA_MM:
-        needed = np.degrees(lines.width_rad) * worst / _MOST_CENTRE_SIGMA_MM
-        raise Refused(
-            f"without T_rig_board the free stroke alone places the rig, and one of {np.degrees(lines.width_rad):.1f} "
-            f"degrees fixes the centre of rotation to {worst:.2f} mm; {_MOST_CENTRE_SIGMA_MM} mm is needed: record a "
-            f"free stroke of about {needed:.0f} degrees, or the board on the rig"
-        )
-    return swing
+def check_swing_suffices(made: Placement) -> None:
+    """Refuses a placement that rests on the swing alone where that does not fix the centre along the whisker, which is
+    what distances count from; says how wide a stroke would do. Raises Refused."""
+    along = float(np.sqrt(made.covariance[3, 3]))
+    if along <= _MOST_ALONG_SIGMA_MM:
+        return
+    width = np.degrees(made.width_rad)
+    # An apex is fixed as the fan is wide, and as the root of its frames, of which a wider one has more. A fifth over.
+    needed = np.ceil(1.2 * width * (along / _MOST_ALONG_SIGMA_MM) ** (2 / 3))
+    raise Refused(
+        f"the free strokes are what places the rig, and {width:.1f} degrees fix the centre of rotation to {along:.2f} "
+        f"mm along the whisker; {_MOST_ALONG_SIGMA_MM} mm is needed: record free strokes of about {needed:.0f} "
+        "degrees, or measure T_rig_board better"
+    )
 
 
 def _alarm(apart: np.ndarray, sigma: np.ndarray) -> str:

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.calibration import SessionCalibration
+from bench.calibration import SessionCalibration, calibrate_session
 from bench.doubts import Doubts
+from bench.errors import BadInput
 from bench.placing import place_rig
 from bench.results import plain
 from bench.session import load_session
@@ -28,14 +29,14 @@ def place(small_copy, monkeypatch):
     """A function (step of the true rig, T_rig_board's sigma in mm) that gives the placed calibration, the doubts and
     the stages at which trials were looked at."""
 
-    def placed(step, sigma_mm=0.0, frames=30):
+    def placed(step, sigma_mm=0.0, frames=30, width_deg=8.0):
         rng, stages, lines = np.random.default_rng(5), [], {}
 
         def see(unit):
             stages.append(unit.stage)
             now = unit.calibration.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
             left = step - np.append(np.zeros(3), CAMERAS["one"].T_camera_rig[:, :3].T @ now)
-            made = some_lines(8.0, left, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
+            made = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
             base = plain(lines.setdefault((unit.stage, unit.trial.name), made))
             return {"whisks": [{"base": base}, {"base": None}, {"status": "no pictures"}]}
 
@@ -77,3 +78,16 @@ def test_a_board_with_a_sigma_gives_way(place):
 def test_strokes_too_short_to_tell_are_no_doubt(place):
     made, doubts, _ = place(OFF, frames=3)
     assert not doubts and "needs 4 frames" in made.notes[-1]
+
+
+def test_a_board_by_ruler_needs_strokes_wide_enough(place):
+    with pytest.raises(BadInput, match=r"trials: the free strokes are what places the rig, and 1\.5 degrees fix"):
+        place(0 * OFF, sigma_mm=2.0, width_deg=1.5)
+
+
+def test_without_a_pose_the_session_is_refused_with_what_would_do(small_copy, tmp_path):
+    file = small_copy / "session.toml"
+    text = "".join(line for line in file.read_text().splitlines(True) if not line.startswith("T_rig_board"))
+    file.write_text(text)
+    with pytest.raises(BadInput, match=r"session\.toml: \[rig\] T_rig_board is missing.*2 mm by ruler will do"):
+        calibrate_session(load_session(small_copy), tmp_path)

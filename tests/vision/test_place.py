@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from vision.errors import Refused
-from vision.place import BaseLines, Placement, by_board, by_swing, check_known_lengths, combine, placed, swing_alone
+from vision.place import (
+    BaseLines,
+    Placement,
+    by_board,
+    by_swing,
+    check_known_lengths,
+    check_swing_suffices,
+    combine,
+    placed,
+)
 from vision.rotation import exp_rotation
 from vision.scene import Camera, Cameras
 
@@ -74,14 +83,15 @@ def test_alarm_names_the_encoder():
     assert abs(found - 0.5) < 0.012
 
 
-def test_without_a_board_a_narrow_swing_is_refused_with_the_width_that_would_do():
-    lines = some_lines(1.5, across_mm=0.01, turn_rad=5e-4)
-    swing = by_swing(lines)
-    needed = 1.5 * np.sqrt(swing.covariance[3, 3]) / 0.05
-    with pytest.raises(Refused, match=f"free stroke of about {needed:.0f} degrees"):
-        swing_alone(swing, lines)
-    wide = some_lines(60.0, across_mm=0.01, turn_rad=5e-4)
-    assert swing_alone(by_swing(wide), wide) is not None
+def test_a_narrow_swing_with_a_board_by_ruler_is_refused_with_the_width_that_would_do():
+    ruler = by_board(np.eye(3, 4), 3.0, 0.05)
+    narrow = combine(ruler, by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4)))
+    with pytest.raises(Refused, match=r"along the whisker; 0\.05 mm is needed") as refusal:
+        check_swing_suffices(narrow)
+    needed = float(re.search(r"free strokes of about (\d+) degrees", str(refusal.value))[1])
+    # A stroke that wide, with frames as close, does.
+    wide = some_lines(needed, across_mm=0.01, turn_rad=5e-4, frames=round(30 * needed / 1.5))
+    check_swing_suffices(combine(ruler, by_swing(wide)))
 
 
 def test_too_few_frames_are_refused():
