@@ -3,6 +3,9 @@
     python tests/ladder/figure_8.py FOLDER [--only one|stick-slip] [--slopes N] [--whisks N] [--seed N] [--workers N]
         [--picture FILE]
 
+The last columns say where the difference (less the kinetic α) comes from: "model", fitted to exact moments, slopes and
+distances; "slope" and "d_x", their nominal values in the place of the true ones; "rest", gauges, touch and noise.
+
 FOLDER keeps sessions and results, and is taken up again where it stopped. Once with one friction coefficient and once
 with a static one a quarter above the kinetic one (stick–slip). Prints a table, with times and sizes; the command's
 own simulate, evaluate and `figures 8` make everything. --slopes and --whisks leave out part of the protocol; --picture
@@ -13,6 +16,7 @@ import argparse
 import sys
 import time
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,28 +28,57 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench import cli
 from bench.rig.protocol import FOLDER as PROTOCOLS
-from bench.runs import pooled
+from bench.runs import pooled, read_run
+from bench.surfaces import Surface
+from estimator.friction import fit_alpha
 
 STATIC_BY_KINETIC = {"one": 1.0, "stick-slip": 1.25}
 WIDTH_PX = 1400
 
 
 @dataclass(frozen=True)
-class Panel:
-    """One panel: the friction angles that were simulated and the one that was fitted, with its sigma, in degrees."""
+class Whisk:
+    """What was felt of a whisk at the pushing angle, what was nominal, and what the truth files say of it."""
 
-    title: str
+    beta_deg: float
+    d_x_mm: float
+    felt_Nmm: np.ndarray
+    true_beta_deg: float
+    true_d_x_mm: float
+    exact_Nmm: np.ndarray
     kinetic_deg: float
     static_deg: float
-    alpha_deg: float
-    sigma_deg: float
-    whisks: int
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel of the figure and its whisks."""
+
+    surface: Surface
+    whisks: tuple[Whisk, ...]
 
     def line(self) -> str:
+        alpha, sigma = np.degrees([self.surface.fit.alpha_rad, self.surface.fit.sigma_rad])
+        kinetic, static = (np.mean([getattr(w, name) for w in self.whisks]) for name in ("kinetic_deg", "static_deg"))
+        by_slope = alpha - self.fitted_deg(beta_deg="true_beta_deg")
+        by_distance = alpha - self.fitted_deg(d_x_mm="true_d_x_mm")
+        by_model = self.fitted_deg("true_beta_deg", "true_d_x_mm", "exact_Nmm") - kinetic
+        shares = (by_model, by_slope, by_distance, alpha - kinetic - by_model - by_slope - by_distance)
         return (
-            f"{self.title:<20}{self.kinetic_deg:8.2f}{self.static_deg:8.2f}{self.alpha_deg:9.2f} ± {self.sigma_deg:.2f}"
-            f"{self.alpha_deg - self.kinetic_deg:+11.2f}{self.whisks:8d}"
+            f"{self.surface.title:<18}{len(self.whisks):5d}{kinetic:8.2f}{static:8.2f}{alpha:8.2f} ± {sigma:.2f}"
+            f"{alpha - kinetic:+8.2f}" + "".join(f"{share:+8.2f}" for share in shares)
         )
+
+    def fitted_deg(self, beta_deg="beta_deg", d_x_mm="d_x_mm", moments="felt_Nmm") -> float:
+        """α that fits with these fields of the whisks."""
+        beta, d_x, m = (np.array([getattr(w, name) for w in self.whisks]) for name in (beta_deg, d_x_mm, moments))
+        theta, C = self.surface.theta_rad, self.surface.C_Nmm2
+        return float(np.degrees(fit_alpha(np.radians(beta), *m.T, d_x, theta, C).alpha_rad))
+
+
+HEAD = f"{'':<18}{'n':>5}{'kinetic':>8}{'static':>8}{'fitted':>15}" + "".join(
+    f"{name:>8}" for name in ("less", "model", "slope", "d_x", "rest")
+)
 
 
 def protocol(static_by_kinetic: float, slopes: int = 16, whisks: int = 10) -> dict:
@@ -79,27 +112,32 @@ def _require(code: int) -> None:
 
 
 def panels(folder: Path) -> list[Panel]:
-    """What the fits of an evaluated session return, a panel each."""
-    return [
-        Panel(
-            surface.title,
-            *_angles_deg(folder / "session" / "trials", surface.name, surface.speed_deg_s),
-            *np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad]),
-            len(surface.felt),
+    """An evaluated session's panels, each with its whisks."""
+    found: dict[tuple, list[Whisk]] = {}
+    for result in read_run(folder / "out"):
+        trial = result["trial"]
+        if trial["purpose"] == "measure":
+            whisks = found.setdefault((trial["surface"], trial["speed_deg_s"]), [])
+            whisks += _whisks(result, folder / "session" / "trials" / trial["name"])
+    return [Panel(s, tuple(found[s.name, s.speed_deg_s])) for s in pooled([folder / "out"])]
+
+
+def _whisks(result: dict, folder: Path) -> Iterator[Whisk]:
+    """The whisks of a trial beside its truth files."""
+    truth = {k: np.atleast_1d(v) for k, v in tomllib.loads((folder / "truth.toml").read_text(encoding="utf-8")).items()}
+    track = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
+    felt, trial = result["felt"]["whisks"], result["trial"]
+    for k, (whisk, frames) in enumerate(zip(felt, np.split(track, len(felt)))):
+        theta_deg = frames["motor_deg"] - truth["touch_deg"][k]
+        yield Whisk(
+            trial["beta_nominal_deg"],
+            trial["d_x_nominal_mm"],
+            np.array([whisk["m_y_Nmm"], whisk["m_z_Nmm"]]),
+            truth["beta_deg"][k],
+            truth["d_x_mm"][k],
+            np.array([np.interp(result["theta_deg"], theta_deg, frames[m]) for m in ("m_y_Nmm", "m_z_Nmm")]),
+            *np.degrees(np.arctan([truth["mu_kinetic"][k], truth["mu_static"][k]])),
         )
-        for surface in pooled([folder / "out"])
-    ]
-
-
-def _angles_deg(trials: Path, surface: str, speed_deg_s: float) -> np.ndarray:
-    """Friction angles, kinetic and static, of the whisks as they were simulated: mean over their truth files."""
-    coefficients = []
-    for trial in sorted(trials.iterdir()):
-        stated = tomllib.loads((trial / "trial.toml").read_text(encoding="utf-8"))
-        truth = tomllib.loads((trial / "truth.toml").read_text(encoding="utf-8"))
-        if (stated["purpose"], stated["surface"], stated["speed_deg_s"]) == ("measure", surface, speed_deg_s):
-            coefficients.append(np.array([truth["mu_kinetic"], truth["mu_static"]]).reshape(2, -1))
-    return np.degrees(np.arctan(np.concatenate(coefficients, axis=1))).mean(axis=1)
 
 
 def main() -> None:
@@ -117,8 +155,7 @@ def main() -> None:
         tables, folder = protocol(STATIC_BY_KINETIC[name], options.slopes, options.whisks), options.folder / name
         took = record(folder, tables, options.seed, options.workers)
         lines += ["", f"{name}: simulate {took[0]:.0f} s, evaluate {took[1]:.0f} s, {took[2]:.0f} MB"]
-        lines += [f"{'':<20}{'kinetic':>8}{'static':>8}{'fitted α':>16}{'less kin.':>11}{'whisks':>8}"]
-        lines += [panel.line() for panel in panels(folder)]
+        lines += [HEAD, *(panel.line() for panel in panels(folder))]
     print("\n".join(lines))
     if options.picture:
         _require(cli.main(["figures", "8", str(folder / "out"), "--out", str(folder / "figures")]))
