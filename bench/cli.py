@@ -256,7 +256,7 @@ def _figure_8(options: argparse.Namespace) -> int:
 
 
 def _error_map(options: argparse.Namespace) -> int:
-    from bench.map_figures import write_map
+    from bench.model_error_maps import write_map
 
     for path in write_map(options.name, options.out, workers=options.workers, progress=sys.stderr.isatty()):
         print(path)

@@ -24,9 +24,7 @@ _FRICTION, _FRICTION_SIGMA = 0.2, 0.4 / np.sqrt(12.0)
 _LEAST_THETA_RAD = np.radians(0.3)
 _NOMINAL_SHARE = 0.01  # a distance set by a ruler
 _NOMINAL_SLOPE_DEG = 5.0
-# Within 1.3° of touch the low-pass, whose cut-off goes with the speed, bends the corner of the rise: 0.7 % at 1°,
-# 0.1 % at 1.3°, less beyond.
-_NOMINAL_THETA_RAD = np.radians(np.linspace(1.5, 4.0, 6))
+_NOMINAL_THETA_RAD = np.radians(np.linspace(1.0, 4.0, 6))
 _MOST_HALF_WINDOW_RAD = np.radians(0.5)
 
 

@@ -14,7 +14,7 @@ from bench.atomic import write_whole
 
 _TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
 _NO_RESULTS = (  # they only parse and tell, or gather finished results anew in every run
-    *("cli.py", "environment.py", "theory_figures.py", "error_maps.py", "map_figures.py"),
+    *("cli.py", "environment.py", "theory_figures.py", "model_error.py", "model_error_maps.py"),
     *("runs.py", "summary.py", "score.py"),
     *("alphas.py", "friction_runs.py", "friction_tables.py", "section_vii.py", "explained.py", "friction_map.py"),
     *("gauge_calibration.py", "gauge_certificate.py"),

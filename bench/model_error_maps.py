@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bench.assembly import write_table
 from bench.drawing import publish, style
-from bench.error_maps import Panel, Push, radius_map, tilt_map
+from bench.model_error import Panel, Push, radius_map, tilt_map
 from bench.workers import Workers
 
 COLUMNS = (*(f.name for f in fields(Push)), "error_percent", "predicted_percent")

@@ -5,9 +5,9 @@ import csv
 import numpy as np
 import pytest
 
-from bench import map_figures
-from bench.error_maps import ROD, Push, error_percent, predicted_percent, radius_map, tilt_map
-from bench.map_figures import MAPS, Map, write_map
+from bench import model_error_maps
+from bench.model_error import ROD, Push, error_percent, predicted_percent, radius_map, tilt_map
+from bench.model_error_maps import MAPS, Map, write_map
 from bench.workers import Workers
 
 THIN_MM = 1e-6  # radius of a bar that is nearly a line
@@ -80,7 +80,7 @@ def test_files_hold_the_cells(tmp_path, monkeypatch):
         return tilt_map(pool, beta_deg=np.array([0.0, 40.0]), psi_deg=np.array([-30.0, 30.0]))
 
     monkeypatch.setitem(MAPS, "tilt", Map(small, "few cells"))
-    monkeypatch.setattr(map_figures, "Workers", lambda *_: Workers(0))
+    monkeypatch.setattr(model_error_maps, "Workers", lambda *_: Workers(0))
     paths = write_map("tilt", tmp_path)
     assert [p.name for p in paths] == ["error_by_tilt.png", "error_by_tilt.svg", "error_by_tilt.csv"]
     with paths[2].open(newline="") as file:
