@@ -60,12 +60,13 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: boo
     if signals.kind == "V":
         for where in places:  # elsewhere the motor may rest, and a channel stand still with it
             channels[where] = off_the_rails(channels[where])
-    found = []
+    found, lowpassed = [], {}
     for where, end in zip(places, [*(place.start for place in places[1:]), len(signals.time_s)]):
         time, motor = signals.time_s[where], signals.motor_rad[where]
         cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
-        filtered = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
-        stroke, back = Stroke(time, motor, channels[where], filtered[where]), slice(where.stop, end)
+        if cutoff_Hz not in lowpassed:  # strokes at the stated speed share one
+            lowpassed[cutoff_Hz] = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
+        stroke, back = Stroke(time, motor, channels[where], lowpassed[cutoff_Hz][where]), slice(where.stop, end)
         way_back = signals.time_s[back], signals.motor_rad[back], channels[back]
         found.append(_levelled(stroke, *way_back) if level else stroke)
     return found
