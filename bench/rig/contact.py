@@ -19,11 +19,13 @@ import numpy as np
 from bench.rig.bar import Bar, Touch, cross
 from bench.rig.elastica import Elastica
 from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
+from bench.rig.linear import solved
 from bench.rig.rod import Rod
 
 _PARTS = 0.5 ** np.arange(8)
 _ACROSS = np.array([0.0, 1.0, 0.0])
 _BACKWARDS_MM = -1e-9
+_LAST = 1e-6  # of a Newton step, in parts
 
 
 @dataclass(frozen=True)
@@ -93,9 +95,9 @@ class Contact:
         problem = _Problem(self, _turn(motor_rad), old, law, tip)
         here = problem.at(unknowns, old.angle)
         for _ in range(40):
-            step = np.linalg.solve(here.jacobian, here.residual)
+            step = solved(here.jacobian, here.residual)
             if _settled(step, unknowns):
-                return here.state(motor_rad, unknowns - step, "tip" if tip else law.status)
+                return here.state(motor_rad, unknowns, step, "tip" if tip else law.status)
             unknowns, here = problem.nearer(unknowns, here, step)
         raise ArithmeticError(f"no contact found at motor angle {math.degrees(motor_rad):.4f} deg")
 
@@ -148,14 +150,18 @@ class _Here:
     shear: np.ndarray
     motion: np.ndarray
 
-    def state(self, motor_rad, unknowns, status) -> State:
+    def state(self, motor_rad, unknowns, step, status) -> State:
+        """The solution after Newton's last step: the pose follows to first order, what is left is the step squared."""
+        point, tangent = (v - by @ step[:4] for v, by in ((self.pose.point, self.pose.point_by),
+                                                          (self.pose.tangent, self.pose.tangent_by)))
+        unknowns = unknowns - step
         sliding = len(unknowns) > 4
         heading = float(unknowns[4]) if sliding else math.atan2(self.motion[1], self.motion[0])
         onward = self.motion[0] * math.cos(heading) + self.motion[1] * math.sin(heading)
         if self.press < 0 or (sliding and onward < _BACKWARDS_MM):
             raise ArithmeticError("a contact that pulls, or friction along the motion")
         share = abs(self.shear[0]) / self.press
-        return State(motor_rad, unknowns[:3], float(unknowns[3]), self.pose.point, self.pose.tangent, share, status,
+        return State(motor_rad, unknowns[:3], float(unknowns[3]), point, tangent, share, status,
                      heading, float(self.motion[1]), self.pose.angle)
 
 
@@ -221,7 +227,7 @@ class _Problem:
         for part in _PARTS:
             try:
                 there = self.at(unknowns - part * step, here.pose.angle)
-                left = np.linalg.norm(size * np.linalg.solve(here.jacobian, there.residual))
+                left = np.linalg.norm(size * solved(here.jacobian, there.residual))
             except ArithmeticError:
                 continue
             if left <= (1 - part / 4) * length or part == _PARTS[-1]:
@@ -246,7 +252,8 @@ def _cross_matrix(a):
 
 
 def _settled(step, unknowns):
+    """After one more step, which is taken, the solution is exact to the square of this."""
     force = math.sqrt(unknowns[:3] @ unknowns[:3])
-    if len(step) > 4 and abs(step[4]) > 1e-7:
+    if len(step) > 4 and abs(step[4]) > _LAST:
         return False
-    return np.abs(step[:3]).max() <= 1e-9 * force and abs(step[3]) < 1e-9 * unknowns[3]
+    return np.abs(step[:3]).max() <= _LAST * force and abs(step[3]) < _LAST * unknowns[3]

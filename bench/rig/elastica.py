@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from bench.rig.linear import solved
 from bench.rig.rod import Rod
 
 
@@ -75,7 +76,7 @@ class Elastica:
             cos, sin = np.cos(angle), np.sin(angle)
             load = scale * (force_e_N * cos - force_x_N * sin)
             matrix = np.eye(len(angle)) + twice * (scale * (force_e_N * sin + force_x_N * cos))
-            step = np.linalg.solve(matrix, twice @ load - angle)
+            step = solved(matrix, twice @ load - angle)
             angle = angle + step
             if np.abs(step).max() < 1e-9:  # quadratic: the next step would be below 1e-16
                 return self._bent(angle, matrix, twice, twice_by_arc, scale, (force_x_N, force_e_N), arc_mm)
@@ -97,7 +98,7 @@ class Elastica:
         sources = np.stack([-scale * (twice @ sin), scale * (twice @ cos), 2 / arc_mm * (twice @ load)], -1)
         if twice_by_arc is not None:
             sources[:, 2] += twice_by_arc @ load
-        angle_by = np.linalg.solve(matrix, sources)
+        angle_by = solved(matrix, sources)
         unit_end = np.array([self.nodes.weights @ cos, self.nodes.weights @ sin])
         end_by = arc_mm * np.stack([-(self.nodes.weights * sin) @ angle_by, (self.nodes.weights * cos) @ angle_by])
         end_by[:, 2] += unit_end
