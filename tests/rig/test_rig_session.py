@@ -16,6 +16,7 @@ import pytest
 
 from bench.errors import BadInput
 from bench.rig.protocol import FOLDER, load
+from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from bench.session import load_session
 from bench.signals import forward_strokes, frame_times, read_signals
@@ -431,6 +432,27 @@ def test_friction_holds_slip_and_moment_back_on_both_ways(ways):
     alpha_deg = math.degrees(math.atan(0.18))
     assert phi[half // 2] == pytest.approx(60 - alpha_deg, abs=0.5)
     assert phi[-10] == pytest.approx(60 + alpha_deg, abs=2.0)
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_the_whisker_that_is_painted_touches_where_truth_says(back, tmp_path):
+    """On both ways its centreline runs through the contact point, at frames and between them."""
+    protocol = load(protocol_file(tmp_path, WAYS))
+    recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng(2))
+    whisk, way = recording.whisks[0], recording.whisks[0].way(back)
+    frames = [motor for _, motor, _, b in recording.frames if b == back and way.state_at(motor) is not None]
+    assert len(frames) > 80
+    for motor in frames[::5]:
+        state = way.state_at(motor)
+        assert way.state_between(motor) is state or way.state_between(motor).force_hub_N == pytest.approx(
+            state.force_hub_N, rel=1e-9
+        )
+        (point,) = whisk.centreline_mm(motor, way.state_between(motor), [state.arc_mm])
+        assert point == pytest.approx(state.point_mm, abs=1e-8)
+        between = motor + 1e-4
+        if (aside := way.state_between(between)) is not None:
+            (near,) = whisk.centreline_mm(between, aside, [aside.arc_mm])
+            assert near == pytest.approx(point, abs=0.1)
 
 
 def test_stick_slip_is_a_saw_tooth_in_truth(ways):
