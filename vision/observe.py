@@ -265,7 +265,6 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     if first:
         pieces, light[view.camera.name] = settle(pieces, knots, _SEARCH_PX)
     blur = light[view.camera.name]
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_FIRST if first else _ROUNDS_AGAIN,
-                                  search_px=_SEARCH_PX if first else 0.0)
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_FIRST if first else _ROUNDS_AGAIN)
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))

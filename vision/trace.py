@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import minimize
 
 from vision.fit import Observed
 from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
@@ -92,12 +92,10 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     A rough curve passes for a wider blur, and a blur that is wrong by a sixth moves the whole wire by up to a pixel
     before an even wall, where shading takes up the rest. So the pieces are first brought in line with each other;
     then blur and what all frames share, shift, tilt and bow, are looked for together, with all waves that a narrow
-    highlight has: what they lack
-    passes for blur.
+    highlight has: what they lack passes for blur.
     """
     pieces, _, _ = trace(pieces, find_blur(pieces, WAVES, knots_mm), WAVES, knots_mm, rounds=2)
     prior = wave_prior(pieces, _ALL_WAVES)
-
     lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
 
@@ -120,15 +118,12 @@ def _some(pieces: Pieces, count: int = _ENOUGH_PIECES) -> Pieces:
     return pieces.select(slice(None, None, max(1, round(len(pieces) / count))))
 
 
-def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 5,
-          search_px: float = 0.0) -> tuple[Pieces, Located, float]:
+def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm,
+          rounds: int = 5) -> tuple[Pieces, Located, float]:
     """Shading and positions by turns; the pieces come back where they were found, with what is left to move.
 
-    search_px: where above 0, the common shift of all pieces is first looked for within it.
-    Also the median misfit (chi² per pixel).
+    Also the median misfit (chi² per pixel). The pieces must be near; from a rough curve, see `settle`.
     """
-    if search_px > 0:
-        pieces = _best_common_shift(pieces, blur_px, terms, knots_mm, search_px)
     prior, robust = wave_prior(pieces, terms), None
     for _ in range(rounds):
         shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust, prior)
@@ -143,24 +138,6 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm, rounds: int = 5,
 def _robust(misfit) -> np.ndarray:
     """Weights (s,) that leave out pieces whose misfit is well above the median."""
     return 1.0 / np.maximum(misfit / max(np.median(misfit), 1e-9), 1.0) ** 2
-
-
-def _best_common_shift(pieces: Pieces, blur_px, terms, knots_mm, search_px) -> Pieces:
-    """All pieces moved by the one shift that the shading explains best, to a hundredth of a pixel.
-
-    Where both edges stand before an even background, shading and shift can stand in for each other; so only the
-    shift of the whole wire is looked for before its pieces are.
-    """
-    some = _some(pieces)
-    prior = wave_prior(some, terms)
-
-    def misfit(shift: float) -> float:
-        return fit_shading(some.moved(np.full(len(some), shift)), blur_px, terms, knots_mm, prior=prior)[1]
-
-    shifts = np.arange(-search_px, search_px + 1e-9, 0.25)
-    best = shifts[int(np.argmin([misfit(d) for d in shifts]))]
-    found = minimize_scalar(misfit, bounds=(best - 0.25, best + 0.25), method="bounded", options={"xatol": 0.01})
-    return pieces.moved(np.full(len(pieces), found.x))
 
 
 def to_points(pieces: Pieces, found: Located, misfit: float) -> tuple[LinePoints, np.ndarray]:

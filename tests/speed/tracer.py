@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.vision.test_observe import BAR, WIRE, Recorded
 from vision.line import WAVES, Noise, cut_pieces, read_band
 from vision.observe import observe_trial
-from vision.trace import find_blur, to_points, trace
+from vision.trace import settle, to_points, trace
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES, SHAPE = 13, (480, 640)
@@ -56,8 +56,8 @@ def rough_bands(background, frames, heights, off_px: float):
 def trace_first(scene) -> float:
     """Everything for frames that were never looked at; returns the lens blur found."""
     pieces = cut_pieces(rough_bands(*scene, 1.0), 12, Noise(NOISE**2, 0.0))
-    blur = find_blur(pieces, WAVES, KNOTS)
-    to_points(*trace(pieces, blur, WAVES, KNOTS, search_px=1.5))
+    near, blur = settle(pieces, KNOTS, 1.5)
+    to_points(*trace(near, blur, WAVES, KNOTS))
     return blur
 
 
