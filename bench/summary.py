@@ -51,6 +51,7 @@ def write_summary(
             *_titled("Friction angle α (± one sigma)", [*alpha_lines(friction), *_run_lines(judged, settings)]),
             *_titled("Gauges, N·mm/V (± 95 %)", _gauge_lines(gauges)),
             *_titled("Cameras", cameras),
+            *_titled("Light from one side", _light_lines(results)),
             *_titled("Doubtful", doubtful),
             *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
             *_titled("Taken as exact, for no sigma was given", _exact(session)),
@@ -183,8 +184,16 @@ def _whisk_doubts(results) -> Iterator[str]:
         for answer in felt["estimates"]:
             if answer["status"] and answer["estimator"] not in _UNTOLD:
                 yield f"{name}, {answer['estimator']}: {answer['status']}"
+
+
+def _light_lines(results: Sequence[dict]) -> Iterator[str]:
+    """A line a camera that saw the wire lit from one side: the first trial's, and in how many it was so."""
+    told: dict[str, list[str]] = {}
     for result in results:
-        yield from (f"{result['trial']['name']}: {note}" for note in result["seen"]["notes"])
+        for note in result["seen"]["notes"]:
+            told.setdefault(note.split(" sees ")[0], []).append(f"{result['trial']['name']}: {note}")
+    for notes in told.values():
+        yield notes[0] + (f" (and so in {len(notes) - 1} more trials)" if len(notes) > 1 else "")
 
 
 def _exact(session: Session) -> Iterator[str]:

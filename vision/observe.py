@@ -20,6 +20,7 @@ from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.fit import LAST_SCALE, Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
 from vision.line import WAVES, Noise, measure_noise
+from vision.one_sided import Lit, one_sided_lines, seen_width
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
@@ -82,9 +83,10 @@ def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_
     if len(views) == 1:
         return _nothing(whisks, f"camera {views[0].camera.name} alone does not tell how far away the bar is; two are "
                                 "needed")
+    lights = [{} for _ in whisks]
     rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, axis, time_s, motor_rad,
-                       settings) for number, where in enumerate(whisks)]
-    return TrialTruth(axis.point_mm, axis.direction, np.full((4, 4), np.nan), tuple(rows))
+                       lights[number], settings) for number, where in enumerate(whisks)]
+    return TrialTruth(axis.point_mm, axis.direction, np.full((4, 4), np.nan), tuple(rows), one_sided_lines(lights))
 
 
 def _nothing(whisks, reason: str) -> TrialTruth:
@@ -142,16 +144,16 @@ def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSetting
 
 
 def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis, time_s, motor_rad,
-               settings: VisionSettings) -> WhiskTruth:
+               light: dict[str, Lit], settings: VisionSettings) -> WhiskTruth:
     """Truth of one whisk; its status where there is none."""
     views, left_out = _with_frames(views, indices)
-    cameras = cameras.subset([view.camera.name for view in views])
     seen = [f for f in indices if all(f in view.frames for view in views)]
     if len(seen) < 4 or len(views) < 2:
         return WhiskTruth(number, None, status=f"{len(seen)} frames seen by two cameras or more, 4 are needed")
+    cameras = cameras.subset([view.camera.name for view in views])
     motor = {f: float(motor_rad[f]) for f in seen}
     try:
-        problem, state, covariance = _fit_whisk(views, cameras, rods, axis, motor, settings)
+        problem, state, covariance = _fit_whisk(views, cameras, rods, axis, motor, light, settings)
     except Refused as reason:
         return WhiskTruth(number, None, status=str(reason))
     except np.linalg.LinAlgError:
@@ -176,10 +178,11 @@ def _with_frames(views, indices) -> tuple[list[View], str]:
     return kept, "; ".join(lost)
 
 
-def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], settings: VisionSettings):
+def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], light: dict[str, Lit],
+               settings: VisionSettings):
     """Problem and state after the last round, and the parameters' covariance.
 
-    (None, reason, …) where there is no touch to fit.
+    (None, reason, …) where there is no touch to fit. light: filled with how each camera sees the wire.
     """
     angles = np.array(list(motor.values()))
     rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, _early(motor))
@@ -192,7 +195,6 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         return None, _STARTS_TOUCHING, None
     state = None
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
-    light = {}
     for round_number in range(settings.rounds + 1):
         curves = _curves(state, rods, rest, bend, arcs, angles, motor) if state is None else _fitted(*state, motor)
         axis = axis if state is None else bar_axis(state[0], state[1].vector)
@@ -261,10 +263,9 @@ def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, lig
     if len(pieces) == 0:
         return []
     knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
-    first = view.camera.name not in light
-    if first:
-        pieces, light[view.camera.name] = settle(pieces, knots, _SEARCH_PX)
-    blur = light[view.camera.name]
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_FIRST if first else _ROUNDS_AGAIN)
+    name, known = view.camera.name, light.get(view.camera.name)
+    pieces, blur = (pieces, known.blur_px) if known else settle(pieces, knots, _SEARCH_PX)
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST)
+    light[name] = known or Lit(blur, seen_width(pieces, blur))
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))

@@ -76,6 +76,17 @@ def dark(t, x):
     return 25.0 + 8.0 * t
 
 
+def lamp(elevation_deg: float) -> Callable:
+    """A matt rod under one lamp at right angles to it, this high above the plane across the line of sight."""
+    turn = np.radians(90.0 - elevation_deg)
+    return lambda t, x: 20.0 + 120.0 * np.maximum(0.0, np.cos(np.arcsin(t) + turn))
+
+
+def night(x, y):
+    """As dark as the side of the rod that no lamp reaches."""
+    return 20.0 + 0.0 * x
+
+
 SCENES = {
     "even rod, flat background": Scene(),
     "highlight, flat": Scene(radiance=lit),
@@ -88,6 +99,8 @@ SCENES = {
     "blur 0.6 px, highlight, squares": Scene(radiance=lit, behind=squares, blur=0.6),
     "blur 2 px, highlight, squares": Scene(radiance=lit, behind=squares, blur=2.0),
     "thin: 2 px wide, dark, squares": Scene(radiance=dark, behind=squares, radius=1.0),
+    "one lamp, 45°, on dark": Scene(radiance=lamp(45.0), behind=night),
+    "one lamp, 15°, on dark": Scene(radiance=lamp(15.0), behind=night),
     "crossing a bar, dark": Scene(radiance=lit, behind=squares, bar=(150.0, 0.3, 16.0, 30.0)),
     "crossing a bar, light": Scene(radiance=lit, behind=squares, bar=(150.0, 0.3, 16.0, 150.0)),
 }
@@ -129,7 +142,7 @@ def _beside_bar(scene: Scene, x, y):
     return (x - at - slope * (y - 0.5 * SHAPE[0])) / np.hypot(1.0, slope)
 
 
-COLUMNS = np.linspace(12.0, SHAPE[1] - 12.0, 80)
+COLUMNS, KNOTS = (np.linspace(12.0, SHAPE[1] - 12.0, count) for count in (80, 4))
 
 
 def rough_curve(scene: Scene, frame: int, off_px: float) -> np.ndarray:
@@ -176,33 +189,36 @@ def bounds(scene: Scene, frames, background) -> np.ndarray:
     return NOISE / np.sqrt(np.sum(pieces.grey**2, axis=1))
 
 
-def find(scene: Scene, rng, off_px: float = 0.7) -> Found:
-    """The scene's wire as vision finds it from a rough start: blur, common shift, shading, positions; then again beside
-    a curve through what was found."""
-    background, frames = drawn(scene, None), range(FRAMES)
-    pictures = [drawn(scene, f) + NOISE * rng.standard_normal(SHAPE) for f in frames]
-    noise = Noise(NOISE**2, 0.0)
-    bands = [band(scene, p, background, rough_curve(scene, f, off_px)) for f, p in zip(frames, pictures)]
-    pieces = cut_pieces(bands, PIECE_PX, noise)
-    bound = bounds(scene, frames, background)
+def first_look(scene: Scene, rng, off_px: float = 0.7):
+    """Noisy frames, background, and pieces brought in line from a rough curve, with the lens blur found."""
+    background = drawn(scene, None)
+    pictures = [drawn(scene, f) + NOISE * rng.standard_normal(SHAPE) for f in range(FRAMES)]
+    bands = [band(scene, p, background, rough_curve(scene, f, off_px)) for f, p in enumerate(pictures)]
+    pieces = cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0))
+    if scene.bar is not None:
+        pieces = pieces.select(clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX))
+    near, blur = settle(pieces, KNOTS, 1.5)
+    return pictures, background, trace(near, blur, WAVES, KNOTS), blur
+
+
+def find(scene: Scene, rng) -> Found:
+    """The scene's wire as vision finds it: from a rough start, then again beside a curve through what was found."""
+    pictures, background, seen, blur = first_look(scene, rng)
+    points, source = to_points(*seen)
+    curves = [_through(points.select(source == f)) for f in range(FRAMES)]
+    bands = [band(scene, p, background, c) for c, p in zip(curves, pictures)]
+    pieces, bound = cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0)), bounds(scene, range(FRAMES), background)
     if scene.bar is not None:
         clear = clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX)
         pieces, bound = pieces.select(clear), bound[clear]
-    knots = np.linspace(12.0, SHAPE[1] - 12.0, 4)
-    near, blur = settle(pieces, knots, 1.5)
-    points, source = to_points(*trace(near, blur, WAVES, knots))
-    curves = [_through(points.select(source == f)) for f in frames]
-    pieces = cut_pieces([band(scene, p, background, c) for c, p in zip(curves, pictures)], PIECE_PX, noise)
-    if scene.bar is not None:
-        pieces = pieces.select(clear)
-    settled, found, chi2 = trace(pieces, blur, WAVES, knots)
+    settled, found, chi2 = trace(pieces, blur, WAVES, KNOTS)
     points, source = to_points(settled, found, chi2)
     kept = np.isin(settled.place + 1e4 * settled.source, points.place + 1e4 * source)
-    return Found(_errors(scene, points, source), points.sigma_px, bound[kept], np.round(points.place),
+    return Found(errors(scene, points, source), points.sigma_px, bound[kept], np.round(points.place),
                  _from_bar(scene, points), len(points) / len(pieces))
 
 
-def _errors(scene: Scene, points, source) -> np.ndarray:
+def errors(scene: Scene, points, source) -> np.ndarray:
     height = np.array([axis_height(scene, f, x) for f, x in zip(source, points.px[:, 0])])
     slope = np.array([axis_height(scene, f, 1.0) - axis_height(scene, f, 0.0) for f in source])
     return (points.px[:, 1] - height) / np.hypot(1.0, slope)

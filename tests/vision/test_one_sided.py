@@ -1,0 +1,41 @@
+"""Light from one side: seen by the width against the known diameter, corrected from the lit edge, told in a line."""
+
+import numpy as np
+import pytest
+
+from tests.ladder.lines import SCENES, errors, first_look
+from vision.one_sided import Lit, SeenWidth, one_sided_lines, seen_width
+from vision.trace import to_points
+
+
+def looked_at(name, rng):
+    """Width seen in one of the drawn scenes, and the mean error of the axis found there."""
+    _, _, seen, blur = first_look(SCENES[name], rng, off_px=0.3)
+    points, source = to_points(*seen)
+    return seen_width(seen[0], blur), float(np.mean(errors(SCENES[name], points, source)))
+
+
+@pytest.mark.parametrize("name", ["highlight and step", "highlight over printed squares"])
+def test_a_rod_seen_whole_is_as_wide_as_it_is(rng, name):
+    width, _ = looked_at(name, rng)
+    assert width.seen_px == pytest.approx(5.6, abs=0.4)  # bins of a quarter of a pixel at either edge
+    assert not width.one_sided and width.line("high") == ""
+
+
+@pytest.mark.parametrize("name, off_px", [("one lamp, 45°, on dark", -0.82), ("one lamp, 15°, on dark", -1.04)])
+def test_a_rod_lit_from_one_side_is_seen_narrower_and_its_axis_is_found(rng, name, off_px):
+    """What is lit ends at sin 45° (sin 15°) of the radius beyond the axis, so its middle lies off by (1 - that)/2.
+
+    -0.41 and -1.04 px for a sharp end; brightness fades towards it, so what is plainly seen ends earlier. The axis
+    comes from the lit edge and the diameter, to a fiftieth of that.
+    """
+    width, bias = looked_at(name, rng)
+    assert width.one_sided
+    assert width.off_px < 0.45 * off_px
+    assert abs(bias) < 0.08  # measured: 0.03, of which noise is 0.014
+
+
+def test_the_report_names_camera_and_width_once():
+    narrow, whole = SeenWidth(3.1, 5.6, -1.4), SeenWidth(5.5, 5.6, 0.0)
+    (line,) = one_sided_lines([{"high": Lit(0.9, narrow), "low": Lit(0.9, whole)}, {"high": Lit(0.9, whole)}])
+    assert line.startswith("camera high sees 3.1 of the wire's 5.6 px: light from one side")
