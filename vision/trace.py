@@ -17,7 +17,7 @@ from vision.wire import Curves
 BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
-_FEW_PIECES, _ENOUGH_PIECES = 60, 160
+_FEW_PIECES, _ENOUGH_PIECES = 30, 100
 _STILL_SIGMAS = 0.7  # of a piece's own, below which another round would only trade its shift for shading
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
@@ -104,12 +104,12 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
         return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots_mm, prior=prior)[1]
 
     few, enough = (max(1, round(len(pieces) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
-    starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.3)
-              for blur in BLURS_PX[1:9]]
+    starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
+              for blur in BLURS_PX[1:8]]
     best = min(starts, key=lambda start: misfit(start, few))
     simplex = best + np.concatenate([np.zeros((1, 4)), np.diag([0.15, 0.1, 0.1, 0.08])])
     found = minimize(misfit, best, (enough,), method="Nelder-Mead",
-                     options={"initial_simplex": simplex, "xatol": 0.01, "maxfev": 120})
+                     options={"initial_simplex": simplex, "xatol": 0.01, "maxfev": 70})
     return pieces.moved(bow @ found.x[:3]), float(np.exp(found.x[3]))
 
 

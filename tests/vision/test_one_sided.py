@@ -18,7 +18,8 @@ def looked_at(name, rng):
 @pytest.mark.parametrize("name", ["highlight and step", "highlight over printed squares"])
 def test_a_rod_seen_whole_is_as_wide_as_it_is(rng, name):
     width, _ = looked_at(name, rng)
-    assert width.seen_px == pytest.approx(5.6, abs=0.4)  # bins of a quarter of a pixel at either edge
+    # bins of a quarter of a pixel in all, and 3.3 times the error of the blur, which is some 0.1 px
+    assert width.seen_px == pytest.approx(5.6, abs=0.6)
     assert not width.one_sided and width.line("high") == ""
 
 
