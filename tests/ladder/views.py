@@ -81,11 +81,13 @@ def draw(found: dict[float, Known], path: Path) -> None:
         axes = figure.subplots()
         for name, label, colour in (("d_x_mm", "$d_x$, mm", "#b2182b"), ("slip_mm", "slip, mm", "#2166ac"),
                                     ("beta_deg", "β, degrees", "#1b7837")):
-            axes.plot(list(found), [k.sigma[name] for k in found.values()], color=colour, label=f"{label}: stated")
-            axes.plot(list(found), [k.error[name] for k in found.values()], "o", color=colour, label="error, RMS")
+            axes.plot(list(found), [k.sigma[name] for k in found.values()], color=colour, label=label)
+            axes.plot(list(found), [k.error[name] for k in found.values()], "o", color=colour)
         axes.set(xscale="log", yscale="log", xlabel="angle between the cameras' planes through the bar, degrees",
-                 ylabel="one standard deviation", xticks=list(found), xticklabels=[f"{a:g}" for a in found])
+                 ylabel="stated sigma (line), RMS error (dots)", xticks=list(found),
+                 xticklabels=[f"{a:g}" for a in found])
         axes.minorticks_off()
+        axes.set_ylim(top=3 * axes.get_ylim()[1])
         axes.legend(ncols=3, loc="upper right")
         figure.savefig(path, dpi=130)
 
