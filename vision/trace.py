@@ -46,12 +46,14 @@ class View:
 
 def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:
     """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame."""
-    outlines = {frame: _wire_outline(view, curve, wire) for frame, curve in curves.items()}
-    widest = max(float(np.nanmax(radius)) for _, radius in outlines.values())
-    half = int(np.ceil(widest)) + margin_px  # the same in all frames: pieces are of one size
-    bands = [read_band(view.frames[frame].astype(float), view.background, middle, _arc_mm(wire), radius, half)
-             for frame, (middle, radius) in outlines.items()]
-    return _renumbered(cut_pieces(bands, length_px, view.noise), np.array(list(curves)))
+    outlines = [_outline(view.camera, curve, wire) for curve in curves.values()]
+    # one width for all bands: a wire may pass from one whole pixel of radius to the next within a whisk
+    half = int(np.ceil(max(np.nanmax(radius) for *_, radius in outlines))) + margin_px
+    bands = [read_band(view.frames[frame].astype(float), view.background, middle, arc, radius, half)
+             for frame, (arc, middle, radius) in zip(curves, outlines)]
+    pieces = cut_pieces(bands, length_px, view.noise)
+    frames = np.array(list(curves))
+    return _renumbered(pieces, frames)
 
 
 def _renumbered(pieces: Pieces, names) -> Pieces:
@@ -61,15 +63,12 @@ def _renumbered(pieces: Pieces, names) -> Pieces:
     return Pieces(**values)
 
 
-def _arc_mm(wire: Wire) -> np.ndarray:
-    return np.linspace(2.0, wire.length_mm - 1.0, 200)
-
-
-def _wire_outline(view: View, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray]:
-    """Middle (200, 2) and half-width (200,) of the wire in one picture, in px."""
-    points, tangents = curve.at(_arc_mm(wire))
+def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Arc (n,) in mm, middle (n, 2) and half-width (n,) in px of the wire."""
+    arc = np.linspace(2.0, wire.length_mm - 1.0, 200)
+    points, tangents = curve.at(arc)
     directions = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
-    return outline(view.camera, points, directions, wire.radius_mm(_arc_mm(wire)))
+    return arc, *outline(camera, points, directions, wire.radius_mm(arc))
 
 
 def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.ndarray:
