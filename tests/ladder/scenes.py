@@ -11,6 +11,7 @@ Nothing in here uses the fit's model of whisker or touch. All lengths in mm.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import msgspec
 import numpy as np
@@ -92,11 +93,16 @@ class Scene:
     def motor_rad(self) -> np.ndarray:
         return self.recording.frames.motor_rad
 
+    @cached_property
+    def states(self) -> list:
+        """What the rig's mechanics says of each frame; None before touch."""
+        return [self.recording.whisks[0].forward.state_at(motor) for motor in self.motor_rad]
+
     @property
     def truth(self) -> Truth:
         touch, (whisk, *_) = self.recording.touch, self.recording.whisks
         beta, _ = self.recording.bar.slope(touch.motor_rad)
-        points = [np.full(3, np.nan) if s is None else s.point_mm for s in self.recording.states]
+        points = [np.full(3, np.nan) if s is None else s.point_mm for s in self.states]
         return Truth(touch.motor_rad, touch.d_x_mm, beta, whisk.slip_mm(points))
 
     @property
@@ -253,7 +259,7 @@ def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> l
 def _centreline_mm(scene: Scene, frame: int, arc_mm, more_mm: float) -> np.ndarray:
     """Points (n, 3) of the whisker, pushed a little further where the bar's radius is `more_mm` larger: as a rod that
     is clamped and pushed at its contact, with (3 u² - u³)/2 up to there and straight beyond."""
-    motor, state = scene.motor_rad[frame], scene.recording.states[frame]
+    motor, state = scene.motor_rad[frame], scene.states[frame]
     points = scene.recording.whisks[0].centreline_mm(motor, state, arc_mm)
     if state is None or more_mm == 0.0:
         return points
