@@ -9,6 +9,7 @@ from pathlib import Path
 from bench.atomic import write_whole
 from bench.compare import whisks
 from bench.results import number
+from vision.quantities import CAUSES
 
 # Column and key of the value; in the table each is followed by its sigma.
 _AT_TOUCH = (
@@ -75,10 +76,14 @@ TRACK_COLUMNS = (
 )
 
 
+BUDGET_COLUMNS = ("trial", "whisk", "d_x_sigma_mm", *(f"{cause}_percent" for cause in CAUSES))
+
+
 def write_tables(out: Path, results: Sequence[dict]) -> None:
-    """whisks.csv, estimates.csv, and a track a trial."""
+    """whisks.csv, estimates.csv, budget.csv, and a track a trial."""
     write_table(out / "whisks.csv", WHISK_COLUMNS, whisk_rows(results))
     write_table(out / "estimates.csv", ESTIMATE_COLUMNS, estimate_rows(results))
+    write_table(out / "budget.csv", BUDGET_COLUMNS, budget_rows(results))
     for result in results:
         write_table(out / "track" / f"{result['trial']['name']}.csv", TRACK_COLUMNS, track_rows(result))
 
@@ -93,6 +98,15 @@ def whisk_rows(results: Iterable[dict]) -> Iterator[dict]:
             row |= {column: value for name, key in names for column, value in _with_sigma(name, key, source)}
         row |= _place(seen.get("point_mm"), seen.get("point_sigma_mm"))
         yield row | {"cameras": seen["cameras"], "frames_used": seen["frames_used"], "status": status_of(seen, felt)}
+
+
+def budget_rows(results: Iterable[dict]) -> Iterator[dict]:
+    """A row a whisk with truth: what part of d_x's variance each cause has."""
+    for result, seen, _ in whisks(results):
+        if seen.get("d_x_mm") is not None:
+            shares = {f"{cause}_percent": 100.0 * seen["budget"][cause] for cause in CAUSES}
+            row = {"trial": result["trial"]["name"], "whisk": seen["whisk"], "d_x_sigma_mm": seen["d_x_sigma_mm"]}
+            yield row | shares
 
 
 def status_of(seen: dict, felt: dict) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from bench.board_views import read_board_views
 from bench.calibrate_cameras import calibrate_from, report_lines
 from bench.errors import BadInput
+from bench.footage import frame_count, read_frames
 from bench.results import hash_of, hash_of_code, hash_of_files, read_result, write_result
 from bench.scale import check_scale
 from bench.session import Session
@@ -22,6 +23,7 @@ from vision.scene import Cameras
 from vision.static_board import camera_moved
 
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
+_FEWEST_FOR_MEDIAN, _MOST_FOR_MEDIAN = 5, 9  # trials: in fewer the bar stands before a place too often
 _NO_POSE = (
     "[rig] T_rig_board is missing, so nothing says where whisker and motor are: measure where the board stands (2 mm "
     "by ruler will do, with T_rig_board_sigma_mm = 2 and T_rig_board_sigma_deg = 2: the free strokes then place the "
@@ -90,9 +92,20 @@ def _key(session: Session) -> str:
 
 
 def _backgrounds(session: Session, cameras: Cameras) -> dict[str, np.ndarray | None]:
-    """The rig picture of each camera, in which neither whisker nor bar stands."""
+    """The rig picture of each camera, in which neither whisker nor bar stands; without one, the trials' median."""
     paths = {name: session.rig_pictures.get(name) for name in cameras.names}
-    return {name: None if path is None else read_picture(path) for name, path in paths.items()}
+    return {name: _median(session, name) if path is None else read_picture(path) for name, path in paths.items()}
+
+
+def _median(session: Session, camera: str) -> np.ndarray | None:
+    """Median over trials whose bars stand elsewhere, of a frame early and one late in each; None of too few trials."""
+    sources = [trial.camera_sources[camera] for trial in session.trials if camera in trial.camera_sources]
+    if len(sources) < _FEWEST_FOR_MEDIAN:
+        return None
+    chosen = np.unique(np.linspace(0, len(sources) - 1, _MOST_FOR_MEDIAN).round().astype(int))
+    frames = (read_frames(sources[k], {0, max(0, frame_count(sources[k]) - 1)}) for k in chosen)
+    pictures = [picture for read in frames for picture in read.values() if picture is not None]
+    return np.median(pictures, axis=0).astype(np.float32) if pictures else None
 
 
 def moved_cameras(session: Session, calibration: SessionCalibration, frames) -> dict[str, str]:

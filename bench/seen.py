@@ -1,5 +1,7 @@
 """The seen half of a trial's result: pictures in, truth out, as plain values. No gauge is read here."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from bench.calibration import SessionCalibration, moved_cameras
@@ -17,6 +19,7 @@ from vision.truth import WhiskTruth
 
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12
+_MOST_NAMED = 5  # frames in a line
 _NOT_PLAIN = ("smooth", "frames", "overlay")
 
 
@@ -65,7 +68,7 @@ def _see(
         "bar": {"point_mm": truth.bar_point_mm, "direction": truth.bar_direction},
         "bar_radius_mm": 0.5 * trial.bar_diameter_mm,
         "wire_radius_mm": 0.5 * wire.diameter_mm,
-        "notes": truth.notes,
+        "notes": [*truth.notes, *_lost(frames, times)],
     }
 
 
@@ -82,6 +85,17 @@ def _frames(trial: Trial, times: FrameTimes) -> dict[str, dict[int, np.ndarray]]
         read = read_frames(source, place.values())
         frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
     return frames
+
+
+def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
+    """A line for each camera that has no picture of some frames: dropped by it, or damaged."""
+    for name, pictures in frames.items():
+        dropped = int(np.sum(times.picture[name] < 0))
+        damaged = [str(k) for k in range(len(times)) if times.picture[name][k] >= 0 and k not in pictures]
+        if dropped:
+            yield f"camera {name} dropped {dropped} of {len(times)} frames"
+        if damaged:
+            yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
 
 
 def whisk_record(truth: WhiskTruth, settings: Settings, doubts=()) -> dict:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.assembly import budget_rows
 from bench.atomic import write_whole
 from bench.compare import Judged, judge, whisks
 from bench.drawing import label_of
@@ -16,12 +17,14 @@ from bench.seen import NO_PICTURES
 from bench.session import Session
 from bench.settings import Settings
 from bench.unit import OWN_GAUGES
+from vision.quantities import CAUSES
 
 DONE, DOUBTFUL = 0, 1
 _SILENT = ("", NO_PICTURES, OWN_GAUGES)
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
 _UNTOLD = ("no_slip", "frictionless", *RUNS)
 _U95 = 1.96
+_LEAST_TOLD_PERCENT = 0.5
 
 
 def write_summary(
@@ -43,7 +46,7 @@ def write_summary(
         [
             *_verdict(session, results, judged, settings, doubtful),
             "",
-            *_titled("Truth, from the pictures (± one sigma)", _truth_lines(results)),
+            *_titled("Truth, from the pictures (± one sigma)", [*_truth_lines(results), *_budget_lines(results)]),
             *_titled(
                 f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
                 _error_lines(judged),
@@ -122,6 +125,16 @@ def _truth_lines(results) -> Iterator[str]:
             f"{_pm(s, 'd_x', 3):>14} mm  {_pm(at, 'slip', 3):>14} mm  {_pm(s, 'touch', 3, degrees=True):>16}°  "
             f"{late:>+10.3f}°"
         )
+
+
+def _budget_lines(results) -> Iterator[str]:
+    """Where the variance of d_x comes from, in the mean over the whisks."""
+    rows = list(budget_rows(results))
+    if rows:
+        shares = {cause: np.mean([row[f"{cause}_percent"] for row in rows]) for cause in CAUSES}
+        largest = sorted(shares.items(), key=lambda item: -item[1])
+        parts = (f"{cause} {share:.0f} %" for cause, share in largest if share >= _LEAST_TOLD_PERCENT)
+        yield f"variance of d_x by cause, mean over the whisks: {', '.join(parts)} (docs/truth.md, budget.csv)"
 
 
 def _pm(source: dict, name: str, digits: int, *, degrees: bool = False) -> str:
@@ -216,6 +229,6 @@ def _exact(session: Session) -> Iterator[str]:
 def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    tables = ["whisks.csv", "estimates.csv", "friction.csv", "phases.csv", "surfaces.csv", "explained.csv"]
-    tables.append("error_map.csv")
+    tables = ["whisks.csv", "estimates.csv", "budget.csv", "friction.csv", "phases.csv", "surfaces.csv"]
+    tables += ["explained.csv", "error_map.csv"]
     return [", ".join([*tables, "track/", *single, *(f"{folder}/" for folder in folders)])]

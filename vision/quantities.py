@@ -144,11 +144,16 @@ def calibration_share(problem: Problem, state: State, covariance) -> np.ndarray:
     return answer @ problem.cameras.covariance @ answer.T
 
 
+CAUSES = ("wire", "bar", "touch", "diameters", "light", "beliefs", "cameras")
+
+
 def variance_by_cause(problem: Problem, state: State, covariance, lens, gradient) -> dict[str, float]:
     """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
 
-    covariance, lens (size, size): of the parameters, by the fit and by the cameras. The fit's covariance is the
-    inverse of the sum of all observations' information, so each observation's part is its row's.
+    wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their sigmas; light: lines
+    off as a whole; beliefs: the priors of rest shape and bend; cameras: lenses, poses and rig board. covariance, lens
+    (size, size): of the parameters, by the fit and by the cameras. The fit's covariance is the inverse of the sum of
+    all observations' information, so each observation's part is its row's.
     """
     weighed = weighted_jacobian(problem, state)
     parts = (weighed @ (covariance @ gradient)) ** 2
