@@ -46,11 +46,12 @@ def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
     product of two pictures is the product of the blurred ones, and blur² times that of their slopes, and blur⁴/2
     times that of their curvatures, and so on.
     """
-    z = (offset_px[..., None] + pieces.radius_px[:, None, None] * np.array([1.0, -1.0])) / blur_px
-    bells = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
-    bent = z * bells
-    return (blur_px * pieces.slope * (bells[..., 1] - bells[..., 0])
-            + 0.5 * blur_px**2 * pieces.curvature * (bent[..., 0] - bent[..., 1]))
+    leaked = 0.0
+    for side in (-1.0, 1.0):
+        z = (offset_px - side * pieces.radius_px[:, None]) * (1.0 / blur_px)
+        bell = np.exp(-0.5 * z * z) * (side / np.sqrt(2.0 * np.pi))
+        leaked = leaked + bell * (blur_px * pieces.slope - (0.5 * blur_px**2) * z * pieces.curvature)
+    return leaked
 
 
 def _project_out(columns, *targets):
