@@ -22,6 +22,9 @@ def at_angle(whisk: WhiskTruth, theta_rad: float) -> TruthAtAngle:
     values = {}
     for name, unit in _NAMES.items():
         value, sigma = _combine(smooth, name, weights, slope)
+        if not jumps:
+            sigma = max(sigma, _least_sigma(smooth, name, theta_rad))
+            sigma = float(np.hypot(sigma, _unfitted(smooth, name, theta_rad)))
         values[f"{name}_{unit}"], values[f"{name}_sigma_{unit}"] = value, sigma
     if jumps:
         nearest = float(smooth.theta_rad[int(np.argmax(weights))])
@@ -45,18 +48,45 @@ def _weights(smooth: Smooth, theta_rad: float):
 def _local_fit(theta, at):
     """Weights of a polynomial fit around `at` for its value and its slope there: quadratic where five frames
     are near, else a line, else the nearest frame."""
-    x = theta - at
-    near = np.abs(x) <= _WINDOW_RAD
-    if np.sum(near) < 2:
-        near = np.argsort(np.abs(x))[:2]
-    x_near = x[near]
-    degree = min(2 if len(x_near) >= 5 else 1, len(x_near) - 1)
-    inverse = np.linalg.pinv(np.vander(x_near, degree + 1, increasing=True))
+    near = _near(theta - at)
+    degree = _degree(int(np.sum(near)))
+    inverse = np.linalg.pinv(np.vander((theta - at)[near], degree + 1, increasing=True))
     value, slope = np.zeros(len(theta)), np.zeros(len(theta))
     value[near] = inverse[0]
     if degree >= 1:
         slope[near] = inverse[1]
     return value, slope
+
+
+def _unfitted(smooth: Smooth, name: str, theta_rad: float) -> float:
+    """How far the frames scatter about the local fit: small jumps are in no frame's sigma, but in what lies between."""
+    near = _near(smooth.theta_rad - theta_rad)
+    x, values = smooth.theta_rad[near] - theta_rad, smooth.values[name][near]
+    degree = _degree(len(x))
+    if len(x) <= degree + 1:
+        return 0.0
+    left = values - np.polyval(np.polyfit(x, values, degree), x)
+    return float(np.sqrt(np.sum(left**2) / (len(x) - degree - 1)))
+
+
+def _least_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
+    """Sigma of the surest of the frames nearby: what stands behind the wire errs in all of them alike."""
+    rows = smooth.jacobians[name][_near(smooth.theta_rad - theta_rad)]
+    return float(np.sqrt(np.min(np.einsum("fi,ij,fj->f", rows, smooth.covariance, rows))))
+
+
+def _near(x) -> np.ndarray:
+    """Frames (f,) within the window of the angle, the two nearest where there are fewer."""
+    near = np.abs(x) <= _WINDOW_RAD
+    if np.sum(near) >= 2:
+        return near
+    near = np.zeros(len(x), dtype=bool)
+    near[np.argsort(np.abs(x))[:2]] = True
+    return near
+
+
+def _degree(count: int) -> int:
+    return min(2 if count >= 5 else 1, count - 1)
 
 
 def _combine(smooth: Smooth, name: str, weights, slope_weights):

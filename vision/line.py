@@ -108,13 +108,16 @@ def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarra
 def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
     """`shading_basis` by integration round the rod."""
     ratio = np.max(radius_px, initial=1.0) / blur_px
-    nodes, shares = np.polynomial.legendre.leggauss(int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * ratio), 16, 96)))
+    nodes, shares = _legendre(int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * ratio), 16, 96)))
     t = 0.5 * np.pi * nodes
     radius = radius_px[..., None]
     z = (offset_px[..., None] - radius * np.sin(t)) / blur_px
     share = 0.5 * np.pi * shares * np.cos(t) / (blur_px * np.sqrt(2 * np.pi))
     weight = np.exp(-0.5 * z * z) * (radius * share)
     return weight @ round_the_rod(t, terms)
+
+
+_legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
 @lru_cache(maxsize=64)
