@@ -149,7 +149,9 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
     views, left_out = _with_frames(views, indices)
     seen = [f for f in indices if all(f in view.frames for view in views)]
     if len(seen) < 4 or len(views) < 2:
-        return WhiskTruth(number, None, status=f"{len(seen)} frames seen by two cameras or more, 4 are needed")
+        count = len(seen) if len(views) > 1 else 0
+        few = f"{count} frames seen by two cameras or more, 4 are needed"
+        return WhiskTruth(number, None, status="; ".join(filter(None, [few, left_out])))
     cameras = cameras.subset([view.camera.name for view in views])
     motor = {f: float(motor_rad[f]) for f in seen}
     try:

@@ -67,7 +67,11 @@ def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
     error = (seen.frames.slip_mm - steep.rows["slip_mm"])[touching]
     assert np.sqrt(np.mean(error**2)) < 0.03
     assert np.all(np.abs(error) < 3 * seen.frames.slip_sigma_mm[touching])
+    assert sum(seen.budget.values()) == pytest.approx(1.0)
+    assert all(share >= 0 for share in seen.budget.values())
     at = seen.at(np.radians(3.0))
+    near = touching & (np.abs(seen.frames.theta_rad - np.radians(3.0)) < np.radians(1.6))
+    assert at.slip_sigma_mm >= np.min(seen.frames.slip_sigma_mm[near])  # frames nearby err alike
     assert at.slip_mm == pytest.approx(truth["slip_at_3deg_mm"], abs=3 * at.slip_sigma_mm)
     # friction of the scene: atan(0.185339)
     assert np.degrees(at.alpha_rad) == pytest.approx(10.5, abs=3 * np.degrees(at.alpha_sigma_rad))
@@ -95,3 +99,19 @@ def test_without_a_bar_in_view_the_trial_says_so(steep):
     (whisk,) = observe_trial(frames, steep.rows["time_s"][:4], motor, [slice(0, 4)], steep.cameras, WIRE, BAR,
                              background).whisks
     assert np.isnan(whisk.d_x_mm) and "no bar of diameter 6 mm is seen" in whisk.status
+
+
+def test_one_camera_alone_gives_no_truth(steep):
+    frames = {"high": steep.frames["high"]}
+    motor, time = np.radians(steep.rows["motor_deg"]), steep.rows["time_s"]
+    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], steep.cameras, WIRE, BAR,
+                             steep.background).whisks
+    assert np.isnan(whisk.d_x_mm) and "camera high alone" in whisk.status
+
+
+def test_a_camera_with_gaps_is_left_out_by_name(steep):
+    frames = steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}}
+    motor, time = np.radians(steep.rows["motor_deg"]), steep.rows["time_s"]
+    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], steep.cameras, WIRE, BAR,
+                             steep.background).whisks
+    assert np.isnan(whisk.d_x_mm) and "camera low was left out: 3 frames" in whisk.status

@@ -1,0 +1,40 @@
+"""What the pictures' side of a run says of lost frames, and what it takes for background where no rig picture is."""
+
+import numpy as np
+
+from bench.calibration import _backgrounds
+from bench.frame_times import frame_times
+from bench.seen import _frames, _lost
+from bench.session import load_session
+from vision.pictures import read_picture
+from vision.scene import Camera, Cameras
+
+
+def test_damaged_frames_are_counted_and_named(small_copy):
+    folder = small_copy / "trials" / "b60_4" / "low"
+    third = sorted(folder.iterdir())[2]
+    data = third.read_bytes()
+    third.unlink()  # the copy may share its file with the fixture
+    third.write_bytes(data[: len(data) // 2][:40])
+    trial = next(t for t in load_session(small_copy).trials if t.name == "b60_4")
+    times = frame_times(trial)
+    assert list(_lost(_frames(trial, times), times)) == [f"camera low: 1 of {len(times)} frames damaged (2)"]
+
+
+def test_without_a_rig_picture_the_trials_median_is_the_background(small_session, monkeypatch):
+    """Where neither rod ever stands, the median is the rig picture but for noise and light."""
+    session = load_session(small_session)
+    cameras = Cameras([Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))])
+    monkeypatch.setattr("bench.calibration._FEWEST_FOR_MEDIAN", 3)
+    rig = read_picture(session.rig_pictures["high"]).astype(float)
+    session.rig_pictures.clear()
+    median = _backgrounds(session, cameras)["high"]
+    corner = np.s_[:150, :150]
+    assert abs(np.median(median[corner] - rig[corner])) < 2.0
+
+
+def test_too_few_trials_leave_no_background(small_session):
+    session = load_session(small_session)
+    cameras = Cameras([Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))])
+    session.rig_pictures.clear()
+    assert _backgrounds(session, cameras)["high"] is None
