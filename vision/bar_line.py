@@ -21,6 +21,7 @@ _INNER_SHARE = 0.72
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
 _FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
+_NO_BAR = 3.0  # chi² per pixel: a bar before its background leaves 0.1 to 2
 _KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
 _ROUNDS = 2
@@ -46,7 +47,7 @@ class BarLine:
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                 settings: VisionSettings, *, coarse: bool, blur_px: float | None = None) -> BarLine | None:
-    """The bar's line in the mean picture `grey`; None where too little of it is clear.
+    """The bar's line in the mean picture `grey`; None where too little of it is clear, or what is seen is no bar.
 
     wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be 10 px off, and a line to a
     tenth of a pixel is enough. blur_px: the lens blur where it is roughly known.
@@ -63,6 +64,8 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
         line, blur_px, covariance, misfit = _settle(model, line, blur_px or _best_blur(model, line))
         on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
+    if not coarse and misfit > _NO_BAR:
+        return None
     return BarLine(_two_points(pieces, line, covariance), blur_px, misfit, float(np.sum(np.abs(line))))
 
 

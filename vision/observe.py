@@ -252,8 +252,10 @@ def _trace_all(views, rods: _Rods, axis: BarAxis, curves, light: dict, settings:
         seen += _trace_wire(number, view, rods, axis, curves, light, settings)
         if name in lines:
             seen.append(Observed(-1, number, lines[name].points))
-    if not any(one.frame >= 0 for one in seen):
-        raise Refused("no camera shows the wire clear of the bar")
+    for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
+                       ("bar clear of the wire", any(one.frame < 0 for one in seen))):
+        if not there:
+            raise Refused(f"no camera shows enough of the {rod}")
     return seen
 
 
