@@ -21,6 +21,7 @@ _INNER_SHARE = 0.72
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
 _FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
+_UNTOLD_PX = 0.7  # a sigma that is more: the misfit has no minimum there to speak of
 _NO_BAR = 3.0  # chi² per pixel: a bar before its background leaves 0.1 to 2
 _KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
@@ -64,9 +65,10 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
         line, blur_px, covariance, misfit = _settle(model, line, blur_px or _best_blur(model, line))
         on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
-    if not coarse and misfit > _NO_BAR:
+    points = _two_points(pieces, line, covariance)
+    if not coarse and (misfit > _NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
         return None
-    return BarLine(_two_points(pieces, line, covariance), blur_px, misfit, float(np.sum(np.abs(line))))
+    return BarLine(points, blur_px, misfit, float(np.sum(np.abs(line))))
 
 
 @dataclass(frozen=True)
