@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from vision.bar import changed, find_bar
+from vision.bar import HALF, changed, find_bar
 from vision.contact import BarAxis
 from vision.line import measure_noise
 from vision.scene import Bar, Camera, Cameras, Wire
@@ -46,7 +46,8 @@ def bar_diameter_mm(
 
 
 def _change(pictures: Sequence[np.ndarray], background: np.ndarray) -> np.ndarray:
-    return changed(np.median(pictures, axis=0), np.asarray(background, dtype=float), measure_noise(*pictures[:2]))
+    median = np.median([picture[::HALF, ::HALF] for picture in pictures], axis=0)
+    return changed(median, np.asarray(background, dtype=float)[::HALF, ::HALF], measure_noise(*pictures[:2]))
 
 
 def _width_mm(change: np.ndarray, camera: Camera, axis: BarAxis, radius_mm: float) -> float:
@@ -55,7 +56,7 @@ def _width_mm(change: np.ndarray, camera: Camera, axis: BarAxis, radius_mm: floa
     across = radius_mm * np.linspace(-_REACH, _REACH, _STEPS)
     along = axis.point_mm + _ALONG_MM[:, None] * axis.direction
     points = along[:, None] + across[:, None] * sideways / np.linalg.norm(sideways)
-    column, row = camera.project(points.reshape(-1, 3)).T
+    column, row = camera.project(points.reshape(-1, 3)).T / HALF
     profiles = map_coordinates(change, [row, column], order=1, cval=np.nan).reshape(len(_ALONG_MM), -1)
     profiles = profiles[np.all(np.isfinite(profiles), axis=1)]
     if len(profiles) < _FEWEST_PLACES:
