@@ -22,7 +22,7 @@ _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to
 _FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
 _UNTOLD_PX = 0.7  # a sigma that is more: the misfit has no minimum there to speak of
-_NO_BAR = 3.0  # chi² per pixel: a bar before its background leaves 0.1 to 2
+_NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
 _KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
 _ROUNDS = 2
@@ -47,11 +47,13 @@ class BarLine:
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                settings: VisionSettings, *, coarse: bool, blur_px: float | None = None) -> BarLine | None:
+                settings: VisionSettings, *, coarse: bool = False, last: bool = False,
+                blur_px: float | None = None) -> BarLine | None:
     """The bar's line in the mean picture `grey`; None where too little of it is clear, or what is seen is no bar.
 
     wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be 10 px off, and a line to a
-    tenth of a pixel is enough. blur_px: the lens blur where it is roughly known.
+    tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on. blur_px: the
+    lens blur where it is roughly known.
     """
     pieces = _pieces(view, grey, axis, radius_mm, settings)
     pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
@@ -66,7 +68,7 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
         on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
     points = _two_points(pieces, line, covariance)
-    if not coarse and (misfit > _NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
+    if last and (misfit > _NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
         return None
     return BarLine(points, blur_px, misfit, float(np.sum(np.abs(line))))
 

@@ -134,11 +134,12 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
     return axis
 
 
-def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, coarse: bool):
+def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, coarse: bool = False,
+               last: bool = False):
     """The bar's line in each camera that shows enough of it."""
     found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF))),
                                            view.mean, axis, rods.bar.radius_mm,
-                                           wires.get(view.camera.name, []), settings, coarse=coarse)
+                                           wires.get(view.camera.name, []), settings, coarse=coarse, last=last)
              for view in views}
     return {name: line for name, line in found.items() if line is not None}
 
@@ -200,7 +201,8 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
     for round_number in range(settings.rounds + 1):
         curves = _curves(state, rods, rest, bend, arcs, angles, motor) if state is None else _fitted(*state, motor)
         axis = axis if state is None else bar_axis(state[0], state[1].vector)
-        seen = _trace_all(views, rods, axis, curves, light, settings)
+        last = round_number == settings.rounds
+        seen = _trace_all(views, rods, axis, curves, light, settings, last=last)
         problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
         begin = _begin(problem, rest, bend, arcs)
         fitted, _ = solve(problem, begin)
@@ -209,7 +211,7 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         state = (problem, fitted)
         rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
         touch = float(first_touch(problem, fitted.vector).motor_rad)
-        if round_number < settings.rounds:
+        if not last:
             touching, free = frames_by_touch(angles, touch, np.radians(0.02))
             if np.sum(free) < _FEWEST_FREE:
                 return None, _STARTS_TOUCHING, None
@@ -242,10 +244,12 @@ def _begin(problem: Problem, rest, bend, arcs) -> State:
     return State(vector, np.asarray(arcs, dtype=float))
 
 
-def _trace_all(views, rods: _Rods, axis: BarAxis, curves, light: dict, settings: VisionSettings) -> list[Observed]:
-    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time."""
+def _trace_all(views, rods: _Rods, axis: BarAxis, curves, light: dict, settings: VisionSettings, *,
+               last: bool) -> list[Observed]:
+    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. last: see
+    `measure_bar`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in curves.values()] for view in views}
-    lines = _bar_lines(views, axis, rods, wires, settings, coarse=False)
+    lines = _bar_lines(views, axis, rods, wires, settings, last=last)
     seen = []
     for number, view in enumerate(views):
         name = view.camera.name

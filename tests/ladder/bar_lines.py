@@ -84,7 +84,7 @@ def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:
     axis = BarAxis((across_mm + off_mm) * normal, direction)
     noise = NOISE**2 * (1.0 + 1.0 / FRAMES)
     found = measure_bar(View(camera, {}, background, Noise(noise, 0.0)), picture, axis, RADIUS_MM, [], VisionSettings(),
-                        coarse=False)
+                        last=True)
     return (found.points.px - CENTRE) @ normal[:2] - np.mean(edges_px(across_mm)), found.points.sigma_px
 
 
