@@ -535,7 +535,7 @@ def test_size_and_time_are_said_before_and_progress_after(tmp_path, capsys):
     (line,) = said
     assert "4 trials, 6 whisks, 0 pictures" in line and "MB" in line and "minutes" in line
     bar = capsys.readouterr().err
-    assert "parts" in bar and "4/4" in bar
+    assert "parts" in bar and "/4 [" in bar
     size = sum(len(data) for name, data in contents(session).items() if name.endswith("signals.csv")) / 1e6
     assert float(line.split("about ")[1].split(" MB")[0]) == pytest.approx(size, abs=0.6)
 
