@@ -41,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _interrupt(*_) -> None:
-    """A polite kill (SIGTERM) ends a run as Ctrl-C does."""
+    """A polite kill (SIGTERM) ends a run as Ctrl-C does; a second one finds it ending."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise KeyboardInterrupt
 
 
