@@ -16,6 +16,10 @@ HALF = 2  # a coarse look needs no more
 _ALONG_MM = np.arange(-24.0, 24.1, 6.0)
 _INSIDE = np.array([-0.75, 0.0, 0.75])
 _OUTSIDE = np.array([-1.5, 1.5])
+_STARTS, _LEAST_SCORE = 6, 0.25
+_FIRST_STEP, _SHRINKS = np.array([1.0, 0.02, 0.05, 0.07]), 5  # half a step of the grid: mm, rad, rad, rad
+_AROUND = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
+_MOST_CLIMBS = 20
 
 
 def changed(grey, background, noise: Noise) -> np.ndarray:
@@ -64,12 +68,6 @@ def find_bar(changes: Mapping[str, np.ndarray], cameras: Cameras, radius_mm: flo
         raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
                       f"{score:.2f}, needed {_LEAST_SCORE:g}); record with the bar in view of every camera")
     return axis_from_angles(*found, reach_mm)
-
-
-_STARTS, _LEAST_SCORE = 6, 0.25
-_FIRST_STEP, _SHRINKS = np.array([1.0, 0.02, 0.05, 0.07]), 5  # half a step of the grid: mm, rad, rad, rad
-_AROUND = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
-_MOST_CLIMBS = 20
 
 
 def _climb(starts, changes, cameras, radius_mm: float, reach_mm: float) -> tuple[np.ndarray, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.line import RIMS, WAVES, LinePoints, Pieces, cut_pieces, read_band
-from vision.shading import fit_shading, locate, piece_misfit, wave_prior
+from vision.shading import fit_shading, locate, wave_prior
 from vision.silhouette import outline
 from vision.trace import View
 
@@ -35,32 +35,26 @@ _FORMAL_TO_TRUE = 2.0
 
 @dataclass(frozen=True)
 class BarLine:
-    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; lens blur in px.
-
-    moved_px: how far they lie from there.
-    """
+    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; how far from there."""
 
     points: LinePoints
-    blur_px: float
-    misfit: float
     moved_px: float
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                settings: VisionSettings, *, coarse: bool = False, last: bool = False,
-                blur_px: float | None = None) -> BarLine | None:
+                settings: VisionSettings, *, coarse: bool = False,
+                last: bool = False) -> BarLine | None:
     """The bar's line in the mean picture `grey`; None where too little of it is clear, or what is seen is no bar.
 
     wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be 10 px off, and a line to a
-    tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on. blur_px: the
-    lens blur where it is roughly known.
+    tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on.
     """
     pieces = _pieces(view, grey, axis, radius_mm, settings)
     pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
     if len(pieces) < _FEWEST_PIECES:
         return None
     knots = np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM)
-    line = _sweep(pieces, knots) if coarse else np.zeros(2)
+    line, blur_px = _sweep(pieces, knots) if coarse else np.zeros(2), None
     pieces = _of_bar_alone(pieces, line, knots)
     for _ in range(1 if coarse else _ROUNDS):  # line, blur, and what counts as a rim depend on each other
         model = _model(pieces, line, knots)
@@ -70,7 +64,7 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
     points = _two_points(pieces, line, covariance)
     if last and (misfit > _NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
         return None
-    return BarLine(points, blur_px, misfit, float(np.sum(np.abs(line))))
+    return BarLine(points, float(np.sum(np.abs(line))))
 
 
 @dataclass(frozen=True)
@@ -139,7 +133,7 @@ def _of_bar_alone(pieces: Pieces, line, knots) -> Pieces:
     """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border."""
     for _ in range(3):
         moved = _moved(pieces, line)
-        misfit = piece_misfit(moved, fit_shading(moved, 1.0, WAVES, knots)[0])
+        misfit = locate(moved, fit_shading(moved, 1.0, WAVES, knots)[0], rounds=1).chi2
         good = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
         if np.all(good) or np.sum(good) < _FEWEST_PIECES:
             break

@@ -18,7 +18,7 @@ from skimage.graph import route_through_array
 
 from vision.errors import Refused
 from vision.line import LinePoints, Noise, Pieces, cut_pieces, noise_by_level, read_band
-from vision.shading import fit_shading, piece_misfit, wave_prior
+from vision.shading import fit_shading, locate, wave_prior
 from vision.trace import to_points, trace
 
 _AROUND_PX = 25  # a line bends no farther than this out of the rectangle of its ends
@@ -231,12 +231,11 @@ def _best_width(pieces: Pieces, begin: _Width) -> _Width:
     share = (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9)
     knots = _knots(pieces)
 
-
     def misfit(logs) -> float:
         start, end, blur = np.exp(logs)
         wide = replace(pieces, radius_px=start + (end - start) * share)
         shading, _ = fit_shading(wide, blur, _EVEN, knots, prior=wave_prior(wide, _EVEN))
-        return float(np.mean(np.log(piece_misfit(wide, shading))))  # what crosses a few pieces counts little
+        return float(np.mean(np.log(locate(wide, shading, rounds=1).chi2)))  # what crosses a few pieces counts little
 
     starts = [(begin.start_px, begin.end_px, begin.blur_px), *((radius, radius, 1.0) for radius in _FIRST_RADII_PX)]
     middle = min((np.log(start) for start in starts), key=misfit)  # a thick line and a blurred one are two minima

@@ -196,27 +196,25 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         return None, None, None
     if np.sum(~touching) < _FEWEST_FREE:
         return None, _STARTS_TOUCHING, None
-    state = None
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
+    curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
     for round_number in range(settings.rounds + 1):
-        curves = _curves(state, rods, rest, bend, arcs, angles, motor) if state is None else _fitted(*state, motor)
-        axis = axis if state is None else bar_axis(state[0], state[1].vector)
         last = round_number == settings.rounds
         seen = _trace_all(views, rods, axis, curves, light, settings, last=last)
         problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
-        begin = _begin(problem, rest, bend, arcs)
-        fitted, _ = solve(problem, begin)
+        fitted, _ = solve(problem, _begin(problem, rest, bend, arcs))
         problem = honest(problem, fitted)
         fitted, covariance = solve(problem, fitted, scales=[LAST_SCALE] * 3)
-        state = (problem, fitted)
+        if last:
+            break
         rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
+        axis, curves = bar_axis(problem, fitted.vector), _fitted(problem, fitted, motor)
         touch = float(first_touch(problem, fitted.vector).motor_rad)
-        if not last:
-            touching, free = frames_by_touch(angles, touch, np.radians(0.02))
-            if np.sum(free) < _FEWEST_FREE:
-                return None, _STARTS_TOUCHING, None
-            if not np.any(touching):
-                return None, None, None
+        touching, free = frames_by_touch(angles, touch, np.radians(0.02))
+        if np.sum(free) < _FEWEST_FREE:
+            return None, _STARTS_TOUCHING, None
+        if not np.any(touching):
+            return None, None, None
     return problem, fitted, covariance
 
 
@@ -226,10 +224,6 @@ def _early(motor: Mapping[int, float]) -> dict[int, float]:
     limit = angles[0] + (angles[-1] - angles[0]) / 7.0
     count = max(2, sum(1 for angle in angles if angle <= limit))
     return dict(list(motor.items())[:count])
-
-
-def _curves(_, rods: _Rods, rest, bend, arcs, angles, motor) -> dict[int, Curves]:
-    return {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
 
 
 def _fitted(problem: Problem, state: State, motor) -> dict[int, Curves]:

@@ -122,13 +122,6 @@ def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
     return max(float(contrast), 1.0) * _WAVE_SHARE[:terms]
 
 
-def piece_misfit(pieces: Pieces, shading: Shading) -> np.ndarray:
-    """Chi² per pixel (s,) of each piece under a shading, its background's gain and offset free."""
-    waves = shading.at(pieces.place)
-    residual, _, _ = _linearise(pieces, shading, waves, np.zeros(len(pieces)))
-    return np.sum(residual**2, axis=1) / np.maximum((pieces.weight > 0).sum(axis=1) - 3, 1)
-
-
 @dataclass(frozen=True)
 class Located:
     """Where each piece lies: shift_px, sigma_px (s,) along the normal; chi2 (s,) per pixel; contrast (s,).

@@ -1,7 +1,7 @@
 """Line points of the wire in every frame, read in narrow bands beside where it is expected."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ from vision.shading import Located, fit_shading, line_points, locate, wave_prior
 from vision.silhouette import outline
 from vision.wire import Curves
 
-BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
+_BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
 _FEW_PIECES, _ENOUGH_PIECES = 30, 100
@@ -52,15 +52,7 @@ def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px:
     bands = [read_band(view.frames[frame].astype(float), view.background, middle, arc, radius, half)
              for frame, (arc, middle, radius) in zip(curves, outlines)]
     pieces = cut_pieces(bands, length_px, view.noise)
-    frames = np.array(list(curves))
-    return _renumbered(pieces, frames)
-
-
-def _renumbered(pieces: Pieces, names) -> Pieces:
-    """Pieces whose source is the frame's index, not the band's number."""
-    values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__}
-    values["source"] = names[pieces.source]
-    return Pieces(**values)
+    return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
 
 
 def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -77,12 +69,11 @@ def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.n
     return np.min(away - radius_px[None], axis=1) > margin_px
 
 
-def find_blur(pieces: Pieces, terms: int, knots_mm) -> float:
+def _best_blur(pieces: Pieces, knots_mm) -> float:
     """The lens blur, px: the one under which the shading explains the pieces best."""
     pieces = _some(pieces)
-    prior = wave_prior(pieces, terms)
-    misfit = [fit_shading(pieces, blur, terms, knots_mm, prior=prior)[1] for blur in BLURS_PX]
-    return BLURS_PX[int(np.argmin(misfit))]
+    prior = wave_prior(pieces, WAVES)
+    return min(_BLURS_PX, key=lambda blur: fit_shading(pieces, blur, WAVES, knots_mm, prior=prior)[1])
 
 
 def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
@@ -93,7 +84,7 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     then blur and what all frames share, shift, tilt and bow, are looked for together, with all waves that a narrow
     highlight has: what they lack passes for blur.
     """
-    pieces, _, _ = trace(pieces, find_blur(pieces, WAVES, knots_mm), WAVES, knots_mm, rounds=2)
+    pieces, _, _ = trace(pieces, _best_blur(pieces, knots_mm), WAVES, knots_mm, rounds=2)
     prior = wave_prior(pieces, _ALL_WAVES)
     lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
@@ -104,7 +95,7 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
 
     few, enough = (max(1, round(len(pieces) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
     starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
-              for blur in BLURS_PX[1:8]]
+              for blur in _BLURS_PX[1:8]]
     best = min(starts, key=lambda start: misfit(start, few))
     simplex = best + np.concatenate([np.zeros((1, 4)), np.diag([0.15, 0.1, 0.1, 0.08])])
     found = minimize(misfit, best, (enough,), method="Nelder-Mead",
