@@ -14,7 +14,7 @@ from vision.bar_width import SIGMA_SHARE, bar_diameter_mm
 from vision.errors import Refused
 from vision.pictures import read_picture
 from vision.place import check_known_lengths
-from vision.scene import Bar, Cameras, Wire
+from vision.scene import Bar, Cameras
 
 _MOST_TRIALS, _MOST_PICTURES = 3, 11
 
@@ -39,18 +39,16 @@ def check_scale(session: Session, cameras: Cameras) -> str | None:
 
 
 def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:
-    w = session.whisker
-    wire = Wire(w.shape, w.length_mm, w.diameter_mm)
     background = {n: read_picture(p) for n, p in session.rig_pictures.items() if n in cameras}
     for trial in trials:
         try:
             pictures = {n: _spread(trial, n) for n in trial.camera_sources if n in cameras}
             bar = Bar(trial.bar_diameter_mm)
-            share = bar_diameter_mm(pictures, background, _motor_span(trial), cameras, wire, bar) / bar.diameter_mm
+            seen_mm = bar_diameter_mm(pictures, background, _motor_span(trial), cameras, session.whisker.wire, bar)
         except Refused:
             continue
-        if np.isfinite(share):
-            yield share
+        if np.isfinite(seen_mm):
+            yield seen_mm / bar.diameter_mm
 
 
 def _spread(trial: Trial, camera: str) -> list[np.ndarray]:

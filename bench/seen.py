@@ -14,7 +14,7 @@ from bench.trial import Trial
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.observe import observe_trial
-from vision.scene import Bar, Wire
+from vision.scene import Bar
 from vision.truth import WhiskTruth
 
 NO_PICTURES = "no pictures"
@@ -50,7 +50,7 @@ def _see(
     times = frame_times(trial)
     frames = _frames(trial, times)
     moved = moved_cameras(session, calibration, frames)
-    wire = _wire(session)
+    wire = session.whisker.wire
     truth = observe_trial(
         {name: pictures for name, pictures in frames.items() if name not in moved},
         times.time_s,
@@ -70,11 +70,6 @@ def _see(
         "wire_radius_mm": 0.5 * wire.diameter_mm,
         "notes": [*truth.notes, *_lost(frames, times)],
     }
-
-
-def _wire(session: Session) -> Wire:
-    w = session.whisker
-    return Wire(w.shape, w.length_mm, w.diameter_mm, w.length_sigma_mm, w.diameter_sigma_mm)
 
 
 def _frames(trial: Trial, times: FrameTimes) -> dict[str, dict[int, np.ndarray]]:

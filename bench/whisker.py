@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from estimator.beam import flexural_rigidity
+from vision.scene import Wire
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,11 @@ class Whisker:
     def __post_init__(self):
         if (self.youngs_modulus_GPa is None) == (self.flexural_rigidity_Nmm2 is None):
             raise ValueError("give either youngs_modulus_GPa or flexural_rigidity_Nmm2")
+
+    @property
+    def wire(self) -> Wire:
+        """What the cameras look for."""
+        return Wire(self.shape, self.length_mm, self.diameter_mm, self.length_sigma_mm, self.diameter_sigma_mm)
 
     @property
     def EI_Nmm2(self) -> float:
