@@ -22,6 +22,7 @@ _STILL_SIGMAS = 0.7  # of a piece's own, below which another round would only tr
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
 _WORST_MISFIT = 6.0
+_PLAIN_MISFIT = 3.0  # the same, for what the light is learnt from
 
 
 @dataclass(frozen=True)
@@ -84,16 +85,18 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     then blur and what all frames share, shift, tilt and bow, are looked for together, with all waves that a narrow
     highlight has: what they lack passes for blur.
     """
-    pieces, _, _ = trace(pieces, _best_blur(pieces, knots_mm), WAVES, knots_mm, rounds=2)
-    prior = wave_prior(pieces, _ALL_WAVES)
+    pieces, found, typical = trace(pieces, _best_blur(pieces, knots_mm), WAVES, knots_mm, rounds=2)
     lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
+    plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
+    looked_at, bow_there = pieces.select(plain), bow[plain]
+    prior = wave_prior(looked_at, _ALL_WAVES)
 
     def misfit(moves_and_blur, every: int) -> float:
-        some = pieces.select(slice(None, None, every)).moved(bow[::every] @ moves_and_blur[:3])
+        some = looked_at.select(slice(None, None, every)).moved(bow_there[::every] @ moves_and_blur[:3])
         return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots_mm, prior=prior)[1]
 
-    few, enough = (max(1, round(len(pieces) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
+    few, enough = (max(1, round(len(looked_at) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
     starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
               for blur in _BLURS_PX[1:8]]
     best = min(starts, key=lambda start: misfit(start, few))
