@@ -50,17 +50,26 @@ def _gap(rest_mm, motor_rad, axis: BarAxis, reach_mm, wire: Wire):
 def frames_that_touch(motor_rad, bend_rad) -> tuple[np.ndarray, np.ndarray]:
     """From coarse bends (f, 2): which frames surely touch, and which surely do not; (f,) bool each.
 
-    The bend grows from nothing at touch. A frame is free while no bend to speak of has been seen, touching from
-    the first of at least two frames in a row that are surely bent; the frame before that is left undecided.
+    The bend is nothing up to touch and then grows with the motor's angle, towards where it ends: the touch that
+    explains all bends best parts the frames. One frame to either side of it is left undecided, but the first two
+    are taken as free: whether they are, the fit will show. None touches where no two frames in a row are surely bent.
     """
-    size = np.linalg.norm(bend_rad, axis=1)
-    sure = size > _SURE_BEND_RAD
-    runs = sure & np.append(sure[1:], sure[-1])
-    if not np.any(runs):
-        return np.zeros(len(size), dtype=bool), np.ones(len(size), dtype=bool)
-    first = int(np.argmax(runs))
-    index = np.arange(len(size))
-    return (index >= first) & sure, index < max(first - 1, 1)
+    sure = np.linalg.norm(bend_rad, axis=1) > _SURE_BEND_RAD
+    if not np.any(sure & np.append(sure[1:], sure[-1])):
+        return np.zeros(len(sure), dtype=bool), np.ones(len(sure), dtype=bool)
+    touch, step = _hinge(motor_rad, bend_rad), np.median(np.abs(np.diff(motor_rad)))
+    first = np.arange(len(sure)) < 2
+    return (motor_rad > touch + step) & sure & ~first, (motor_rad < touch - step) | first
+
+
+def _hinge(motor_rad, bend_rad) -> float:
+    """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
+    towards = np.median(bend_rad[-max(2, len(bend_rad) // 3):], axis=0)
+    bend = bend_rad @ (towards / max(np.linalg.norm(towards), 1e-12))
+    starts = np.linspace(motor_rad[0], motor_rad[-2], 10 * len(motor_rad))
+    rises = np.maximum(motor_rad - starts[:, None], 0.0)
+    slopes = np.sum(rises * bend, axis=1) / np.sum(rises**2, axis=1)
+    return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
 
 
 def frames_by_touch(motor_rad, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
