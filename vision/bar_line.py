@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.binned import binned, without
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.line import RIMS, WAVES, LinePoints, Pieces, cut_pieces, read_band
@@ -28,6 +29,8 @@ _LEAST_OFF_PX = 0.15
 _ROUNDS = 2
 _MOST_STEPS, _SETTLED_PX = 6, 0.01
 _STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
+FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
+_BIN_PX, _COARSE_BIN_PX = 0.25, 0.75
 _BLURS_PX = (0.5, 0.6, 0.7, 0.8, 0.9, 1.05, 1.25, 1.5, 1.9, 2.5)
 # Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/truth.md).
 _FORMAL_TO_TRUE = 2.0
@@ -42,21 +45,21 @@ class BarLine:
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                settings: VisionSettings, *, coarse: bool = False,
+                settings: VisionSettings, *, off_px: float = 0.0,
                 last: bool = False) -> BarLine | None:
     """The bar's line in the mean picture `grey`; None where too little of it is clear, or what is seen is no bar.
 
-    wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be 10 px off, and a line to a
-    tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on.
+    wires_px: lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be; where it may be, a
+    line to a tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on.
     """
     pieces = _pieces(view, grey, axis, radius_mm, settings)
     pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
     if len(pieces) < _FEWEST_PIECES:
         return None
     knots = np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM)
-    line, blur_px = _sweep(pieces, knots) if coarse else np.zeros(2), None
+    line, blur_px = _sweep(pieces, knots, off_px), None
     pieces = _of_bar_alone(pieces, line, knots)
-    for _ in range(1 if coarse else _ROUNDS):  # line, blur, and what counts as a rim depend on each other
+    for _ in range(1 if off_px else _ROUNDS):  # line, blur, and what counts as a rim depend on each other
         model = _model(pieces, line, knots)
         line, blur_px, covariance, misfit = _settle(model, line, blur_px or _best_blur(model, line))
         on_line = _on_line(replace(model, blur_px=blur_px), line)
@@ -98,7 +101,9 @@ def _model(pieces: Pieces, line, knots) -> _Model:
 
 
 def _best_blur(model: _Model, line) -> float:
-    return min(_BLURS_PX, key=lambda blur: replace(model, blur_px=blur).misfit(line))
+    pieces, blurred = binned(model.pieces, _BIN_PX)
+    model = replace(model, pieces=pieces)
+    return without(min(_BLURS_PX, key=lambda blur: replace(model, blur_px=blur).misfit(line)), blurred)
 
 
 def _rims(pieces: Pieces, line) -> Pieces:
@@ -148,10 +153,13 @@ def _on_line(model: _Model, line) -> np.ndarray:
     return off < max(4.0 * 1.48 * np.median(off), _LEAST_OFF_PX)
 
 
-def _sweep(pieces: Pieces, knots) -> np.ndarray:
-    """Coordinate descent over ± 9 px of shift and tilt with a coarse, blurred model and every other piece."""
-    line, model = np.zeros(2), _Model(pieces.select(slice(None, None, 2)), WAVES, knots, 1.5, None)
-    for reach, step in ((9.0, 1.5), (3.0, 0.75)):
+def _sweep(pieces: Pieces, knots, off_px: float) -> np.ndarray:
+    """Coordinate descent over ± off_px of shift and tilt with a coarse, blurred model and every other piece."""
+    few, _ = binned(pieces.select(slice(None, None, 2)), _COARSE_BIN_PX)
+    line, model = np.zeros(2), _Model(few, WAVES, knots, 1.5, None)
+    for reach, step in ((FAR_PX, 1.5), (NEAR_PX, 0.75)):
+        if reach > off_px:
+            continue
         grid = np.arange(-reach, reach + 1e-9, step)
         for _ in range(2):
             for k in range(2):

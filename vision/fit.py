@@ -8,6 +8,7 @@ tilt per camera with a prior, and so ends up in the stated uncertainty.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from vision.bar import axis_frame, shifted_axis
 from vision.contact import BarAxis, clearance, closest_arc
 from vision.line import LinePoints
 from vision.scene import Cameras, Wire
-from vision.silhouette import outline
+from vision.silhouette import edges
 from vision.wire import REST_POWERS, Curves, centrelines
 
 BAR, REST = 4, 2 * REST_POWERS
@@ -134,8 +135,9 @@ def linearise(problem: Problem, state: State) -> tuple[Linear, State]:
     """Residuals and Jacobian at a state; the state comes back with its contact arcs brought up to date."""
     moved, columns = _perturbed(problem, state.vector)
     curves, arcs = curves_of(problem, moved, state.arcs_mm)
-    blocks = [_wire_block(problem, seen, curves, columns, state.vector) if seen.frame >= 0
-              else _bar_block(problem, seen, state.vector) for seen in problem.seen]
+    alike = groupby(problem.seen, key=lambda seen: (seen.camera, seen.frame >= 0))
+    blocks = [_wire_block(problem, camera, list(group), curves, columns, state.vector) if on_wire
+              else _bar_block(problem, camera, list(group), state.vector) for (camera, on_wire), group in alike]
     count = sum(len(block[0]) for block in blocks)
     blocks += [_contact_block(problem, moved, curves, columns, state.vector), _prior_block(problem, state.vector)]
     residual = np.concatenate([block[0] for block in blocks])
@@ -163,47 +165,52 @@ def _perturbed(problem: Problem, vector):
     return np.stack(rows), columns
 
 
-def _wire_block(problem: Problem, seen: Observed, curves: Curves, columns, vector):
-    f, points = seen.frame, seen.points
-    one = Curves(curves.arc_mm, curves.points_mm[:, f], curves.tangents[:, f])
-    positions, _ = one.at(points.place)
-    camera = problem.cameras.cameras[seen.camera]
-    px, by_point, _ = camera.project_with_jacobians(positions[0])
+def _together(group: Sequence[Observed]) -> LinePoints:
+    """The line points of all of them."""
+    return LinePoints(*(np.concatenate([getattr(seen.points, name) for seen in group])
+                        for name in LinePoints.__dataclass_fields__))
+
+
+def _wire_block(problem: Problem, number: int, group: Sequence[Observed], curves: Curves, columns, vector):
+    """Residuals and Jacobian rows of one camera's points of the wire, all frames."""
+    frame, points = np.repeat([s.frame for s in group], [len(s.points) for s in group]), _together(group)
+    positions = curves.at_one_each(frame, points.place)
+    px, by_point, _ = problem.cameras.cameras[number].project_with_jacobians(positions[0])
     along_normal = np.einsum("ni,nij->nj", points.normal, by_point)
-    jacobian = np.zeros((len(points), problem.size))
-    for (step, names), position in zip(columns, positions[1:]):
-        if names[f] >= 0:
-            jacobian[:, names[f]] = np.sum(along_normal * (position - positions[0]), axis=1) / step
-    first = BAR + REST + 1 + 4 * seen.camera
+    moved = np.einsum("cnj,nj->cn", positions[1:] - positions[0], along_normal)
+    jacobian, row = np.zeros((len(points), problem.size)), np.arange(len(points))
+    for (step, names), by_step in zip(columns, moved):
+        bent = names[frame] >= 0
+        jacobian[row[bent], names[frame][bent]] = by_step[bent] / step
     lever = points.place / problem.wire.length_mm - 0.5
-    jacobian[:, first], jacobian[:, first + 1] = 1.0, 2.0 * lever
-    residual = np.sum(points.normal * (px - points.px), axis=1)
-    residual = residual + vector[first] + vector[first + 1] * 2.0 * lever
-    return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
+    return _over_sigma(points, px, jacobian, BAR + REST + 1 + 4 * number, 2.0 * lever, vector)
 
 
-def bar_outline(problem: Problem, camera, vector, place_mm) -> np.ndarray:
-    """Middle (n, 2) of the bar's outline at places along its axis, in one camera."""
-    axis = bar_axis(problem, vector)
-    points = axis.point_mm + np.asarray(place_mm)[:, None] * axis.direction
-    directions = np.broadcast_to(axis.direction, points.shape)
-    return outline(camera, points, directions, problem.reach_mm - problem.wire.diameter_mm / 2)[0]
-
-
-def _bar_block(problem: Problem, seen: Observed, vector):
-    points, camera = seen.points, problem.cameras.cameras[seen.camera]
-    px = bar_outline(problem, camera, vector, points.place)
-    step = _steps(problem)
-    jacobian = np.zeros((len(points), problem.size))
-    for k in range(BAR):
-        moved = vector + step[k] * (np.arange(problem.size) == k)
-        jacobian[:, k] = np.sum(points.normal * (bar_outline(problem, camera, moved, points.place) - px),
-                                axis=1) / step[k]
-    first = BAR + REST + 1 + 4 * seen.camera + 2
-    lever = points.place / BAR_TILT_ARM_MM
+def _over_sigma(points: LinePoints, px, jacobian, first: int, lever, vector):
+    """Residuals of points predicted at px (n, 2), and their Jacobian, over sigma; with the line's offset and tilt."""
     jacobian[:, first], jacobian[:, first + 1] = 1.0, lever
     residual = np.sum(points.normal * (px - points.px), axis=1) + vector[first] + vector[first + 1] * lever
     return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
+
+
+def bar_middle(problem: Problem, camera, vector, place_mm) -> np.ndarray:
+    """Middle (…, n, 2) of the bar's outline in one camera, at places (n,) along its axis; vector (…, size)."""
+    axis = bar_axis(problem, vector)
+    points = axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
+    directions = np.broadcast_to(axis.direction[..., None, :], points.shape)
+    one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3),
+                       problem.reach_mm - problem.wire.diameter_mm / 2)
+    return (0.5 * (one + other)).reshape(*points.shape[:-1], 2)
+
+
+def _bar_block(problem: Problem, number: int, group: Sequence[Observed], vector):
+    """Residuals and Jacobian rows of one camera's points of the bar."""
+    points, step = _together(group), _steps(problem)[:BAR]
+    moved = vector + step[:, None] * np.eye(BAR, problem.size)
+    px = bar_middle(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points.place)
+    jacobian = np.zeros((len(points), problem.size))
+    jacobian[:, :BAR] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
+    return _over_sigma(points, px[0], jacobian, BAR + REST + 1 + 4 * number + 2, points.place / BAR_TILT_ARM_MM, vector)
 
 
 def _contact_block(problem: Problem, moved, curves: Curves, columns, vector):
@@ -214,9 +221,8 @@ def _contact_block(problem: Problem, moved, curves: Curves, columns, vector):
     frames = np.flatnonzero(problem.touching)
     jacobian = np.zeros((len(frames), problem.size))
     for (step, names), row in zip(columns, distance[1:]):
-        for i, f in enumerate(frames):
-            if names[f] >= 0:
-                jacobian[i, names[f]] = (row[f] - distance[0, f]) / step
+        held = names[frames] >= 0
+        jacobian[np.flatnonzero(held), names[frames[held]]] = (row - distance[0])[frames[held]] / step
     jacobian[:, BAR + REST] = -1.0
     residual = distance[0, frames] - problem.reach_mm - vector[BAR + REST]
     return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
@@ -255,7 +261,8 @@ def solve(problem: Problem, state: State, *,
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
-    jacobian = weighted_jacobian(problem, state, scales[-1])
+    else:
+        jacobian = weighted_jacobian(problem, state, scales[-1])
     return state, np.linalg.inv(jacobian.T @ jacobian)
 
 

@@ -98,9 +98,9 @@ def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarra
     the radius (which stretches the blur with it, by as little).
     """
     radius = np.asarray(radius_px, dtype=float)
-    middle = float(np.median(radius)) if radius.size else 1.0
-    if radius.size and np.ptp(radius) < _SAME_RADIUS * middle:
-        middle = round(middle, 1)
+    least, most = radius.min(initial=np.inf), radius.max(initial=0.0)
+    if most - least < _SAME_RADIUS * least:
+        middle = round(0.5 * (least + most), 1)
         return _from_table(np.asarray(offset_px) * (middle / radius), _table(middle, blur_px, terms))
     return _integrated(np.asarray(offset_px), radius, blur_px, terms)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.bar import HALF, changed, find_bar, settle_axis
-from vision.bar_line import measure_bar
+from vision.bar_line import FAR_PX, NEAR_PX, measure_bar
 from vision.base_line import base_lines
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
@@ -34,7 +34,6 @@ _WIRE_KNOT_MM = 12.0
 _NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 _BESIDE_BAR_PX = 4.0
 _SEARCH_PX = 1.5
-_NEAR_PX = 3.0  # a bar found this near to where it was expected need not be looked for again
 _ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
 _FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
@@ -126,20 +125,20 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
                for view in views}
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
-    for _ in range(2):
-        lines = _bar_lines(views, axis, rods, {}, settings, coarse=True)
+    for off_px in (FAR_PX, NEAR_PX):
+        lines = _bar_lines(views, axis, rods, {}, settings, off_px=off_px)
         axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
-        if max((line.moved_px for line in lines.values()), default=0.0) < _NEAR_PX:
+        if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
             break
     return axis
 
 
-def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, coarse: bool = False,
+def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
                last: bool = False):
     """The bar's line in each camera that shows enough of it."""
     found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF))),
                                            view.mean, axis, rods.bar.radius_mm,
-                                           wires.get(view.camera.name, []), settings, coarse=coarse, last=last)
+                                           wires.get(view.camera.name, []), settings, off_px=off_px, last=last)
              for view in views}
     return {name: line for name, line in found.items() if line is not None}
 

@@ -1,6 +1,7 @@
 """The rod's own shading, shared by all pieces of a camera, and the position of each piece under it."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -55,11 +56,10 @@ def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
 
 
 def _project_out(columns, *targets):
-    """Parts of the targets (s, p, k) that the columns (s, p, c) cannot explain, piece by piece."""
+    """Parts of the targets (s, p, k) that the two columns (s, p, 2) cannot explain, piece by piece."""
     turned = columns.transpose(0, 2, 1)
-    normal = turned @ columns + _WEAK * np.eye(columns.shape[-1])
-    found = [np.linalg.solve(normal, turned @ target) for target in targets]
-    return [target - columns @ x for target, x in zip(targets, found)]
+    inverse = _inverse_of_two(turned @ columns + _WEAK * np.eye(2))
+    return [target - columns @ (inverse @ (turned @ target)) for target in targets]
 
 
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots_mm, robust=None,
@@ -106,9 +106,15 @@ def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
     keep = np.r_[:terms, terms + 2]
     around = slice(terms, terms + 2)
     mixed = products[:, around][:, :, keep]
-    left = products[:, keep][:, :, keep] - mixed.transpose(0, 2, 1) @ np.linalg.solve(
-        products[:, around, around] + _WEAK * np.eye(2), mixed)
+    inverse = _inverse_of_two(products[:, around, around] + _WEAK * np.eye(2))
+    left = products[:, keep][:, :, keep] - mixed.transpose(0, 2, 1) @ (inverse @ mixed)
     return left[:, :terms, :terms], left[:, :terms, terms], left[:, terms, terms]
+
+
+def _inverse_of_two(matrices) -> np.ndarray:
+    """Inverses of symmetric matrices (s, 2, 2)."""
+    a, b, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    return np.stack([d, -b, -b, a], axis=1).reshape(-1, 2, 2) / (a * d - b * b)[:, None, None]
 
 
 # How strong each wave round a thin, lit rod is beside its contrast: diffuse light fills the first three, a highlight
@@ -123,8 +129,15 @@ _CHANGE_SHARE = 0.1
 
 def _stiffness(prior, knots: int) -> np.ndarray:
     """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to the next."""
+    between = _chain(knots)[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :]
+    return between.reshape(2 * (knots * len(prior),))
+
+
+@lru_cache
+def _chain(knots: int) -> np.ndarray:
+    """Inverse covariance (knots, knots) of one wave's coefficients over its own variance."""
     steps = np.diff(np.eye(knots), axis=0)
-    return np.kron(np.eye(knots) + steps.T @ steps / _CHANGE_SHARE**2, np.diag(prior**-2.0))
+    return np.eye(knots) + steps.T @ steps / _CHANGE_SHARE**2
 
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:

@@ -8,8 +8,18 @@ from vision.scene import Camera
 def outline(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
     """Middle (n, 2) and half-width (n,) in pixels of a rod's outline at points (n, 3) of its axis.
 
-    directions (n, 3) unit: the rod's local direction. The two lines of sight that graze a cylinder touch it
-    r²/d before its axis and r √(1 - r²/d²) beside it, d being the distance of the camera from the axis.
+    directions (n, 3) unit: the rod's local direction.
+    """
+    one, other = edges(camera, points_mm, directions, radius_mm)
+    middle = 0.5 * (one + other)
+    return middle, 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=1))
+
+
+def edges(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
+    """The two edges (n, 2) each of a rod's outline at points (n, 3) of its axis; directions (n, 3), unit.
+
+    The two lines of sight that graze a cylinder touch it r²/d before its axis and r √(1 - r²/d²) beside it, d being
+    the distance of the camera from the axis.
     """
     points, directions = np.atleast_2d(points_mm), np.atleast_2d(directions)
     radius = np.broadcast_to(radius_mm, len(points))[:, None]
@@ -19,9 +29,8 @@ def outline(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarra
     sideways = np.cross(directions, sight / distance)
     near = points - radius**2 / distance**2 * sight
     aside = radius * np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0)) * sideways
-    one, other = camera.project(near + aside), camera.project(near - aside)
-    middle = 0.5 * (one + other)
-    return middle, 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=1))
+    one, other = np.split(camera.project(np.concatenate([near + aside, near - aside])), 2)
+    return one, other
 
 
 def normals(curve_px) -> np.ndarray:

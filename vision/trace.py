@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize
 
+from vision.binned import binned, without
 from vision.fit import Observed
 from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.scene import Camera, Wire
@@ -17,6 +18,7 @@ from vision.wire import Curves
 _BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
+_BIN_PX = 0.25
 _FEW_PIECES, _ENOUGH_PIECES = 30, 100
 _STILL_SIGMAS = 0.7  # of a piece's own, below which another round would only trade its shift for shading
 _WORST_SIGMA_PX = 0.5
@@ -42,7 +44,11 @@ class View:
     @cached_property
     def mean(self) -> np.ndarray:
         """Mean (h, w) of the pictures, of MEAN_OF at most."""
-        return np.mean([picture.astype(np.float32) for picture in self.some(MEAN_OF)], axis=0)
+        pictures = self.some(MEAN_OF)
+        total = np.zeros(pictures[0].shape, dtype=np.float32)
+        for picture in pictures:
+            total += picture
+        return total / len(pictures)
 
 
 def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:
@@ -50,7 +56,7 @@ def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px:
     outlines = [_outline(view.camera, curve, wire) for curve in curves.values()]
     # one width for all bands: a wire may pass from one whole pixel of radius to the next within a whisk
     half = int(np.ceil(max(np.nanmax(radius) for *_, radius in outlines))) + margin_px
-    bands = [read_band(view.frames[frame].astype(float), view.background, middle, arc, radius, half)
+    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half)
              for frame, (arc, middle, radius) in zip(curves, outlines)]
     pieces = cut_pieces(bands, length_px, view.noise)
     return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
@@ -89,8 +95,8 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
     plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
-    looked_at, bow_there = pieces.select(plain), bow[plain]
-    prior = wave_prior(looked_at, _ALL_WAVES)
+    prior = wave_prior(pieces.select(plain), _ALL_WAVES)
+    (looked_at, blurred), bow_there = binned(pieces.select(plain), _BIN_PX), bow[plain]
 
     def misfit(moves_and_blur, every: int) -> float:
         some = looked_at.select(slice(None, None, every)).moved(bow_there[::every] @ moves_and_blur[:3])
@@ -103,7 +109,7 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     simplex = best + np.concatenate([np.zeros((1, 4)), np.diag([0.15, 0.1, 0.1, 0.08])])
     found = minimize(misfit, best, (enough,), method="Nelder-Mead",
                      options={"initial_simplex": simplex, "xatol": 0.01, "maxfev": 70})
-    return pieces.moved(bow @ found.x[:3]), float(np.exp(found.x[3]))
+    return pieces.moved(bow @ found.x[:3]), without(np.exp(found.x[3]), blurred)
 
 
 def _some(pieces: Pieces, count: int = _ENOUGH_PIECES) -> Pieces:

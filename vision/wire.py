@@ -44,12 +44,26 @@ class Curves:
     def at(self, arc_mm) -> tuple[np.ndarray, np.ndarray]:
         """Points and (unnormalised) tangents (…, k, 3) at arc lengths (k,) or (…, k), by cubic Hermite pieces."""
         arc = np.broadcast_to(arc_mm, (*self.points_mm.shape[:-2], np.shape(arc_mm)[-1]))
-        h = self.arc_mm[1] - self.arc_mm[0]
-        k = np.clip((arc / h).astype(int), 0, len(self.arc_mm) - 2)
-        t = (arc / h - k)[..., None]
+        k, t = self._place(arc)
         take = [np.take_along_axis(a, k[..., None] + d, axis=-2)
                 for a in (self.points_mm, self.tangents) for d in (0, 1)]
-        p0, p1, m0, m1 = take
+        return self._between(t, *take)
+
+    def at_one_each(self, which, arc_mm) -> np.ndarray:
+        """Points (…, n, 3), each on its own curve: which (n,) of the curves (…, f), at arc lengths (n,)."""
+        k, t = self._place(np.asarray(arc_mm))
+        take = [a[..., which, k + d, :] for a in (self.points_mm, self.tangents) for d in (0, 1)]
+        return self._between(t, *take)[0]
+
+    def _place(self, arc_mm):
+        """The piece that an arc length lies in, and where in it (…, 1), from 0 to 1."""
+        steps = arc_mm / (self.arc_mm[1] - self.arc_mm[0])
+        k = np.clip(steps.astype(int), 0, len(self.arc_mm) - 2)
+        return k, (steps - k)[..., None]
+
+    def _between(self, t, p0, p1, m0, m1):
+        """Points and tangents within a piece from those at its ends."""
+        h = self.arc_mm[1] - self.arc_mm[0]
         m0, m1 = m0 * h, m1 * h
         a, b = 2 * (p0 - p1) + m0 + m1, 3 * (p1 - p0) - 2 * m0 - m1
         return p0 + t * (m0 + t * (b + t * a)), (m0 + t * (2 * b + t * 3 * a)) / h
@@ -70,7 +84,7 @@ def centrelines(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
     forward = np.sqrt(np.maximum(1.0 - np.sum(aside**2, axis=-1), 0.01))
     tangents = np.concatenate([forward[..., None], aside], axis=-1)
     start = np.concatenate([np.zeros((*np.shape(rest_mm)[:-2], 1)), np.asarray(rest_mm)[..., :, 0]], axis=-1)
-    walked = cumulative_simpson(tangents, x=arc, axis=-2, initial=0.0)
+    walked = cumulative_simpson(tangents, dx=arc[1], axis=-2, initial=0.0)
     points = walked + np.broadcast_to(start, (*walked.shape[:-2], 3))[..., None, :]
     turned = rotation_z(motor_rad)
     return Curves(arc, np.einsum("...ij,...mj->...mi", turned, points),

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.rig.protocol import MotorTable, PicturesTable, WhiskerTable
 from tests.ladder.scenes import STEP_DEG, Scene, Sigmas, as_problem, begin, draw_scene, line_points
-from vision.fit import BAR, Observed, Problem, State, bar_outline, curves_of, solve
+from vision.fit import BAR, Observed, Problem, State, bar_middle, curves_of, solve
 from vision.line import LinePoints
 from vision.quantities import Measured, measure
 from vision.silhouette import normals
@@ -50,7 +50,7 @@ def own_points(problem: Problem, state: State, sigma_px: float) -> Problem:
 def _own(problem: Problem, state: State, curves: Curves, seen: Observed, sigma_px: float) -> Observed:
     camera, place = problem.cameras.cameras[seen.camera], seen.points.place
     if seen.frame < 0:
-        px = bar_outline(problem, camera, state.vector, place)
+        px = bar_middle(problem, camera, state.vector, place)
     else:
         one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
         px = camera.project(one.at(place)[0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vision.contact import BarAxis, clearance, contact_frame_angles
-from vision.fit import Observed, Problem, State, bar_axis, bar_outline, bends, curves_of, linearise, solve
+from vision.fit import Observed, Problem, State, bar_axis, bar_middle, bends, curves_of, linearise, solve
 from vision.line import LinePoints
 from vision.quantities import measure
 from vision.scene import Camera, Cameras, Wire
@@ -72,7 +72,7 @@ def with_points(problem, state, rng=None, sigma=0.05):
             one = Curves(curves.arc_mm, curves.points_mm[frame], curves.tangents[frame])
             seen.append(Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng)))
         place = np.linspace(-25.0, 25.0, 20)
-        seen.append(Observed(-1, number, _points(bar_outline(problem, view, state.vector, place), place, sigma, rng)))
+        seen.append(Observed(-1, number, _points(bar_middle(problem, view, state.vector, place), place, sigma, rng)))
     return replace(problem, seen=seen)
 
 
