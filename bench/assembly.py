@@ -76,14 +76,22 @@ TRACK_COLUMNS = (
 )
 
 
+_BEAM = (("d_x_mm", "d_x"), ("touch_deg", "touch"), ("slip_mm", "slip"))  # column and key in the whisk's `beam`
+BEAM_COLUMNS = (
+    *("trial", "whisk", "theta_deg"),
+    *(f"{stem}_{what}_{unit}" for stem, unit in (name.rsplit("_", 1) for name, _ in _BEAM)
+      for what in ("beam", "spline", "difference_sigma")),
+    "chance",
+)  # fmt: skip
 BUDGET_COLUMNS = ("trial", "whisk", "d_x_sigma_mm", *(f"{cause}_percent" for cause in CAUSES))
 
 
 def write_tables(out: Path, results: Sequence[dict]) -> None:
-    """whisks.csv, estimates.csv, budget.csv, and a track a trial."""
+    """whisks.csv, estimates.csv, budget.csv, beam.csv, and a track a trial."""
     write_table(out / "whisks.csv", WHISK_COLUMNS, whisk_rows(results))
     write_table(out / "estimates.csv", ESTIMATE_COLUMNS, estimate_rows(results))
     write_table(out / "budget.csv", BUDGET_COLUMNS, budget_rows(results))
+    write_table(out / "beam.csv", BEAM_COLUMNS, beam_rows(results))
     for result in results:
         write_table(out / "track" / f"{result['trial']['name']}.csv", TRACK_COLUMNS, track_rows(result))
 
@@ -107,6 +115,20 @@ def budget_rows(results: Iterable[dict]) -> Iterator[dict]:
             shares = {f"{cause}_percent": 100.0 * seen["budget"][cause] for cause in CAUSES}
             row = {"trial": result["trial"]["name"], "whisk": seen["whisk"], "d_x_sigma_mm": seen["d_x_sigma_mm"]}
             yield row | shares
+
+
+def beam_rows(results: Iterable[dict]) -> Iterator[dict]:
+    """A row a whisk with truth: d_x, touch, and slip at the largest pushing angle, by a beam and by a spline."""
+    for result, seen, _ in whisks(results):
+        beam = seen.get("beam")
+        if seen.get("d_x_mm") is None or not beam:
+            continue
+        row = {"trial": result["trial"]["name"], "whisk": seen["whisk"], "chance": beam["chance"]}
+        row["theta_deg"] = _degrees(beam["theta_rad"])
+        for name, key in _BEAM:
+            (stem, unit), turn = name.rsplit("_", 1), _degrees if name.endswith("_deg") else _same
+            row |= {f"{stem}_{w}_{unit}": turn(beam[key][w]) for w in ("beam", "spline", "difference_sigma")}
+        yield row
 
 
 def status_of(seen: dict, felt: dict) -> str:

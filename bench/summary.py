@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.assembly import budget_rows
+from bench.assembly import beam_rows, budget_rows
 from bench.atomic import write_whole
 from bench.compare import Judged, judge, whisks
 from bench.drawing import label_of
@@ -46,7 +46,10 @@ def write_summary(
         [
             *_verdict(session, results, judged, settings, doubtful),
             "",
-            *_titled("Truth, from the pictures (± one sigma)", [*_truth_lines(results), *_budget_lines(results)]),
+            *_titled(
+                "Truth, from the pictures (± one sigma)",
+                [*_truth_lines(results), *_budget_lines(results), *_beam_lines(results)],
+            ),
             *_titled(
                 f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
                 _error_lines(judged),
@@ -135,6 +138,19 @@ def _budget_lines(results) -> Iterator[str]:
         largest = sorted(shares.items(), key=lambda item: -item[1])
         parts = (f"{cause} {share:.0f} %" for cause, share in largest if share >= _LEAST_TOLD_PERCENT)
         yield f"variance of d_x by cause, mean over the whisks: {', '.join(parts)} (docs/truth.md, budget.csv)"
+
+
+def _beam_lines(results) -> Iterator[str]:
+    """How far the truth would move if the wire's curve were a spline: the largest of each quantity."""
+    rows = list(beam_rows(results))
+    parts = []
+    for name, unit in (("d_x", "mm"), ("touch", "deg"), ("slip", "mm")) if rows else ():
+        moved = [(row[f"{name}_spline_{unit}"] - row[f"{name}_beam_{unit}"]) for row in rows]
+        k = int(np.argmax(np.abs(moved)))
+        sigma = rows[k][f"{name}_difference_sigma_{unit}"]
+        parts.append(f"{name} {moved[k]:+.4f} ± {sigma:.4f} {unit} ({rows[k]['trial']})")
+    if parts:
+        yield f"by a spline instead of a beam with a point load, at most: {', '.join(parts)} (beam.csv)"
 
 
 def _pm(source: dict, name: str, digits: int, *, degrees: bool = False) -> str:
@@ -229,6 +245,6 @@ def _exact(session: Session) -> Iterator[str]:
 def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    tables = ["whisks.csv", "estimates.csv", "budget.csv", "friction.csv", "phases.csv", "surfaces.csv"]
+    tables = ["whisks.csv", "estimates.csv", "budget.csv", "beam.csv", "friction.csv", "phases.csv", "surfaces.csv"]
     tables += ["explained.csv", "error_map.csv"]
     return [", ".join([*tables, "track/", *single, *(f"{folder}/" for folder in folders)])]

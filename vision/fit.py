@@ -241,7 +241,7 @@ def start(problem: Problem, contact_arc_mm: float) -> State:
     return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
 
 
-def _weights(linear: Linear, scale: float) -> np.ndarray:
+def robust_weights(linear: Linear, scale: float) -> np.ndarray:
     """Cauchy weights of line points; observations of touch and priors keep theirs."""
     return np.where(linear.is_point, 1.0 / (1.0 + (linear.residual / scale) ** 2), 1.0)
 
@@ -254,7 +254,7 @@ def solve(problem: Problem, state: State, *,
     """
     for scale in scales:
         linear, state = linearise(problem, state)
-        root = np.sqrt(_weights(linear, scale))
+        root = np.sqrt(robust_weights(linear, scale))
         jacobian = linear.jacobian * root[:, None]
         step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
         step = step * min(1.0, 0.3 / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
@@ -269,7 +269,7 @@ def solve(problem: Problem, state: State, *,
 def weighted_jacobian(problem: Problem, state: State, scale: float = LAST_SCALE) -> np.ndarray:
     """All observations' rows (n, size) over their sigma and robustly weighted: line points, touching, priors."""
     linear, _ = linearise(problem, state)
-    return linear.jacobian * np.sqrt(_weights(linear, scale))[:, None]
+    return linear.jacobian * np.sqrt(robust_weights(linear, scale))[:, None]
 
 
 def honest(problem: Problem, state: State) -> Problem:

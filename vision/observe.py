@@ -15,6 +15,7 @@ import numpy as np
 from vision.bar import HALF, changed, find_bar, settle_axis
 from vision.bar_line import FAR_PX, NEAR_PX, measure_bar
 from vision.base_line import base_lines
+from vision.beam_check import check_beam
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
@@ -167,8 +168,9 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
     lens = calibration_share(problem, state, covariance)
     whisk = to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
                      lens, views, rods.bar.radius_mm, settings)
-    status = "; ".join(filter(None, [whisk.status, left_out]))
-    return replace(whisk, base=base_lines(problem, state, lens), status=status)
+    beam = check_beam(problem, state, covariance + lens, measured, by_parameter)
+    status = "; ".join(filter(None, [whisk.status, beam.alarm, left_out]))
+    return replace(whisk, base=base_lines(problem, state, lens), beam=beam, status=status)
 
 
 def _with_frames(views, indices) -> tuple[list[View], str]:

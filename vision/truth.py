@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vision.beam_check import BeamCheck
 from vision.place import BaseLines
 
 NAN = float("nan")
@@ -76,7 +77,8 @@ class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
     d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
-    budget: shares of d_x's variance by cause. base: the whisker's base in the frames before touch.
+    budget: shares of d_x's variance by cause. base: the whisker's base in the frames before touch. beam: the same by a
+    curve that is no beam.
     """
 
     whisk: int
@@ -98,6 +100,7 @@ class WhiskTruth:
     smooth: Smooth | None = None
     budget: dict = field(default_factory=dict)
     base: BaseLines | None = None
+    beam: BeamCheck | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""
