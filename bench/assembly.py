@@ -112,7 +112,7 @@ def budget_rows(results: Iterable[dict]) -> Iterator[dict]:
     """A row a whisk with truth: what part of d_x's variance each cause has."""
     for result, seen, _ in whisks(results):
         if seen.get("d_x_mm") is not None and seen.get("budget"):
-            shares = {f"{cause}_percent": 100.0 * seen["budget"][cause] for cause in CAUSES}
+            shares = {f"{cause}_percent": 100.0 * number(seen["budget"][cause]) for cause in CAUSES}
             row = {"trial": result["trial"]["name"], "whisk": seen["whisk"], "d_x_sigma_mm": seen["d_x_sigma_mm"]}
             yield row | shares
 

@@ -57,7 +57,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     if missing:
         raise BadInput(f"has no camera {missing[0]}, which has frames; calibrate it", file="cameras.toml")
     background = _backgrounds(session, cameras)
-    content = [[c, cameras.covariance] for c in cameras.cameras], list(background.values())
+    content = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras], list(background.values())
     return SessionCalibration(cameras, background, hash_of(*content), notes, session.T_rig_board)
 
 

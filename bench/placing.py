@@ -80,7 +80,7 @@ def _settled(calibration: SessionCalibration, board: Placement, chosen: Sequence
 def _moved(calibration: SessionCalibration, before: Placement, after: Placement) -> SessionCalibration:
     cameras = placed(calibration.cameras, before, after)
     T_rig_board = compose(invert_transform(after.T_board_rig), calibration.T_rig_board)
-    made = hash_of([[camera, cameras.covariance] for camera in cameras], calibration.hash)
+    made = hash_of([[camera, cameras.covariance, cameras.placement] for camera in cameras], calibration.hash)
     return replace(calibration, cameras=cameras, T_rig_board=T_rig_board, hash=made)
 
 

@@ -134,10 +134,13 @@ def _budget_lines(results) -> Iterator[str]:
     """Where the variance of d_x comes from, in the mean over the whisks."""
     rows = list(budget_rows(results))
     if rows:
-        shares = {cause: np.mean([row[f"{cause}_percent"] for row in rows]) for cause in CAUSES}
+        table = np.array([[row[f"{cause}_percent"] for cause in CAUSES] for row in rows])
+        shares = dict(zip(CAUSES, np.nan_to_num(table).mean(axis=0)))
         largest = sorted(shares.items(), key=lambda item: -item[1])
         parts = (f"{cause} {share:.0f} %" for cause, share in largest if share >= _LEAST_TOLD_PERCENT)
         yield f"variance of d_x by cause, mean over the whisks: {', '.join(parts)} (docs/truth.md, budget.csv)"
+        if np.isnan(table).any():
+            yield "  cameras.npz does not tell the rig board's part from the lenses': `cameras` is both"
 
 
 def _beam_lines(results) -> Iterator[str]:

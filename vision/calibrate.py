@@ -23,6 +23,7 @@ from vision.errors import Refused
 from vision.first_guess import board_pose, first_lens, has_pose
 from vision.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
 from vision.noise import Settled, settle
+from vision.place import by_board
 from vision.recording import (
     check_lenses,
     check_rig_view,
@@ -142,6 +143,9 @@ def calibrate_cameras(
     if timing is not None:
         notes.append(_timing_note(alone, timing))
     calibration = _calibration(alone, sizes_px, settled, board, notes, timing, together)
+    if with_rig:
+        placement = by_board(T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad).covariance
+        calibration = replace(calibration, cameras=replace(calibration.cameras, placement=placement))
     check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
     check_work(calibration.cameras, alone, standing, work_points_mm)
     return calibration

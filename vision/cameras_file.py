@@ -21,7 +21,7 @@ _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
 
 def write_cameras(path: Path | str, cameras: Cameras) -> None:
     """Writes `path` (TOML) and, beside it with the suffix .npz, the joint covariance with the parameters'
-    names.
+    names, and the part of it that is the rig frame's, where that is told.
 
     The covariance goes first, so that a run that dies between the two leaves no TOML pointing at nothing.
     """
@@ -49,11 +49,13 @@ def _as_table(camera: Camera) -> dict:
 
 def _pack_covariance(cameras: Cameras) -> bytes:
     buffer = BytesIO()
+    told = {} if cameras.placement is None else {"placement": cameras.placement}
     np.savez(
         buffer,
         covariance=cameras.covariance,
         cameras=np.array(cameras.names),
         parameters=np.array(PARAMETERS),
+        **told,
     )
     return buffer.getvalue()
 
@@ -91,7 +93,7 @@ def read_cameras(path: Path | str) -> Cameras:
     cameras = tuple(_camera(name, table) for name, table in tables.items())
     for camera in cameras:
         check_lens(camera)
-    return Cameras(cameras, _read_covariance(path, document, cameras))
+    return Cameras(cameras, *_read_covariance(path, document, cameras))
 
 
 def _parse(path: Path) -> dict:
@@ -120,10 +122,11 @@ def _camera(name: str, table: dict) -> Camera:
         raise error if isinstance(error, Refused) else Refused(f"cameras.{name}: {error}") from error
 
 
-def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) -> np.ndarray | None:
+def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) -> tuple:
+    """Joint covariance and the placement's part of it; None for what the files do not tell."""
     name = document.get("covariance")
     if name is None:
-        return None
+        return None, None
     companion = path.with_name(str(name))
     if not companion.is_file():
         raise Refused(f"names {name} for its covariance, but there is no such file beside it: copy both")
@@ -132,7 +135,8 @@ def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) ->
         raise Refused(
             f"{name} is not the covariance this file was written with: copy both, or calibrate again"
         )
-    return _in_order(np.load(BytesIO(packed)), cameras)
+    stored = np.load(BytesIO(packed))
+    return _in_order(stored, cameras), stored.get("placement")
 
 
 def _in_order(stored: "np.lib.npyio.NpzFile", cameras: tuple[Camera, ...]) -> np.ndarray:

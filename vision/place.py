@@ -18,7 +18,7 @@ from scipy.stats import chi2
 
 from vision.errors import Refused
 from vision.rotation import compose, exp_rotation, skew
-from vision.scene import N_PARAMETERS, Cameras
+from vision.scene import Cameras
 
 # Chance by which swing and board, both right, would disagree as much as calls for an alarm.
 _FALSE_ALARM = 1e-3
@@ -263,13 +263,11 @@ def placed(cameras: Cameras, before: Placement, after: Placement) -> Cameras:
     moved = tuple(
         replace(camera, T_camera_rig=compose(camera.T_camera_rig, after.T_board_rig)) for camera in cameras
     )
-    shared = np.zeros((N_PARAMETERS * len(cameras), 6))
-    for k, camera in enumerate(cameras):
-        for part in (0, 3):
-            first = N_PARAMETERS * k + 9 + part
-            shared[first : first + 3, part : part + 3] = camera.T_camera_rig[:, :3]
+    shared = cameras.by_placement
     change = shared @ (after.covariance - before.covariance) @ shared.T
-    return Cameras(moved, _positive(cameras.covariance + change, np.sqrt(np.diag(cameras.covariance))))
+    covariance = _positive(cameras.covariance + change, np.sqrt(np.diag(cameras.covariance)))
+    turned = np.kron(np.eye(2), after.T_board_rig[:, :3])  # `after` counts along the old axes, the cameras along theirs
+    return Cameras(moved, covariance, turned.T @ after.covariance @ turned)
 
 
 def _positive(covariance: np.ndarray, scale: np.ndarray) -> np.ndarray:

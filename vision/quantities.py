@@ -135,25 +135,32 @@ def _difference(name: str, moved, here):
 
 
 def calibration_share(problem: Problem, state: State, covariance) -> np.ndarray:
-    """Covariance (size, size) that the cameras' own uncertainty adds to the parameters.
-
-    The parameters answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees.
-    """
-    linear, _ = linearise(problem, state)
-    answer = -covariance @ (linear.jacobian[linear.is_point].T @ camera_rows(problem, state))
+    """Covariance (size, size) that the cameras' own uncertainty adds to the parameters."""
+    answer = _answer(problem, state, covariance)
     return answer @ problem.cameras.covariance @ answer.T
 
 
-CAUSES = ("wire", "bar", "touch", "diameters", "light", "beliefs", "cameras")
+def _answer(problem: Problem, state: State, covariance) -> np.ndarray:
+    """Derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
+
+    They answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees.
+    """
+    linear, _ = linearise(problem, state)
+    return -covariance @ (linear.jacobian[linear.is_point].T @ camera_rows(problem, state))
+
+
+CAUSES = ("wire", "bar", "touch", "diameters", "light", "beliefs", "cameras", "placement")
 
 
 def variance_by_cause(problem: Problem, state: State, covariance, lens, gradient) -> dict[str, float]:
     """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
 
     wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their sigmas; light: lines
-    off as a whole; beliefs: the priors of rest shape and bend; cameras: lenses, poses and rig board. covariance, lens
-    (size, size): of the parameters, by the fit and by the cameras. The fit's covariance is the inverse of the sum of
-    all observations' information, so each observation's part is its row's.
+    off as a whole; beliefs: the priors of rest shape and bend; cameras: lenses, and poses towards the rig board;
+    placement: where the rig frame is, by rig board and free strokes (NaN where the cameras do not tell it apart: it is
+    in `cameras` then). covariance, lens (size, size): of the parameters, by the fit and by the cameras. The fit's
+    covariance is the inverse of the sum of all observations' information, so each observation's part is its row's.
+    The placement errs apart from corners and lenses, so that there are no cross-terms.
     """
     weighed = weighted_jacobian(problem, state)
     parts = (weighed @ (covariance @ gradient)) ** 2
@@ -164,7 +171,20 @@ def variance_by_cause(problem: Problem, state: State, covariance, lens, gradient
     causes = {"wire": parts[:len(on_wire)][on_wire], "bar": parts[:len(on_wire)][~on_wire],
               "touch": parts[len(on_wire):touch], "diameters": parts[reach], "light": parts[light],
               "beliefs": [parts[touch:reach].sum(), parts[touch + problem.first_bend:].sum()]}
-    return {name: float(np.sum(part)) for name, part in causes.items()} | {"cameras": float(gradient @ lens @ gradient)}
+    whole = float(gradient @ lens @ gradient)
+    placement = _by_placement(problem, state, covariance, gradient)
+    own = whole if np.isnan(placement) else max(whole - placement, 0.0)  # rounding may leave less than nothing
+    parts = {name: float(np.sum(part)) for name, part in causes.items()}
+    return parts | {"cameras": own, "placement": placement}
+
+
+def _by_placement(problem: Problem, state: State, covariance, gradient) -> float:
+    """Variance that the rig frame's placement adds to a quantity; NaN where the cameras do not tell it apart."""
+    cameras = problem.cameras
+    if cameras.placement is None:
+        return float("nan")
+    by = gradient @ _answer(problem, state, covariance) @ cameras.by_placement
+    return float(by @ cameras.placement @ by)
 
 
 def camera_rows(problem: Problem, state: State) -> np.ndarray:

@@ -116,9 +116,10 @@ def _frames(indices, seen, time_s, motor_rad, problem: Problem, measured: Measur
 
 
 def _budget(problem: Problem, state: State, noise, lens, gradient) -> dict[str, float]:
-    """Shares of the variance by cause; they add up to 1."""
+    """Shares of the variance by cause; those that are told add up to 1."""
     parts = variance_by_cause(problem, state, noise, lens, gradient)
-    return {name: part / sum(parts.values()) for name, part in parts.items()}
+    whole = np.nansum(list(parts.values()))
+    return {name: part / whole for name, part in parts.items()}
 
 
 def _overlay(problem: Problem, state: State, measured: Measured, seen, views, bar_radius_mm: float) -> dict:

@@ -254,11 +254,13 @@ class Cameras:
     """Cameras of one rig with the joint covariance of all their parameters.
 
     covariance: (15 n, 15 n) in the cameras' order, each camera's parameters as in PARAMETERS; a row of
-    zeros is a parameter held fixed. Left out, everything is taken as exact.
+    zeros is a parameter held fixed. Left out, everything is taken as exact. placement (6, 6): what of it is the rig
+    frame's own, of a turn w (rad) and shift v (mm) that all cameras share, x = Exp(w) x_rig + v; None where not told.
     """
 
     cameras: tuple[Camera, ...]
     covariance: np.ndarray = field(default=None)
+    placement: np.ndarray | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "cameras", tuple(self.cameras))
@@ -279,6 +281,29 @@ class Cameras:
         covariance = 0.5 * (covariance + covariance.T)
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
+        self._settle_placement()
+
+    def _settle_placement(self) -> None:
+        placement = self.placement
+        if placement is None and not self.covariance.any():
+            placement = np.zeros((6, 6))  # exact cameras are exactly placed
+        if placement is None:
+            return
+        placement = np.array(placement, dtype=float)
+        _require(
+            placement.shape == (6, 6) and bool(np.all(np.isfinite(placement))),
+            "the cameras' placement must be 6 x 6 finite numbers",
+        )
+        placement.setflags(write=False)
+        object.__setattr__(self, "placement", placement)
+
+    @property
+    def by_placement(self) -> np.ndarray:
+        """The parameters' derivatives (15 n, 6) by a turn and a shift of the rig frame; lenses stand still."""
+        rows = np.zeros((len(self), N_PARAMETERS, 6))
+        for camera, own in zip(self.cameras, rows):
+            own[-6:] = np.kron(np.eye(2), camera.T_camera_rig[:, :3])
+        return rows.reshape(-1, 6)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -311,9 +336,9 @@ class Cameras:
     def subset(self, names: Sequence[str]) -> "Cameras":
         """These cameras in this order, with their share of the covariance."""
         rows = np.concatenate([np.arange(N_PARAMETERS) + self.parameters_of(n).start for n in names])
-        return Cameras(tuple(self[n] for n in names), self.covariance[np.ix_(rows, rows)])
+        return Cameras(tuple(self[n] for n in names), self.covariance[np.ix_(rows, rows)], self.placement)
 
     def moved(self, step: np.ndarray) -> "Cameras":
         """The cameras with all parameters changed by `step` (15 n,), in the same order; same covariance."""
         steps = np.asarray(step, dtype=float).reshape(len(self), N_PARAMETERS)
-        return Cameras(tuple(c.moved(s) for c, s in zip(self.cameras, steps)), self.covariance)
+        return replace(self, cameras=tuple(c.moved(s) for c, s in zip(self.cameras, steps)))

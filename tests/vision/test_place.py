@@ -112,6 +112,7 @@ def test_cameras_follow_the_frame_and_trade_the_shared_error():
     old = rig @ exp_rotation(STEP[:3]).T + STEP[3:]
     np.testing.assert_allclose(moved["a"].project(rig), camera.project(old), atol=1e-9)
     np.testing.assert_allclose(moved.covariance, shared / 4, atol=1e-12)
+    np.testing.assert_allclose(moved.by_placement @ moved.placement @ moved.by_placement.T, shared / 4, atol=1e-12)
 
 
 def test_a_board_at_the_wrong_scale_is_refused_with_the_factor():
