@@ -109,7 +109,13 @@ def _add_evaluate(verbs) -> None:
     verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
     verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
     verb.add_argument("--cutoff-Hz", type=float, metavar="X", help="of the low-pass (default: 0.5 for each deg/s)")
-    verb.add_argument("--clock-sigma-s", type=float, metavar="X", help="how well frames' and signals' clocks agree")
+    verb.add_argument(
+        "--clock-sigma-s",
+        type=float,
+        metavar="X",
+        help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
+        "else to half a frame)",
+    )
     verb.add_argument(
         "--estimator",
         action="append",

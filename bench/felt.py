@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rails import off_the_rails
+from bench.results import number
 from bench.settings import Settings
 from bench.signals import Signals, forward_strokes
 from bench.trial import Trial
@@ -15,6 +16,17 @@ from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_
 
 _GUARD_RAD = np.radians(0.2)
 _LEAST_FREE = 50  # samples
+# Of the paper's 800 Hz filter ahead of the converter, taken as of fourth order (Butterworth): 0.52 ms. The session does
+# not say which filter it had.
+GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
+
+
+def lateness(seen: dict, felt: dict) -> tuple[float, float]:
+    """Felt less seen touch of a whisk's two records, rad, and its sigma: of both touches and of the filter's delay, by
+    which what is felt comes late. (No error of θ: touch and moments are late alike.)"""
+    speed = np.median(np.diff(seen["frames"]["motor_rad"]) / np.diff(seen["frames"]["time_s"]))
+    sigmas = seen["touch_sigma_rad"], number(felt.get("touch_felt_sigma_rad")), GAUGE_DELAY_S * speed
+    return number(felt.get("touch_felt_rad")) - seen["touch_rad"], float(np.linalg.norm(sigmas))
 
 
 @dataclass(frozen=True)

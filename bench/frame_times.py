@@ -28,7 +28,9 @@ class FrameTimes:
     """time_s: (n,) middle of the exposure of each frame, s, increasing. source: where the times come from.
 
     picture: camera to (n,) the index of its picture of each frame, −1 where that camera dropped it. spread_s:
-    the largest difference between cameras within one frame. doubts: lines that the user should read.
+    the largest difference between cameras within one frame. doubts: lines that the user should read. clock_sigma_s: how
+    well the times are known on the signals' clock: 0 where they were recorded on it, else half a frame. Forward
+    strokes do not tell it: an offset of the clock looks as one of the encoder's zero.
     """
 
     time_s: np.ndarray
@@ -36,6 +38,7 @@ class FrameTimes:
     picture: Mapping[str, np.ndarray]
     spread_s: float = 0.0
     doubts: tuple[str, ...] = ()
+    clock_sigma_s: float = 0.0
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -135,7 +138,15 @@ def _steady(trial: Trial) -> FrameTimes:
     first_s = 0.0 if trial.first_frame_s is None else trial.first_frame_s
     doubts = () if trial.first_frame_s is not None else (f"{_shown(trial)}: first_frame_s is not given; taken as 0",)
     picture = {camera: np.arange(count) for camera in counts}
-    return FrameTimes(first_s + np.arange(count) / trial.frame_rate_Hz, "frame_rate_Hz", picture, doubts=doubts)
+    time_s = first_s + np.arange(count) / trial.frame_rate_Hz
+    sigma_s = _clock_sigma_s(trial, 1.0 / trial.frame_rate_Hz)
+    return FrameTimes(time_s, "frame_rate_Hz", picture, doubts=doubts, clock_sigma_s=sigma_s)
+
+
+def _clock_sigma_s(trial: Trial, interval_s: float) -> float:
+    """Of frame times that no recorded edge ties to the signals: the first frame's where stated, or half a frame."""
+    stated = trial.first_frame_s is not None and trial.first_frame_sigma_s > 0
+    return trial.first_frame_sigma_s if stated else 0.5 * interval_s
 
 
 def _from_container(trial: Trial) -> FrameTimes:
@@ -147,7 +158,8 @@ def _from_container(trial: Trial) -> FrameTimes:
     doubt = f"{_shown(trial)}: frame times are those of {trial.camera_sources[camera].name}'s container; "
     picture = {name: np.arange(count) for name in times}
     doubts = (doubt + "nothing ties them to the signals' clock",)
-    return FrameTimes(first_s + times[camera], "container", picture, doubts=doubts)
+    sigma_s = _clock_sigma_s(trial, float(np.median(np.diff(times[camera]))) if count > 1 else 0.0)
+    return FrameTimes(first_s + times[camera], "container", picture, doubts=doubts, clock_sigma_s=sigma_s)
 
 
 def _container_times(source: Path, trial: Trial) -> np.ndarray:

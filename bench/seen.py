@@ -51,6 +51,7 @@ def _see(
     frames = _frames(trial, times)
     moved = moved_cameras(session, calibration, frames)
     wire = session.whisker.wire
+    clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     truth = observe_trial(
         {name: pictures for name, pictures in frames.items() if name not in moved},
         times.time_s,
@@ -60,7 +61,7 @@ def _see(
         wire,
         Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
         calibration.background,
-        VisionSettings(clock_sigma_s=settings.clock_sigma_s),
+        VisionSettings(clock_sigma_s=clock_sigma_s),
     )
     whisks = [whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks]
     return {
@@ -69,6 +70,7 @@ def _see(
         "bar_radius_mm": 0.5 * trial.bar_diameter_mm,
         "wire_radius_mm": 0.5 * wire.diameter_mm,
         "notes": [*truth.notes, *_lost(frames, times)],
+        "clock": {"source": times.source, "sigma_s": clock_sigma_s, "recorded": times.clock_sigma_s == 0.0},
     }
 
 

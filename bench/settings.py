@@ -16,21 +16,23 @@ class Settings:
     """theta_deg: pushing angle of truth and estimates. alpha_est_deg: friction angle that (10) assumes.
 
     cutoff_Hz: of the zero-phase low-pass; None goes by speed. estimators: "module:function" of one's own.
-    clock_sigma_s: how well the cameras' clock is known against the motor's. Raises BadInput out of range.
+    clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
+    (`FrameTimes.clock_sigma_s`). Raises BadInput out of range.
     """
 
     theta_deg: float = 3.0
     alpha_est_deg: float = 10.0
     cutoff_Hz: float | None = None
     estimators: tuple[str, ...] = ()
-    clock_sigma_s: float = 0.0
+    clock_sigma_s: float | None = None
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)
         _require("--alpha-est-deg", self.alpha_est_deg, 0.0, 89.0)
         if self.cutoff_Hz is not None:
             _require("--cutoff-Hz", self.cutoff_Hz, 0.0, 1e5, above=True)
-        _require("--clock-sigma-s", self.clock_sigma_s, 0.0, 10.0)
+        if self.clock_sigma_s is not None:
+            _require("--clock-sigma-s", self.clock_sigma_s, 0.0, 10.0)
 
     @property
     def theta_rad(self) -> float:

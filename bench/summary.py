@@ -1,5 +1,6 @@
 """summary.txt: the verdict first, then what it rests on. Also shown in the terminal."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from bench.assembly import beam_rows, budget_rows
 from bench.atomic import write_whole
 from bench.compare import Judged, judge, whisks
 from bench.drawing import label_of
+from bench.felt import GAUGE_DELAY_S, lateness
 from bench.friction_runs import FITTED, RUNS, SEEN
 from bench.friction_tables import SurfaceFriction, alpha_lines
 from bench.gauges import GaugeMatrix, Gauges
@@ -50,6 +52,7 @@ def write_summary(
                 "Truth, from the pictures (± one sigma)",
                 [*_truth_lines(results), *_budget_lines(results), *_beam_lines(results)],
             ),
+            *_titled("Clocks", _clock_lines(results)),
             *_titled(
                 f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)",
                 _error_lines(judged),
@@ -118,15 +121,38 @@ def _truth_lines(results) -> Iterator[str]:
     if rows:
         yield (
             f"{'trial':<18}{'whisk':>5}  {'β seen':>16}  {'d_x':>17}  {'slip at θ':>17}  {'touch seen':>17}  "
-            f"{'felt − seen':>11}"
+            f"{'felt − seen':>17}"
         )
     for result, s, felt in rows:
         at = s["at"]
-        late = np.degrees(number(felt.get("touch_felt_rad")) - s["touch_rad"])
+        late, late_sigma = np.degrees(lateness(s, felt))
         yield (
             f"{result['trial']['name']:<18}{s['whisk']:>5}  {_pm(s, 'beta', 2, degrees=True):>15}°  "
             f"{_pm(s, 'd_x', 3):>14} mm  {_pm(at, 'slip', 3):>14} mm  {_pm(s, 'touch', 3, degrees=True):>16}°  "
-            f"{late:>+10.3f}°"
+            f"{f'{late:+.3f} ± {late_sigma:.3f}':>16}°"
+        )
+
+
+def _clock_lines(results) -> Iterator[str]:
+    """What ties the frames to the signals, a line for each way, and what the felt touch is late by."""
+    clocks = [result["seen"]["clock"] for result in results if result["seen"].get("clock")]
+    ways = Counter((clock["source"], clock["sigma_s"], clock["recorded"]) for clock in clocks)
+    for (source, sigma_s, recorded), number_of in ways.items():
+        count = f"{number_of} of {len(clocks)} trials"
+        known = f"taken as known to {1e3 * sigma_s:.3g} ms, which is in the sigma of touch seen"
+        if recorded:
+            yield f"frame times as recorded ({source}), {count}; their clock is " + (
+                known if sigma_s else "taken as that of the signals"
+            )
+        else:
+            yield (
+                f"frame times by {source}, {count}: no recorded edge ties them to the signals, and forward "
+                f"strokes do not tell the clock from the encoder's zero; {known}"
+            )
+    if ways:
+        yield (
+            f"felt − seen: its sigma holds {1e3 * GAUGE_DELAY_S:.2f} ms of delay by a gauges' filter of 800 Hz, fourth "
+            "order (the session does not name its own)"
         )
 
 

@@ -28,7 +28,7 @@ def replace_frames_csv(folder, toml: str) -> None:
 
 def test_frames_csv(small_copy):
     found = times(small_copy)
-    assert found.source == "frames.csv"
+    assert (found.source, found.clock_sigma_s) == ("frames.csv", 0.0)
     np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=1e-12)
     assert {camera: list(index) for camera, index in found.picture.items()} == {
         "high": list(range(11)),
@@ -40,7 +40,13 @@ def test_stated_rate(small_copy, folder):
     replace_frames_csv(folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\n")
     found = times(small_copy)
     assert (found.source, found.doubts) == ("frame_rate_Hz", ())
+    assert found.clock_sigma_s == 0.025  # half a frame: no edge was recorded
     np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=1e-12)
+
+
+def test_a_stated_sigma_of_the_first_frame_is_the_clocks(small_copy, folder):
+    replace_frames_csv(folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\nfirst_frame_sigma_s = 0.002\n")
+    assert times(small_copy).clock_sigma_s == 0.002
 
 
 def test_stated_rate_without_a_start_is_doubtful(small_copy, folder):
@@ -76,7 +82,7 @@ def test_container_times_are_doubtful(small_copy, folder, as_video):
     for camera in ("high", "low"):
         as_video(folder / camera, ".mkv", "FFV1")
     found = times(small_copy)
-    assert found.source == "container"
+    assert found.source == "container" and found.clock_sigma_s == pytest.approx(0.025, rel=0.05)
     assert "nothing ties them to the signals' clock" in found.doubts[0]
     np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=6e-4)  # rounded to 1 ms
 
