@@ -1,18 +1,33 @@
-"""Wires that do not bend as a beam with a point load, as line points of a scene whose contacts stay what they are.
+"""Wires that do not bend as a beam with a point load, and what the whisk says of them.
+
+    python tests/ladder/broken_beams.py FOLDER --count 20
 
 The contact points of exact mechanics are kept, so that touch, d_x and slip keep their truth; between base, contact and
 tip the wire takes the shape of another rod that is pushed as far: softer in part, with a joint, in a clamp that gives.
+Or the fit is told the wrong profile. Prints, for each break, in how many scenes it moved d_x, touch or slip by more
+than their sigma, and in how many of these, and of the others, there was an alarm.
 """
 
+import argparse
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from tests.ladder.scenes import Scene
-from vision.fit import Observed
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-_GRID = 400
+from bench.rig.protocol import WhiskerTable
+from tests.ladder.coverage import SCALES
+from tests.ladder.rows import all_rows
+from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, line_points
+from vision.beam_check import BeamCheck, check_beam
+from vision.fit import Observed, Problem, honest, solve
+from vision.quantities import calibration_share, jacobians
+
+_GRID = 400  # intervals of the integrals along the wire
 # Softness (n,) along the arc (n,), mm, of a rod of this length that is 1 at the base.
 Softness = Callable[[np.ndarray, float], np.ndarray]
 
@@ -60,3 +75,66 @@ def _moved(scene: Scene, one: Observed, softness: Softness, along) -> Observed:
     share = deflection(softness, place, state.arc_mm, length) - deflection(uniform, place, state.arc_mm, length)
     px = one.points.px + camera.project(points + share[:, None] * pushed) - camera.project(points)
     return replace(one, points=replace(one.points, px=px))
+
+
+BREAKS = {
+    "none": None,
+    "outer half 1.5 times as soft": softer_outside(1.5),
+    "joint at 30 mm, of 5 mm": joint(30.0, 5.0),
+    "clamp that gives as 3 mm": loose_clamp(3.0),
+    "cone entered as cylinder": "cylinder",
+}
+QUANTITIES = ("d_x", "touch", "slip")
+COLUMNS = ("seed", "chance", "alarm", *(f"{name}_{what}" for name in QUANTITIES for what in ("moved", "told")))
+
+
+def check_of(problem: Problem) -> BeamCheck:
+    """The check of line points, fitted as those of a trial."""
+    state, _ = solve(problem, begin(problem), scales=SCALES)
+    problem = honest(problem, state)
+    state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
+    covariance = lines + calibration_share(problem, state, lines)
+    return check_beam(problem, state, covariance, *jacobians(problem, state))
+
+
+def row_of(seed: int, how: Softness | str | None) -> dict:
+    """Of a break in a scene: what it moves, and what the spline says it moved, in stated sigmas."""
+    wrong_shape = how if isinstance(how, str) else None
+    scene = draw_scene(seed, whisker=WhiskerTable(shape="cone" if wrong_shape else "cylinder"))
+    rng = np.random.default_rng([scene.seed, 22])
+    cameras, (wire, bar), seen = calibrated(scene, rng), given(scene, rng), line_points(scene, rng)
+    whole = check_of(as_problem(scene, cameras, wire, bar, seen))
+    if wrong_shape:
+        wire = replace(wire, shape=wrong_shape)
+    elif how:
+        seen = broken(scene, seen, how)
+    check = check_of(as_problem(scene, cameras, wire, bar, seen))
+    row = {"seed": seed, "chance": check.chance, "alarm": int(bool(check.alarm))}
+    for quantity in QUANTITIES:
+        before, after = getattr(whole, quantity), getattr(check, quantity)
+        row |= {f"{quantity}_moved": (after.beam - before.beam) / after.sigma, f"{quantity}_told": after.shift}
+    return row
+
+
+def summary(name: str, rows: Sequence[dict]) -> str:
+    """A line on a break."""
+    moved = np.array([max(abs(row[f"{quantity}_moved"]) for quantity in QUANTITIES) for row in rows])
+    alarms, far = np.array([row["alarm"] == 1 for row in rows]), moved > 1.0
+    return (
+        f"{name:30s} moved by over a sigma in {far.sum():3d} of {len(rows)}, alarm in {alarms[far].sum():3d} of these "
+        f"and {alarms[~far].sum():3d} of the others; least chance {min(row['chance'] for row in rows):.1g}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--count", type=int, default=20)
+    options = parser.parse_args()
+    for name, how in BREAKS.items():
+        table = options.folder / f"{name.replace(' ', '_')}.csv"
+        print(summary(name, all_rows(table, COLUMNS, range(options.count), partial(row_of, how=how))), flush=True)
+
+
+if __name__ == "__main__":
+    main()

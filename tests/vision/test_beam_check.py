@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 from bench.rig.protocol import WhiskerTable
-from tests.ladder.broken_beams import broken, joint, loose_clamp, softer_outside
-from tests.ladder.coverage import SCALES
-from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.beam_check import BeamCheck, Compared, _beside, check_beam
-from vision.fit import honest, solve
-from vision.quantities import jacobians
+from tests.ladder.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
+from tests.ladder.scenes import as_problem, draw_scene, line_points
+from vision.beam_check import BeamCheck, Compared, _beside
 from vision.scene import Wire
 
 
@@ -20,11 +17,7 @@ def checked(seed: int, softness=None, shape="cylinder", given="cylinder") -> Bea
     if softness is not None:
         seen = broken(scene, seen, softness)
     wire = Wire(given, scene.wire.length_mm, scene.wire.diameter_mm)
-    problem = as_problem(scene, scene.cameras, wire, scene.bar, seen)
-    state, _ = solve(problem, begin(problem), scales=SCALES)
-    problem = honest(problem, state)
-    state, covariance = solve(problem, state, scales=(4.0, 4.0, 4.0))
-    return check_beam(problem, state, covariance, *jacobians(problem, state))
+    return check_of(as_problem(scene, scene.cameras, wire, scene.bar, seen))
 
 
 @pytest.mark.parametrize("seed", range(4))
