@@ -67,7 +67,7 @@ class Compared:
 class BeamCheck:
     """Beam against spline in one whisk: d_x (mm), touch (rad), slip (mm) at the largest pushing angle theta_rad.
 
-    chance: by which a wire that bends as a beam departs from it so far.
+    chance: by which a wire that bends as a beam departs from it so far; NaN where the fit is nowhere.
     """
 
     d_x: Compared
@@ -80,7 +80,7 @@ class BeamCheck:
     def alarm(self) -> str:
         """What is wrong, or '': the curves differ by more than chance, and the truth with them by what matters."""
         worst = max(_NAMES, key=lambda name: abs(getattr(self, name).shift))
-        if self.chance > FALSE_ALARM or abs(getattr(self, worst).shift) < _MATTERS:
+        if not (self.chance <= FALSE_ALARM and abs(getattr(self, worst).shift) >= _MATTERS):
             return ""
         moved: Compared = getattr(self, worst)
         scale, unit = (np.degrees(1.0), "deg") if worst == "touch" else (1.0, "mm")
@@ -103,9 +103,16 @@ def check_beam(problem: Problem, state: State, covariance, measured: Measured, b
         row = gradient @ follows + (slip_by if name == "slip" else 0.0)
         sigma, beam = np.sqrt(gradient @ covariance @ gradient), float(values[name])
         found[name] = Compared(beam, beam + float(row @ departure), float(np.sqrt(row @ spread @ row)), float(sigma))
-    square = departure @ np.linalg.solve(spread, departure)
     theta = float(problem.motor_rad[last] - measured.whisk["touch"])
-    return BeamCheck(**found, theta_rad=theta, chance=float(chi2.sf(square, len(departure))))
+    return BeamCheck(**found, theta_rad=theta, chance=_chance(departure, spread))
+
+
+def _chance(departure, spread) -> float:
+    """Of a departure so far from none; 1 where the lines do not tell it, NaN where the fit is nowhere."""
+    if not np.all(np.isfinite(spread)):
+        return float("nan")
+    square = departure @ np.linalg.pinv(spread, hermitian=True) @ departure
+    return float(chi2.sf(square, len(departure)))
 
 
 def _departure(problem: Problem, state: State, frame: int):

@@ -6,7 +6,7 @@ import pytest
 from bench.rig.protocol import WhiskerTable
 from tests.ladder.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
 from tests.ladder.scenes import as_problem, draw_scene, line_points
-from vision.beam_check import BeamCheck, Compared, _beside
+from vision.beam_check import BeamCheck, Compared, _beside, _chance
 from vision.scene import Wire
 
 
@@ -53,6 +53,15 @@ def test_little_is_no_alarm_however_sure():
     assert BeamCheck(small, small, small, 0.1, 1e-12).alarm == ""
     assert "slip at 5.7 deg is +0.0400 mm" in BeamCheck(small, small, large, 0.1, 1e-12).alarm
     assert BeamCheck(small, small, large, 0.1, 0.01).alarm == ""
+    assert BeamCheck(small, small, large, 0.1, float("nan")).alarm == ""
+
+
+def test_lines_that_tell_nothing_are_no_departure():
+    """No point lies on a bent wire: nothing is told, and nothing breaks."""
+    own, nothing = np.eye(3), np.zeros((3, 2))
+    found, spread, _ = _beside(own, np.zeros((1, 3)), nothing, np.ones(3), np.zeros((3, 1)), np.zeros((1, 1)))
+    assert _chance(found, spread) == 1.0
+    assert np.isnan(_chance(found, np.nan * spread))
 
 
 def test_one_step_is_the_joint_fit(rng):
