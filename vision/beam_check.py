@@ -85,10 +85,11 @@ class BeamCheck:
         moved: Compared = getattr(self, worst)
         scale, unit = (np.degrees(1.0), "deg") if worst == "touch" else (1.0, "mm")
         what = f"slip at {np.degrees(self.theta_rad):.1f} deg" if worst == "slip" else worst
+        by = f"{scale * (moved.spline - moved.beam):+.4f} ± {scale * moved.difference_sigma:.4f} {unit}"
         return (
             f"the wire does not bend as a beam with a point load (chance {self.chance:.1g}): by a spline {what} is "
-            f"{scale * (moved.spline - moved.beam):+.4f} {unit} from the beam's, {abs(moved.shift):.1f} of its stated "
-            "sigma; check the whisker's shape, its clamp, and its shaft for joints"
+            f"{by} from the beam's, {abs(moved.shift):.1f} of its stated sigma; check the whisker's shape, its clamp, "
+            "and its shaft for joints"
         )
 
 
