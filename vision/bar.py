@@ -94,7 +94,7 @@ def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float)
         along, sideways = _axis_frame(axis, camera)
         inside = _sample(changes[camera.name], camera, along, sideways, radius_mm * _INSIDE)
         outside = _sample(changes[camera.name], camera, along, sideways, radius_mm * _OUTSIDE)
-        total += np.nanmean(inside, axis=(1, 2)) - np.nanmean(outside, axis=(1, 2))
+        total += inside.mean(axis=(1, 2)) - outside.mean(axis=(1, 2))
     return total / len(cameras)
 
 

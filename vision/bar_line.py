@@ -11,6 +11,7 @@ import numpy as np
 
 from vision.binned import binned, without
 from vision.contact import BarAxis
+from vision.descent import descend
 from vision.effort import VisionSettings
 from vision.line import RIMS, WAVES, LinePoints, Pieces, cut_pieces, read_band
 from vision.shading import fit_shading, locate, wave_prior
@@ -26,12 +27,11 @@ _UNTOLD_PX = 0.7  # a sigma that is more: the misfit has no minimum there to spe
 _NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
 _KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
-_ROUNDS = 2
-_MOST_STEPS, _SETTLED_PX = 6, 0.01
+_ROUGHLY, _EXACTLY = (0.3,), (0.1, 0.05)  # px: what a line may still move by, round by round
 _STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 _BIN_PX, _COARSE_BIN_PX = 0.25, 0.75
-_BLURS_PX = (0.5, 0.6, 0.7, 0.8, 0.9, 1.05, 1.25, 1.5, 1.9, 2.5)
+_BLURS_PX = (0.55, 0.8, 1.15, 1.65, 2.4)  # to begin with
 # Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/truth.md).
 _FORMAL_TO_TRUE = 2.0
 
@@ -59,9 +59,9 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
     knots = np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM)
     line, blur_px = _sweep(pieces, knots, off_px), None
     pieces = _of_bar_alone(pieces, line, knots)
-    for _ in range(1 if off_px else _ROUNDS):  # line, blur, and what counts as a rim depend on each other
+    for settled_px in _ROUGHLY if off_px else _EXACTLY:  # line, blur, and what counts as a rim depend on each other
         model = _model(pieces, line, knots)
-        line, blur_px, covariance, misfit = _settle(model, line, blur_px or _best_blur(model, line))
+        line, blur_px, covariance, misfit = _settle(model, line, blur_px, settled_px)
         on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
     points = _two_points(pieces, line, covariance)
@@ -98,12 +98,6 @@ def _model(pieces: Pieces, line, knots) -> _Model:
     if float(np.median(pieces.radius_px)) > _THICK_PX:
         return _Model(_rims(pieces, line), RIMS, knots, 1.0, None)
     return _Model(pieces, WAVES, knots, 1.0, wave_prior(pieces, WAVES))
-
-
-def _best_blur(model: _Model, line) -> float:
-    pieces, blurred = binned(model.pieces, _BIN_PX)
-    model = replace(model, pieces=pieces)
-    return without(min(_BLURS_PX, key=lambda blur: replace(model, blur_px=blur).misfit(line)), blurred)
 
 
 def _rims(pieces: Pieces, line) -> Pieces:
@@ -168,47 +162,20 @@ def _sweep(pieces: Pieces, knots, off_px: float) -> np.ndarray:
     return line
 
 
-def _settle(model: _Model, line, blur_px: float):
-    """Line and blur at the least misfit, the line's covariance (2, 2) from the curvature there, and the misfit.
-
-    Newton's method in shift, tilt and logarithm of the blur, with derivatives from differences.
-    """
-    misfit = lambda q: replace(model, blur_px=float(np.exp(q[2]))).misfit(q[:2])  # noqa: E731
-    q = np.array([*line, np.log(blur_px)])
-    here = misfit(q)
-    for _ in range(_MOST_STEPS):
-        slope, curvature = _derivatives(misfit, q, here)
-        step = _downhill(slope, curvature)
-        trials = [(misfit(q + step * part), q + step * part) for part in (1.0, 0.3)]
-        lower, there = min(trials, key=lambda trial: trial[0])
-        if lower < here:
-            here, q = lower, there
-        if lower >= here or np.max(np.abs(step[:2])) < _SETTLED_PX:
-            break
-    pixels = float(np.sum(model.pieces.weight > 0))
+def _settle(model: _Model, line, blur_px: float | None, settled_px: float):
+    """Line and lens blur at the least misfit, the line's covariance (2, 2) from the curvature there, and the misfit."""
+    pieces, blurred = binned(model.pieces, _BIN_PX)
+    few = replace(model, pieces=pieces)
+    misfit = lambda q: replace(few, blur_px=float(np.exp(q[2]))).misfit(q[:2])  # noqa: E731
+    blurs = np.log(_BLURS_PX if blur_px is None else [blur_px])
+    begin = min((np.array([*line, blur]) for blur in blurs), key=misfit)
+    q, _, curvature = descend(misfit, begin, _STEPS, _LONGEST, settled_px)
+    blur_px = without(np.exp(q[2]), blurred)
+    here = replace(model, blur_px=blur_px).misfit(q[:2])
+    pixels = float(np.sum(pieces.weight > 0))
     values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(here, 1.0))
     inverse = vectors @ np.diag(1.0 / np.maximum(values, 4.0)) @ vectors.T
-    return q[:2], float(np.exp(q[2])), inverse[:2, :2] * _FORMAL_TO_TRUE**2, here
-
-
-def _derivatives(function, q, here: float) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient (n,) and second derivatives (n, n) by central differences; 2n + n(n-1)/2 evaluations."""
-    step = np.diag(_STEPS)
-    ahead, behind = (np.array([function(q + sign * row) for row in step]) for sign in (1, -1))
-    curvature = np.diag(ahead + behind - 2.0 * here)
-    for i in range(len(q)):
-        for j in range(i):
-            both = function(q + step[i] + step[j])
-            curvature[i, j] = curvature[j, i] = both - ahead[i] - ahead[j] + here
-    return (ahead - behind) / (2.0 * _STEPS), curvature / np.outer(_STEPS, _STEPS)
-
-
-def _downhill(slope, curvature) -> np.ndarray:
-    """Newton's step, turned downhill where the curvature is not positive, and not longer than _LONGEST."""
-    values, vectors = np.linalg.eigh(curvature)
-    values = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values)))
-    step = -vectors @ ((vectors.T @ slope) / values)
-    return step / max(1.0, np.max(np.abs(step) / _LONGEST))
+    return q[:2], blur_px, inverse[:2, :2] * _FORMAL_TO_TRUE**2, here
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:

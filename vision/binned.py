@@ -21,7 +21,8 @@ def binned(pieces: Pieces, width_px: float) -> tuple[Pieces, float]:
             for name in ("offset_px", "grey", "background", "slope", "curvature")}
     spread = (pieces.offset_px - mean["offset_px"].ravel()[place]) ** 2
     values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__} | mean
-    return Pieces(**values | {"weight": np.sqrt(total)}), float(np.average(spread, weights=weight))
+    fewer = Pieces(**values | {"weight": np.sqrt(total)})
+    return fewer.columns(np.any(total > 0, axis=0)), float(np.average(spread, weights=weight))
 
 
 def without(blur_px: float, variance_px2: float) -> float:

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import minimize
 
 from vision.binned import binned, without
+from vision.descent import descend
 from vision.fit import Observed
 from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.scene import Camera, Wire
@@ -19,6 +19,8 @@ _BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
 _BIN_PX = 0.25
+_STEPS, _LONGEST = np.array([0.1, 0.1, 0.1, 0.08]), np.array([0.5, 0.4, 0.4, 0.3])  # shift, tilt, bow (px), log blur
+_SETTLED = 0.05
 _FEW_PIECES, _ENOUGH_PIECES = 30, 100
 _STILL_SIGMAS = 0.7  # of a piece's own, below which another round would only trade its shift for shading
 _WORST_SIGMA_PX = 0.5
@@ -91,25 +93,25 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     then blur and what all frames share, shift, tilt and bow, are looked for together, with all waves that a narrow
     highlight has: what they lack passes for blur.
     """
-    pieces, found, typical = trace(pieces, _best_blur(pieces, knots_mm), WAVES, knots_mm, rounds=2)
-    lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
-    bow = np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
+    rough, blurred = binned(pieces, _BIN_PX)
+    near, found, typical = trace(rough, _best_blur(rough, knots_mm), WAVES, knots_mm, rounds=2)
+    lever = 2.0 * (near.place - near.place.min()) / max(np.ptp(near.place), 1e-9) - 1.0
+    bow = np.stack([np.ones(len(near)), lever, lever**2 - 1.0 / 3.0], axis=1)
     plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
-    prior = wave_prior(pieces.select(plain), _ALL_WAVES)
-    (looked_at, blurred), bow_there = binned(pieces.select(plain), _BIN_PX), bow[plain]
+    shown, bow_there = near.select(plain), bow[plain]
+    prior = wave_prior(shown, _ALL_WAVES)
 
     def misfit(moves_and_blur, every: int) -> float:
-        some = looked_at.select(slice(None, None, every)).moved(bow_there[::every] @ moves_and_blur[:3])
+        some = shown.select(slice(None, None, every)).moved(bow_there[::every] @ moves_and_blur[:3])
         return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots_mm, prior=prior)[1]
 
-    few, enough = (max(1, round(len(looked_at) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
+    few, enough = (max(1, round(len(shown) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
     starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
               for blur in _BLURS_PX[1:8]]
     best = min(starts, key=lambda start: misfit(start, few))
-    simplex = best + np.concatenate([np.zeros((1, 4)), np.diag([0.15, 0.1, 0.1, 0.08])])
-    found = minimize(misfit, best, (enough,), method="Nelder-Mead",
-                     options={"initial_simplex": simplex, "xatol": 0.01, "maxfev": 70})
-    return pieces.moved(bow @ found.x[:3]), without(np.exp(found.x[3]), blurred)
+    best, _, _ = descend(lambda q: misfit(q, enough), best, _STEPS, _LONGEST, _SETTLED)
+    moved = np.sum((near.foot_px - pieces.foot_px) * pieces.normal, axis=1) + bow @ best[:3]
+    return pieces.moved(moved), without(np.exp(best[3]), blurred)
 
 
 def _some(pieces: Pieces, count: int = _ENOUGH_PIECES) -> Pieces:

@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_simpson
 from vision.scene import Wire
 
 REST_POWERS = 4  # offset, slope, curvature and change of curvature, each across (y) and along the axis (z)
-_NODES = 81
+_NODES = 41
 
 
 def tangent_growth(arc_mm, contact_mm, wire: Wire) -> np.ndarray:

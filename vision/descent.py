@@ -1,0 +1,46 @@
+"""The least value of a smooth function of a few parameters, by Newton's method with derivatives from differences."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+_MOST_STEPS = 6
+
+
+def descend(function: Callable, begin, steps, longest, settled: float) -> tuple[np.ndarray, float, np.ndarray]:
+    """Where the function is least near `begin` (n,), its value there, and its second derivatives (n, n).
+
+    steps (n,): of the differences; longest (n,): a Newton step goes no farther. Ends when no part of a step is more
+    than `settled`, or nothing lower is found.
+    """
+    q, here = np.asarray(begin, dtype=float), function(begin)
+    for _ in range(_MOST_STEPS):
+        slope, curvature = _derivatives(function, q, here, steps)
+        step = _downhill(slope, curvature, longest)
+        trials = [(function(q + step * part), q + step * part) for part in (1.0, 0.3)]
+        lower, there = min(trials, key=lambda trial: trial[0])
+        if lower < here:
+            q, moved, here = there, np.max(np.abs(there - q)), lower
+        if lower > here or moved < settled:
+            break
+    return q, here, curvature
+
+
+def _derivatives(function, q, here: float, steps) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (n,) and second derivatives (n, n) by central differences; 2n + n(n-1)/2 evaluations."""
+    step = np.diag(steps)
+    ahead, behind = (np.array([function(q + sign * row) for row in step]) for sign in (1, -1))
+    curvature = np.diag(ahead + behind - 2.0 * here)
+    for i in range(len(q)):
+        for j in range(i):
+            both = function(q + step[i] + step[j])
+            curvature[i, j] = curvature[j, i] = both - ahead[i] - ahead[j] + here
+    return (ahead - behind) / (2.0 * steps), curvature / np.outer(steps, steps)
+
+
+def _downhill(slope, curvature, longest) -> np.ndarray:
+    """Newton's step, turned downhill where the curvature is not positive, and not longer than allowed."""
+    values, vectors = np.linalg.eigh(curvature)
+    values = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values)))
+    step = -vectors @ ((vectors.T @ slope) / values)
+    return step / max(1.0, np.max(np.abs(step) / longest))
