@@ -26,7 +26,7 @@ REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
 # How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
-BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.07
+BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.035
 BAR_TILT_ARM_MM = 20.0
 CONTACT_SIGMA_MM = 0.002
 # Neighbouring points of a wire share what is behind them, and so do the same points of the next frames: their
