@@ -89,18 +89,20 @@ def _climb(starts, changes, cameras, radius_mm: float, reach_mm: float) -> tuple
 def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float) -> np.ndarray:
     """Mean over cameras of (change inside the outline) - (change beside it), (n,) for hypotheses (n, 4)."""
     axis = axis_from_angles(*angles.T, reach_mm)
-    total = np.zeros(len(angles))
-    for camera in cameras:
-        along, sideways = _axis_frame(axis, camera)
-        inside = _sample(changes[camera.name], camera, along, sideways, radius_mm * _INSIDE)
-        outside = _sample(changes[camera.name], camera, along, sideways, radius_mm * _OUTSIDE)
-        total += inside.mean(axis=(1, 2)) - outside.mean(axis=(1, 2))
-    return total / len(cameras)
+    offsets = radius_mm * _INSIDE, radius_mm * _OUTSIDE
+    return sum(standing_out(axis, changes[camera.name], camera, *offsets) for camera in cameras) / len(cameras)
 
 
-def _axis_frame(axis: BarAxis, camera):
+def standing_out(axis: BarAxis, change, camera, inside_mm, outside_mm, along_mm=_ALONG_MM) -> np.ndarray:
+    """(change inside the outline) - (change beside it), (n,) for axes (n, 3), read at these places beside each axis."""
+    along, sideways = _axis_frame(axis, camera, along_mm)
+    inside, outside = (_sample(change, camera, along, sideways, offsets) for offsets in (inside_mm, outside_mm))
+    return inside.mean(axis=(1, 2)) - outside.mean(axis=(1, 2))
+
+
+def _axis_frame(axis: BarAxis, camera, along_mm):
     """Points (n, t, 3) along each axis and the direction (n, 3) in which the camera sees its width."""
-    along = axis.point_mm[:, None] + _ALONG_MM[:, None] * axis.direction[:, None]
+    along = axis.point_mm[:, None] + along_mm[:, None] * axis.direction[:, None]
     sideways = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
     return along, sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
 

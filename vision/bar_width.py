@@ -29,13 +29,14 @@ def bar_diameter_mm(
     wire: Wire,
     bar: Bar,
 ) -> float:
-    """Diameter of the bar as the cameras see it, mm; NaN where none shows both rims.
+    """Diameter of the bar as the cameras see it, mm; NaN where none shows both rims, or fewer than two cameras see it:
+    one alone takes from this diameter how far away the bar is.
 
     pictures: grey (h, w) of one trial by camera, spread over it; background: the same without rods. motor_rad: lowest
     and highest motor angle. Raises Refused where nothing like the bar is seen.
     """
     names = [n for n in cameras.names if len(pictures.get(n, ())) >= _FEWEST_PICTURES and background.get(n) is not None]
-    if not names:
+    if len(names) < 2:
         return np.nan
     used = cameras.subset(names)
     changes = {name: _change(pictures[name], background[name]) for name in names}

@@ -15,6 +15,7 @@ import numpy as np
 from vision.bar import axis_frame, shifted_axis
 from vision.contact import BarAxis, clearance, closest_arc
 from vision.line import LinePoints
+from vision.onset import Onset
 from vision.scene import Cameras, Wire
 from vision.silhouette import edges
 from vision.wire import REST_POWERS, Curves, centrelines
@@ -38,11 +39,15 @@ _STILL_SIGMA = 0.01  # a step that moves all parameters together by less than th
 
 @dataclass(frozen=True)
 class Observed:
-    """Line points of one camera in one frame (frame is -1 for the bar, which stands still)."""
+    """Line points of one camera in one frame (frame is -1 for the bar, which stands still).
+
+    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals.
+    """
 
     frame: int
     camera: int
     points: LinePoints
+    side: int = 0
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,8 @@ class Problem:
     """What is known and seen of one whisk.
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
-    axis: where the bar's four parameters are counted from.
+    axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
+    cameras do not know whisker and bar well enough in space to tell when they touch.
     """
 
     cameras: Cameras
@@ -62,6 +68,7 @@ class Problem:
     touching: np.ndarray
     bent: np.ndarray
     seen: Sequence[Observed]
+    onset: Onset | None = None
 
     @property
     def size(self) -> int:
@@ -140,6 +147,8 @@ def linearise(problem: Problem, state: State) -> tuple[Linear, State]:
               else _bar_block(problem, camera, list(group), state.vector) for (camera, on_wire), group in alike]
     count = sum(len(block[0]) for block in blocks)
     blocks += [_contact_block(problem, moved, curves, columns, state.vector), _prior_block(problem, state.vector)]
+    if problem.onset is not None:
+        blocks.append(_onset_block(problem, problem.onset, moved, columns, state.vector))
     residual = np.concatenate([block[0] for block in blocks])
     jacobian = np.concatenate([block[1] for block in blocks])
     return (Linear(residual, jacobian, np.arange(len(residual)) < count),
@@ -195,22 +204,37 @@ def _over_sigma(points: LinePoints, px, jacobian, first: int, lever, vector):
 
 def bar_middle(problem: Problem, camera, vector, place_mm) -> np.ndarray:
     """Middle (…, n, 2) of the bar's outline in one camera, at places (n,) along its axis; vector (…, size)."""
+    one, other = _bar_edges(problem, camera, vector, place_mm, 0.0)
+    return 0.5 * (one + other)
+
+
+def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np.ndarray, np.ndarray]:
+    """Both edges (…, n, 2) of the bar's outline; wider_mm (…, n) or a number: added to the bar's radius."""
     axis = bar_axis(problem, vector)
     points = axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
     directions = np.broadcast_to(axis.direction[..., None, :], points.shape)
-    one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3),
-                       problem.reach_mm - problem.wire.diameter_mm / 2)
-    return (0.5 * (one + other)).reshape(*points.shape[:-1], 2)
+    radius_mm = np.broadcast_to(problem.reach_mm - problem.wire.diameter_mm / 2 + wider_mm, points.shape[:-1])
+    one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radius_mm.ravel())
+    return one.reshape(*points.shape[:-1], 2), other.reshape(*points.shape[:-1], 2)
 
 
 def _bar_block(problem: Problem, number: int, group: Sequence[Observed], vector):
-    """Residuals and Jacobian rows of one camera's points of the bar."""
-    points, step = _together(group), _steps(problem)[:BAR]
-    moved = vector + step[:, None] * np.eye(BAR, problem.size)
-    px = bar_middle(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points.place)
+    """Residuals and Jacobian rows of one camera's points of the bar: of its middle, or of an edge."""
+    points, side = _together(group), np.repeat([s.side for s in group], [len(s.points) for s in group])
+    moving = [*range(BAR), BAR + REST] if np.any(side) else [*range(BAR)]
+    step = _steps(problem)[moving]
+    moved = vector + step[:, None] * np.eye(problem.size)[moving]
+    px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side)
     jacobian = np.zeros((len(points), problem.size))
-    jacobian[:, :BAR] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
+    jacobian[:, moving] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
     return _over_sigma(points, px[0], jacobian, BAR + REST + 1 + 4 * number + 2, points.place / BAR_TILT_ARM_MM, vector)
+
+
+def _bar_px(problem: Problem, camera, vector, points: LinePoints, side) -> np.ndarray:
+    """Where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's error is taken for the bar's."""
+    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., BAR + REST, None] * (side != 0))
+    half = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
+    return 0.5 * (one + other) + side[:, None] * half * points.normal
 
 
 def _contact_block(problem: Problem, moved, curves: Curves, columns, vector):
@@ -226,6 +250,22 @@ def _contact_block(problem: Problem, moved, curves: Curves, columns, vector):
     jacobian[:, BAR + REST] = -1.0
     residual = distance[0, frames] - problem.reach_mm - vector[BAR + REST]
     return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
+
+
+def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
+    """At the onset of bending the unbent whisker is the reach away from the axis."""
+    rest, axis = rest_shape(moved), bar_axis(problem, moved)
+    count = len(moved)
+    curves = centrelines(rest, np.zeros((count, 2)), np.full(count, problem.wire.length_mm / 2),
+                         np.full(count, onset.motor_rad), problem.wire)
+    distance, arc, _ = clearance(curves, axis)
+    sigma_mm = onset.sigma_rad * arc[0]
+    jacobian = np.zeros((1, problem.size))
+    for k in range(BAR + REST):
+        jacobian[0, k] = (distance[k + 1] - distance[0]) / columns[k][0]
+    jacobian[0, BAR + REST] = -1.0
+    residual = distance[:1] - problem.reach_mm - vector[BAR + REST]
+    return residual / sigma_mm, jacobian / sigma_mm
 
 
 def _prior_block(problem: Problem, vector):

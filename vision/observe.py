@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.bar import HALF, changed, find_bar, settle_axis
+from vision.bar_edges import measure_edges
 from vision.bar_line import FAR_PX, NEAR_PX, measure_bar
 from vision.base_line import base_lines
 from vision.beam_check import check_beam
@@ -20,13 +21,14 @@ from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.fit import LAST_SCALE, Observed, Problem, State, bar_axis, bends, curves_of, honest, rest_shape, solve
-from vision.line import WAVES, Noise, measure_noise
+from vision.line import WAVES, LinePoints, Noise, measure_noise
 from vision.one_sided import Lit, one_sided_lines, seen_width
+from vision.one_view import see_bar_alone, seen_from_one_side, touch_by_onset
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
-from vision.touch import first_touch, frames_by_touch, frames_that_touch
+from vision.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
 from vision.trace import MEAN_OF, View, clear_of_bar, observed, settle, to_points, trace, wire_pieces
 from vision.truth import TrialTruth, WhiskTruth
 from vision.wire import Curves
@@ -37,10 +39,9 @@ _BESIDE_BAR_PX = 4.0
 _SEARCH_PX = 1.5
 _ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
-_FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
-_STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
+_STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 _USUAL = VisionSettings()
 
@@ -80,9 +81,6 @@ def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_
         axis = _see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
-    if len(views) == 1:
-        return _nothing(whisks, f"camera {views[0].camera.name} alone does not tell how far away the bar is; two are "
-                                "needed")
     lights = [{} for _ in whisks]
     rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, axis, time_s, motor_rad,
                        lights[number], settings) for number, where in enumerate(whisks)]
@@ -124,6 +122,15 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
     """The bar's axis from the pictures of all frames, before any wire is known."""
     changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
                for view in views}
+    axis = _see_bar_by_lines(changes, views, cameras, rods, motor_rad, settings) if len(views) > 1 else None
+    if axis is not None and not seen_from_one_side(cameras, axis):
+        return axis
+    change = changes[views[0].camera.name]
+    return see_bar_alone(change, _of_mean(views[0]), rods.wire, rods.bar.radius_mm, motor_rad, settings)
+
+
+def _see_bar_by_lines(changes, views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSettings) -> BarAxis:
+    """Where the sights of two cameras or more cross."""
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
     for off_px in (FAR_PX, NEAR_PX):
@@ -137,11 +144,15 @@ def _see_bar(views, cameras: Cameras, rods: _Rods, motor_rad, settings: VisionSe
 def _bar_lines(views, axis: BarAxis, rods: _Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
                last: bool = False):
     """The bar's line in each camera that shows enough of it."""
-    found = {view.camera.name: measure_bar(replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF))),
-                                           view.mean, axis, rods.bar.radius_mm,
+    found = {view.camera.name: measure_bar(_of_mean(view), view.mean, axis, rods.bar.radius_mm,
                                            wires.get(view.camera.name, []), settings, off_px=off_px, last=last)
              for view in views}
     return {name: line for name, line in found.items() if line is not None}
+
+
+def _of_mean(view: View) -> View:
+    """The view with the noise of its mean picture."""
+    return replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF)))
 
 
 def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis, time_s, motor_rad,
@@ -149,9 +160,8 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
     """Truth of one whisk; its status where there is none."""
     views, left_out = _with_frames(views, indices)
     seen = [f for f in indices if all(f in view.frames for view in views)]
-    if len(seen) < 4 or len(views) < 2:
-        count = len(seen) if len(views) > 1 else 0
-        few = f"{count} frames seen by two cameras or more, 4 are needed"
+    if len(seen) < 4:
+        few = f"{len(seen)} frames seen by every camera, 4 are needed"
         return WhiskTruth(number, None, status="; ".join(filter(None, [few, left_out])))
     cameras = cameras.subset([view.camera.name for view in views])
     motor = {f: float(motor_rad[f]) for f in seen}
@@ -189,30 +199,41 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
     (None, reason, …) where there is no touch to fit. light: filled with how each camera sees the wire.
     """
     angles = np.array(list(motor.values()))
-    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, _early(motor))
+    early = _early(motor)
+    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
     coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
     bend = np.array(list(coarse.values()))
     touching, free = frames_that_touch(angles, bend)
-    if not np.any(touching):
+    one_side = seen_from_one_side(cameras, axis)
+    if one_side:  # a bend along the sight is not seen at first
+        free = np.arange(len(angles)) < len(early)
+        touching = touching & ~free
+    elif not np.any(touching):
         return None, None, None
-    if np.sum(~touching) < _FEWEST_FREE:
+    if np.sum(~touching) < FEWEST_FREE:
         return None, _STARTS_TOUCHING, None
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
     curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
     for round_number in range(settings.rounds + 1):
         last = round_number == settings.rounds
-        seen = _trace_all(views, rods, axis, curves, light, settings, last=last)
+        seen = _trace_all(views, cameras, rods, axis, curves, light, settings, last=last)
         problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
-        fitted, _ = solve(problem, _begin(problem, rest, bend, arcs))
+        fitted, covariance = solve(problem, _begin(problem, rest, bend, arcs))
+        if one_side:
+            problem, fitted = touch_by_onset(problem, fitted, covariance)
+            fitted, _ = solve(problem, fitted)
         problem = honest(problem, fitted)
         fitted, covariance = solve(problem, fitted, scales=[LAST_SCALE] * 3)
         if last:
             break
         rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
         axis, curves = bar_axis(problem, fitted.vector), _fitted(problem, fitted, motor)
+        if one_side:
+            touching = problem.touching
+            continue
         touch = float(first_touch(problem, fitted.vector).motor_rad)
         touching, free = frames_by_touch(angles, touch, np.radians(0.02))
-        if np.sum(free) < _FEWEST_FREE:
+        if np.sum(free) < FEWEST_FREE:
             return None, _STARTS_TOUCHING, None
         if not np.any(touching):
             return None, None, None
@@ -239,23 +260,31 @@ def _begin(problem: Problem, rest, bend, arcs) -> State:
     return State(vector, np.asarray(arcs, dtype=float))
 
 
-def _trace_all(views, rods: _Rods, axis: BarAxis, curves, light: dict, settings: VisionSettings, *,
+def _trace_all(views, cameras: Cameras, rods: _Rods, axis: BarAxis, curves, light: dict, settings: VisionSettings, *,
                last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. last: see
     `measure_bar`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in curves.values()] for view in views}
-    lines = _bar_lines(views, axis, rods, wires, settings, last=last)
+    bar = _trace_bar(views, cameras, rods, axis, wires, settings, last=last)
     seen = []
     for number, view in enumerate(views):
-        name = view.camera.name
         seen += _trace_wire(number, view, rods, axis, curves, light, settings)
-        if name in lines:
-            seen.append(Observed(-1, number, lines[name].points))
+        seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
     for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
         if not there:
             raise Refused(f"no camera shows enough of the {rod}")
     return seen
+
+
+def _trace_bar(views, cameras: Cameras, rods: _Rods, axis: BarAxis, wires, settings: VisionSettings, *,
+               last: bool) -> list[dict[int, LinePoints]]:
+    """Per camera the points of the bar's middle (side 0), or of its two edges where the cameras stand on one side."""
+    if seen_from_one_side(cameras, axis):
+        return [measure_edges(_of_mean(view), view.mean, axis, rods.bar.radius_mm, wires[view.camera.name],
+                              settings) or {} for view in views]
+    lines = _bar_lines(views, axis, rods, wires, settings, last=last)
+    return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
 
 
 def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, light: dict,

@@ -22,6 +22,7 @@ from vision.fit import (
     weighted_jacobian,
 )
 from vision.scene import N_PARAMETERS
+from vision.silhouette import grazed
 from vision.touch import FirstTouch, first_touch
 from vision.wire import Curves, centrelines
 
@@ -205,9 +206,19 @@ def _by_cameras(problem: Problem, seen: Observed, on_rod_mm) -> np.ndarray:
 
 
 def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
-    """Points (n, 3) of the rods' axes that the line points are pictures of."""
+    """Points (n, 3) of the rods' axes, or of the bar's edge, that the line points are pictures of."""
     if seen.frame < 0:
         axis = bar_axis(problem, state.vector)
-        return axis.point_mm + seen.points.place[:, None] * axis.direction
+        points = axis.point_mm + seen.points.place[:, None] * axis.direction
+        return _on_edge(problem, seen, points, axis) if seen.side else points
     one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
     return one.at(seen.points.place)[0]
+
+
+def _on_edge(problem: Problem, seen: Observed, points, axis: BarAxis) -> np.ndarray:
+    """Points (n, 3) of the bar's surface on the edge that is seen, beside points of its axis."""
+    camera = problem.cameras.cameras[seen.camera]
+    edges = grazed(camera, points, np.broadcast_to(axis.direction, points.shape),
+                   problem.reach_mm - problem.wire.diameter_mm / 2)
+    beside = [np.sum((camera.project(edge) - camera.project(points)) * seen.points.normal) for edge in edges]
+    return edges[int(np.argmax(seen.side * np.array(beside)))]

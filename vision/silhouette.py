@@ -16,7 +16,13 @@ def outline(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarra
 
 
 def edges(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
-    """The two edges (n, 2) each of a rod's outline at points (n, 3) of its axis; directions (n, 3), unit.
+    """The two edges (n, 2) each of a rod's outline at points (n, 3) of its axis; directions (n, 3), unit."""
+    one, other = np.split(camera.project(np.concatenate(grazed(camera, points_mm, directions, radius_mm))), 2)
+    return one, other
+
+
+def grazed(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) and (n, 3) of a rod's surface on its two edges, as the camera sees them, see `outline`.
 
     The two lines of sight that graze a cylinder touch it r²/d before its axis and r √(1 - r²/d²) beside it, d being
     the distance of the camera from the axis.
@@ -29,8 +35,7 @@ def edges(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray,
     sideways = np.cross(directions, sight / distance)
     near = points - radius**2 / distance**2 * sight
     aside = radius * np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0)) * sideways
-    one, other = np.split(camera.project(np.concatenate([near + aside, near - aside])), 2)
-    return one, other
+    return near + aside, near - aside
 
 
 def normals(curve_px) -> np.ndarray:

@@ -20,6 +20,7 @@ _PIECE_PX = 16
 _REACH_PX = 26
 _SIGMA_PX = 1.0
 _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
+_PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
 _SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
 
 
@@ -75,6 +76,7 @@ def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: flo
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
     found: dict[int, np.ndarray] = {}
+    pull = _pull(axis, len(views))
     last, before = np.zeros(2), np.zeros(2)
     for frame, motor in motor_rad.items():
         guess = 2 * last - before
@@ -82,10 +84,19 @@ def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: flo
         curve = one_curve(rest_mm, guess, arc, motor, wire)
         seen = [coarse_points(view, {frame: curve}, wire, axis, reach_mm - wire.diameter_mm / 2)[0]
                 for view in views]
-        bend = _fit_bend(views, seen, rest_mm, guess, arc, motor, wire)
+        bend = _fit_bend(views, seen, rest_mm, guess, arc, motor, wire, pull)
         found[frame] = bend
         before, last = last, bend
     return found
+
+
+def _pull(axis: BarAxis, views: int) -> np.ndarray:
+    """Inverse covariance (2, 2) of a bend before it is seen: weak, but for one view, to which a part of it is hidden:
+    the bar pushes at right angles to itself, and friction adds a part of that."""
+    if views > 1:
+        return np.eye(2) / _PULL_RAD**2
+    along = axis.direction[1:] / np.linalg.norm(axis.direction[1:])
+    return np.eye(2) / _PULL_RAD**2 + np.outer(along, along) / _ALONG_BAR_RAD**2
 
 
 def contact_arc(rest_mm, bend, motor, axis: BarAxis, wire: Wire) -> float:
@@ -95,8 +106,8 @@ def contact_arc(rest_mm, bend, motor, axis: BarAxis, wire: Wire) -> float:
     return float(np.clip(closest_arc(bent, axis), 1.0, wire.length_mm))
 
 
-def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire: Wire, rounds: int = 8):
-    """Least squares on the two components of the bend, Cauchy weights of 2 px, a weak pull towards none."""
+def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire: Wire, pull, rounds: int = 8):
+    """Least squares on the two components of the bend, Cauchy weights of 2 px, a pull (2, 2) towards none."""
     bend, step = np.array(bend, dtype=float), 1e-5
     for _ in range(rounds):
         left, columns = _bend_residual(views, seen, rest_mm, bend, arc, motor, wire), []
@@ -105,8 +116,8 @@ def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire
             columns.append((moved - left) / step)
         weight = 1.0 / (1.0 + (left / 2.0) ** 2)
         jacobian = np.stack(columns, axis=1)
-        normal = jacobian.T @ (weight[:, None] * jacobian) + np.eye(2) / 0.2**2
-        change = np.linalg.solve(normal, jacobian.T @ (weight * left) + bend / 0.2**2)
+        normal = jacobian.T @ (weight[:, None] * jacobian) + pull
+        change = np.linalg.solve(normal, jacobian.T @ (weight * left) + pull @ bend)
         bend = np.clip(bend - change, -0.5, 0.5)
         if np.max(np.abs(change)) < _STILL_RAD:
             break

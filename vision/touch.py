@@ -9,6 +9,7 @@ from vision.fit import Problem, bar_axis, rest_shape
 from vision.scene import Wire
 from vision.wire import centrelines
 
+FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _SURE_BEND_RAD = np.radians(0.25)
 _TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
 

@@ -2,13 +2,14 @@
 
     python tests/ladder/coverage.py points FOLDER --count 1000
     python tests/ladder/coverage.py pictures FOLDER --count 300
+    python tests/ladder/coverage.py alone FOLDER --count 100
     python tests/ladder/coverage.py hard FOLDER --count 100
 
 Every scene is drawn anew (slope, distance, cameras, noise, friction, sag, tilt of the bar, light) and its cameras are
 calibrated anew from noisy corners. `points` fits line points with every error that the fit allows for; `pictures` has
-the rig paint each frame and looks at it with `observe_trial`; `hard` does so with wires and bars of any brightness. A
-scene is a row of FOLDER/points.csv, pictures.csv or hard.csv; one that is there is not seen again: interrupt it and go
-on at will. Prints the coverage of all rows.
+the rig paint each frame and looks at it with `observe_trial`; `alone` shows it the first camera; `hard` does so with
+wires and bars of any brightness. A scene is a row of FOLDER/points.csv, pictures.csv and so on; one that is there is
+not seen again: interrupt it and go on at will. Prints the coverage of all rows.
 """
 
 import argparse
@@ -27,6 +28,7 @@ from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
 from vision.fit import Problem, State, honest, solve
 from vision.observe import observe_trial
+from vision.one_view import seen_from_one_side, touch_by_onset
 from vision.quantities import calibration_share, jacobians
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}
@@ -49,7 +51,10 @@ class Seen:
 
 def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
     """What the fit says of line points, done as on a trial: fitted once, then again with honest sigmas."""
-    state, _ = solve(problem, start, scales=scales)
+    state, covariance = solve(problem, start, scales=scales)
+    if seen_from_one_side(problem.cameras, problem.axis):
+        problem, state = touch_by_onset(problem, state, covariance)
+        state, _ = solve(problem, state)
     problem = honest(problem, state)
     state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
     covariance = lines + calibration_share(problem, state, lines)
@@ -66,13 +71,13 @@ def see_points(scene: Scene) -> Seen:
     return see_lines(problem, begin(problem))
 
 
-def see_pictures(scene: Scene) -> Seen:
-    """What `observe_trial` says of painted pictures."""
+def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
+    """What `observe_trial` says of painted pictures, of the first cameras only where a number is given."""
     rng = np.random.default_rng([scene.seed, 23])
     cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
     job = Job(Path(), scene.protocol, scene.seed, False)
     frames = {studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
-              for k, studio in enumerate(job.studios)}
+              for k, studio in enumerate(job.studios[:most_cameras])}
     background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
     (whisk,) = observe_trial(frames, scene.recording.frames.time_s, scene.motor_rad,
                              [slice(0, len(scene.motor_rad))], cameras, wire, bar, background).whisks
@@ -82,6 +87,11 @@ def see_pictures(scene: Scene) -> Seen:
     return Seen({"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": rows.slip_mm},
                 {"touch": whisk.touch_sigma_rad, "d_x": whisk.d_x_sigma_mm, "beta": whisk.beta_sigma_rad,
                  "slip": rows.slip_sigma_mm}, whisk.status)
+
+
+def see_alone(scene: Scene) -> Seen:
+    """The same with one camera."""
+    return see_pictures(scene, 1)
 
 
 def see_hard(scene: Scene) -> Seen:
@@ -127,7 +137,7 @@ def summary(rows: list[dict]) -> Iterable[str]:
                f"{np.sqrt(np.mean(error**2)):.4f}, sigma median {np.median(sigma):.4f}")
 
 
-WAYS = {"points": see_points, "pictures": see_pictures, "hard": see_hard}
+WAYS = {"points": see_points, "pictures": see_pictures, "alone": see_alone, "hard": see_hard}
 
 
 def main() -> None:

@@ -21,6 +21,7 @@ from bench.rig.protocol import BoardTable, CameraTable, LightTable, PicturesTabl
 from bench.rig.recording import Recording
 from tests.ladder.board_scenes import BOARD, board_views, measured_pose, noisy, rig_view
 from vision import fit
+from vision.bar_edges import EDGE_PX
 from vision.calibrate import calibrate_cameras
 from vision.contact import BarAxis
 from vision.fit import Observed, Problem, State
@@ -238,7 +239,8 @@ def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Ob
     frames = len(scene.motor_rad)
     not_round = np.zeros(frames) if rng is None else fit.CONTACT_SIGMA_MM * rng.standard_normal(frames)
     return [seen for number, camera in enumerate(scene.cameras)
-            for seen in [*_wire_points(scene, number, camera, not_round, rng), _bar_points(scene, number, camera, rng)]]
+            for seen in [*_wire_points(scene, number, camera, not_round, rng),
+                         *_bar_points(scene, number, camera, rng)]]
 
 
 def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> list[Observed]:
@@ -269,15 +271,29 @@ def _centreline_mm(scene: Scene, frame: int, arc_mm, more_mm: float) -> np.ndarr
     return points + more_mm * pushed[:, None] * away / np.linalg.norm(away)
 
 
-def _bar_points(scene: Scene, number: int, camera: Camera, rng) -> Observed:
-    """Two points of the bar's middle, as vision hands it on."""
+def _bar_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observed]:
+    """Two points of the bar's middle, as vision hands it on; of its two edges where there is one camera."""
+    if len(scene.cameras) == 1:
+        return _edge_points(scene, number, camera, rng)
     offset, tilt = _whole(rng, fit.BAR_OFFSET_PX, fit.BAR_TILT_PX)
     axis, sigma = scene.axis, scene.sigmas.bar_px
     points = axis.point_mm + BAR_PLACES_MM[:, None] * axis.direction
     px = outline(camera, points, np.broadcast_to(axis.direction, points.shape), scene.bar.radius_mm)[0]
     noise = np.zeros(2) if rng is None else sigma * rng.standard_normal(2)
     off, normal = offset + tilt * BAR_PLACES_MM / fit.BAR_TILT_ARM_MM + noise, normals(px)
-    return Observed(-1, number, LinePoints(px + off[:, None] * normal, normal, np.full(2, sigma), BAR_PLACES_MM))
+    return [Observed(-1, number, LinePoints(px + off[:, None] * normal, normal, np.full(2, sigma), BAR_PLACES_MM))]
+
+
+def _edge_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observed]:
+    """Two points of each of the bar's edges, each edge with an error of its own."""
+    points = scene.axis.point_mm + BAR_PLACES_MM[:, None] * scene.axis.direction
+    middle, half = outline(camera, points, np.broadcast_to(scene.axis.direction, points.shape), scene.bar.radius_mm)
+    normal, sigma, seen = normals(middle), np.hypot(scene.sigmas.bar_px, EDGE_PX), []
+    for side in (-1, 1):
+        noise = np.zeros(2) if rng is None else sigma * rng.standard_normal(2)
+        px = middle + (side * half + noise)[:, None] * normal
+        seen.append(Observed(-1, number, LinePoints(px, normal, np.full(2, sigma), BAR_PLACES_MM), side))
+    return seen
 
 
 def _whole(rng, offset_px: float, tilt_px: float) -> np.ndarray:

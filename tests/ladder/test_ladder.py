@@ -12,6 +12,7 @@ from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_
 from tests.ladder.precision import repeat
 from tests.ladder.rows import all_rows, read_rows
 from tests.ladder.scenes import draw_scene, lumpy_noise
+from tests.ladder.views import known
 from vision.fit import WIRE_LUMP
 
 FEW = PicturesTable(step_deg=1.5)  # five frames a whisk
@@ -52,6 +53,14 @@ def test_rung_4_intervals_hold():
         for name in ("d_x_mm", "touch_deg", "beta_deg", "slip_mm"):
             assert abs(row[f"{name}_error"]) < 5 * row[f"{name}_sigma"]
     assert next(iter(summary(rows))) == "3 scenes, 3 with a truth"
+
+
+def test_rung_4_one_camera_errs_within_what_it_states():
+    """Three draws: a root mean square of three exceeds 2.5 sigma once in three thousand."""
+    alone = known([0.0], 3)
+    assert alone.count == 3 and alone.sigma["d_x_mm"] < 0.5
+    for name, sigma in alone.sigma.items():
+        assert alone.error[name] < 2.5 * sigma, name
 
 
 def test_a_table_goes_on_where_it_stopped(tmp_path):

@@ -101,17 +101,31 @@ def test_without_a_bar_in_view_the_trial_says_so(steep):
     assert np.isnan(whisk.d_x_mm) and "no bar of diameter 6 mm is seen" in whisk.status
 
 
-def test_one_camera_alone_gives_no_truth(steep):
-    frames = {"high": steep.frames["high"]}
-    motor, time = np.radians(steep.rows["motor_deg"]), steep.rows["time_s"]
-    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], steep.cameras, WIRE, BAR,
-                             steep.background).whisks
-    assert np.isnan(whisk.d_x_mm) and "camera high alone" in whisk.status
+def _whisk(recorded, frames):
+    motor, time = np.radians(recorded.rows["motor_deg"]), recorded.rows["time_s"]
+    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], recorded.cameras, WIRE, BAR,
+                             recorded.background).whisks
+    return whisk
+
+
+def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
+    """The bar's width tells d_x to half a millimetre, its taper the slope to some degrees, each within three sigma."""
+    whisk, truth = _whisk(steep, {"high": steep.frames["high"]}), steep.truth
+    assert whisk.cameras == 1 and "no two cameras see it" in whisk.status
+    for found, sigma, true, most in ((whisk.d_x_mm, whisk.d_x_sigma_mm, truth["d_x_mm"], 0.5),
+                                     (np.degrees(whisk.beta_rad), np.degrees(whisk.beta_sigma_rad),
+                                      truth["beta_deg"], 10.0),
+                                     (np.degrees(whisk.touch_rad), np.degrees(whisk.touch_sigma_rad),
+                                      truth["touch_deg"], 0.5)):
+        assert abs(found - true) < 3 * sigma
+        assert sigma < most
+    touching = whisk.frames.touching
+    error = (whisk.frames.slip_mm - steep.rows["slip_mm"])[touching]
+    assert np.all(np.abs(error) < 3 * whisk.frames.slip_sigma_mm[touching])
+    assert sum(whisk.budget.values()) == pytest.approx(1.0)
 
 
 def test_a_camera_with_gaps_is_left_out_by_name(steep):
-    frames = steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}}
-    motor, time = np.radians(steep.rows["motor_deg"]), steep.rows["time_s"]
-    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], steep.cameras, WIRE, BAR,
-                             steep.background).whisks
-    assert np.isnan(whisk.d_x_mm) and "camera low was left out: 3 frames" in whisk.status
+    whisk = _whisk(steep, steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}})
+    assert "camera low was left out: 3 frames" in whisk.status
+    assert whisk.cameras == 1 and abs(whisk.d_x_mm - steep.truth["d_x_mm"]) < 3 * whisk.d_x_sigma_mm
