@@ -62,7 +62,7 @@ def read_board_views(session: Session) -> BoardViews:
         frames = _open(source, name)
         sizes[name] = frames.size_px
         boards[name] = _series(frames, session.board, name)
-        if name in session.rig_pictures and session.T_rig_board is not None:
+        if name in session.rig_pictures:
             rig[name] = rig_view(session, name, frames.size_px)
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out

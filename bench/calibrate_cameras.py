@@ -27,6 +27,10 @@ _ASKED_SIGMAS = 2.0
 _MOST_LEFT_OUT = 0.1
 # Bars stand beyond this share of the whisker, and are looked at by so much on either side of it.
 _NEAREST_BAR, _BAR_REACH_MM = 0.4, 20.0
+_NOT_PLACED = (
+    "T_rig_board is missing, so the cameras stand in the frame of the board on the rig, or of the first camera where "
+    "there is no such board; `evaluate` without a cameras.toml finds the rig by the free strokes"
+)
 
 
 def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = None) -> int:
@@ -40,7 +44,8 @@ def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = No
         return _write(out, place_imported(loaded, lenses), [f"lenses as in {lenses.name}, taken as exact"], [])
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
-    length = check_scale(loaded, calibration.cameras)
+    placed_here = loaded.T_rig_board is not None
+    length = check_scale(loaded, calibration.cameras) if placed_here else _NOT_PLACED
     measured = measure_held_out(loaded, views)
     lines = [*report_lines(calibration), *filter(None, [length]), *held_out_lines(measured, calibration)]
     return _write(out, calibration.cameras, lines, [*views.notes, *_doubts(calibration)])
@@ -71,18 +76,18 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
 
 
 def calibrate_from(session: Session, views: BoardViews) -> Calibration:
-    """The session's cameras from its views. Raises BadInput."""
-    if session.T_rig_board is not None:
-        missing = [name for name in views.boards if name not in views.rig]
-        if missing:
-            raise BadInput(f"has no picture {missing[0]}.png: record the board standing on the rig", file="boards/rig")
+    """The session's cameras from its views, in the rig frame; without T_rig_board in that of the board on the rig, or
+    of the first camera where not all see that board. Raises BadInput."""
+    missing = [name for name in views.boards if name not in views.rig]
+    if missing and session.T_rig_board is not None:
+        raise BadInput(f"has no picture {missing[0]}.png: record the board standing on the rig", file="boards/rig")
     try:
         return calibrate_cameras(
             views.boards,
-            views.rig,
+            {} if missing else views.rig,
             session.board,
             views.sizes_px,
-            session.T_rig_board,
+            board_in_world(session, views),
             T_rig_board_sigma_mm=session.T_rig_board_sigma_mm,
             T_rig_board_sigma_rad=session.T_rig_board_sigma_rad,
             trial_views=views.trials,
@@ -91,6 +96,14 @@ def calibrate_from(session: Session, views: BoardViews) -> Calibration:
         )
     except Refused as reason:
         raise BadInput(str(reason), file="boards") from None
+
+
+def board_in_world(session: Session, views: BoardViews) -> np.ndarray | None:
+    """Where the board on the rig stands, (3, 4), in the frame that `calibrate_from` gives the cameras in; None where
+    not all cameras see it."""
+    if session.T_rig_board is not None:
+        return session.T_rig_board
+    return np.eye(3, 4) if all(name in views.rig for name in views.boards) else None
 
 
 def _work_points(session: Session) -> np.ndarray | None:

@@ -9,26 +9,24 @@ from pathlib import Path
 import numpy as np
 
 from bench.board_views import read_board_views
-from bench.calibrate_cameras import calibrate_from, report_lines
+from bench.calibrate_cameras import board_in_world, calibrate_from, report_lines
 from bench.errors import BadInput
+from bench.first_look import by_first_look, first_look
 from bench.footage import frame_count, read_frames
-from bench.results import hash_of, hash_of_code, hash_of_files, read_result, write_result
+from bench.results import hash_of, hash_of_code, hash_of_files, plain, read_result, write_result
 from bench.scale import check_scale
 from bench.session import Session
 from vision.cameras_file import read_cameras, write_cameras
 from vision.corners import refine_corners
 from vision.errors import Refused
 from vision.pictures import read_picture
+from vision.place import placed
+from vision.rotation import compose, invert_transform, log_rotation
 from vision.scene import Cameras
 from vision.static_board import camera_moved
 
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
 _FEWEST_FOR_MEDIAN, _MOST_FOR_MEDIAN = 5, 9  # trials: in fewer the bar stands before a place too often
-_NO_POSE = (
-    "[rig] T_rig_board is missing, so nothing says where whisker and motor are: measure where the board stands (2 mm "
-    "by ruler will do, with T_rig_board_sigma_mm = 2 and T_rig_board_sigma_deg = 2: the free strokes then place the "
-    "rig, and must be some 5 to 10 degrees wide)"
-)
 
 
 @dataclass(frozen=True)
@@ -52,41 +50,59 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     """Cameras and backgrounds. Raises BadInput where the session cannot be calibrated, saying what to record."""
     if not any(trial.camera_sources for trial in session.trials):
         return SessionCalibration(None, {}, hash_of("no pictures"))
-    cameras, notes = _given(session) if session.cameras_toml else _made(session, out / "calibration")
+    made = _given(session) if session.cameras_toml else _made(session, out / "calibration")
+    cameras, notes, T_rig_board = made
     missing = [name for name in session.camera_names if name not in cameras]
     if missing:
         raise BadInput(f"has no camera {missing[0]}, which has frames; calibrate it", file="cameras.toml")
     background = _backgrounds(session, cameras)
     content = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras], list(background.values())
-    return SessionCalibration(cameras, background, hash_of(*content), notes, session.T_rig_board)
+    return SessionCalibration(cameras, background, hash_of(*content), notes, T_rig_board)
 
 
-def _given(session: Session) -> tuple[Cameras, tuple[str, ...]]:
+def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
     try:
-        return read_cameras(session.cameras_toml), ("cameras as given in cameras.toml",)
+        return read_cameras(session.cameras_toml), ("cameras as given in cameras.toml",), session.T_rig_board
     except Refused as reason:
         raise BadInput(str(reason), file="cameras.toml") from None
 
 
-def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...]]:
-    """Cameras as kept in `folder`, or calibrated there. What is used is what the file holds, in every run."""
-    if session.T_rig_board is None:
-        raise BadInput(_NO_POSE, file="session.toml")
+def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
+    """Cameras as kept in `folder`, or calibrated there, notes and where the board on the rig stands. What is used is
+    what the file holds, in every run."""
     key, kept = _key(session), read_result(folder / "cameras.json")
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
-        made = calibrate_from(session, read_board_views(session))
-        lengths = check_scale(session, made.cameras)
+        views = read_board_views(session)
+        made = calibrate_from(session, views)
+        cameras, T_rig_board, first = on_the_rig(session, made.cameras, board_in_world(session, views))
+        lengths = check_scale(session, cameras)
         folder.mkdir(parents=True, exist_ok=True)
-        write_cameras(folder / "cameras.toml", made.cameras)
-        kept = {"hash": key, "notes": [*report_lines(made), *filter(None, [lengths])]}
+        write_cameras(folder / "cameras.toml", cameras)
+        notes = [*report_lines(made), *filter(None, [first, lengths])]
+        kept = plain({"hash": key, "notes": notes, "T_rig_board": T_rig_board})
         write_result(folder / "cameras.json", kept)
-    return read_cameras(folder / "cameras.toml"), tuple(kept["notes"])
+    T_rig_board = None if kept["T_rig_board"] is None else np.array(kept["T_rig_board"])
+    return read_cameras(folder / "cameras.toml"), tuple(kept["notes"]), T_rig_board
+
+
+def on_the_rig(session: Session, cameras: Cameras, T_world_board: np.ndarray | None):
+    """Cameras in the rig frame, T_rig_board (None where there is no such board) and a note, by a first look at the
+    free strokes where session.toml does not say where the rig is."""
+    if session.T_rig_board is not None:
+        return cameras, session.T_rig_board, None
+    first = first_look(session, cameras)
+    T_world_rig = invert_transform(first.T_rig_world)
+    there = replace(by_first_look(), step=np.append(log_rotation(T_world_rig[:, :3]), T_world_rig[:, 3]))
+    note = f"T_rig_board is missing: a first look at {first.strokes} strokes says where whisker and motor are."
+    T_rig_board = None if T_world_board is None else compose(first.T_rig_world, T_world_board)
+    return placed(cameras, replace(there, step=np.zeros(6), covariance=np.zeros((6, 6))), there), T_rig_board, note
 
 
 def _key(session: Session) -> str:
     """Hash of all that the cameras are made from: boards, their givens, and the trials' frames (the rig board is in
     them)."""
-    frames = [source for trial in session.trials for source in trial.camera_sources.values()]
+    by_strokes = session.T_rig_board is None  # then motor angles count too
+    frames = [p for t in session.trials for p in ([t.folder] if by_strokes else t.camera_sources.values())]
     given = [session.board, session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad]
     return hash_of(hash_of_code(), given, session.whisker, hash_of_files([session.path / "boards", *frames]))
 

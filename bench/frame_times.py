@@ -1,6 +1,6 @@
 """When each frame of a trial was taken, on the signals' clock, and which picture of each camera it is."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.errors import BadInput
-from bench.footage import decoded_count, frame_count
+from bench.footage import decoded_count, frame_count, read_frames
 from bench.table import Table, forward_in_time, read_table, require_columns
 from bench.trial import Trial
 from vision.errors import Refused
@@ -75,6 +75,18 @@ def frame_times(trial: Trial) -> FrameTimes:
     if not trial.camera_sources:
         return FrameTimes(np.array([]), "none", {})
     return _steady(trial) if trial.frame_rate_Hz else _from_container(trial)
+
+
+def read_trial(
+    trial: Trial, times: FrameTimes, wanted: Iterable[int] | None = None
+) -> dict[str, dict[int, np.ndarray]]:
+    """Grey pictures by camera and frame index, of the frames wanted (None: all); lost ones are left out."""
+    frames, wanted = {}, range(len(times)) if wanted is None else sorted(set(wanted))
+    for name, source in trial.camera_sources.items():
+        place = {frame: int(times.picture[name][frame]) for frame in wanted if times.picture[name][frame] >= 0}
+        read = read_frames(source, place.values())
+        frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
+    return frames
 
 
 def _own(camera: str) -> str:

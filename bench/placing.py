@@ -8,6 +8,7 @@ import numpy as np
 from bench.calibration import SessionCalibration
 from bench.doubts import Doubts
 from bench.errors import BadInput
+from bench.first_look import by_first_look, first_look, spread
 from bench.results import hash_of
 from bench.session import Session
 from bench.unit import Unit, see_unit
@@ -16,11 +17,11 @@ from vision.errors import Refused
 from vision.place import BaseLines, Placement, by_board, by_strokes, check_swing_suffices, combine, placed
 from vision.rotation import compose, invert_transform
 
-# Strokes beyond these say little more: what they share (light, lenses) no average makes smaller.
-_MOST_TRIALS = 6
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
 _SMALL_STEP = np.repeat([2e-3, 0.2], 3)
 _MOST_ROUNDS = 3
+# A first look finds the centre across the whisker to half a millimetre (docs/cameras.md).
+_ELSEWHERE_MM = 2.0
 # A T_rig_board known no better is a first guess: the strokes alone must then do.
 _BY_RULER_MM = 1.0
 _STAYS = "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
@@ -36,7 +37,8 @@ def place_rig(
     """
     if calibration.cameras is None:
         return calibration
-    board, chosen = _by_board(session), _chosen(units)
+    board, chosen = _before(session), spread([unit for unit in units if unit.trial.camera_sources])
+    alone = session.T_rig_board is None and session.cameras_toml is None
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
@@ -45,12 +47,31 @@ def place_rig(
         else:
             placed_here, both = _settled(calibration, board, chosen, pool)
     except Refused as reason:
+        if alone:
+            asked = "record free strokes of some 10 degrees, or measure T_rig_board"
+            raise BadInput(f"T_rig_board is missing, and {reason}: {asked}", file="trials") from None
+        doubts.notes += _elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
-    if not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM:
+    if alone or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
         _check_suffices(both)
-    if both.alarm:
+    if both.alarm and not alone:
         doubts.note(both.alarm)
-    return placed_here.with_notes(*(both.notes[:1] if stays else both.notes), *[_STAYS] * stays)
+    return placed_here.with_notes(*(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays)
+
+
+def _elsewhere(session: Session, calibration: SessionCalibration) -> list[str]:
+    """A doubt where no stroke can be read and what turns with the motor is not where the board has the whisker."""
+    try:
+        first = first_look(session, calibration.cameras)
+    except BadInput:
+        return []
+    across_mm = float(np.linalg.norm(invert_transform(first.T_rig_world)[1:, 3]))
+    if across_mm < _ELSEWHERE_MM:
+        return []
+    return [
+        f"no free stroke can be read, and what turns with the motor turns about a centre some {across_mm:.0f} mm from "
+        "where T_rig_board has it: measure a square of the board and check square_mm, then check T_rig_board"
+    ]
 
 
 def _check_suffices(both: Placement) -> None:
@@ -79,20 +100,19 @@ def _settled(calibration: SessionCalibration, board: Placement, chosen: Sequence
 
 def _moved(calibration: SessionCalibration, before: Placement, after: Placement) -> SessionCalibration:
     cameras = placed(calibration.cameras, before, after)
-    T_rig_board = compose(invert_transform(after.T_board_rig), calibration.T_rig_board)
+    T_rig_board = calibration.T_rig_board
+    if T_rig_board is not None:
+        T_rig_board = compose(invert_transform(after.T_board_rig), T_rig_board)
     made = hash_of([[camera, cameras.covariance, cameras.placement] for camera in cameras], calibration.hash)
     return replace(calibration, cameras=cameras, T_rig_board=T_rig_board, hash=made)
 
 
-def _by_board(session: Session) -> Placement:
+def _before(session: Session) -> Placement:
+    """What is known of the rig frame that the cameras came in."""
+    if session.T_rig_board is None and session.cameras_toml is None:
+        return by_first_look()
     T = np.eye(3, 4) if session.T_rig_board is None else session.T_rig_board
     return by_board(T, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
-
-
-def _chosen(units: Sequence[Unit]) -> list[Unit]:
-    """A few of the trials with pictures, spread over the session."""
-    seen = [unit for unit in units if unit.trial.camera_sources]
-    return [seen[k] for k in np.unique(np.linspace(0, len(seen) - 1, _MOST_TRIALS).astype(int))] if seen else []
 
 
 def _by_strokes(units: Sequence[Unit], pool: Workers) -> Placement:

@@ -20,8 +20,11 @@ _MOST_TRIALS, _MOST_PICTURES = 3, 11
 
 
 def check_scale(session: Session, cameras: Cameras) -> str | None:
-    """A note on how thick the bars look, None where the session shows none. Raises BadInput at the wrong scale."""
-    if session.whisker is None or session.T_rig_board is None or session.board is None:
+    """A note on how thick the bars look, None where the session shows none. cameras: in the rig frame.
+
+    Raises BadInput at the wrong scale.
+    """
+    if session.whisker is None or session.board is None:
         return None
     trials = [t for t in session.trials if t.bar_diameter_mm and set(t.camera_sources) & set(session.rig_pictures)]
     shares = np.array(list(_seen_over_given(session, cameras, trials[:: max(1, len(trials) // _MOST_TRIALS)])))

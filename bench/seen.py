@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bench.calibration import SessionCalibration, moved_cameras
-from bench.footage import read_frames
-from bench.frame_times import FrameTimes, frame_times
+from bench.frame_times import FrameTimes, frame_times, read_trial
 from bench.session import Session
 from bench.settings import Settings
 from bench.signals import Signals, forward_strokes
@@ -48,7 +47,7 @@ def _see(
     session: Session, trial: Trial, signals: Signals, strokes, calibration: SessionCalibration, settings: Settings
 ) -> dict:
     times = frame_times(trial)
-    frames = _frames(trial, times)
+    frames = read_trial(trial, times)
     moved = moved_cameras(session, calibration, frames)
     wire = session.whisker.wire
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
@@ -72,16 +71,6 @@ def _see(
         "notes": [*truth.notes, *_lost(frames, times)],
         "clock": {"source": times.source, "sigma_s": clock_sigma_s, "recorded": times.clock_sigma_s == 0.0},
     }
-
-
-def _frames(trial: Trial, times: FrameTimes) -> dict[str, dict[int, np.ndarray]]:
-    """Pictures by camera and frame index; lost ones are left out."""
-    frames = {}
-    for name, source in trial.camera_sources.items():
-        place = {frame: int(k) for frame, k in enumerate(times.picture[name]) if k >= 0}
-        read = read_frames(source, place.values())
-        frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
-    return frames
 
 
 def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:

@@ -4,7 +4,7 @@ The bar stands still, so its frames are averaged. Near each rim its shading is a
 round the bar, so that a dark rim is not taken for an edge farther in; the middle, with its highlights, is left out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,18 +14,18 @@ from vision.contact import BarAxis
 from vision.descent import descend
 from vision.effort import VisionSettings
 from vision.line import RIMS, WAVES, LinePoints, Pieces, cut_pieces, read_band
-from vision.shading import fit_shading, locate, wave_prior
+from vision.shading import Knots, fit_shading, locate, wave_prior
 from vision.silhouette import outline
 from vision.trace import View
 
 ARM_MM = 20.0  # the line is handed on as two points, this far to either side
-_INNER_SHARE = 0.72
+INNER_SHARE = 0.72
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
-_FEWEST_PIECES = 4
+FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
 _UNTOLD_PX = 0.7  # a sigma that is more: the misfit has no minimum there to speak of
-_NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
-_KNOT_MM = 14.0
+NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
+KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
 _ROUGHLY, _EXACTLY = (0.3,), (0.1, 0.05)  # px: what a line may still move by, round by round
 _STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
@@ -52,20 +52,20 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
     wires_px: lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be; where it may be, a
     line to a tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on.
     """
-    pieces = _pieces(view, grey, axis, radius_mm, settings)
+    pieces = bar_pieces(view, grey, axis, radius_mm, settings)
     pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
-    if len(pieces) < _FEWEST_PIECES:
+    if len(pieces) < FEWEST_PIECES:
         return None
-    knots = np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM)
+    knots = Knots(np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, KNOT_MM))
     line, blur_px = _sweep(pieces, knots, off_px), None
-    pieces = _of_bar_alone(pieces, line, knots)
+    pieces = of_bar_alone(pieces, lambda some: _moved(some, line), knots)
     for settled_px in _ROUGHLY if off_px else _EXACTLY:  # line, blur, and what counts as a rim depend on each other
         model = _model(pieces, line, knots)
         line, blur_px, covariance, misfit = _settle(model, line, blur_px, settled_px)
         on_line = _on_line(replace(model, blur_px=blur_px), line)
-        pieces = pieces.select(on_line) if np.sum(on_line) >= _FEWEST_PIECES else pieces
+        pieces = pieces.select(on_line) if np.sum(on_line) >= FEWEST_PIECES else pieces
     points = _two_points(pieces, line, covariance)
-    if last and (misfit > _NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
+    if last and (misfit > NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
         return None
     return BarLine(points, float(np.sum(np.abs(line))))
 
@@ -76,7 +76,7 @@ class _Model:
 
     pieces: Pieces
     terms: int
-    knots: np.ndarray
+    knots: Knots
     blur_px: float
     prior: np.ndarray | None
 
@@ -102,12 +102,13 @@ def _model(pieces: Pieces, line, knots) -> _Model:
 
 def _rims(pieces: Pieces, line) -> Pieces:
     """Pieces without their middle: highlights there say nothing about the edges."""
-    inner = np.abs(_moved(pieces, line).offset_px) < _INNER_SHARE * pieces.radius_px[:, None]
+    inner = np.abs(_moved(pieces, line).offset_px) < INNER_SHARE * pieces.radius_px[:, None]
     rims = replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
     return rims.columns(np.any(rims.weight > 0, axis=0))
 
 
-def _pieces(view: View, grey, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Pieces:
+def bar_pieces(view: View, grey, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Pieces:
+    """Pieces of the bar's band in the picture `grey`, to either side of the axis's point."""
     place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
     points = axis.point_mm + place[:, None] * axis.direction
     middle, radius = outline(view.camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
@@ -128,13 +129,16 @@ def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: flo
     return clear
 
 
-def _of_bar_alone(pieces: Pieces, line, knots) -> Pieces:
-    """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border."""
+def of_bar_alone(pieces: Pieces, placed: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
+    """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border.
+
+    placed: brings pieces to where the bar is taken to be.
+    """
     for _ in range(3):
-        moved = _moved(pieces, line)
-        misfit = locate(moved, fit_shading(moved, 1.0, WAVES, knots)[0], rounds=1).chi2
+        there = placed(pieces)
+        misfit = locate(there, fit_shading(there, 1.0, WAVES, knots)[0], rounds=1).chi2
         good = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
-        if np.all(good) or np.sum(good) < _FEWEST_PIECES:
+        if np.all(good) or np.sum(good) < FEWEST_PIECES:
             break
         pieces = pieces.select(good)
     return pieces

@@ -1,23 +1,24 @@
 """The least value of a smooth function of a few parameters, by Newton's method with derivatives from differences."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-_MOST_STEPS = 6
+_MOST_STEPS = 12
 
 
-def descend(function: Callable, begin, steps, longest, settled: float) -> tuple[np.ndarray, float, np.ndarray]:
+def descend(function: Callable, begin, steps, longest, settled: float,
+            parts: Sequence[float] = (1.0, 0.3)) -> tuple[np.ndarray, float, np.ndarray]:
     """Where the function is least near `begin` (n,), its value there, and its second derivatives (n, n).
 
     steps (n,): of the differences; longest (n,): a Newton step goes no farther. Ends when no part of a step is more
-    than `settled`, or nothing lower is found.
+    than `settled`, or nothing lower is found by any of the parts of a step.
     """
     q, here = np.asarray(begin, dtype=float), function(begin)
     for _ in range(_MOST_STEPS):
         slope, curvature = _derivatives(function, q, here, steps)
         step = _downhill(slope, curvature, longest)
-        trials = [(function(q + step * part), q + step * part) for part in (1.0, 0.3)]
+        trials = [(function(q + step * part), q + step * part) for part in parts]
         lower, there = min(trials, key=lambda trial: trial[0])
         if lower < here:
             q, moved, here = there, np.max(np.abs(there - q)), lower

@@ -18,7 +18,7 @@ from skimage.graph import route_through_array
 
 from vision.errors import Refused
 from vision.line import LinePoints, Noise, Pieces, cut_pieces, noise_by_level, read_band
-from vision.shading import fit_shading, locate, wave_prior
+from vision.shading import Knots, fit_shading, locate, wave_prior
 from vision.trace import to_points, trace
 
 _AROUND_PX = 25  # a line bends no farther than this out of the rectangle of its ends
@@ -218,10 +218,10 @@ def _from_sides(pieces: Pieces, width: _Width) -> Pieces:
     return replace(pieces, background=(columns @ found)[..., 0])
 
 
-def _knots(pieces: Pieces) -> np.ndarray:
+def _knots(pieces: Pieces) -> Knots:
     """Places between which the shading changes linearly."""
     first, last = pieces.place.min(), pieces.place.max()
-    return np.linspace(first, last, max(2, round((last - first) / _KNOT_PX)))
+    return Knots(np.linspace(first, last, max(2, round((last - first) / _KNOT_PX))))
 
 
 def _best_width(pieces: Pieces, begin: _Width) -> _Width:

@@ -27,6 +27,7 @@ from vision.one_view import see_bar_alone, seen_from_one_side, touch_by_onset
 from vision.quantities import calibration_share, jacobians
 from vision.report import to_whisk
 from vision.scene import Bar, Cameras, Wire
+from vision.shading import Knots
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
 from vision.trace import MEAN_OF, View, clear_of_bar, observed, settle, to_points, trace, wire_pieces
@@ -39,8 +40,12 @@ _BESIDE_BAR_PX = 4.0
 _SEARCH_PX = 1.5
 _ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
+# Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
+# another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
+_NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
 _FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
 
+_NEVER_TOUCHES = "the whisker never touches"
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 _USUAL = VisionSettings()
@@ -166,21 +171,19 @@ def _see_whisk(number: int, indices, views, cameras, rods: _Rods, axis: BarAxis,
     cameras = cameras.subset([view.camera.name for view in views])
     motor = {f: float(motor_rad[f]) for f in seen}
     try:
-        problem, state, covariance = _fit_whisk(views, cameras, rods, axis, motor, light, settings)
-    except Refused as reason:
-        return WhiskTruth(number, None, status=str(reason))
-    except np.linalg.LinAlgError:
-        return WhiskTruth(number, None, status="the fit of wire and bar does not settle")
-    if problem is None:
-        return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
-                          status="the whisker never touches" if state is None else state)
+        problem, state, covariance, near = _fit_whisk(views, cameras, rods, axis, motor, light, settings)
+    except (Refused, np.linalg.LinAlgError) as reason:
+        status = str(reason) if isinstance(reason, Refused) else "the fit of wire and bar does not settle"
+        return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen), status=status)
     measured, by_parameter = jacobians(problem, state)
     lens = calibration_share(problem, state, covariance)
-    whisk = to_whisk(number, indices, seen, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
+    rows = [f for f in indices if f >= near[0]]
+    whisk = to_whisk(number, rows, near, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
                      lens, views, rods.bar.radius_mm, settings)
     beam = check_beam(problem, state, covariance + lens, measured, by_parameter)
     status = "; ".join(filter(None, [whisk.status, beam.alarm, left_out]))
-    return replace(whisk, base=base_lines(problem, state, lens), beam=beam, status=status)
+    far = _free_stroke(views, rods, problem, state, motor, near, light, settings) if near[0] > seen[0] else None
+    return replace(whisk, base=base_lines(*(far or (problem, state)), lens), beam=beam, status=status)
 
 
 def _with_frames(views, indices) -> tuple[list[View], str]:
@@ -194,29 +197,30 @@ def _with_frames(views, indices) -> tuple[list[View], str]:
 
 def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, float], light: dict[str, Lit],
                settings: VisionSettings):
-    """Problem and state after the last round, and the parameters' covariance.
+    """Problem and state after the last round, the parameters' covariance, and the frames in it: all but those far
+    before touch.
 
-    (None, reason, …) where there is no touch to fit. light: filled with how each camera sees the wire.
+    light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    angles = np.array(list(motor.values()))
     early = _early(motor)
     rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
     coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
-    bend = np.array(list(coarse.values()))
-    touching, free = frames_that_touch(angles, bend)
     one_side = seen_from_one_side(cameras, axis)
+    motor = motor if one_side else _near_touch(motor, coarse)
+    angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
+    touching, free = frames_that_touch(angles, bend)
     if one_side:  # a bend along the sight is not seen at first
         free = np.arange(len(angles)) < len(early)
         touching = touching & ~free
     elif not np.any(touching):
-        return None, None, None
+        raise Refused(_NEVER_TOUCHES)
     if np.sum(~touching) < FEWEST_FREE:
-        return None, _STARTS_TOUCHING, None
+        raise Refused(_STARTS_TOUCHING)
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
     curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
     for round_number in range(settings.rounds + 1):
         last = round_number == settings.rounds
-        seen = _trace_all(views, cameras, rods, axis, curves, light, settings, last=last)
+        seen = _trace_all(views, cameras, rods, axis, motor, curves, light, settings, last=last)
         problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
         fitted, covariance = solve(problem, _begin(problem, rest, bend, arcs))
         if one_side:
@@ -234,10 +238,35 @@ def _fit_whisk(views, cameras, rods: _Rods, axis: BarAxis, motor: Mapping[int, f
         touch = float(first_touch(problem, fitted.vector).motor_rad)
         touching, free = frames_by_touch(angles, touch, np.radians(0.02))
         if np.sum(free) < FEWEST_FREE:
-            return None, _STARTS_TOUCHING, None
+            raise Refused(_STARTS_TOUCHING)
         if not np.any(touching):
-            return None, None, None
-    return problem, fitted, covariance
+            raise Refused(_NEVER_TOUCHES)
+    return problem, fitted, covariance, list(motor)
+
+
+def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> dict[int, float]:
+    """The frames from a little before the first that surely touches."""
+    angles = np.array(list(motor.values()))
+    touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
+    if not np.any(touching):
+        return dict(motor)
+    first = int(np.argmax(touching))
+    begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
+    return dict(list(motor.items())[begin:])
+
+
+def _free_stroke(views, rods: _Rods, problem: Problem, state: State, motor: Mapping[int, float], near, light: dict,
+                 settings: VisionSettings) -> tuple[Problem, State]:
+    """All frames before touch and what is seen in them, about the bar and the shape at rest of a fit."""
+    free = {f: angle for f, angle in motor.items() if f not in near or not problem.bent[near.index(f)]}
+    rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
+    curves = {f: one_curve(rest, np.zeros(2), rods.wire.length_mm, angle, rods.wire) for f, angle in free.items()}
+    seen = [one for number, view in enumerate(views)
+            for one in _trace_wire(number, view, rods, axis, free, curves, light, settings)]
+    nothing = np.zeros(len(free), dtype=bool)
+    alone = replace(problem, motor_rad=np.array(list(free.values())), touching=nothing, bent=nothing, seen=seen)
+    there = State(state.vector[:problem.first_bend], np.full(len(free), 0.5 * rods.wire.length_mm))
+    return honest(alone, there), there
 
 
 def _early(motor: Mapping[int, float]) -> dict[int, float]:
@@ -260,7 +289,8 @@ def _begin(problem: Problem, rest, bend, arcs) -> State:
     return State(vector, np.asarray(arcs, dtype=float))
 
 
-def _trace_all(views, cameras: Cameras, rods: _Rods, axis: BarAxis, curves, light: dict, settings: VisionSettings, *,
+def _trace_all(views, cameras: Cameras, rods: _Rods, axis: BarAxis, motor, curves, light: dict,
+               settings: VisionSettings, *,
                last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. last: see
     `measure_bar`."""
@@ -268,7 +298,7 @@ def _trace_all(views, cameras: Cameras, rods: _Rods, axis: BarAxis, curves, ligh
     bar = _trace_bar(views, cameras, rods, axis, wires, settings, last=last)
     seen = []
     for number, view in enumerate(views):
-        seen += _trace_wire(number, view, rods, axis, curves, light, settings)
+        seen += _trace_wire(number, view, rods, axis, motor, curves, light, settings)
         seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
     for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
@@ -287,14 +317,14 @@ def _trace_bar(views, cameras: Cameras, rods: _Rods, axis: BarAxis, wires, setti
     return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
 
 
-def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, curves, light: dict,
+def _trace_wire(number: int, view: View, rods: _Rods, axis: BarAxis, motor, curves, light: dict,
                 settings: VisionSettings) -> list[Observed]:
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
     if len(pieces) == 0:
         return []
-    knots = np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM)
+    knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
     pieces, blur = (pieces, known.blur_px) if known else settle(pieces, knots, _SEARCH_PX)
     pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST)

@@ -1,6 +1,7 @@
 """The rod's own shading, shared by all pieces of a camera, and the position of each piece under it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -10,20 +11,54 @@ from vision.line import LinePoints, Pieces, shading_basis
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
 
 
-@dataclass(frozen=True)
-class Shading:
-    """Radiance round the rod, linear in place between knots.
+# Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
+# alike, moved all lines by half a pixel, and by a quarter of one from end to end.
+_LIT_ALIKE_RAD = np.radians(8.0)
 
-    knots_mm (m,), waves (m, terms): coefficients of 1, sin t, cos t, … in grey levels; blur_px.
+
+@dataclass(frozen=True)
+class Knots:
+    """Between what a rod's shading is linear: places along it (m,), mm, and where it turns far, angles (k,), rad.
+
+    turns: angle of each band (`Pieces.source`), needed where k > 1.
     """
 
-    knots_mm: np.ndarray
+    place_mm: np.ndarray
+    turn_rad: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    turns: Mapping[int, float] = field(default_factory=dict)
+
+    @staticmethod
+    def of_turning(place_mm: np.ndarray, turns: Mapping[int, float]) -> "Knots":
+        """Knots of a rod whose bands stand at these angles, rad."""
+        angles = np.array(list(turns.values()))
+        width = float(np.ptp(angles)) if len(angles) else 0.0
+        if width <= _LIT_ALIKE_RAD:
+            return Knots(place_mm)
+        return Knots(place_mm, np.linspace(angles.min(), angles.max(), 1 + int(np.ceil(width / _LIT_ALIKE_RAD))), turns)
+
+    def __len__(self) -> int:
+        return len(self.place_mm) * len(self.turn_rad)
+
+    def weights(self, pieces: Pieces) -> np.ndarray:
+        """How much each knot has in the shading of each piece, (s, k m)."""
+        along = _hats(pieces.place, self.place_mm)
+        if len(self.turn_rad) == 1:
+            return along
+        turned = _hats(np.array([self.turns[band] for band in pieces.source.tolist()]), self.turn_rad)
+        return (turned[:, :, None] * along[:, None, :]).reshape(len(along), -1)
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Radiance round the rod. waves (k m, terms): at each knot the coefficients of 1, sin t, cos t, …, grey levels."""
+
+    knots: Knots
     waves: np.ndarray
     blur_px: float
 
-    def at(self, place_mm) -> np.ndarray:
-        """Coefficients (s, terms) at places (s,) along the rod."""
-        return _hats(place_mm, self.knots_mm) @ self.waves
+    def of(self, pieces: Pieces) -> np.ndarray:
+        """Coefficients (s, terms) of each piece."""
+        return self.knots.weights(pieces) @ self.waves
 
 
 def _hats(place_mm, knots_mm) -> np.ndarray:
@@ -62,7 +97,7 @@ def _project_out(columns, *targets):
     return [target - columns @ (inverse @ (turned @ target)) for target in targets]
 
 
-def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots_mm, robust=None,
+def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust=None,
                 prior=None) -> tuple[Shading, float]:
     """Most probable radiance over all pieces with their positions as they stand; also how badly it fits, per pixel.
 
@@ -74,19 +109,19 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots_mm, robust=Non
     """
     gram, moment, power = _normal_equations(pieces, blur_px, terms)
     robust = np.ones(len(pieces)) if robust is None else robust
-    hats = _hats(pieces.place, knots_mm)
-    size = len(knots_mm) * terms
+    hats = knots.weights(pieces)
+    size = len(knots) * terms
     pairs = (hats[:, :, None] * hats[:, None, :] * robust[:, None, None]).reshape(len(pieces), -1)
     left = pairs.T @ gram.reshape(len(pieces), -1)
-    left = left.reshape(len(knots_mm), len(knots_mm), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
+    left = left.reshape(len(knots), len(knots), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
     right = ((hats * robust[:, None]).T @ moment).reshape(size)
-    stiff = 1e-6 * np.trace(left) / size * np.eye(size) if prior is None else _stiffness(prior, len(knots_mm))
+    stiff = 1e-6 * np.trace(left) / size * np.eye(size) if prior is None else _stiffness(prior, knots)
     waves = np.linalg.solve(left + stiff, right)
     misfit = float(robust @ power - 2.0 * right @ waves + waves @ left @ waves)
     if prior is not None:
         misfit += float(waves @ stiff @ waves + np.linalg.slogdet(left + stiff)[1])
     pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
-    shading = Shading(np.asarray(knots_mm, dtype=float), waves.reshape(len(knots_mm), terms), blur_px)
+    shading = Shading(knots, waves.reshape(len(knots), terms), blur_px)
     return shading, misfit / max(1.0, pixels)
 
 
@@ -125,19 +160,23 @@ _WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
 # What of it changes from knot to knot: the light and the rod's finish are much the same a centimetre farther on. Left
 # to itself at every knot, shading bends the line of a wire before an even floor by up to a pixel.
 _CHANGE_SHARE = 0.1
+# The same from turn to turn of _LIT_ALIKE_RAD: light and rod keep, the angle at which they meet does not.
+_TURNED_SHARE = 0.3
 
 
-def _stiffness(prior, knots: int) -> np.ndarray:
-    """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to the next."""
-    between = _chain(knots)[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :]
-    return between.reshape(2 * (knots * len(prior),))
+def _stiffness(prior, knots: Knots) -> np.ndarray:
+    """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
+    between = _between(len(knots.turn_rad), len(knots.place_mm))
+    both = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :]
+    return both.reshape(2 * (len(knots) * len(prior),))
 
 
 @lru_cache
-def _chain(knots: int) -> np.ndarray:
+def _between(turns: int, places: int) -> np.ndarray:
     """Inverse covariance (knots, knots) of one wave's coefficients over its own variance."""
-    steps = np.diff(np.eye(knots), axis=0)
-    return np.eye(knots) + steps.T @ steps / _CHANGE_SHARE**2
+    along, turned = (steps.T @ steps for steps in (np.diff(np.eye(count), axis=0) for count in (places, turns)))
+    return (np.eye(turns * places) + np.kron(np.eye(turns), along) / _CHANGE_SHARE**2
+            + np.kron(turned, np.eye(places)) / _TURNED_SHARE**2)
 
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
@@ -165,7 +204,7 @@ def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 
 
     Sigma, misfit and contrast are those of the last round, before its step.
     """
-    waves = shading.at(pieces.place)
+    waves = shading.of(pieces)
     shift = np.zeros(len(pieces))
     for _ in range(rounds):
         residual, slope, contrast = _linearise(pieces, shading, waves, shift)

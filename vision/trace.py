@@ -11,7 +11,7 @@ from vision.descent import descend
 from vision.fit import Observed
 from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.scene import Camera, Wire
-from vision.shading import Located, fit_shading, line_points, locate, wave_prior
+from vision.shading import Knots, Located, fit_shading, line_points, locate, wave_prior
 from vision.silhouette import outline
 from vision.wire import Curves
 
@@ -78,14 +78,14 @@ def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.n
     return np.min(away - radius_px[None], axis=1) > margin_px
 
 
-def _best_blur(pieces: Pieces, knots_mm) -> float:
+def _best_blur(pieces: Pieces, knots: Knots) -> float:
     """The lens blur, px: the one under which the shading explains the pieces best."""
-    pieces = _some(pieces)
+    pieces = _some(pieces, _ENOUGH_PIECES * len(knots.turn_rad))
     prior = wave_prior(pieces, WAVES)
-    return min(_BLURS_PX, key=lambda blur: fit_shading(pieces, blur, WAVES, knots_mm, prior=prior)[1])
+    return min(_BLURS_PX, key=lambda blur: fit_shading(pieces, blur, WAVES, knots, prior=prior)[1])
 
 
-def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
+def settle(pieces: Pieces, knots: Knots, search_px: float) -> tuple[Pieces, float]:
     """Pieces brought from a rough curve to where they are, all within search_px, and the lens blur in px.
 
     A rough curve passes for a wider blur, and a blur that is wrong by a sixth moves the whole wire by up to a pixel
@@ -94,7 +94,7 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     highlight has: what they lack passes for blur.
     """
     rough, blurred = binned(pieces, _BIN_PX)
-    near, found, typical = trace(rough, _best_blur(rough, knots_mm), WAVES, knots_mm, rounds=2)
+    near, found, typical = trace(rough, _best_blur(rough, knots), WAVES, knots, rounds=2)
     lever = 2.0 * (near.place - near.place.min()) / max(np.ptp(near.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(near)), lever, lever**2 - 1.0 / 3.0], axis=1)
     plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
@@ -103,9 +103,10 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
 
     def misfit(moves_and_blur, every: int) -> float:
         some = shown.select(slice(None, None, every)).moved(bow_there[::every] @ moves_and_blur[:3])
-        return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots_mm, prior=prior)[1]
+        return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots, prior=prior)[1]
 
-    few, enough = (max(1, round(len(shown) / count)) for count in (_FEW_PIECES, _ENOUGH_PIECES))
+    turns = len(knots.turn_rad)
+    few, enough = (max(1, round(len(shown) / count)) for count in (_FEW_PIECES * turns, _ENOUGH_PIECES * turns))
     starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
               for blur in _BLURS_PX[1:8]]
     best = min(starts, key=lambda start: misfit(start, few))
@@ -114,12 +115,12 @@ def settle(pieces: Pieces, knots_mm, search_px: float) -> tuple[Pieces, float]:
     return pieces.moved(moved), without(np.exp(best[3]), blurred)
 
 
-def _some(pieces: Pieces, count: int = _ENOUGH_PIECES) -> Pieces:
+def _some(pieces: Pieces, count: int) -> Pieces:
     """About `count` of them, spread over all: what a camera's pieces have in common shows in these."""
     return pieces.select(slice(None, None, max(1, round(len(pieces) / count))))
 
 
-def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm,
+def trace(pieces: Pieces, blur_px: float, terms: int, knots: Knots,
           rounds: int = 5) -> tuple[Pieces, Located, float]:
     """Shading and positions by turns; the pieces come back where they were found, with what is left to move.
 
@@ -127,7 +128,7 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots_mm,
     """
     prior, robust = wave_prior(pieces, terms), None
     for _ in range(rounds):
-        shading, _ = fit_shading(pieces, blur_px, terms, knots_mm, robust, prior)
+        shading, _ = fit_shading(pieces, blur_px, terms, knots, robust, prior)
         found = locate(pieces, shading, rounds=1)
         pieces, robust = pieces.moved(found.shift_px), _robust(found.chi2)
         if np.quantile(np.abs(found.shift_px) / found.sigma_px, 0.9) < _STILL_SIGMAS:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from bench.calibration import _backgrounds
-from bench.frame_times import frame_times
-from bench.seen import _frames, _lost
+from bench.frame_times import frame_times, read_trial
+from bench.seen import _lost
 from bench.session import load_session
 from vision.pictures import read_picture
 from vision.scene import Camera, Cameras
@@ -18,7 +18,7 @@ def test_damaged_frames_are_counted_and_named(small_copy):
     third.write_bytes(data[: len(data) // 2][:40])
     trial = next(t for t in load_session(small_copy).trials if t.name == "b60_4")
     times = frame_times(trial)
-    assert list(_lost(_frames(trial, times), times)) == [f"camera low: 1 of {len(times)} frames damaged (2)"]
+    assert list(_lost(read_trial(trial, times), times)) == [f"camera low: 1 of {len(times)} frames damaged (2)"]
 
 
 def test_without_a_rig_picture_the_trials_median_is_the_background(small_session, monkeypatch):

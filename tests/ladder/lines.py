@@ -25,6 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from vision.line import WAVES, Noise, cut_pieces, read_band
+from vision.shading import Knots
 from vision.trace import clear_of_bar, settle, to_points, trace
 
 FINE, FRAMES, SHAPE = 5, 13, (110, 300)
@@ -142,7 +143,8 @@ def _beside_bar(scene: Scene, x, y):
     return (x - at - slope * (y - 0.5 * SHAPE[0])) / np.hypot(1.0, slope)
 
 
-COLUMNS, KNOTS = (np.linspace(12.0, SHAPE[1] - 12.0, count) for count in (80, 4))
+COLUMNS, PLACES = (np.linspace(12.0, SHAPE[1] - 12.0, count) for count in (80, 4))
+KNOTS = Knots(PLACES)
 
 
 def rough_curve(scene: Scene, frame: int, off_px: float) -> np.ndarray:

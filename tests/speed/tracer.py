@@ -23,12 +23,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.vision.test_observe import BAR, WIRE, Recorded
 from vision.line import WAVES, Noise, cut_pieces, read_band
 from vision.observe import observe_trial
+from vision.shading import Knots
 from vision.trace import settle, to_points, trace
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES, SHAPE = 13, (480, 640)
 RADIUS_PX, BLUR_PX, NOISE = 2.8, 0.95, 2.0
-KNOTS = np.arange(40.0, 600.0, 70.0)  # as many as a whisker of 100 mm gets
+KNOTS = Knots(np.arange(40.0, 600.0, 70.0))  # as many as a whisker of 100 mm gets
 BAR_MS = 13.2  # a tenth of the faster of Janelia's two times
 
 
