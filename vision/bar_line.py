@@ -38,10 +38,17 @@ _FORMAL_TO_TRUE = 2.0
 
 @dataclass(frozen=True)
 class BarLine:
-    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; how far from there."""
+    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; how far from there; and
+    how badly a bar explains the pixels (chi² each)."""
 
     points: LinePoints
     moved_px: float
+    misfit: float
+
+    @property
+    def told(self) -> bool:
+        """Whether what is seen is a bar, and where it is."""
+        return self.misfit <= NO_BAR and bool(np.max(self.points.sigma_px) <= _UNTOLD_PX)
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
@@ -64,10 +71,8 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
         line, blur_px, covariance, misfit = _settle(model, line, blur_px, settled_px)
         on_line = _on_line(replace(model, blur_px=blur_px), line)
         pieces = pieces.select(on_line) if np.sum(on_line) >= FEWEST_PIECES else pieces
-    points = _two_points(pieces, line, covariance)
-    if last and (misfit > NO_BAR or np.max(points.sigma_px) > _UNTOLD_PX):
-        return None
-    return BarLine(points, float(np.sum(np.abs(line))))
+    found = BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), misfit)
+    return found if found.told or not last else None
 
 
 @dataclass(frozen=True)

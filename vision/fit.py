@@ -318,20 +318,27 @@ def honest(problem: Problem, state: State) -> Problem:
     The excess over the points' own sigmas is one figure a camera (median of the residuals, so that outliers do
     not set it).
     """
+    scatter, own = scatter_px(problem, state), [_own_sigma_px(problem, k) for k in range(len(problem.cameras))]
+    excess = [float(np.sqrt(max(many**2 - few**2, 0.0))) for many, few in zip(scatter, own)]
+    return replace(problem, seen=[_honest_points(seen, excess[seen.camera]) if seen.frame >= 0 else seen
+                                  for seen in problem.seen])
+
+
+def scatter_px(problem: Problem, state: State) -> list[float]:
+    """Standard deviation in px of each camera's wire points about the fit, by their median; 0 where it has none."""
     linear, _ = linearise(problem, state)
     ends = np.cumsum([len(seen.points) for seen in problem.seen])
-    parts = [linear.residual[end - len(seen.points):end] * seen.points.sigma_px
+    parts = [np.abs(linear.residual[end - len(seen.points):end]) * seen.points.sigma_px
              for end, seen in zip(ends, problem.seen)]
-    return replace(problem, seen=[_honest_points(seen, _excess(problem, parts, seen.camera))
-                                  if seen.frame >= 0 else seen for seen in problem.seen])
+    each = [[part for part, seen in zip(parts, problem.seen) if seen.camera == k and seen.frame >= 0]
+            for k in range(len(problem.cameras))]
+    return [float(np.median(np.concatenate(mine))) / 0.6745 if mine else 0.0 for mine in each]
 
 
-def _excess(problem: Problem, parts, camera: int) -> float:
-    """Standard deviation in px by which a camera's wire points scatter beyond their own sigmas."""
-    mine = [k for k, seen in enumerate(problem.seen) if seen.camera == camera and seen.frame >= 0]
-    scatter = np.median(np.abs(np.concatenate([parts[k] for k in mine]))) / 0.6745
-    own = np.median(np.concatenate([problem.seen[k].points.sigma_px for k in mine]))
-    return float(np.sqrt(max(scatter**2 - own**2, 0.0)))
+def _own_sigma_px(problem: Problem, camera: int) -> float:
+    """Median sigma of a camera's wire points; 0 where it has none."""
+    mine = [seen.points.sigma_px for seen in problem.seen if seen.camera == camera and seen.frame >= 0]
+    return float(np.median(np.concatenate(mine))) if mine else 0.0
 
 
 def _honest_points(seen: Observed, excess_px: float) -> Observed:

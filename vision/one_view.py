@@ -108,9 +108,14 @@ def _distance_mm(axis: BarAxis, camera: Camera) -> float:
 
 def seen_from_one_side(cameras: Cameras, axis: BarAxis) -> bool:
     """Whether all cameras' planes through the bar are the same to a degree: only its width tells how far away it is."""
+    return widest_angle_rad(cameras, axis) < _SAME_PLANE_RAD
+
+
+def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
+    """Between the planes through the bar of the two cameras that see it from the most different sides."""
     across = np.array([np.cross(axis.direction, axis.point_mm - camera.centre_mm) for camera in cameras])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return bool(np.min(np.abs(across @ across.T)) > np.cos(_SAME_PLANE_RAD))
+    return float(np.arccos(min(np.min(np.abs(across @ across.T)), 1.0)))
 
 
 def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: float) -> BarAxis:

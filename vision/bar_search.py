@@ -1,0 +1,101 @@
+"""Where the bar is, before any wire is known: looked for among what has changed, then by its lines in all cameras."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.bar import HALF, changed, find_bar, settle_axis
+from vision.bar_line import FAR_PX, NEAR_PX, BarLine, measure_bar
+from vision.contact import BarAxis
+from vision.effort import VisionSettings
+from vision.errors import Refused
+from vision.line import Noise
+from vision.one_view import see_bar_alone, seen_from_one_side, widest_angle_rad
+from vision.rods import Rods
+from vision.scene import Cameras
+from vision.trace import MEAN_OF, View
+
+# Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
+_NARROW_RAD = np.radians(8.0)
+_MEDIAN_OF = 11  # frames: more would not make the bar clearer
+
+
+def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
+    """The bar's axis from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
+
+    Where the sights of all cameras are nearly the same, or not all see the bar that two of them found, each is asked
+    alone, too: by its two edges one camera tells roughly how far away a bar is, and finds no other for it.
+    """
+    changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
+               for view in views}
+    alone = lambda view: see_bar_alone(changes[view.camera.name], of_mean(view), rods.wire,  # noqa: E731
+                                       rods.bar.radius_mm, motor_rad, settings)
+    if len(views) == 1:
+        return alone(views[0])
+    found = [_by_lines(changes, views, cameras, rods, motor_rad, settings)]
+    if all(line.told for line in found[0].lines) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
+        return found[0].axis
+    for view in views:
+        with suppress(Refused):
+            found.append(_settled(alone(view), (NEAR_PX,), views, cameras, rods, settings))
+    one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
+    return max(found[1:] if one_side else found, key=lambda one: one.worth).axis
+
+
+@dataclass(frozen=True)
+class _Found:
+    """An axis and the lines of the bar by which it was settled."""
+
+    axis: BarAxis
+    lines: Sequence[BarLine]
+
+    @property
+    def worth(self) -> tuple[int, float]:
+        """The more cameras see a bar there, and the better, the more."""
+        misfits = [line.misfit for line in self.lines if line.told]
+        return len(misfits), -sum(misfits)
+
+
+def _by_lines(changes, views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> _Found:
+    """Where the sights of two cameras or more cross."""
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
+    return _settled(axis, (FAR_PX, NEAR_PX), views, cameras, rods, settings)
+
+
+def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods,
+             settings: VisionSettings) -> _Found:
+    """The axis by the bar's lines, which are looked for so far away in turn."""
+    for most_px in off_px:
+        lines = bar_lines(views, axis, rods, {}, settings, off_px=most_px)
+        axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
+        if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
+            break
+    return _Found(axis, [*lines.values()])
+
+
+def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
+              last: bool = False) -> dict[str, BarLine]:
+    """The bar's line in each camera that shows enough of it."""
+    found = {view.camera.name: measure_bar(of_mean(view), view.mean, axis, rods.bar.radius_mm,
+                                           wires.get(view.camera.name, []), settings, off_px=off_px, last=last)
+             for view in views}
+    return {name: line for name, line in found.items() if line is not None}
+
+
+def of_mean(view: View) -> View:
+    """The view with the noise of its mean picture."""
+    return replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF)))
+
+
+def _quieter(noise: Noise, count: int) -> Noise:
+    """Noise of a mean of `count` frames beside one picture of the background."""
+    share = 1.0 / count + 1.0
+    return Noise(noise.floor * share, noise.gain * share)
+
+
+def _median_picture(view: View) -> np.ndarray:
+    """Median of some frames at every HALF-th pixel: where the wire moves it vanishes."""
+    return np.median([picture[::HALF, ::HALF] for picture in view.some(_MEDIAN_OF)], axis=0)

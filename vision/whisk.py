@@ -1,0 +1,194 @@
+"""One whisk: wire and bar traced in all its frames and fitted together, by turns."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from vision.bar_edges import measure_edges
+from vision.bar_search import bar_lines, of_mean
+from vision.contact import BarAxis
+from vision.effort import VisionSettings
+from vision.errors import Misled, Refused
+from vision.fit import (
+    LAST_SCALE,
+    Observed,
+    Problem,
+    State,
+    bar_axis,
+    bends,
+    curves_of,
+    honest,
+    rest_shape,
+    scatter_px,
+    solve,
+)
+from vision.line import WAVES, LinePoints
+from vision.one_sided import Lit, seen_width
+from vision.one_view import seen_from_one_side, touch_by_onset
+from vision.rods import Rods
+from vision.scene import Cameras
+from vision.shading import Knots
+from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
+from vision.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
+from vision.trace import View, clear_of_bar, observed, settle, to_points, trace, wire_pieces
+from vision.wire import Curves
+
+_WIRE_KNOT_MM = 12.0
+_NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
+_BESIDE_BAR_PX = 4.0
+_SEARCH_PX = 1.5
+_ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
+# Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
+# another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
+_NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
+_MOST_SCATTER_PX = 0.7  # where a wire is seen at all its points lie on one line to a tenth of a pixel
+_NEVER_TOUCHES = "the whisker never touches"
+_STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
+
+
+def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float], light: dict[str, Lit],
+               settings: VisionSettings):
+    """Problem and state after the last round, the parameters' covariance, and the frames in it: all but those far
+    before touch.
+
+    light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
+    """
+    early = _early(motor)
+    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
+    coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
+    one_side = seen_from_one_side(cameras, axis)
+    motor = motor if one_side else _near_touch(motor, coarse)
+    angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
+    touching, free = frames_that_touch(angles, bend)
+    if one_side:  # a bend along the sight is not seen at first
+        free = np.arange(len(angles)) < len(early)
+        touching = touching & ~free
+    elif not np.any(touching):
+        raise Refused(_NEVER_TOUCHES)
+    if np.sum(~touching) < FEWEST_FREE:
+        raise Refused(_STARTS_TOUCHING)
+    arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
+    curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
+    for round_number in range(settings.rounds + 1):
+        last = round_number == settings.rounds
+        seen = _trace_all(views, cameras, rods, axis, motor, curves, light, settings, last=last)
+        problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
+        fitted, covariance = solve(problem, _begin(problem, rest, bend, arcs))
+        if one_side:
+            problem, fitted = touch_by_onset(problem, fitted, covariance)
+            fitted, _ = solve(problem, fitted)
+        problem = honest(problem, fitted)
+        fitted, covariance = solve(problem, fitted, scales=[LAST_SCALE] * 3)
+        if last:
+            break
+        _check_scatter(problem, fitted)
+        rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
+        axis, curves = bar_axis(problem, fitted.vector), _fitted(problem, fitted, motor)
+        if one_side:
+            touching = problem.touching
+            continue
+        touch = float(first_touch(problem, fitted.vector).motor_rad)
+        touching, free = frames_by_touch(angles, touch, np.radians(0.02))
+        if np.sum(free) < FEWEST_FREE:
+            raise Refused(_STARTS_TOUCHING)
+        if not np.any(touching):
+            raise Refused(_NEVER_TOUCHES)
+    return problem, fitted, covariance, list(motor)
+
+
+def _check_scatter(problem: Problem, state: State) -> None:
+    """Raises Misled where a camera's lines are not those of one wire."""
+    scatter = scatter_px(problem, state)
+    worst = int(np.argmax(scatter))
+    if scatter[worst] > _MOST_SCATTER_PX:
+        name = [camera.name for camera in problem.cameras][worst]
+        raise Misled(name, f"its lines of the wire scatter by {scatter[worst]:.1f} px, {_MOST_SCATTER_PX:g} is allowed")
+
+
+def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> dict[int, float]:
+    """The frames from a little before the first that surely touches."""
+    angles = np.array(list(motor.values()))
+    touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
+    if not np.any(touching):
+        return dict(motor)
+    first = int(np.argmax(touching))
+    begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
+    return dict(list(motor.items())[begin:])
+
+
+def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mapping[int, float], near, light: dict,
+                 settings: VisionSettings) -> tuple[Problem, State]:
+    """All frames before touch and what is seen in them, about the bar and the shape at rest of a fit."""
+    free = {f: angle for f, angle in motor.items() if f not in near or not problem.bent[near.index(f)]}
+    rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
+    curves = {f: one_curve(rest, np.zeros(2), rods.wire.length_mm, angle, rods.wire) for f, angle in free.items()}
+    seen = [one for number, view in enumerate(views)
+            for one in _trace_wire(number, view, rods, axis, free, curves, light, settings)]
+    nothing = np.zeros(len(free), dtype=bool)
+    alone = replace(problem, motor_rad=np.array(list(free.values())), touching=nothing, bent=nothing, seen=seen)
+    there = State(state.vector[:problem.first_bend], np.full(len(free), 0.5 * rods.wire.length_mm))
+    return honest(alone, there), there
+
+
+def _early(motor: Mapping[int, float]) -> dict[int, float]:
+    """The frames of the first seventh of the stroke, two at least: taken as free for a first look."""
+    angles = list(motor.values())
+    limit = angles[0] + (angles[-1] - angles[0]) / 7.0
+    count = max(2, sum(1 for angle in angles if angle <= limit))
+    return dict(list(motor.items())[:count])
+
+
+def _fitted(problem: Problem, state: State, motor) -> dict[int, Curves]:
+    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
+    return {f: Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k]) for k, f in enumerate(motor)}
+
+
+def _begin(problem: Problem, rest, bend, arcs) -> State:
+    vector = np.zeros(problem.size)
+    vector[4:12] = np.ravel(rest)
+    vector[problem.first_bend:] = bend[problem.bent].ravel()
+    return State(vector, np.asarray(arcs, dtype=float))
+
+
+def _trace_all(views, cameras: Cameras, rods: Rods, axis: BarAxis, motor, curves, light: dict,
+               settings: VisionSettings, *, last: bool) -> list[Observed]:
+    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. last: see
+    `measure_bar`."""
+    wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in curves.values()] for view in views}
+    bar = _trace_bar(views, cameras, rods, axis, wires, settings, last=last)
+    seen = []
+    for number, view in enumerate(views):
+        seen += _trace_wire(number, view, rods, axis, motor, curves, light, settings)
+        seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
+    for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
+                       ("bar clear of the wire", any(one.frame < 0 for one in seen))):
+        if not there:
+            raise Refused(f"no camera shows enough of the {rod}")
+    return seen
+
+
+def _trace_bar(views, cameras: Cameras, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
+               last: bool) -> list[dict[int, LinePoints]]:
+    """Per camera the points of the bar's middle (side 0), or of its two edges where the cameras stand on one side."""
+    if seen_from_one_side(cameras, axis):
+        return [measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm, wires[view.camera.name],
+                              settings) or {} for view in views]
+    lines = bar_lines(views, axis, rods, wires, settings, last=last)
+    return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
+
+
+def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
+                settings: VisionSettings) -> list[Observed]:
+    pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
+    pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
+    if len(pieces) == 0:
+        return []
+    knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
+    name, known = view.camera.name, light.get(view.camera.name)
+    pieces, blur = (pieces, known.blur_px) if known else settle(pieces, knots, _SEARCH_PX)
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST)
+    light[name] = known or Lit(blur, seen_width(pieces, blur))
+    points, source = to_points(pieces, found, misfit)
+    return observed(points, source, number, list(curves))
