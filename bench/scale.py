@@ -17,6 +17,7 @@ from vision.place import check_known_lengths
 from vision.scene import Bar, Cameras
 
 _MOST_TRIALS, _MOST_PICTURES = 3, 11
+_UNCONFIRMED = 0.05  # of one trial alone
 
 
 def check_scale(session: Session, cameras: Cameras) -> str | None:
@@ -30,15 +31,21 @@ def check_scale(session: Session, cameras: Cameras) -> str | None:
     shares = np.array(list(_seen_over_given(session, cameras, trials[:: max(1, len(trials) // _MOST_TRIALS)])))
     if not len(shares):
         return None
-    share, sigma, given_mm = float(np.median(shares)), SIGMA_SHARE / np.sqrt(len(shares)), trials[0].bar_diameter_mm
+    # at a wrong scale the bar is not where the whisker would touch it, and another thing may pass for it
+    scatter = np.std(shares, ddof=1) if len(shares) > 1 else _UNCONFIRMED
+    share, sigma = float(np.median(shares)), float(np.hypot(SIGMA_SHARE, scatter) / np.sqrt(len(shares)))
+    if scatter > _UNCONFIRMED:
+        return (f"Second length: bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are "
+                "hardly seen where square_mm and T_rig_board have the whisker.")
+    given_mm = trials[0].bar_diameter_mm
     given_sigma_mm = max(t.bar_diameter_sigma_mm for t in trials)
     try:
         check_known_lengths({"bar diameter": (share * given_mm, sigma * share * given_mm, given_mm, given_sigma_mm)})
     except Refused as reason:
         square_mm = session.board.square_mm
-        found = f"square_mm is {square_mm:g}, some {square_mm / share:.2g} would fit the bar"
+        found = f"square_mm is {square_mm:g}, some {square_mm / share:.3g} would fit the bar"
         raise BadInput(f"{reason}; {found}", file="session.toml") from None
-    return f"Second length: bars look {share:.2f} ± {sigma:.2f} times as thick as given; square_mm can be right."
+    return f"Second length: bars look {share:.3f} ± {sigma:.3f} times as thick as given; square_mm can be right."
 
 
 def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from vision.bar_line import ARM_MM, FEWEST_PIECES, INNER_SHARE, KNOT_MM, NO_BAR, bar_pieces, clear_of_wire, of_bar_alone
+from vision.binned import binned
 from vision.contact import BarAxis
 from vision.descent import descend
 from vision.effort import VisionSettings
@@ -20,7 +21,7 @@ from vision.trace import View
 
 # An edge's error beyond its formal one, which half-widths of path-traced and painted bars show (docs/truth.md).
 EDGE_PX, FORMAL_TO_TRUE = 0.12, 2.0
-_SWEEP_BLUR_PX = 1.5
+_SWEEP_BLUR_PX, _BIN_PX = 1.5, 0.5
 _SWEEP_REACH_MM = 20.0
 # Shift and tilt in px; widening and taper in half-widths, the latter of a bar at 20 degrees to the sight.
 _SWEEP_MOST_PX, _SWEEP_MOST_SHARE = (5.0, 5.0), np.array([0.2, 0.15])
@@ -66,7 +67,8 @@ def _placed(pieces: Pieces, q) -> Pieces:
 def _sweep(pieces: Pieces, knots) -> np.ndarray:
     """Coordinate descent over shift, tilt, widening and taper with a coarse, blurred model, near the contact."""
     near = np.abs(pieces.place) < _SWEEP_REACH_MM
-    some, found = pieces.select(near) if np.sum(near) >= FEWEST_PIECES else pieces, np.zeros(4)
+    some, _ = binned(pieces.select(near) if np.sum(near) >= FEWEST_PIECES else pieces, _BIN_PX)
+    found = np.zeros(4)
     misfit = lambda q: fit_shading(_placed(some, q), _SWEEP_BLUR_PX, WAVES, knots)[1]  # noqa: E731
     most = np.array([*_SWEEP_MOST_PX, *np.median(pieces.radius_px) * _SWEEP_MOST_SHARE])
     for part in _SWEEP_PARTS:

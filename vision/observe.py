@@ -100,13 +100,13 @@ def _see_whisk(number: int, indices, views, cameras, rods: Rods, axis: BarAxis, 
             left_out = [*left_out, status]
     measured, by_parameter = jacobians(problem, state)
     lens = calibration_share(problem, state, covariance)
-    rows = [f for f in indices if f >= near[0]]
-    whisk = to_whisk(number, rows, near, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
-                     lens, views, rods.bar.radius_mm, settings)
+    far = set(motor) - set(near)
+    whisk = to_whisk(number, indices, near, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
+                     lens, views, rods.bar.radius_mm, settings, far)
     beam = check_beam(problem, state, covariance + lens, measured, by_parameter)
     status = "; ".join(filter(None, [whisk.status, beam.alarm, *left_out]))
-    far = free_stroke(views, rods, problem, state, motor, near, light, settings) if near[0] > seen[0] else None
-    return replace(whisk, base=base_lines(*(far or (problem, state)), lens), beam=beam, status=status)
+    stroke = free_stroke(views, rods, problem, state, motor, near, light, settings) if far else (problem, state)
+    return replace(whisk, base=base_lines(*stroke, lens), beam=beam, status=status)
 
 
 def _with_frames(views, indices) -> tuple[list[View], list[str]]:

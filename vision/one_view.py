@@ -18,7 +18,7 @@ from vision.fit import Problem, State, bends
 from vision.line import LinePoints
 from vision.onset import onset, seen_bend
 from vision.scene import Camera, Cameras, Wire
-from vision.swing import one_curve
+from vision.swing import resting_lines
 from vision.touch import FEWEST_FREE, frames_by_touch
 from vision.trace import View
 from vision.wire import rotation_z
@@ -90,8 +90,7 @@ def see_bar_alone(change: np.ndarray, view: View, wire: Wire, radius_mm: float, 
     """
     camera, span = view.camera, (float(np.min(motor_rad)), float(np.max(motor_rad)))
     first = axis = find_bar_alone(change, camera, radius_mm, span, wire.length_mm)
-    straight = [camera.project(one_curve(np.zeros((2, 4)), np.zeros(2), wire.length_mm, motor, wire).points_mm)
-                for motor in np.unique(motor_rad)]
+    straight = resting_lines(camera, wire, np.unique(motor_rad))
     for coarse in (True, False):
         edges = measure_edges(view, view.mean, axis, radius_mm, straight, settings, coarse=coarse)
         found = axis if edges is None else axis_from_edges(edges, camera, radius_mm)

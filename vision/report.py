@@ -1,6 +1,6 @@
 """From the fit to rows: values with sigmas, statuses, and lines to draw on the pictures."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -20,16 +20,17 @@ _PLAIN = ("slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha")
 
 def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, motor_rad, problem: Problem,
              state: State, measured: Measured, by_parameter: Jacobians, noise, lens, views, bar_radius_mm: float,
-             settings: VisionSettings) -> WhiskTruth:
-    """The row of a whisk and its frames. noise, lens: covariances (size, size) of the parameters by cause."""
+             settings: VisionSettings, far: Collection[int] = ()) -> WhiskTruth:
+    """The row of a whisk and its frames. seen: the frames in the fit; far: those left out of it, long before touch.
+    noise, lens: covariances (size, size) of the parameters by cause."""
     covariance = noise + lens
     sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by_parameter.whisk.items()}
     value = {name: float(v) for name, v in measured.whisk.items()}
     clock = settings.clock_sigma_s * _speed(time_s[list(seen)], problem.motor_rad, value["touch"])
     sigma["touch"] = float(np.hypot(sigma["touch"], clock))
-    frames = _frames(indices, seen, time_s, motor_rad, problem, measured, by_parameter, covariance, value["touch"],
-                     sigma["touch"])
-    lost = _lost_at_touch(indices, seen, motor_rad, value["touch"])
+    frames = _frames(indices, seen, far, time_s, motor_rad, problem, measured, by_parameter, covariance,
+                     value["touch"], sigma["touch"])
+    lost = _lost_at_touch(indices, [*far, *seen], motor_rad, value["touch"])
     outside = _outside(problem, value)
     status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"])]))
     truth = {} if lost or outside else {
@@ -83,7 +84,7 @@ def _smooth(problem: Problem, measured: Measured, by_parameter: Jacobians, covar
                   {name: by_parameter.frame[name][keep] for name in _PLAIN}, covariance)
 
 
-def _frames(indices, seen, time_s, motor_rad, problem: Problem, measured: Measured, by_parameter: Jacobians,
+def _frames(indices, seen, far, time_s, motor_rad, problem: Problem, measured: Measured, by_parameter: Jacobians,
             covariance, touch_rad: float, touch_sigma_rad: float) -> FrameTruth:
     """A row for every frame of the whisk, NaN for those not seen or not touching."""
     indices = np.array(list(indices))
@@ -99,8 +100,8 @@ def _frames(indices, seen, time_s, motor_rad, problem: Problem, measured: Measur
 
     sigmas = {name: np.sqrt(np.maximum(np.einsum("fi,ij,fj->f", j, covariance, j), 0.0))
               for name, j in by_parameter.frame.items()}
-    status = tuple("no picture" if r < 0 else "" if t or not b else "at touch" for r, t, b in
-                   zip(rows, touching, bent))
+    status = tuple("long before touch" if f in far else "no picture" if r < 0 else "" if t or not b else "at touch"
+                   for f, r, t, b in zip(indices, rows, touching, bent))
     plain = {}
     for name in _PLAIN:
         unit = "rad" if name in ("phi", "alpha") else "mm"

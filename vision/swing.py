@@ -72,6 +72,12 @@ def one_curve(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
                        wire)
 
 
+def resting_lines(camera, wire: Wire, motor_rad) -> list[np.ndarray]:
+    """Lines (m, 2) in one camera of a straight, unbent wire at each of the motor angles (n,)."""
+    return [camera.project(one_curve(np.zeros((2, REST_POWERS)), np.zeros(2), wire.length_mm, motor, wire).points_mm)
+            for motor in motor_rad]
+
+
 def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float, rest_mm,
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
