@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit import BAR, REST, REST_PRIOR_MM, WIRE_OFFSET_PX, Observed, Problem, State, linearise
+from vision.fit import linearise
 from vision.place import BaseLines
+from vision.problem import BAR, REST, REST_PRIOR_MM, WIRE_OFFSET_PX, Observed, Problem, State
 from vision.wire import REST_POWERS, rotation_z
 
 # Offsets and slopes, y then z, among the rest shape's parameters.

@@ -19,19 +19,8 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 from vision.contact import BarAxis, clearance
-from vision.fit import (
-    CONTACT_SIGMA_MM,
-    LAST_SCALE,
-    WIRE_OFFSET_PX,
-    Observed,
-    Problem,
-    State,
-    bar_axis,
-    bends,
-    curves_of,
-    linearise,
-    robust_weights,
-)
+from vision.fit import LAST_SCALE, linearise, robust_weights
+from vision.problem import CONTACT_SIGMA_MM, WIRE_OFFSET_PX, Observed, Problem, State, bar_axis, bends, curves_of
 from vision.quantities import Jacobians, Measured, camera_rows
 from vision.wire import Curves, rotation_z
 

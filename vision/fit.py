@@ -12,114 +12,33 @@ from itertools import groupby
 
 import numpy as np
 
-from vision.bar import axis_frame, shifted_axis
-from vision.contact import BarAxis, clearance, closest_arc
+from vision.contact import BarAxis, clearance
 from vision.line import LinePoints
 from vision.onset import Onset
-from vision.scene import Cameras, Wire
+from vision.problem import (
+    BAR,
+    BAR_OFFSET_PX,
+    BAR_TILT_ARM_MM,
+    BAR_TILT_PX,
+    BEND_PRIOR_RAD,
+    CONTACT_SIGMA_MM,
+    REST,
+    REST_PRIOR_MM,
+    WIRE_LUMP,
+    WIRE_OFFSET_PX,
+    WIRE_TILT_PX,
+    Observed,
+    Problem,
+    State,
+    bar_axis,
+    curves_of,
+    rest_shape,
+)
 from vision.silhouette import edges
-from vision.wire import REST_POWERS, Curves, centrelines
+from vision.wire import Curves, centrelines
 
-BAR, REST = 4, 2 * REST_POWERS
-# One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
-# set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
-REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
-BEND_PRIOR_RAD = 0.3
-# How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
-WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
-BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.035
-BAR_TILT_ARM_MM = 20.0
-CONTACT_SIGMA_MM = 0.002
-# Neighbouring points of a wire share what is behind them, and so do the same points of the next frames: their
-# errors come in lumps of about four points, which halves what averaging gains.
-WIRE_LUMP = 4.0
 LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
 _STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
-
-
-@dataclass(frozen=True)
-class Observed:
-    """Line points of one camera in one frame (frame is -1 for the bar, which stands still).
-
-    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals.
-    """
-
-    frame: int
-    camera: int
-    points: LinePoints
-    side: int = 0
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What is known and seen of one whisk.
-
-    motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
-    axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
-    cameras do not know whisker and bar well enough in space to tell when they touch.
-    """
-
-    cameras: Cameras
-    wire: Wire
-    reach_mm: float
-    reach_sigma_mm: float
-    axis: BarAxis
-    motor_rad: np.ndarray
-    touching: np.ndarray
-    bent: np.ndarray
-    seen: Sequence[Observed]
-    onset: Onset | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of parameters: bar, rest shape, reach, two offsets and two tilts a camera, bends."""
-        return self.first_bend + 2 * int(np.sum(self.bent))
-
-    @property
-    def first_bend(self) -> int:
-        """Index of the first bend."""
-        return BAR + REST + 1 + 4 * len(self.cameras)
-
-
-@dataclass(frozen=True)
-class State:
-    """Parameters in one vector, with the contact arcs (f,) from which the next evaluation starts."""
-
-    vector: np.ndarray
-    arcs_mm: np.ndarray
-
-
-def bar_axis(problem: Problem, vector) -> BarAxis:
-    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start."""
-    return shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
-
-
-def rest_shape(vector) -> np.ndarray:
-    """Rest polynomials (…, 2, 4) in mm."""
-    return vector[..., BAR:BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
-
-
-def bends(problem: Problem, vector) -> np.ndarray:
-    """Tangent angles at the contact (…, f, 2); zero in frames that may not bend."""
-    angles = np.zeros((*vector.shape[:-1], len(problem.motor_rad), 2))
-    angles[..., problem.bent, :] = vector[..., problem.first_bend:].reshape(*vector.shape[:-1], -1, 2)
-    return angles
-
-
-def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 1) -> tuple[Curves, np.ndarray]:
-    """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
-    rest = rest_shape(vector)[..., None, :, :]
-    axis = bar_axis(problem, vector)
-    axis = BarAxis(axis.point_mm[..., None, :], axis.direction[..., None, :])
-    angles = bends(problem, vector)
-    shape = angles.shape[:-1]
-    arcs = np.broadcast_to(arcs_mm, shape)
-    motor = np.broadcast_to(problem.motor_rad, shape)
-    rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
-    for _ in range(rounds):
-        curves = centrelines(rest, angles, arcs, motor, problem.wire)
-        arcs = np.clip(closest_arc(curves, axis, arcs), 1.0, problem.wire.length_mm)
-    return centrelines(rest, angles, arcs, motor, problem.wire), arcs
 
 
 def _steps(problem: Problem) -> np.ndarray:
@@ -274,11 +193,6 @@ def _prior_block(problem: Problem, vector):
                             [max(problem.reach_sigma_mm, 1e-6)], np.tile(per_camera, len(problem.cameras)),
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
-
-
-def start(problem: Problem, contact_arc_mm: float) -> State:
-    """No bend, straight whisker, the bar where the problem counts it from."""
-    return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
 
 
 def robust_weights(linear: Linear, scale: float) -> np.ndarray:

@@ -14,9 +14,9 @@ from vision.bar_edges import measure_edges
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
-from vision.fit import Problem, State, bends
 from vision.line import LinePoints
 from vision.onset import onset, seen_bend
+from vision.problem import Problem, State, bends
 from vision.scene import Camera, Cameras, Wire
 from vision.swing import resting_lines
 from vision.touch import FEWEST_FREE, frames_by_touch

@@ -9,18 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.contact import BarAxis, clearance, contact_frame_angles
-from vision.fit import (
-    BAR,
-    REST,
-    Observed,
-    Problem,
-    State,
-    bar_axis,
-    curves_of,
-    linearise,
-    rest_shape,
-    weighted_jacobian,
-)
+from vision.fit import linearise, weighted_jacobian
+from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of, rest_shape
 from vision.scene import N_PARAMETERS
 from vision.silhouette import grazed
 from vision.touch import FirstTouch, first_touch

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from vision.effort import VisionSettings
-from vision.fit import Problem, State, bar_axis, curves_of
+from vision.problem import Problem, State, bar_axis, curves_of
 from vision.quantities import Jacobians, Measured, variance_by_cause
 from vision.silhouette import normals, outline
 from vision.truth import FrameTruth, Smooth, WhiskTruth

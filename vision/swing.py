@@ -9,8 +9,9 @@ import numpy as np
 
 from vision.contact import BarAxis, closest_arc
 from vision.errors import Refused
-from vision.fit import BAR, REST, Observed, Problem, solve, start
+from vision.fit import solve
 from vision.line import LinePoints, strongest_shift
+from vision.problem import BAR, REST, Observed, Problem, start
 from vision.scene import Cameras, Wire
 from vision.silhouette import outline
 from vision.trace import View, clear_of_bar, wire_pieces

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.contact import BarAxis, clearance
-from vision.fit import Problem, bar_axis, rest_shape
+from vision.problem import Problem, bar_axis, rest_shape
 from vision.scene import Wire
 from vision.wire import centrelines
 

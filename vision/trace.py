@@ -8,8 +8,8 @@ import numpy as np
 
 from vision.binned import binned, without
 from vision.descent import descend
-from vision.fit import Observed
 from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
+from vision.problem import Observed
 from vision.scene import Camera, Wire
 from vision.shading import Knots, Located, fit_shading, line_points, locate, wave_prior
 from vision.silhouette import outline

@@ -10,22 +10,11 @@ from vision.bar_search import bar_lines, of_mean
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Misled, Refused
-from vision.fit import (
-    LAST_SCALE,
-    Observed,
-    Problem,
-    State,
-    bar_axis,
-    bends,
-    curves_of,
-    honest,
-    rest_shape,
-    scatter_px,
-    solve,
-)
+from vision.fit import LAST_SCALE, honest, scatter_px, solve
 from vision.line import WAVES, LinePoints
 from vision.one_sided import Lit, seen_width
 from vision.one_view import seen_from_one_side, touch_by_onset
+from vision.problem import Observed, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.rods import Rods
 from vision.scene import Cameras
 from vision.shading import Knots

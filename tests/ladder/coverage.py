@@ -26,9 +26,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from bench.rig.parts import Job, frames_of
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
-from vision.fit import Problem, State, honest, solve
+from vision.fit import honest, solve
 from vision.observe import observe_trial
 from vision.one_view import seen_from_one_side, touch_by_onset
+from vision.problem import Problem, State
 from vision.quantities import calibration_share, jacobians
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}

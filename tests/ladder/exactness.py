@@ -20,8 +20,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.rig.protocol import MotorTable, PicturesTable, WhiskerTable
 from tests.ladder.scenes import STEP_DEG, Scene, Sigmas, as_problem, begin, draw_scene, line_points
-from vision.fit import BAR, Observed, Problem, State, bar_middle, curves_of, solve
+from vision.fit import bar_middle, solve
 from vision.line import LinePoints
+from vision.problem import BAR, Observed, Problem, State, curves_of
 from vision.quantities import Measured, measure
 from vision.silhouette import normals
 from vision.wire import Curves

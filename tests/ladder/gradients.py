@@ -18,7 +18,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.scenes import Scene, as_problem, begin, draw_scene, line_points
-from vision.fit import BAR, Problem, State, linearise, solve
+from vision.fit import linearise, solve
+from vision.problem import BAR, Problem, State
 from vision.quantities import camera_rows, jacobians, measure
 
 # Steps of about 1e-4 px: rounding leaves 1e-8 of the residual, curvature 1e-6.

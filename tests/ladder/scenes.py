@@ -20,12 +20,12 @@ from bench.rig import build
 from bench.rig.protocol import BoardTable, CameraTable, LightTable, PicturesTable, Protocol, TrialTable, WhiskerTable
 from bench.rig.recording import Recording
 from tests.ladder.board_scenes import BOARD, board_views, measured_pose, noisy, rig_view
-from vision import fit
+from vision import problem as model
 from vision.bar_edges import EDGE_PX
 from vision.calibrate import calibrate_cameras
 from vision.contact import BarAxis
-from vision.fit import Observed, Problem, State
 from vision.line import LinePoints
+from vision.problem import Observed, Problem, State
 from vision.scene import Bar, Camera, Cameras, Wire
 from vision.silhouette import normals, outline
 from vision.swing import outline_of_bar
@@ -34,7 +34,7 @@ POINT_STEP_MM, FIRST_POINT_MM, BESIDE_BAR_PX = 2.4, 6.0, 4.0
 # Small pictures and few frames: a scene costs seconds, and many are wanted.
 SIZE_PX, STEP_DEG = (960, 600), 0.7
 BAR_PLACES_MM = np.array([-20.0, 20.0])
-LUMP = round(fit.WIRE_LUMP)  # so many neighbouring points have one error: what the fit takes them for
+LUMP = round(model.WIRE_LUMP)  # so many neighbouring points have one error: what the fit takes them for
 LEAST_SIGHT_DEG = 20.0  # between a camera's sight and bar or wire; nearer there is no line to see
 # Where the cameras' planes through the bar nearly coincide, its slope is told by nothing but offsets of whole lines:
 # sigmas of tens of degrees, where nothing is linear.
@@ -237,7 +237,7 @@ def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Ob
     out of round at each frame's contact, by as much as the fit's priors say.
     """
     frames = len(scene.motor_rad)
-    not_round = np.zeros(frames) if rng is None else fit.CONTACT_SIGMA_MM * rng.standard_normal(frames)
+    not_round = np.zeros(frames) if rng is None else model.CONTACT_SIGMA_MM * rng.standard_normal(frames)
     return [seen for number, camera in enumerate(scene.cameras)
             for seen in [*_wire_points(scene, number, camera, not_round, rng),
                          *_bar_points(scene, number, camera, rng)]]
@@ -245,7 +245,7 @@ def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Ob
 
 def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> list[Observed]:
     length, sigma, seen = scene.wire.length_mm, scene.sigmas.wire_px, []
-    offset, tilt = _whole(rng, fit.WIRE_OFFSET_PX, fit.WIRE_TILT_PX)
+    offset, tilt = _whole(rng, model.WIRE_OFFSET_PX, model.WIRE_TILT_PX)
     bar = outline_of_bar(camera, scene.axis, scene.bar.radius_mm)
     place = np.arange(FIRST_POINT_MM, length - 1.0, POINT_STEP_MM)
     for frame, more_mm in enumerate(not_round):
@@ -275,12 +275,12 @@ def _bar_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observed
     """Two points of the bar's middle, as vision hands it on; of its two edges where there is one camera."""
     if len(scene.cameras) == 1:
         return _edge_points(scene, number, camera, rng)
-    offset, tilt = _whole(rng, fit.BAR_OFFSET_PX, fit.BAR_TILT_PX)
+    offset, tilt = _whole(rng, model.BAR_OFFSET_PX, model.BAR_TILT_PX)
     axis, sigma = scene.axis, scene.sigmas.bar_px
     points = axis.point_mm + BAR_PLACES_MM[:, None] * axis.direction
     px = outline(camera, points, np.broadcast_to(axis.direction, points.shape), scene.bar.radius_mm)[0]
     noise = np.zeros(2) if rng is None else sigma * rng.standard_normal(2)
-    off, normal = offset + tilt * BAR_PLACES_MM / fit.BAR_TILT_ARM_MM + noise, normals(px)
+    off, normal = offset + tilt * BAR_PLACES_MM / model.BAR_TILT_ARM_MM + noise, normals(px)
     return [Observed(-1, number, LinePoints(px + off[:, None] * normal, normal, np.full(2, sigma), BAR_PLACES_MM))]
 
 
@@ -325,4 +325,4 @@ def as_problem(scene: Scene, cameras: Cameras, wire: Wire, bar: Bar, seen: Seque
 
 def begin(problem: Problem) -> State:
     """No bend and a straight whisker, the contact where the bar is."""
-    return fit.start(problem, float(np.linalg.norm(problem.axis.point_mm)))
+    return model.start(problem, float(np.linalg.norm(problem.axis.point_mm)))

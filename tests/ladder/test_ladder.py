@@ -13,7 +13,7 @@ from tests.ladder.precision import repeat
 from tests.ladder.rows import all_rows, read_rows
 from tests.ladder.scenes import draw_scene, lumpy_noise
 from tests.ladder.views import known
-from vision.fit import WIRE_LUMP
+from vision.problem import WIRE_LUMP
 
 FEW = PicturesTable(step_deg=1.5)  # five frames a whisk
 

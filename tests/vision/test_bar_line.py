@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.ladder.bar_lines import SCENES, errors_and_sigmas
-from vision.fit import BAR_OFFSET_PX, BAR_TILT_PX
+from vision.problem import BAR_OFFSET_PX, BAR_TILT_PX
 
 
 def test_over_printed_squares_both_edges_are_told_to_a_fiftieth_of_a_pixel(rng):

@@ -7,8 +7,8 @@ import pytest
 
 from tests.vision.test_fit import CAMERAS, scene, with_points
 from vision.base_line import base_lines
-from vision.fit import State
 from vision.place import by_swing
+from vision.problem import State
 from vision.rotation import compose, exp_rotation, invert_transform
 from vision.scene import Cameras
 

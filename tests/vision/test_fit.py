@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from vision.contact import BarAxis, clearance, contact_frame_angles
-from vision.fit import Observed, Problem, State, bar_axis, bar_middle, bends, curves_of, linearise, solve
+from vision.fit import bar_middle, linearise, solve
 from vision.line import LinePoints
+from vision.problem import Observed, Problem, State, bar_axis, bends, curves_of
 from vision.quantities import measure
 from vision.scene import Camera, Cameras, Wire
 from vision.silhouette import normals

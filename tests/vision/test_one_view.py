@@ -12,10 +12,11 @@ from vision.bar_edges import measure_edges
 from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Refused
-from vision.fit import Observed, State, bar_axis, linearise, solve
+from vision.fit import linearise, solve
 from vision.line import LinePoints, Noise
 from vision.one_view import axis_from_edges, find_bar_alone, seen_from_one_side, touch_by_onset
 from vision.onset import Onset, onset
+from vision.problem import Observed, State, bar_axis
 from vision.quantities import calibration_share, jacobians, variance_by_cause
 from vision.scene import Camera, Cameras
 from vision.silhouette import grazed, normals
