@@ -15,10 +15,12 @@ from vision.line import Noise
 from vision.one_view import see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.rods import Rods
 from vision.scene import Cameras
+from vision.swing import resting_lines
 from vision.trace import MEAN_OF, View
 
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
+_WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
 
 
@@ -28,18 +30,22 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
     Where the sights of all cameras are nearly the same, or not all see the bar that two of them found, each is asked
     alone, too: by its two edges one camera tells roughly how far away a bar is, and finds no other for it.
     """
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
     changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
                for view in views}
+    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
     alone = lambda view: see_bar_alone(changes[view.camera.name], of_mean(view), rods.wire,  # noqa: E731
                                        rods.bar.radius_mm, motor_rad, settings)
+    settled = lambda axis, *off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
     if len(views) == 1:
         return alone(views[0])
-    found = [_by_lines(changes, views, cameras, rods, motor_rad, settings)]
-    if all(line.told for line in found[0].lines) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
+    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
+    found = [settled(axis, FAR_PX, NEAR_PX)]
+    if found[0].worth[0] == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
         return found[0].axis
     for view in views:
         with suppress(Refused):
-            found.append(_settled(alone(view), (NEAR_PX,), views, cameras, rods, settings))
+            found.append(settled(alone(view), NEAR_PX))
     one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
     return max(found[1:] if one_side else found, key=lambda one: one.worth).axis
 
@@ -58,18 +64,11 @@ class _Found:
         return len(misfits), -sum(misfits)
 
 
-def _by_lines(changes, views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> _Found:
-    """Where the sights of two cameras or more cross."""
-    span = float(np.min(motor_rad)), float(np.max(motor_rad))
-    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
-    return _settled(axis, (FAR_PX, NEAR_PX), views, cameras, rods, settings)
-
-
-def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods,
+def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
              settings: VisionSettings) -> _Found:
     """The axis by the bar's lines, which are looked for so far away in turn."""
     for most_px in off_px:
-        lines = bar_lines(views, axis, rods, {}, settings, off_px=most_px)
+        lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
         axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
         if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
             break

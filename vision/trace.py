@@ -94,7 +94,7 @@ def settle(pieces: Pieces, knots: Knots, search_px: float) -> tuple[Pieces, floa
     highlight has: what they lack passes for blur.
     """
     rough, blurred = binned(pieces, _BIN_PX)
-    near, found, typical = trace(rough, _best_blur(rough, knots), WAVES, knots, rounds=2)
+    near, found, typical = _by_turns(rough, _best_blur(rough, knots), WAVES, knots, 2)
     lever = 2.0 * (near.place - near.place.min()) / max(np.ptp(near.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(near)), lever, lever**2 - 1.0 / 3.0], axis=1)
     plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
@@ -111,8 +111,7 @@ def settle(pieces: Pieces, knots: Knots, search_px: float) -> tuple[Pieces, floa
               for blur in _BLURS_PX[1:8]]
     best = min(starts, key=lambda start: misfit(start, few))
     best, _, _ = descend(lambda q: misfit(q, enough), best, _STEPS, _LONGEST, _SETTLED)
-    moved = np.sum((near.foot_px - pieces.foot_px) * pieces.normal, axis=1) + bow @ best[:3]
-    return pieces.moved(moved), without(np.exp(best[3]), blurred)
+    return pieces.moved(_apart(near, pieces) + bow @ best[:3]), without(np.exp(best[3]), blurred)
 
 
 def _some(pieces: Pieces, count: int) -> Pieces:
@@ -124,9 +123,18 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots: Knots,
           rounds: int = 5) -> tuple[Pieces, Located, float]:
     """Shading and positions by turns; the pieces come back where they were found, with what is left to move.
 
-    Also the median misfit (chi² per pixel). The pieces must be near; from a rough curve, see `settle`.
+    Also the median misfit (chi² per pixel). The pieces must be near; from a rough curve, see `settle`. All turns but
+    the last are taken with averaged pixels.
     """
-    prior, robust = wave_prior(pieces, terms), None
+    rough, blurred = binned(pieces, _BIN_PX)
+    near, found, _ = _by_turns(rough, np.hypot(blur_px, np.sqrt(blurred)), terms, knots, rounds - 1)
+    return _by_turns(pieces.moved(_apart(near, pieces)), blur_px, terms, knots, 1, _robust(found.chi2))
+
+
+def _by_turns(pieces: Pieces, blur_px: float, terms: int, knots: Knots, rounds: int,
+              robust=None) -> tuple[Pieces, Located, float]:
+    """`trace` with the pixels as they are. robust (s,): weights of the pieces to begin with."""
+    prior = wave_prior(pieces, terms)
     for _ in range(rounds):
         shading, _ = fit_shading(pieces, blur_px, terms, knots, robust, prior)
         found = locate(pieces, shading, rounds=1)
@@ -135,6 +143,11 @@ def trace(pieces: Pieces, blur_px: float, terms: int, knots: Knots,
             break
     found = locate(pieces, shading, rounds=1)
     return pieces, found, float(np.median(found.chi2))
+
+
+def _apart(near: Pieces, pieces: Pieces) -> np.ndarray:
+    """How far (s,) the same pieces lie from each other along their normals, px."""
+    return np.sum((near.foot_px - pieces.foot_px) * pieces.normal, axis=1)
 
 
 def _robust(misfit) -> np.ndarray:
