@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 # Gauss–Legendre nodes over the rod's half circumference, where the integrand is smooth: 1e-5 of the contrast.
 _NODES_PER_RADIUS_TO_BLUR = 4
@@ -276,16 +277,17 @@ def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarr
     """
     columns = np.stack([pieces.background, np.ones_like(pieces.background)], -1) * pieces.weight[..., None]
     seen = pieces.grey * pieces.weight
-    normal = np.einsum("spi,spj->sij", columns, columns) + np.diag([1e-3, 1e-3])
-    found = np.linalg.solve(normal, np.einsum("spi,sp->si", columns, seen)[..., None])[..., 0]
+    turned = columns.transpose(0, 2, 1)
+    found = np.linalg.solve(turned @ columns + np.diag([1e-3, 1e-3]), turned @ seen[..., None])[..., 0]
     trusted = np.abs(found[:, 0] - 1.0) < 0.5
     found = np.where(trusted[:, None], found, [1.0, 0.0])
-    energy = np.clip((seen - np.einsum("spi,si->sp", columns, found)) ** 2, 0.0, 400.0) - 1.0
+    energy = np.clip((seen - (columns @ found[..., None])[..., 0]) ** 2, 0.0, 400.0) - 1.0
     bins = np.clip(np.round(pieces.offset_px).astype(int) + reach_px, 0, 2 * reach_px)
-    profile = np.zeros((len(pieces), 2 * reach_px + 1))
-    np.add.at(profile, (np.arange(len(pieces))[:, None], bins), energy)
+    count = 2 * reach_px + 1
+    place = bins + count * np.arange(len(pieces))[:, None]
+    profile = np.bincount(place.ravel(), energy.ravel(), count * len(pieces)).reshape(len(pieces), count)
     half = max(1, round(float(np.median(pieces.radius_px))))
-    window = np.stack([np.convolve(row, np.ones(2 * half + 1), mode="same") for row in profile])
+    window = uniform_filter1d(profile, 2 * half + 1, axis=1, mode="constant") * (2 * half + 1)
     best = np.argmax(window, axis=1)
     share = window.max(axis=1) / np.maximum(np.sum(np.maximum(profile, 0.0), axis=1), 1e-9)
     return best - float(reach_px), share
