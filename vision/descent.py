@@ -20,9 +20,10 @@ def descend(function: Callable, begin, steps, longest, settled: float,
         step = _downhill(slope, curvature, longest)
         trials = [(function(q + step * part), q + step * part) for part in parts]
         lower, there = min(trials, key=lambda trial: trial[0])
-        if lower < here:
-            q, moved, here = there, np.max(np.abs(there - q)), lower
-        if lower > here or moved < settled:
+        if lower >= here:
+            break
+        moved, q, here = np.max(np.abs(there - q)), there, lower
+        if moved < settled:
             break
     return q, here, curvature
 

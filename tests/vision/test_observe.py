@@ -129,3 +129,13 @@ def test_a_camera_with_gaps_is_left_out_by_name(steep):
     whisk = _whisk(steep, steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}})
     assert "camera low was left out: 3 frames" in whisk.status
     assert whisk.cameras == 1 and abs(whisk.d_x_mm - steep.truth["d_x_mm"]) < 3 * whisk.d_x_sigma_mm
+
+
+def test_a_camera_that_shows_another_wire_is_left_out(steep):
+    """Its pictures jump from frame to frame, as from a camera that shakes: what is left is one camera's truth."""
+    shaken = {k: np.roll(picture, 4 * (-1) ** k, axis=0) for k, picture in steep.frames["low"].items()}
+    motor = np.radians(steep.rows["motor_deg"])
+    (whisk,) = observe_trial({"high": steep.frames["high"], "low": shaken}, steep.rows["time_s"], motor,
+                             [slice(0, len(motor))], steep.cameras, WIRE, BAR, steep.background).whisks
+    assert whisk.cameras == 1 and "camera low was left out: its lines of the wire scatter by" in whisk.status
+    assert abs(whisk.d_x_mm - steep.truth["d_x_mm"]) < 3 * whisk.d_x_sigma_mm

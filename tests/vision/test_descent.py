@@ -1,0 +1,32 @@
+"""The least value of a smooth function of a few parameters."""
+
+import numpy as np
+import pytest
+
+from vision.descent import descend
+
+STEPS, LONGEST = np.array([0.1, 0.1]), np.array([0.5, 0.5])
+
+
+def test_a_quadratic_is_left_at_its_least_value_with_its_curvature():
+    curvature, least = np.array([[4.0, 1.0], [1.0, 2.0]]), np.array([0.3, -1.2])
+    function = lambda q: 0.5 * (q - least) @ curvature @ (q - least) + 7.0  # noqa: E731
+    found, value, second = descend(function, np.zeros(2), STEPS, LONGEST, 1e-3)
+    # differences of a quadratic are exact but for rounding over the square of a step
+    assert found == pytest.approx(least, abs=1e-9)
+    assert value == pytest.approx(7.0, abs=1e-12)
+    assert second == pytest.approx(curvature, abs=1e-9)
+
+
+def test_from_a_saddle_it_goes_downhill():
+    """Newton's step alone would stay on the ridge."""
+    function = lambda q: (q[0] ** 2 - 1.0) ** 2 + q[1] ** 2  # noqa: E731
+    found, value, _ = descend(function, np.array([0.1, 0.4]), STEPS, LONGEST, 1e-3)
+    # fourth derivatives of 24 and steps of 0.1: differences err by 24 h² / 6 in the slope, so 0.04 / 8 in place
+    assert np.abs(found) == pytest.approx([1.0, 0.0], abs=0.01)
+    assert value < 1e-3
+
+
+def test_where_nothing_is_lower_it_stays():
+    found, value, _ = descend(lambda q: float(q @ q), np.zeros(2), STEPS, LONGEST, 1e-3)
+    assert np.array_equal(found, np.zeros(2)) and value == 0.0
