@@ -188,9 +188,11 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
 
 
 def _prior_block(problem: Problem, vector):
-    per_camera = [WIRE_OFFSET_PX, WIRE_TILT_PX, BAR_OFFSET_PX, BAR_TILT_PX]
+    per_camera = np.tile([WIRE_OFFSET_PX, WIRE_TILT_PX, BAR_OFFSET_PX, BAR_TILT_PX], (len(problem.cameras), 1))
+    if problem.doubt_px:
+        per_camera[:, 0] = np.hypot(per_camera[:, 0], problem.doubt_px)
     sigma = np.concatenate([[50.0, 50.0, 1.0, 1.0], REST_PRIOR_MM, REST_PRIOR_MM,
-                            [max(problem.reach_sigma_mm, 1e-6)], np.tile(per_camera, len(problem.cameras)),
+                            [max(problem.reach_sigma_mm, 1e-6)], per_camera.ravel(),
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 

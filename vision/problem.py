@@ -46,7 +46,8 @@ class Problem:
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
     axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
-    cameras do not know whisker and bar well enough in space to tell when they touch.
+    cameras do not know whisker and bar well enough in space to tell when they touch. doubt_px: by camera, how far its
+    lines of the wire may be off as a whole besides the usual; none where empty.
     """
 
     cameras: Cameras
@@ -59,6 +60,7 @@ class Problem:
     bent: np.ndarray
     seen: Sequence[Observed]
     onset: Onset | None = None
+    doubt_px: Sequence[float] = ()
 
     @property
     def size(self) -> int:

@@ -62,7 +62,9 @@ def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, flo
     for round_number in range(settings.rounds + 1):
         last = round_number == settings.rounds
         seen = _trace_all(views, cameras, rods, axis, motor, curves, light, settings, last=last)
-        problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen)
+        doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
+        problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen,
+                          doubt_px=doubt_px)
         fitted, covariance = solve(problem, _begin(problem, rest, bend, arcs))
         if one_side:
             problem, fitted = touch_by_onset(problem, fitted, covariance)
