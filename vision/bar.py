@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from vision.contact import BarAxis
+from vision.contact import BarAxis, upward
 from vision.errors import Refused
 from vision.line import LinePoints, Noise
 from vision.scene import Cameras
@@ -132,7 +132,7 @@ def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints]
         rows.append((-vector / [5.0, 5.0, 0.5, 0.5], np.diag(1.0 / np.array([5.0, 5.0, 0.5, 0.5]))))
         vector = vector + np.linalg.lstsq(np.concatenate([r[1] for r in rows]),
                                           np.concatenate([r[0] for r in rows]), rcond=None)[0]
-    return shifted_axis(axis, across, vector)
+    return upward(shifted_axis(axis, across, vector))
 
 
 def axis_frame(direction) -> np.ndarray:

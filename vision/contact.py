@@ -15,6 +15,11 @@ class BarAxis:
     direction: np.ndarray
 
 
+def upward(axis: BarAxis) -> BarAxis:
+    """The same bar, by that of its two directions which has positive z: slope and slip are counted along it."""
+    return axis if axis.direction[2] >= 0 else BarAxis(axis.point_mm, -axis.direction)
+
+
 def contact_frame_angles(direction, touch_rad: float) -> tuple[float, float]:
     """Slope beta = atan2(a_y, a_z) and tilt psi = asin(a_x) of the bar in the frame turned by the touch angle."""
     c, s = np.cos(touch_rad), np.sin(touch_rad)

@@ -11,7 +11,7 @@ import numpy as np
 
 from vision.bar import standing_out
 from vision.bar_edges import measure_edges
-from vision.contact import BarAxis
+from vision.contact import BarAxis, upward
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.line import LinePoints
@@ -51,7 +51,7 @@ def find_bar_alone(change: np.ndarray, camera: Camera, radius_mm: float, motor_r
         raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
                       f"{best:.2f}, needed {_LEAST_SCORE:g}); record with the bar in view of every camera")
     axis = _axis(found[None], camera, motor)
-    return BarAxis(axis.point_mm[0], axis.direction[0])
+    return upward(BarAxis(axis.point_mm[0], axis.direction[0]))
 
 
 def _axis(hypotheses, camera: Camera, motor_rad: float) -> BarAxis:
@@ -122,11 +122,11 @@ def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: 
     planes = np.array([np.cross(*camera.rays(edges[side].px)) for side in (-1, 1)])
     one, other = planes / np.linalg.norm(planes, axis=1, keepdims=True)
     direction = np.cross(one, other)
-    direction *= np.sign(direction[2]) / np.linalg.norm(direction)
+    direction /= np.linalg.norm(direction)
     distance_mm = radius_mm / np.sin(0.5 * np.arccos(np.clip(one @ other, -1.0, 1.0)))
     middle = np.sum([camera.rays(points.px) for points in edges.values()], axis=(0, 1))
     away = middle - (middle @ direction) * direction
-    return BarAxis(camera.centre_mm + distance_mm / np.linalg.norm(away) * middle, direction)
+    return upward(BarAxis(camera.centre_mm + distance_mm / np.linalg.norm(away) * middle, direction))
 
 
 def touch_by_onset(problem: Problem, state: State, covariance) -> tuple[Problem, State]:

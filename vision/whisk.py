@@ -7,7 +7,7 @@ import numpy as np
 
 from vision.bar_edges import measure_edges
 from vision.bar_search import bar_lines, of_mean
-from vision.contact import BarAxis
+from vision.contact import BarAxis, upward
 from vision.effort import VisionSettings
 from vision.errors import Misled, Refused
 from vision.fit import LAST_SCALE, honest, scatter_px, solve
@@ -75,7 +75,7 @@ def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, flo
             break
         _check_scatter(problem, fitted)
         rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
-        axis, curves = bar_axis(problem, fitted.vector), _fitted(problem, fitted, motor)
+        axis, curves = upward(bar_axis(problem, fitted.vector)), _fitted(problem, fitted, motor)
         if one_side:
             touching = problem.touching
             continue

@@ -8,8 +8,9 @@ import pytest
 from tests.ladder.bar_lines import AWAY_MM, CENTRE, FOCAL_PX, FRAMES, NOISE, RADIUS_MM, SIZE, drawn, edges_px, painted
 from tests.ladder.lines import squares
 from tests.vision.test_fit import CAMERAS, REACH, begun, camera, scene, with_points
+from vision.bar import settle_axis
 from vision.bar_edges import measure_edges
-from vision.contact import BarAxis
+from vision.contact import BarAxis, upward
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.fit import linearise, solve
@@ -151,3 +152,11 @@ def test_an_onset_is_found_within_its_sigma(rng):
 def test_no_bend_is_no_onset(rng):
     motor, sigma = np.radians(np.arange(0.4, 7.0, 0.6)), np.radians(0.02)
     assert onset(motor, sigma * rng.standard_normal(len(motor)), sigma**2 * np.eye(len(motor))) is None
+
+
+def test_a_bar_is_counted_by_its_direction_with_positive_z():
+    """Else slope and slip come out turned by 180 degrees: a search round the sight may end on either."""
+    up = BarAxis(np.array([60.0, 5.0, 0.0]), np.array([0.0, 0.6, 0.8]))
+    down = BarAxis(up.point_mm, -up.direction)
+    assert upward(up) is up and np.array_equal(upward(down).direction, up.direction)
+    assert np.allclose(settle_axis(down, Cameras(()), {}, 3.0).direction, up.direction)
