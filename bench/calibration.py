@@ -75,7 +75,7 @@ def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...], np.
         views = read_board_views(session)
         made = calibrate_from(session, views)
         cameras, T_rig_board, first = on_the_rig(session, made.cameras, board_in_world(session, views))
-        lengths = check_scale(session, cameras)
+        lengths, _ = check_scale(session, cameras)
         folder.mkdir(parents=True, exist_ok=True)
         write_cameras(folder / "cameras.toml", cameras)
         notes = [*report_lines(made), *filter(None, [first, lengths])]

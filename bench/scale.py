@@ -18,25 +18,31 @@ from vision.scene import Bar, Cameras
 
 _MOST_TRIALS, _MOST_PICTURES = 3, 11
 _UNCONFIRMED = 0.05  # of one trial alone
+_MOST_SCATTER = 0.1  # at the right scale six sessions scatter by 0.014 at most, at wrong ones by 0.1 to 0.3
 
 
-def check_scale(session: Session, cameras: Cameras) -> str | None:
-    """A note on how thick the bars look, None where the session shows none. cameras: in the rig frame.
+def check_scale(session: Session, cameras: Cameras) -> tuple[str | None, bool]:
+    """A note on how thick the bars look, None where the session shows none, and whether it is a doubt. cameras: in the
+    rig frame.
 
     Raises BadInput at the wrong scale.
     """
     if session.whisker is None or session.board is None:
-        return None
+        return None, False
     trials = [t for t in session.trials if t.bar_diameter_mm and set(t.camera_sources) & set(session.rig_pictures)]
     shares = np.array(list(_seen_over_given(session, cameras, trials[:: max(1, len(trials) // _MOST_TRIALS)])))
     if not len(shares):
-        return None
+        return None, False
     # at a wrong scale the bar is not where the whisker would touch it, and another thing may pass for it
     scatter = np.std(shares, ddof=1) if len(shares) > 1 else _UNCONFIRMED
     share, sigma = float(np.median(shares)), float(np.hypot(SIGMA_SHARE, scatter) / np.sqrt(len(shares)))
     if scatter > _UNCONFIRMED:
-        return (f"Second length: bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are "
-                "hardly seen where square_mm and T_rig_board have the whisker.")
+        seen = (f"bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are hardly seen "
+                "where square_mm and T_rig_board have the whisker")
+        if scatter > _MOST_SCATTER:
+            asked = "measure a square of the board and enter it, then check T_rig_board"
+            raise BadInput(f"{seen}: {asked}", file="session.toml")
+        return f"Second length: {seen}: check both", True
     given_mm = trials[0].bar_diameter_mm
     given_sigma_mm = max(t.bar_diameter_sigma_mm for t in trials)
     try:
@@ -45,7 +51,7 @@ def check_scale(session: Session, cameras: Cameras) -> str | None:
         square_mm = session.board.square_mm
         found = f"square_mm is {square_mm:g}, some {square_mm / share:.3g} would fit the bar"
         raise BadInput(f"{reason}; {found}", file="session.toml") from None
-    return f"Second length: bars look {share:.3f} ± {sigma:.3f} times as thick as given; square_mm can be right."
+    return f"Second length: bars look {share:.3f} ± {sigma:.3f} times as thick as given; square_mm can be right.", False
 
 
 def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:

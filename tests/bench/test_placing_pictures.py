@@ -134,4 +134,4 @@ def test_squares_a_sixth_too_large_are_what_a_stroke_that_cannot_be_read_leads_t
            for c in moved(wide, invert_transform(wide.T_rig_board))]  # fmt: skip
     on_rig = [replace(c, T_camera_rig=compose(c.T_camera_rig, invert_transform(wide.T_rig_board))) for c in far]
     _, (doubt,), _ = place(wide, Cameras(tuple(on_rig)), wide.T_rig_board, tmp_path)
-    assert "check square_mm" in doubt
+    assert "square_mm" in doubt
