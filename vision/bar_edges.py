@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.bar_line import ARM_MM, FEWEST_PIECES, INNER_SHARE, KNOT_MM, NO_BAR, bar_pieces, clear_of_wire, of_bar_alone
+from vision.bar_pieces import ARM_MM, FEWEST_PIECES, NO_BAR, at_arms, bar_knots, bar_pieces, of_bar_alone, rims_of
 from vision.binned import binned
 from vision.contact import BarAxis
-from vision.descent import descend
+from vision.descent import covariance_of, descend
 from vision.effort import VisionSettings
 from vision.line import RIMS, WAVES, LinePoints, Pieces
-from vision.shading import Knots, fit_shading
+from vision.shading import fit_shading
 from vision.trace import View
 
 # An edge's error beyond its formal one, which half-widths of path-traced and painted bars show (docs/truth.md).
@@ -30,7 +30,6 @@ _ROUNDS = 2  # what counts as a rim depends on where the edges are
 _STEPS = np.array([0.15, 0.15, 0.15, 0.15, 0.1])  # for derivatives by shift, tilt, widening, taper (px), log blur
 _LONGEST = np.array([0.7, 0.7, 0.7, 0.7, 0.4])
 _SETTLED_PX, _PARTS = 0.005, (1.0, 0.3, 0.1, 0.03)
-_LEAST_CURVATURE = 4.0  # px⁻²: what the pictures do not tell is told to half a pixel by nothing
 
 
 def measure_edges(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
@@ -40,20 +39,18 @@ def measure_edges(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: S
 
     wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be some pixels off, and its width.
     """
-    pieces = bar_pieces(view, grey, axis, radius_mm, settings)
-    pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
-    knots = Knots(np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, KNOT_MM))
+    pieces, knots = bar_pieces(view, grey, axis, radius_mm, wires_px, settings), bar_knots(settings)
     if len(pieces) < FEWEST_PIECES:
         return None
     found = np.append(_sweep(pieces, knots) if coarse else np.zeros(4), 0.0)
     pieces = of_bar_alone(pieces, lambda some: _placed(some, found), knots)
     for _ in range(_ROUNDS):
-        rims = _rims(pieces, found)
+        rims = rims_of(pieces, _placed(pieces, found))
         misfit = lambda q: fit_shading(_placed(rims, q), float(np.exp(q[4])), RIMS, knots)[1]  # noqa: B023, E731
         found, left, curvature = descend(misfit, found, _STEPS, _LONGEST, _SETTLED_PX, _PARTS)
     if left > NO_BAR:
         return None
-    return _edges(pieces, found, _covariance(curvature, left, float(np.sum(rims.weight > 0))))
+    return _edges(pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4])
 
 
 def _placed(pieces: Pieces, q) -> Pieces:
@@ -80,26 +77,9 @@ def _sweep(pieces: Pieces, knots) -> np.ndarray:
     return found
 
 
-def _rims(pieces: Pieces, found) -> Pieces:
-    placed = _placed(pieces, found)
-    inner = np.abs(placed.offset_px) < INNER_SHARE * placed.radius_px[:, None]
-    rims = replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
-    return rims.columns(np.any(rims.weight > 0, axis=0))
-
-
-def _covariance(curvature, misfit: float, pixels: float) -> np.ndarray:
-    """Of shift, tilt, widening and taper, (4, 4) px², from noise alone."""
-    values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(misfit, 1.0))
-    return (vectors @ np.diag(1.0 / np.maximum(values, _LEAST_CURVATURE)) @ vectors.T)[:4, :4]
-
-
 def _edges(pieces: Pieces, found, covariance) -> dict[int, LinePoints]:
     """Points at ± ARM_MM of both edges, each with its sigma."""
-    order, place = np.argsort(pieces.place), np.array([-ARM_MM, ARM_MM])
-    known = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order]
-    foot_normal_radius = np.stack([np.polyval(np.polyfit(pieces.place[order], column, 2), place)
-                                   for column in known.T], axis=1)
-    foot, normal, radius = foot_normal_radius[:, :2], foot_normal_radius[:, 2:4], foot_normal_radius[:, 4]
+    place, foot, normal, radius = at_arms(pieces)
     points = {}
     for side in (-1, 1):
         across = np.stack([np.ones(2), place / ARM_MM, np.full(2, side), side * place / ARM_MM], axis=1)

@@ -4,28 +4,31 @@ The bar stands still, so its frames are averaged. Near each rim its shading is a
 round the bar, so that a dark rim is not taken for an edge farther in; the middle, with its highlights, is left out.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.bar_pieces import (
+    ARM_MM,
+    FEWEST_PIECES,
+    NO_BAR,
+    at_arms,
+    bar_knots,
+    bar_pieces,
+    of_bar_alone,
+    rims_of,
+)
 from vision.binned import binned, without
 from vision.contact import BarAxis
-from vision.descent import descend
+from vision.descent import covariance_of, descend
 from vision.effort import VisionSettings
-from vision.line import RIMS, WAVES, LinePoints, Pieces, cut_pieces, read_band
+from vision.line import RIMS, WAVES, LinePoints, Pieces
 from vision.shading import Knots, fit_shading, locate, wave_prior
-from vision.silhouette import outline
 from vision.trace import View
 
-ARM_MM = 20.0  # the line is handed on as two points, this far to either side
-INNER_SHARE = 0.72
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
-FEWEST_PIECES = 4
-_WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
 _UNTOLD_PX = 0.25  # a sigma that is more: the misfit has no minimum there to speak of, and may lead anywhere
-NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
-KNOT_MM = 14.0
 _LEAST_OFF_PX = 0.15
 _ROUGHLY, _EXACTLY = (0.3,), (0.1, 0.05)  # px: what a line may still move by, round by round
 _STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
@@ -59,11 +62,9 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
     wires_px: lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be; where it may be, a
     line to a tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on.
     """
-    pieces = bar_pieces(view, grey, axis, radius_mm, settings)
-    pieces = pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
+    pieces, knots = bar_pieces(view, grey, axis, radius_mm, wires_px, settings), bar_knots(settings)
     if len(pieces) < FEWEST_PIECES:
         return None
-    knots = Knots(np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, KNOT_MM))
     line, blur_px = _sweep(pieces, knots, off_px), None
     pieces = of_bar_alone(pieces, lambda some: _moved(some, line), knots)
     for settled_px in _ROUGHLY if off_px else _EXACTLY:  # line, blur, and what counts as a rim depend on each other
@@ -101,52 +102,8 @@ def _moved(pieces: Pieces, line) -> Pieces:
 def _model(pieces: Pieces, line, knots) -> _Model:
     """Rims alone where the bar is thick, all of it where it is thin."""
     if float(np.median(pieces.radius_px)) > _THICK_PX:
-        return _Model(_rims(pieces, line), RIMS, knots, 1.0, None)
+        return _Model(rims_of(pieces, _moved(pieces, line)), RIMS, knots, 1.0, None)
     return _Model(pieces, WAVES, knots, 1.0, wave_prior(pieces, WAVES))
-
-
-def _rims(pieces: Pieces, line) -> Pieces:
-    """Pieces without their middle: highlights there say nothing about the edges."""
-    inner = np.abs(_moved(pieces, line).offset_px) < INNER_SHARE * pieces.radius_px[:, None]
-    rims = replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
-    return rims.columns(np.any(rims.weight > 0, axis=0))
-
-
-def bar_pieces(view: View, grey, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Pieces:
-    """Pieces of the bar's band in the picture `grey`, to either side of the axis's point."""
-    place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
-    points = axis.point_mm + place[:, None] * axis.direction
-    middle, radius = outline(view.camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
-    half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
-    return cut_pieces([read_band(grey, view.background, middle, place, radius, half)], settings.bar_piece_px,
-                      view.noise)
-
-
-def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: float) -> np.ndarray:
-    """Which pieces (s,) of the bar show no wire: each reads a rectangle along and across the bar."""
-    tangent = np.stack([pieces.normal[:, 1], -pieces.normal[:, 0]], axis=1)
-    clear = np.ones(len(pieces), dtype=bool)
-    for line in wires_px:
-        away = line[None] - pieces.foot_px[:, None]
-        along = np.abs(np.einsum("smi,si->sm", away, tangent))
-        across = np.abs(np.einsum("smi,si->sm", away, pieces.normal))
-        clear &= ~np.any((along < margin_px) & (across < pieces.radius_px[:, None] + margin_px), axis=1)
-    return clear
-
-
-def of_bar_alone(pieces: Pieces, placed: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
-    """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border.
-
-    placed: brings pieces to where the bar is taken to be.
-    """
-    for _ in range(3):
-        there = placed(pieces)
-        misfit = locate(there, fit_shading(there, 1.0, WAVES, knots)[0], rounds=1).chi2
-        good = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
-        if np.all(good) or np.sum(good) < FEWEST_PIECES:
-            break
-        pieces = pieces.select(good)
-    return pieces
 
 
 def _on_line(model: _Model, line) -> np.ndarray:
@@ -181,20 +138,15 @@ def _settle(model: _Model, line, blur_px: float | None, settled_px: float):
     q, _, curvature = descend(misfit, begin, _STEPS, _LONGEST, settled_px)
     blur_px = without(np.exp(q[2]), blurred)
     here = replace(model, blur_px=blur_px).misfit(q[:2])
-    pixels = float(np.sum(pieces.weight > 0))
-    values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(here, 1.0))
-    inverse = vectors @ np.diag(1.0 / np.maximum(values, 4.0)) @ vectors.T
-    return q[:2], blur_px, inverse[:2, :2] * _FORMAL_TO_TRUE**2, here
+    covariance = covariance_of(curvature, here, float(np.sum(pieces.weight > 0)))
+    return q[:2], blur_px, covariance[:2, :2] * _FORMAL_TO_TRUE**2, here
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:
     """The line as two points at ± ARM_MM, each with its sigma."""
-    order = np.argsort(pieces.place)
-    place = np.array([-ARM_MM, ARM_MM])
+    place, foot, normal, _ = at_arms(pieces)
     lever = place / ARM_MM
     across = np.stack([np.ones(2), lever], axis=1)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", across, covariance, across))
-    foot, normal = (np.stack([np.polyval(np.polyfit(pieces.place[order], values[order, k], 2), place)
-                              for k in range(2)], axis=1) for values in (pieces.foot_px, pieces.normal))
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     return LinePoints(foot + (line[0] + line[1] * lever)[:, None] * normal, normal, sigma, place)
