@@ -12,15 +12,13 @@ import numpy as np
 
 from vision.fit import linearise
 from vision.place import BaseLines
-from vision.problem import BAR, REST, REST_PRIOR_MM, WIRE_OFFSET_PX, Observed, Problem, State
+from vision.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Observed, Problem, State, wandering
 from vision.wire import REST_POWERS, rotation_z
 
 # Offsets and slopes, y then z, among the rest shape's parameters.
 _LINE = np.array([0, REST_POWERS, 1, REST_POWERS + 1])
 # Nearer to the hub its shade and its edge are read as the wire's.
 _CLEAR_OF_HUB_MM = 15.0
-# A traced line wanders with what is behind it: by this much (as the whole line is off), over this length of wire.
-_WANDER_PX, _WANDER_MM = WIRE_OFFSET_PX, 12.0
 # A whisker's sag and set: what is more than this is seen, what is less cannot be told from a wandering line.
 _STRAIGHT_MM = np.array([1.0, 0.4])
 # Part of what a whole line is off by that changes as the whisker turns by a radian before its lamp: it passes for a
@@ -85,9 +83,7 @@ def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian)
 
 def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
     """Of each camera a shift of the whole line and hats along the wire, px: (n, cameras · (1 + knots))."""
-    knots = np.arange(0.0, problem.wire.length_mm + _WANDER_MM, _WANDER_MM)
-    hats = np.maximum(1.0 - np.abs(seen.points.place[:, None] - knots) / _WANDER_MM, 0.0)
-    own = np.column_stack([np.ones(len(hats)), hats])
+    own = np.column_stack([np.ones(len(seen.points)), wandering(problem, seen)])
     return np.kron(np.arange(len(problem.cameras)) == seen.camera, own)
 
 
@@ -95,7 +91,7 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
     """Rest shape (8,) and its covariance."""
     J = np.concatenate([np.hstack([r.by_rest, r.by_nuisance]) for r in rows])
     bent = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
-    prior = np.concatenate([bent, bent, np.full(J.shape[1] - REST, _WANDER_PX)])
+    prior = np.concatenate([bent, bent, np.full(J.shape[1] - REST, WANDER_PX)])
     covariance = np.linalg.inv(J.T @ J + np.diag(prior**-2.0))
     found = -covariance @ (J.T @ np.concatenate([r.residual for r in rows]))
     return found[:REST], covariance[:REST, :REST]

@@ -20,7 +20,7 @@ from scipy.stats import chi2
 
 from vision.contact import BarAxis, clearance
 from vision.fit import LAST_SCALE, linearise, robust_weights
-from vision.problem import CONTACT_SIGMA_MM, WIRE_OFFSET_PX, Observed, Problem, State, bar_axis, bends, curves_of
+from vision.problem import CONTACT_SIGMA_MM, WANDER_PX, Observed, Problem, State, bar_axis, bends, curves_of, wandering
 from vision.quantities import Jacobians, Measured, camera_rows
 from vision.wire import Curves, rotation_z
 
@@ -31,8 +31,6 @@ _MATTERS = 0.5
 KNOTS = 5  # beside the one at the base: 20 mm apart on a wire of 100 mm
 # As much as the beam itself deflects at a contact 50 mm out: nothing is believed of the departure beforehand.
 _DEPARTURE_MM_PER_RAD = 50.0
-# A traced line wanders with what is behind it (vision.base_line has the same).
-_WANDER_PX, _WANDER_MM = WIRE_OFFSET_PX, 12.0
 _STEP_MM_PER_RAD = 1e-4
 _NAMES = ("d_x", "touch", "slip")
 
@@ -116,7 +114,7 @@ def _departure(problem: Problem, state: State, frame: int):
     on_bar, slip_by = _contact_rows(problem, state, curves, moves, frame)
     fill = lambda *parts: _filled(len(root), *parts) * root  # noqa: E731
     own = np.hstack([linear.jacobian * root, fill(by_wander)])
-    prior = np.eye(own.shape[1])[problem.size :] / _WANDER_PX
+    prior = np.eye(own.shape[1])[problem.size :] / WANDER_PX
     cameras = fill(camera_rows(problem, state))
     departure, spread, follows = _beside(
         own, prior, fill(by_departure, on_bar), linear.residual * root[:, 0], cameras, problem.cameras.covariance
@@ -159,10 +157,8 @@ def _line_rows(problem: Problem, curves: Curves, moves: Curves) -> tuple[np.ndar
     """Derivatives of the line points' residuals by the departure (n, k), and by each camera's wandering (n, w)."""
     departure, wander = [], []
     for seen in problem.seen:
-        knots = np.arange(0.0, problem.wire.length_mm + _WANDER_MM, _WANDER_MM)
-        hats = np.maximum(1.0 - np.abs(seen.points.place[:, None] - knots) / _WANDER_MM, 0.0)
         on_wire = seen.frame >= 0
-        per_camera = np.kron(np.arange(len(problem.cameras)) == seen.camera, hats) * on_wire
+        per_camera = np.kron(np.arange(len(problem.cameras)) == seen.camera, wandering(problem, seen)) * on_wire
         wander.append(per_camera / seen.points.sigma_px[:, None])
         moved = _across_line(problem, seen, curves, moves) if on_wire else np.zeros((len(seen.points), KNOTS))
         departure.append(moved / seen.points.sigma_px[:, None])

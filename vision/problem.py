@@ -19,6 +19,8 @@ REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
 # How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
+# It also wanders with what is behind it: by as much, over this length of wire.
+WANDER_PX, WANDER_MM = WIRE_OFFSET_PX, 12.0
 BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.035
 BAR_TILT_ARM_MM = 20.0
 CONTACT_SIGMA_MM = 0.002
@@ -117,3 +119,9 @@ def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 1) -> tuple[Curve
 def start(problem: Problem, contact_arc_mm: float) -> State:
     """No bend, straight whisker, the bar where the problem counts it from."""
     return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
+
+
+def wandering(problem: Problem, seen: Observed) -> np.ndarray:
+    """Hats (n, knots) along the wire by which a traced line may wander, at its points."""
+    knots = np.arange(0.0, problem.wire.length_mm + WANDER_MM, WANDER_MM)
+    return np.maximum(1.0 - np.abs(seen.points.place[:, None] - knots) / WANDER_MM, 0.0)
