@@ -45,10 +45,9 @@ def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = No
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
     placed_here = loaded.T_rig_board is not None
-    length, doubtful = check_scale(loaded, calibration.cameras) if placed_here else (_NOT_PLACED, False)
+    lengths, doubts = check_scale(loaded, calibration.cameras) if placed_here else ([_NOT_PLACED], [])
     measured = measure_held_out(loaded, views)
-    plain, doubts = ([], [length]) if doubtful else ([length] if length else [], [])
-    lines = [*report_lines(calibration), *plain, *held_out_lines(measured, calibration)]
+    lines = [*report_lines(calibration), *lengths, *held_out_lines(measured, calibration)]
     return _write(out, calibration.cameras, lines, [*views.notes, *doubts, *_doubts(calibration)])
 
 

@@ -4,6 +4,7 @@ Kept in OUT/calibration with the hash of what it was made from, and made again o
 """
 
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from vision.cameras_file import read_cameras, write_cameras
 from vision.corners import refine_corners
 from vision.errors import Refused
 from vision.pictures import read_picture
-from vision.place import placed
+from vision.place import Placement, placed
 from vision.rotation import compose, invert_transform, log_rotation
 from vision.scene import Cameras
 from vision.static_board import camera_moved
@@ -75,10 +76,10 @@ def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...], np.
         views = read_board_views(session)
         made = calibrate_from(session, views)
         cameras, T_rig_board, first = on_the_rig(session, made.cameras, board_in_world(session, views))
-        lengths, _ = check_scale(session, cameras)
+        lengths = check_scale(session, cameras)
         folder.mkdir(parents=True, exist_ok=True)
         write_cameras(folder / "cameras.toml", cameras)
-        notes = [*report_lines(made), *filter(None, [first, lengths])]
+        notes = [*report_lines(made), *filter(None, [first]), *chain(*lengths)]
         kept = plain({"hash": key, "notes": notes, "T_rig_board": T_rig_board})
         write_result(folder / "cameras.json", kept)
     T_rig_board = None if kept["T_rig_board"] is None else np.array(kept["T_rig_board"])
@@ -95,7 +96,7 @@ def on_the_rig(session: Session, cameras: Cameras, T_world_board: np.ndarray | N
     there = replace(by_first_look(), step=np.append(log_rotation(T_world_rig[:, :3]), T_world_rig[:, 3]))
     note = f"T_rig_board is missing: a first look at {first.strokes} strokes says where whisker and motor are."
     T_rig_board = None if T_world_board is None else compose(first.T_rig_world, T_world_board)
-    return placed(cameras, replace(there, step=np.zeros(6), covariance=np.zeros((6, 6))), there), T_rig_board, note
+    return placed(cameras, Placement(np.zeros(6), np.zeros((6, 6))), there), T_rig_board, note
 
 
 def _key(session: Session) -> str:

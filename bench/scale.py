@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bench.errors import BadInput
+from bench.first_look import spread
 from bench.footage import read_frames
 from bench.frame_times import frame_times
 from bench.session import Session
@@ -21,18 +22,17 @@ _UNCONFIRMED = 0.05  # of one trial alone
 _MOST_SCATTER = 0.1  # at the right scale six sessions scatter by 0.014 at most, at wrong ones by 0.1 to 0.3
 
 
-def check_scale(session: Session, cameras: Cameras) -> tuple[str | None, bool]:
-    """A note on how thick the bars look, None where the session shows none, and whether it is a doubt. cameras: in the
-    rig frame.
+def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str]]:
+    """Notes and doubts on how thick the bars look; none where the session shows no bar. cameras: in the rig frame.
 
     Raises BadInput at the wrong scale.
     """
     if session.whisker is None or session.board is None:
-        return None, False
+        return [], []
     trials = [t for t in session.trials if t.bar_diameter_mm and set(t.camera_sources) & set(session.rig_pictures)]
     shares = np.array(list(_seen_over_given(session, cameras, trials[:: max(1, len(trials) // _MOST_TRIALS)])))
     if not len(shares):
-        return None, False
+        return [], []
     # at a wrong scale the bar is not where the whisker would touch it, and another thing may pass for it
     scatter = np.std(shares, ddof=1) if len(shares) > 1 else _UNCONFIRMED
     share, sigma = float(np.median(shares)), float(np.hypot(SIGMA_SHARE, scatter) / np.sqrt(len(shares)))
@@ -42,7 +42,7 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[str | None, bool]:
         if scatter > _MOST_SCATTER:
             asked = "measure a square of the board and enter it, then check T_rig_board"
             raise BadInput(f"{seen}: {asked}", file="session.toml")
-        return f"Second length: {seen}: check both", True
+        return [], [f"Second length: {seen}: check both"]
     given_mm = trials[0].bar_diameter_mm
     given_sigma_mm = max(t.bar_diameter_sigma_mm for t in trials)
     try:
@@ -51,7 +51,7 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[str | None, bool]:
         square_mm = session.board.square_mm
         found = f"square_mm is {square_mm:g}, some {square_mm / share:.3g} would fit the bar"
         raise BadInput(f"{reason}; {found}", file="session.toml") from None
-    return f"Second length: bars look {share:.3f} ± {sigma:.3f} times as thick as given; square_mm can be right.", False
+    return [f"Second length: bars look {share:.3f} ± {sigma:.3f} times as thick as given; square_mm can be right."], []
 
 
 def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:
@@ -71,8 +71,8 @@ def _spread(trial: Trial, camera: str) -> list[np.ndarray]:
     """Some pictures of a camera, spread over the trial."""
     shown = frame_times(trial).picture[camera]
     shown = shown[shown >= 0]
-    chosen = shown[np.unique(np.linspace(0, len(shown) - 1, _MOST_PICTURES).astype(int))] if len(shown) else []
-    return [grey for grey in read_frames(trial.camera_sources[camera], map(int, chosen)).values() if grey is not None]
+    chosen = map(int, spread(shown, _MOST_PICTURES))
+    return [grey for grey in read_frames(trial.camera_sources[camera], chosen).values() if grey is not None]
 
 
 def _motor_span(trial: Trial) -> tuple[float, float]:
