@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.bar_lines import AWAY_MM, CENTRE, FOCAL_PX, FRAMES, NOISE, RADIUS_MM, SIZE, drawn, edges_px, painted
+from tests.ladder.bar_lines import AWAY_MM, CENTRE, RADIUS_MM, edges_px, noisy_view, painted
 from tests.ladder.lines import squares
 from tests.vision.test_fit import CAMERAS, REACH, begun, camera, scene, with_points
 from vision.bar import settle_axis
@@ -14,14 +14,13 @@ from vision.contact import BarAxis, upward
 from vision.effort import VisionSettings
 from vision.errors import Refused
 from vision.fit import linearise, solve
-from vision.line import LinePoints, Noise
+from vision.line import LinePoints
 from vision.one_view import axis_from_edges, find_bar_alone, seen_from_one_side, touch_by_onset
 from vision.onset import Onset, onset
 from vision.problem import Observed, State, bar_axis
 from vision.quantities import calibration_share, jacobians, variance_by_cause
-from vision.scene import Camera, Cameras
+from vision.scene import Cameras
 from vision.silhouette import grazed, normals
-from vision.trace import View
 
 PLACES_MM = np.array([-20.0, 20.0])
 
@@ -62,15 +61,10 @@ def test_edges_give_the_axis_back():
 def test_edges_of_a_drawn_bar_lie_where_they_say(rng):
     """From a pixel off and 4 % too wide, both edges within three of their own sigmas, an eighth of a pixel."""
     angle, across_mm = 1.2, 0.7
-    picture, background = drawn(painted, squares, angle, across_mm)
-    picture = picture + NOISE / np.sqrt(FRAMES) * rng.standard_normal(picture.shape)
-    background = background + NOISE * rng.standard_normal(picture.shape)
-    matrix = [[FOCAL_PX, 0, CENTRE[0]], [0, FOCAL_PX, CENTRE[1]], [0, 0, 1]]
-    view = Camera("c", SIZE, matrix, np.zeros(5), np.column_stack([np.eye(3), [0, 0, AWAY_MM]]))
+    picture, view = noisy_view(painted, squares, angle, across_mm, rng)
     across = np.array([-np.sin(angle), np.cos(angle), 0.0])
     axis = BarAxis((across_mm + 0.2) * across - [0, 0, 0.04 * AWAY_MM], np.array([np.cos(angle), np.sin(angle), 0.0]))
-    found = measure_edges(View(view, {}, background, Noise(NOISE**2 * (1.0 + 1.0 / FRAMES), 0.0)), picture, axis,
-                          RADIUS_MM, [], VisionSettings(), coarse=True)
+    found = measure_edges(view, picture, axis, RADIUS_MM, [], VisionSettings(), coarse=True)
     seen = sorted([(float(np.mean((p.px - CENTRE) @ across[:2])), float(p.sigma_px.max())) for p in found.values()])
     for (at, sigma), true in zip(seen, edges_px(across_mm)):
         assert sigma < 0.15
