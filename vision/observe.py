@@ -78,26 +78,26 @@ def _views(frames, cameras: Cameras, background) -> list[View]:
 
 
 def _see_whisk(number: int, indices, views, cameras, rods: Rods, axis: BarAxis, time_s, motor_rad,
-               light: dict[str, Lit], settings: VisionSettings) -> WhiskTruth:
-    """Truth of one whisk; its status where there is none."""
+               light: dict[str, Lit], settings: VisionSettings, misled: Sequence[str] = ()) -> WhiskTruth:
+    """Truth of one whisk; its status where there is none. misled: lines on cameras that were left out already."""
     views, left_out = _with_frames(views, indices)
-    while True:
-        seen = [f for f in indices if all(f in view.frames for view in views)]
-        if len(seen) < 4:
-            few = f"{len(seen)} frames seen by every camera, 4 are needed"
-            return WhiskTruth(number, None, status="; ".join([few, *left_out]))
-        cameras = cameras.subset([view.camera.name for view in views])
-        motor = {f: float(motor_rad[f]) for f in seen}
-        try:
-            problem, state, covariance, near = fit_whisk(views, cameras, rods, axis, motor, light, settings)
-            break
-        except (Refused, np.linalg.LinAlgError) as reason:
-            status = str(reason) if isinstance(reason, Refused) else "the fit of wire and bar does not settle"
-            if not isinstance(reason, Misled) or len(views) == 1:
-                return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
-                                  status="; ".join([status, *left_out]))
-            views = [view for view in views if view.camera.name != reason.camera]
-            left_out = [*left_out, status]
+    left_out = [*left_out, *misled]
+    seen = [f for f in indices if all(f in view.frames for view in views)]
+    if len(seen) < 4:
+        few = f"{len(seen)} frames seen by every camera, 4 are needed"
+        return WhiskTruth(number, None, status="; ".join([few, *left_out]))
+    cameras = cameras.subset([view.camera.name for view in views])
+    motor = {f: float(motor_rad[f]) for f in seen}
+    try:
+        problem, state, covariance, near = fit_whisk(views, cameras, rods, axis, motor, light, settings)
+    except (Refused, np.linalg.LinAlgError) as reason:
+        status = str(reason) if isinstance(reason, Refused) else "the fit of wire and bar does not settle"
+        if isinstance(reason, Misled) and len(views) > 1:
+            others = [view for view in views if view.camera.name != reason.camera]
+            return _see_whisk(number, indices, others, cameras, rods, axis, time_s, motor_rad, light, settings,
+                              [*left_out, status])
+        return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
+                          status="; ".join([status, *left_out]))
     measured, by_parameter = jacobians(problem, state)
     lens = calibration_share(problem, state, covariance)
     far = set(motor) - set(near)

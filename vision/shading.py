@@ -9,8 +9,6 @@ import numpy as np
 from vision.line import LinePoints, Pieces, shading_basis
 
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
-
-
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
 # alike, moved all lines by half a pixel, and by a quarter of one from end to end.
 _LIT_ALIKE_RAD = np.radians(8.0)
@@ -155,8 +153,6 @@ def _inverse_of_two(matrices) -> np.ndarray:
 # How strong each wave round a thin, lit rod is beside its contrast: diffuse light fills the first three, a highlight
 # a quarter of the rod wide reaches the eleventh (its Fourier series).
 _WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
-
-
 # What of it changes from knot to knot: the light and the rod's finish are much the same a centimetre farther on. Left
 # to itself at every knot, shading bends the line of a wire before an even floor by up to a pixel.
 _CHANGE_SHARE = 0.1
@@ -167,8 +163,8 @@ _TURNED_SHARE = 0.3
 def _stiffness(prior, knots: Knots) -> np.ndarray:
     """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
     between = _between(len(knots.turn_rad), len(knots.place_mm))
-    both = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :]
-    return both.reshape(2 * (len(knots) * len(prior),))
+    both, size = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :], len(knots) * len(prior)
+    return both.reshape(size, size)
 
 
 @lru_cache

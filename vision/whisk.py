@@ -14,7 +14,7 @@ from vision.fit import LAST_SCALE, honest, scatter_px, solve
 from vision.line import WAVES, LinePoints
 from vision.one_sided import Lit, seen_width
 from vision.one_view import seen_from_one_side, touch_by_onset
-from vision.problem import Observed, Problem, State, bar_axis, bends, curves_of, rest_shape
+from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.rods import Rods
 from vision.scene import Cameras
 from vision.shading import Knots
@@ -37,7 +37,7 @@ _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke
 
 
 def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float], light: dict[str, Lit],
-               settings: VisionSettings):
+              settings: VisionSettings):
     """Problem and state after the last round, the parameters' covariance, and the frames in it: all but those far
     before touch.
 
@@ -93,8 +93,8 @@ def _check_scatter(problem: Problem, state: State) -> None:
     scatter = scatter_px(problem, state)
     worst = int(np.argmax(scatter))
     if scatter[worst] > _MOST_SCATTER_PX:
-        name = [camera.name for camera in problem.cameras][worst]
-        raise Misled(name, f"its lines of the wire scatter by {scatter[worst]:.1f} px, {_MOST_SCATTER_PX:g} is allowed")
+        found = f"its lines of the wire scatter by {scatter[worst]:.1f} px, {_MOST_SCATTER_PX:g} is allowed"
+        raise Misled(problem.cameras.names[worst], found)
 
 
 def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> dict[int, float]:
@@ -109,7 +109,7 @@ def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> d
 
 
 def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mapping[int, float], near, light: dict,
-                 settings: VisionSettings) -> tuple[Problem, State]:
+                settings: VisionSettings) -> tuple[Problem, State]:
     """All frames before touch and what is seen in them, about the bar and the shape at rest of a fit."""
     free = {f: angle for f, angle in motor.items() if f not in near or not problem.bent[near.index(f)]}
     rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
@@ -137,7 +137,7 @@ def _fitted(problem: Problem, state: State, motor) -> dict[int, Curves]:
 
 def _begin(problem: Problem, rest, bend, arcs) -> State:
     vector = np.zeros(problem.size)
-    vector[4:12] = np.ravel(rest)
+    vector[BAR:BAR + REST] = np.ravel(rest)
     vector[problem.first_bend:] = bend[problem.bent].ravel()
     return State(vector, np.asarray(arcs, dtype=float))
 
