@@ -43,9 +43,10 @@ def _refuse(_):
 
 
 _LONG = """
-import os, sys, time
+import os, signal, sys, time
 from bench.workers import Workers
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     with Workers(2) as pool:
         print(*pool.run(abs, [1, 2], "first"), flush=True)
         pool.run(time.sleep, [60, 60], "long")
