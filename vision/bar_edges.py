@@ -13,9 +13,10 @@ import numpy as np
 from vision.bar_pieces import ARM_MM, FEWEST_PIECES, NO_BAR, at_arms, bar_knots, bar_pieces, of_bar_alone, rims_of
 from vision.binned import binned
 from vision.contact import BarAxis
+from vision.cylinder import RIMS, WAVES
 from vision.descent import covariance_of, descend
 from vision.effort import VisionSettings
-from vision.line import RIMS, WAVES, LinePoints, Pieces
+from vision.line import LinePoints, Pieces
 from vision.shading import fit_shading
 from vision.trace import View
 

@@ -21,9 +21,10 @@ from vision.bar_pieces import (
 )
 from vision.binned import binned, without
 from vision.contact import BarAxis
+from vision.cylinder import RIMS, WAVES
 from vision.descent import covariance_of, descend
 from vision.effort import VisionSettings
-from vision.line import RIMS, WAVES, LinePoints, Pieces
+from vision.line import LinePoints, Pieces
 from vision.shading import Knots, fit_shading, locate, wave_prior
 from vision.trace import View
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from vision.contact import BarAxis
+from vision.cylinder import WAVES
 from vision.effort import VisionSettings
-from vision.line import WAVES, Pieces, cut_pieces, read_band
+from vision.line import Pieces, cut_pieces, read_band
 from vision.shading import Knots, fit_shading, locate
 from vision.silhouette import outline
 from vision.trace import View

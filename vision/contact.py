@@ -39,15 +39,18 @@ def _across(vectors, axis: BarAxis) -> np.ndarray:
     return vectors - np.sum(vectors * a, axis=-1, keepdims=True) * a
 
 
-def closest_arc(curves: Curves, axis: BarAxis, near_mm=None, rounds: int = 4) -> np.ndarray:
+_ROUNDS_FROM_NODE, _ROUNDS_FROM_NEAR = 4, 2
+
+
+def closest_arc(curves: Curves, axis: BarAxis, near_mm=None) -> np.ndarray:
     """Arc length (…) where each centreline is nearest to the axis, within the whisker's length.
 
-    near_mm (…): where it roughly is; None looks along the whole of it.
+    near_mm (…): where it was when curve and axis were nearly as they are; None looks along the whole of it.
     """
-    if near_mm is None:
-        near_mm = curves.arc_mm[np.argmin(np.sum(_from_axis(curves.points_mm, axis) ** 2, axis=-1), axis=-1)]
     arc = near_mm
-    for _ in range(rounds):
+    if near_mm is None:
+        arc = curves.arc_mm[np.argmin(np.sum(_from_axis(curves.points_mm, axis) ** 2, axis=-1), axis=-1)]
+    for _ in range(_ROUNDS_FROM_NODE if near_mm is None else _ROUNDS_FROM_NEAR):
         point, tangent = curves.at(arc[..., None])
         away = _from_axis(point, axis)[..., 0, :]
         across = _across(tangent, axis)[..., 0, :]
@@ -56,12 +59,12 @@ def closest_arc(curves: Curves, axis: BarAxis, near_mm=None, rounds: int = 4) ->
     return arc
 
 
-def clearance(curves: Curves, axis: BarAxis) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Signed distance (…) from axis to centreline, contact arc (…), closest point (…, 3).
+def clearance(curves: Curves, axis: BarAxis, near_mm=None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Signed distance (…) from axis to centreline, contact arc (…), closest point (…, 3); near_mm: see `closest_arc`.
 
     Positive on the side that the whisker comes from (lower y), negative once the unbent whisker has passed.
     """
-    arc = closest_arc(curves, axis)
+    arc = closest_arc(curves, axis, near_mm)
     point, tangent = curves.at(arc[..., None])
     away = _from_axis(point, axis)[..., 0, :]
     normal = np.cross(np.asarray(axis.direction), tangent[..., 0, :])

@@ -65,7 +65,7 @@ def linearise(problem: Problem, state: State) -> tuple[Linear, State]:
     blocks = [_wire_block(problem, camera, list(group), curves, columns, state.vector) if on_wire
               else _bar_block(problem, camera, list(group), state.vector) for (camera, on_wire), group in alike]
     count = sum(len(block[0]) for block in blocks)
-    blocks += [_contact_block(problem, moved, curves, columns, state.vector), _prior_block(problem, state.vector)]
+    blocks += [_contact_block(problem, moved, curves, arcs, columns, state.vector), _prior_block(problem, state.vector)]
     if problem.onset is not None:
         blocks.append(_onset_block(problem, problem.onset, moved, columns, state.vector))
     residual = np.concatenate([block[0] for block in blocks])
@@ -156,11 +156,11 @@ def _bar_px(problem: Problem, camera, vector, points: LinePoints, side) -> np.nd
     return 0.5 * (one + other) + side[:, None] * half * points.normal
 
 
-def _contact_block(problem: Problem, moved, curves: Curves, columns, vector):
+def _contact_block(problem: Problem, moved, curves: Curves, arcs_mm, columns, vector):
     """Touching frames: signed distance from axis to centreline is reach + its error."""
     axis = bar_axis(problem, moved)
     axis = BarAxis(axis.point_mm[:, None], axis.direction[:, None])
-    distance = clearance(curves, axis)[0]
+    distance = clearance(curves, axis, arcs_mm)[0]
     frames = np.flatnonzero(problem.touching)
     jacobian = np.zeros((len(frames), problem.size))
     for (step, names), row in zip(columns, distance[1:]):

@@ -9,16 +9,9 @@ or a highlight no longer pulls the position to one side.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-
-# Gauss–Legendre nodes over the rod's half circumference, where the integrand is smooth: 1e-5 of the contrast.
-_NODES_PER_RADIUS_TO_BLUR = 4
-WAVES, RIMS = 8, 6  # how many functions of the angle describe a thin rod, and the rims of a thick one
-_SAME_RADIUS = 0.15
-_TABLE_PER_PX = 400
 
 
 @dataclass(frozen=True)
@@ -89,72 +82,6 @@ def _pick(picture, step, line, along):
     line = np.clip(line, 0, size - 1)
     values = picture[line, step[:, None]] if along == 0 else picture[step[:, None], line]
     return np.where(inside, values, np.nan).astype(float)
-
-
-def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
-    """Blurred pictures (..., terms) of a cylinder whose radiance is each function of `round_the_rod` in turn.
-
-    The first term is the share of the pixel that the rod covers. offset_px (...): distance from the axis;
-    radius_px broadcasts. Where the radius is nearly the same everywhere one table serves all pixels, stretched by
-    the radius (which stretches the blur with it, by as little).
-    """
-    radius = np.asarray(radius_px, dtype=float)
-    least, most = radius.min(initial=np.inf), radius.max(initial=0.0)
-    if most - least < _SAME_RADIUS * least:
-        middle = round(0.5 * (least + most), 1)
-        return _from_table(np.asarray(offset_px) * (middle / radius), _table(middle, blur_px, terms))
-    return _integrated(np.asarray(offset_px), radius, blur_px, terms)
-
-
-def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
-    """`shading_basis` by integration round the rod."""
-    ratio = np.max(radius_px, initial=1.0) / blur_px
-    nodes, shares = _legendre(int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * ratio), 16, 96)))
-    t = 0.5 * np.pi * nodes
-    radius = radius_px[..., None]
-    z = (offset_px[..., None] - radius * np.sin(t)) / blur_px
-    share = 0.5 * np.pi * shares * np.cos(t) / (blur_px * np.sqrt(2 * np.pi))
-    weight = np.exp(-0.5 * z * z) * (radius * share)
-    return weight @ round_the_rod(t, terms)
-
-
-_legendre = lru_cache(np.polynomial.legendre.leggauss)
-
-
-@lru_cache(maxsize=64)
-def _table(radius_px: float, blur_px: float, terms: int) -> tuple[float, np.ndarray]:
-    """Reach in px and values (n, terms), _TABLE_PER_PX of them a pixel, from minus the reach to the reach.
-
-    Every tenth value is integrated, those between are interpolated: at a fortieth of a pixel an error of 1e-4.
-    """
-    reach = np.ceil(radius_px + 5.0 * blur_px) + 1.0
-    offsets = np.linspace(-reach, reach, int(2 * reach * _TABLE_PER_PX) // 10 + 1)
-    values = _integrated(offsets, np.array(radius_px), blur_px, terms)
-    share = np.arange(10)[:, None] / 10.0
-    between = values[:-1, None] * (1.0 - share) + values[1:, None] * share
-    return reach, np.concatenate([between.reshape(-1, values.shape[1]), values[-1:]])
-
-
-def _from_table(offset_px, table: tuple[float, np.ndarray]) -> np.ndarray:
-    """The nearest value: at most an eight-hundredth of a pixel away, 6e-4 of the contrast under a blur of 0.65 px."""
-    reach, values = table
-    place = np.clip((offset_px + reach) * _TABLE_PER_PX + 0.5, 0.0, len(values) - 1)
-    return values.take(place.astype(np.int32), axis=0)
-
-
-def round_the_rod(t, terms: int) -> np.ndarray:
-    """Functions (n, terms) of the angle t (n,) round the rod, from edge (-pi/2) to edge (pi/2); the first is 1.
-
-    WAVES: 1, sin t, cos t, sin 2t …, the whole of a thin rod. RIMS: for each side its own square polynomial in the
-    angle from the edge, for a rod so thick that the two rims can be looked at alone.
-    """
-    if terms == RIMS:
-        side, inward = np.sign(t), np.pi / 2 - np.abs(t)
-        return np.stack([shape for k in range(RIMS // 2) for shape in (inward**k, side * inward**k)], axis=-1)
-    waves = [np.ones_like(t)]
-    for k in range(1, terms // 2 + 1):
-        waves += [np.sin(k * t), np.cos(k * t)]
-    return np.stack(waves[:terms], axis=-1)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from vision.line import LinePoints, Pieces, shading_basis
+from vision.cylinder import shaded, shading_basis
+from vision.line import LinePoints, Pieces
 
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
@@ -67,12 +68,6 @@ def _hats(place_mm, knots_mm) -> np.ndarray:
     return np.clip(1.0 - np.abs(position[:, None] - np.arange(len(knots_mm))), 0.0, None)
 
 
-def _surround(pieces: Pieces, offset_px, cover, blur_px: float) -> np.ndarray:
-    """The two columns (s, p, 2) of the visible background: the known picture and a constant, where not hidden."""
-    visible = (1.0 - cover) * pieces.background + _not_leaked(pieces, offset_px, blur_px)
-    return np.stack([visible, 1.0 - cover], axis=-1) * pieces.weight[..., None]
-
-
 def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
     """What the blurred known picture holds (s, p) of light that the rod hides, near a border in the background.
 
@@ -86,13 +81,6 @@ def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
         bell = np.exp(-0.5 * z * z) * (side / np.sqrt(2.0 * np.pi))
         leaked = leaked + bell * (blur_px * pieces.slope - (0.5 * blur_px**2) * z * pieces.curvature)
     return leaked
-
-
-def _project_out(columns, *targets):
-    """Parts of the targets (s, p, k) that the two columns (s, p, 2) cannot explain, piece by piece."""
-    turned = columns.transpose(0, 2, 1)
-    inverse = _inverse_of_two(turned @ columns + _WEAK * np.eye(2))
-    return [target - columns @ (inverse @ (turned @ target)) for target in targets]
 
 
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust=None,
@@ -128,20 +116,19 @@ def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
 
     Gram matrices (s, terms, terms), moments (s, terms), and the squares (s,) that the background leaves.
     """
-    rows = np.empty((*pieces.offset_px.shape, terms + 3))
-    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
-    np.multiply(basis, pieces.weight[..., None], out=rows[..., :terms])
-    rows[..., terms + 1] = pieces.weight - rows[..., 0]
-    np.multiply(rows[..., terms + 1], pieces.background, out=rows[..., terms])
-    rows[..., terms] += _not_leaked(pieces, pieces.offset_px, blur_px) * pieces.weight
-    np.multiply(pieces.grey, pieces.weight, out=rows[..., terms + 2])
-    products = rows.transpose(0, 2, 1) @ rows
-    keep = np.r_[:terms, terms + 2]
-    around = slice(terms, terms + 2)
-    mixed = products[:, around][:, :, keep]
-    inverse = _inverse_of_two(products[:, around, around] + _WEAK * np.eye(2))
-    left = products[:, keep][:, :, keep] - mixed.transpose(0, 2, 1) @ (inverse @ mixed)
-    return left[:, :terms, :terms], left[:, :terms, terms], left[:, terms, terms]
+    rod = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
+    rod *= pieces.weight[..., None]
+    rest = np.empty((len(pieces), 3, pieces.offset_px.shape[1]))  # two of the background, and what is seen
+    np.subtract(pieces.weight, rod[..., 0], out=rest[:, 1])
+    np.multiply(rest[:, 1], pieces.background, out=rest[:, 0])
+    rest[:, 0] += _not_leaked(pieces, pieces.offset_px, blur_px) * pieces.weight
+    np.multiply(pieces.grey, pieces.weight, out=rest[:, 2])
+    gram, mixed, own = rod.transpose(0, 2, 1) @ rod, rest @ rod, rest @ rest.transpose(0, 2, 1)
+    around, seen = mixed[:, :2].transpose(0, 2, 1), own[:, :2, 2:]
+    inverse = _inverse_of_two(own[:, :2, :2] + _WEAK * np.eye(2))
+    explained = inverse @ seen
+    return (gram - around @ (inverse @ mixed[:, :2]), mixed[:, 2] - (around @ explained)[..., 0],
+            own[:, 2, 2] - np.sum(seen * explained, axis=(1, 2)))
 
 
 def _inverse_of_two(matrices) -> np.ndarray:
@@ -212,25 +199,24 @@ def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 
     return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, contrast)
 
 
-def _linearise(pieces: Pieces, shading: Shading, waves, shift, delta_px: float = 0.05):
+def _linearise(pieces: Pieces, shading: Shading, waves, shift):
     """Residual, its slope by position (both s, p; free of the background's gain and offset), and the contrast."""
-    radius = pieces.radius_px[:, None]
-    ahead, behind = (shading_basis(pieces.offset_px - (shift + d)[:, None], radius, shading.blur_px,
-                                   waves.shape[1]) for d in (delta_px, -delta_px))
-    cover = 0.5 * (ahead + behind)[..., 0]
-    columns = _surround(pieces, pieces.offset_px - shift[:, None], cover, shading.blur_px)
-    rod = (0.5 * (ahead + behind) @ waves[..., None])[..., 0] * pieces.weight
-    seen = np.stack([pieces.grey * pieces.weight, rod], axis=-1)
-    (rest,) = _project_out(columns, seen)
-    turned = columns.transpose(0, 2, 1)
-    around = np.linalg.solve(turned @ columns + _WEAK * np.eye(2),
-                             turned @ (seen[..., 0] - rod)[..., None])[..., 0]
-    by_cover = -(around[:, :1] * pieces.background + around[:, 1:])
-    change = (ahead - behind) / (2 * delta_px)
-    slope = ((change @ waves[..., None])[..., 0] + change[..., 0] * by_cover) * pieces.weight
-    (slope,) = _project_out(columns, slope[..., None])
-    contrast = np.sqrt(np.sum((rod + cover * by_cover * pieces.weight) ** 2, axis=1))
-    return rest[..., 0] - rest[..., 1], slope[..., 0], contrast
+    offset, weight = pieces.offset_px - shift[:, None], pieces.weight
+    (rod, cover), (rod_slope, cover_slope) = shaded(offset, pieces.radius_px, shading.blur_px, waves)
+    around = np.empty((len(pieces), 2, offset.shape[1]))
+    np.multiply(1.0 - cover, weight, out=around[:, 1])
+    np.multiply(around[:, 1], pieces.background, out=around[:, 0])
+    around[:, 0] += _not_leaked(pieces, offset, shading.blur_px) * weight
+    turned = around.transpose(0, 2, 1)
+    inverse = _inverse_of_two(around @ turned + _WEAK * np.eye(2))
+    seen = (pieces.grey - rod) * weight
+    explained = inverse @ (around @ seen[..., None])  # gain and constant
+    by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
+    slope = -(rod_slope + cover_slope * by_cover) * weight
+    contrast = np.sqrt(np.sum(((rod + cover * by_cover) * weight) ** 2, axis=1))
+    free = [values - (turned @ share)[..., 0]
+            for values, share in ((seen, explained), (slope, inverse @ (around @ slope[..., None])))]
+    return *free, contrast
 
 
 def line_points(pieces: Pieces, located: Located, *, worst_chi2: float, worst_sigma_px: float,

@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from vision.binned import binned, without
+from vision.cylinder import WAVES
 from vision.descent import descend
-from vision.line import WAVES, LinePoints, Noise, Pieces, cut_pieces, read_band
+from vision.line import LinePoints, Noise, Pieces, cut_pieces, read_band
 from vision.problem import Observed
 from vision.scene import Camera, Wire
 from vision.shading import Knots, Located, fit_shading, line_points, locate, wave_prior
@@ -95,6 +96,7 @@ def settle(pieces: Pieces, knots: Knots, search_px: float) -> tuple[Pieces, floa
     """
     rough, blurred = binned(pieces, _BIN_PX)
     near, found, typical = _by_turns(rough, _best_blur(rough, knots), WAVES, knots, 2)
+    near = near.moved(found.shift_px)
     lever = 2.0 * (near.place - near.place.min()) / max(np.ptp(near.place), 1e-9) - 1.0
     bow = np.stack([np.ones(len(near)), lever, lever**2 - 1.0 / 3.0], axis=1)
     plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
@@ -121,27 +123,28 @@ def _some(pieces: Pieces, count: int) -> Pieces:
 
 def trace(pieces: Pieces, blur_px: float, terms: int, knots: Knots,
           rounds: int = 5) -> tuple[Pieces, Located, float]:
-    """Shading and positions by turns; the pieces come back where they were found, with what is left to move.
+    """Shading and positions by turns; the pieces come back as near as they were brought, with what is left to move.
 
     Also the median misfit (chi² per pixel). The pieces must be near; from a rough curve, see `settle`. All turns but
     the last are taken with averaged pixels.
     """
     rough, blurred = binned(pieces, _BIN_PX)
     near, found, _ = _by_turns(rough, np.hypot(blur_px, np.sqrt(blurred)), terms, knots, rounds - 1)
-    return _by_turns(pieces.moved(_apart(near, pieces)), blur_px, terms, knots, 1, _robust(found.chi2))
+    there = pieces.moved(_apart(near, pieces) + found.shift_px)
+    return _by_turns(there, blur_px, terms, knots, 1, _robust(found.chi2))
 
 
 def _by_turns(pieces: Pieces, blur_px: float, terms: int, knots: Knots, rounds: int,
               robust=None) -> tuple[Pieces, Located, float]:
     """`trace` with the pixels as they are. robust (s,): weights of the pieces to begin with."""
-    prior = wave_prior(pieces, terms)
+    prior, found = wave_prior(pieces, terms), None
     for _ in range(rounds):
+        pieces = pieces if found is None else pieces.moved(found.shift_px)
         shading, _ = fit_shading(pieces, blur_px, terms, knots, robust, prior)
         found = locate(pieces, shading, rounds=1)
-        pieces, robust = pieces.moved(found.shift_px), _robust(found.chi2)
+        robust = _robust(found.chi2)
         if np.quantile(np.abs(found.shift_px) / found.sigma_px, 0.9) < _STILL_SIGMAS:
             break
-    found = locate(pieces, shading, rounds=1)
     return pieces, found, float(np.median(found.chi2))
 
 

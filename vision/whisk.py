@@ -8,10 +8,11 @@ import numpy as np
 from vision.bar_edges import measure_edges
 from vision.bar_search import bar_lines, of_mean
 from vision.contact import BarAxis, upward
+from vision.cylinder import WAVES
 from vision.effort import VisionSettings
 from vision.errors import Misled, Refused
 from vision.fit import LAST_SCALE, honest, scatter_px, solve
-from vision.line import WAVES, LinePoints
+from vision.line import LinePoints
 from vision.one_sided import Lit, seen_width
 from vision.one_view import seen_from_one_side, touch_by_onset
 from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape

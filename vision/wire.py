@@ -7,6 +7,7 @@ the integral of (contact - s)/EI(s) up to the contact and stays constant beyond.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
@@ -47,13 +48,14 @@ class Curves:
         k, t = self._place(arc)
         take = [np.take_along_axis(a, k[..., None] + d, axis=-2)
                 for a in (self.points_mm, self.tangents) for d in (0, 1)]
-        return self._between(t, *take)
+        return self._point_between(t, *take), self._tangent_between(t, *take)
 
     def at_one_each(self, which, arc_mm) -> np.ndarray:
         """Points (…, n, 3), each on its own curve: which (n,) of the curves (…, f), at arc lengths (n,)."""
         k, t = self._place(np.asarray(arc_mm))
-        take = [a[..., which, k + d, :] for a in (self.points_mm, self.tangents) for d in (0, 1)]
-        return self._between(t, *take)[0]
+        one_row = [a.reshape(*a.shape[:-3], -1, 3) for a in (self.points_mm, self.tangents)]
+        take = [a.take(which * len(self.arc_mm) + k + d, axis=-2) for a in one_row for d in (0, 1)]
+        return self._point_between(t, *take)
 
     def _place(self, arc_mm):
         """The piece that an arc length lies in, and where in it (…, 1), from 0 to 1."""
@@ -61,12 +63,17 @@ class Curves:
         k = np.clip(steps.astype(int), 0, len(self.arc_mm) - 2)
         return k, (steps - k)[..., None]
 
-    def _between(self, t, p0, p1, m0, m1):
-        """Points and tangents within a piece from those at its ends."""
+    def _point_between(self, t, p0, p1, m0, m1):
+        """Points within a piece from points and tangents at its ends."""
         h = self.arc_mm[1] - self.arc_mm[0]
-        m0, m1 = m0 * h, m1 * h
-        a, b = 2 * (p0 - p1) + m0 + m1, 3 * (p1 - p0) - 2 * m0 - m1
-        return p0 + t * (m0 + t * (b + t * a)), (m0 + t * (2 * b + t * 3 * a)) / h
+        u = 1.0 - t
+        return (u * u * (1.0 + 2.0 * t)) * p0 + (t * t * (3.0 - 2.0 * t)) * p1 + (h * t * u) * (u * m0 - t * m1)
+
+    def _tangent_between(self, t, p0, p1, m0, m1):
+        """Tangents, the derivative of `_point_between` by arc length."""
+        u = 1.0 - t
+        h = self.arc_mm[1] - self.arc_mm[0]
+        return (6.0 * t * u / h) * (p1 - p0) + (u * (1.0 - 3.0 * t)) * m0 - (t * (2.0 - 3.0 * t)) * m1
 
 
 def centrelines(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
@@ -81,20 +88,25 @@ def centrelines(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
     growth = tangent_growth(arc, np.asarray(contact_mm)[..., None], wire)
     sine = np.where(turn > 1e-12, np.sin(turn * growth) / np.maximum(turn, 1e-12), growth)
     aside = aside + sine[..., None] * np.asarray(bend_rad)[..., None, :]
-    forward = np.sqrt(np.maximum(1.0 - np.sum(aside**2, axis=-1), 0.01))
-    tangents = np.concatenate([forward[..., None], aside], axis=-1)
-    start = np.concatenate([np.zeros((*np.shape(rest_mm)[:-2], 1)), np.asarray(rest_mm)[..., :, 0]], axis=-1)
-    walked = cumulative_simpson(tangents, dx=arc[1], axis=-2, initial=0.0)
-    points = walked + np.broadcast_to(start, (*walked.shape[:-2], 3))[..., None, :]
-    turned = rotation_z(motor_rad)
-    return Curves(arc, np.einsum("...ij,...mj->...mi", turned, points),
-                  np.einsum("...ij,...mj->...mi", turned, tangents))
+    tangents = np.empty((*aside.shape[:-1], 3))
+    tangents[..., 0] = np.sqrt(np.maximum(1.0 - aside[..., 0] ** 2 - aside[..., 1] ** 2, 0.01))
+    tangents[..., 1:] = aside
+    points = _simpson() @ tangents * arc[1]
+    points[..., 1:] += np.asarray(rest_mm)[..., None, :, 0]
+    turned = np.swapaxes(rotation_z(motor_rad), -1, -2)
+    return Curves(arc, points @ turned, tangents @ turned)
+
+
+@lru_cache
+def _simpson() -> np.ndarray:
+    """The matrix (m, m) that integrates values at the nodes, one apart, from the first node to each."""
+    return cumulative_simpson(np.eye(_NODES), dx=1.0, axis=0, initial=0.0)
 
 
 def _rest_slope(rest_mm, u) -> np.ndarray:
     """Slopes (…, m, 2) of the rest shape by u = s/length."""
     powers = np.stack([k * u ** max(k - 1, 0) for k in range(REST_POWERS)], axis=-1)
-    return np.einsum("mk,...ak->...ma", powers, rest_mm)
+    return powers @ np.swapaxes(rest_mm, -1, -2)
 
 
 def rotation_z(angle_rad) -> np.ndarray:

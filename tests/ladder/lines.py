@@ -24,7 +24,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from vision.line import WAVES, Noise, cut_pieces, read_band
+from vision.cylinder import WAVES
+from vision.line import Noise, cut_pieces, read_band
 from vision.shading import Knots
 from vision.trace import clear_of_bar, settle, to_points, trace
 

@@ -21,7 +21,8 @@ from scipy.special import ndtr
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.vision.test_observe import BAR, WIRE, Recorded
-from vision.line import WAVES, Noise, cut_pieces, read_band
+from vision.cylinder import WAVES
+from vision.line import Noise, cut_pieces, read_band
 from vision.observe import observe_trial
 from vision.shading import Knots
 from vision.trace import settle, to_points, trace

@@ -7,7 +7,8 @@ import pytest
 
 from tests.speed.tracer import KNOTS, NOISE, rough_bands, wire_frames
 from vision.binned import binned, without
-from vision.line import WAVES, Noise, cut_pieces
+from vision.cylinder import WAVES
+from vision.line import Noise, cut_pieces
 from vision.shading import fit_shading, wave_prior
 
 

@@ -5,22 +5,9 @@ The pictures are those of tests/ladder/lines.py, drawn by brute force; nothing o
 
 import numpy as np
 import pytest
-from scipy.special import erf
 
 from tests.ladder.lines import NOISE, PIECE_PX, SCENES, Figures, bounds, find
-from vision.line import measure_noise, read_band, shading_basis
-
-
-def test_shading_basis_is_the_blurred_rod():
-    """Coverage against the error function: exact for a box of any width."""
-    u = np.linspace(-6, 6, 121)
-    for radius, blur in ((0.8, 0.6), (2.7, 0.9), (16.0, 1.5)):
-        box = 0.5 * (erf((u + radius) / blur / np.sqrt(2)) - erf((u - radius) / blur / np.sqrt(2)))
-        # the nearest of 400 values a pixel: 1/800 px times the steepest slope, 1/(sqrt(2 pi) blur); and 1e-4 within
-        # the table
-        allowed = 1 / 800 / (np.sqrt(2 * np.pi) * blur) + 1e-4
-        assert np.allclose(shading_basis(u, np.array(radius), blur, 4)[:, 0], box, atol=allowed)
-
+from vision.line import measure_noise, read_band
 
 PLAIN = ["even rod, flat background", "step of a fifth of the contrast", "highlight and step",
          "within 2° of the rows, highlight"]  # fmt: skip
