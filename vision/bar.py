@@ -25,14 +25,14 @@ _MOST_CLIMBS = 20
 def changed(grey, background, noise: Noise) -> np.ndarray:
     """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 3 × 3 pixels.
 
-    Both pictures are given at every HALF-th pixel.
+    Both pictures are given at every HALF-th pixel. The outermost pixels are 0.
 
     The scale is the median of the differences themselves: most of the picture has not changed, and a picture of
     the background may be noisier than the frames.
     """
     difference = uniform_filter(grey - background, 3) / noise.sigma(0.5 * (grey + background))
     z = np.abs(difference) / max(float(np.median(np.abs(difference))) / 0.6745, 1e-6)
-    return np.clip((z - 3.0) / 6.0, 0.0, 1.0)
+    return np.pad(np.clip((z - 3.0) / 6.0, 0.0, 1.0)[1:-1, 1:-1], 1)
 
 
 def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
@@ -96,7 +96,11 @@ def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float)
 def standing_out(axis: BarAxis, change, camera, inside_mm, outside_mm, along_mm=_ALONG_MM) -> np.ndarray:
     """(change inside the outline) - (change beside it), (n,) for axes (n, 3), read at these places beside each axis."""
     along, sideways = _axis_frame(axis, camera, along_mm)
-    inside, outside = (_sample(change, camera, along, sideways, offsets) for offsets in (inside_mm, outside_mm))
+    reach = float(np.max(np.abs(outside_mm)))
+    px = camera.project(np.stack([along, along + reach * sideways[:, None]]).reshape(-1, 3))
+    middle, side = px.T.reshape(2, 2, *along.shape[:2], 1).swapaxes(0, 1)  # (x and y, n, t, 1)
+    step = (side - middle) / reach  # so near the axis a picture is as good as flat
+    inside, outside = (_read(change, *(middle + offsets * step)) for offsets in (inside_mm, outside_mm))
     return inside.mean(axis=(1, 2)) - outside.mean(axis=(1, 2))
 
 
@@ -107,14 +111,11 @@ def _axis_frame(axis: BarAxis, camera, along_mm):
     return along, sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
 
 
-def _sample(picture, camera, along, sideways, offsets_mm) -> np.ndarray:
-    """Values (n, t, k) of a picture at points beside each axis; 0 outside the picture."""
-    points = along[:, :, None] + offsets_mm[:, None] * sideways[:, None, None]
-    px = camera.project(points.reshape(-1, 3))
-    column, row = np.round(np.nan_to_num(px, nan=-9.0) / HALF).astype(int).T
-    inside = (row >= 0) & (row < picture.shape[0]) & (column >= 0) & (column < picture.shape[1])
-    values = np.where(inside, picture[np.where(inside, row, 0), np.where(inside, column, 0)], 0.0)
-    return values.reshape(points.shape[:-1])
+def _read(picture, x_px, y_px) -> np.ndarray:
+    """Values (…) of a picture, given at every HALF-th pixel, at pixels (…); its rim's where outside or not known."""
+    row, column = (np.fmin(np.fmax(px * (1.0 / HALF) + 0.5, 0.0), size - 1).astype(np.intp)
+                   for px, size in zip((y_px, x_px), picture.shape))
+    return picture.ravel().take(row * picture.shape[1] + column)
 
 
 def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints], radius_mm: float,
