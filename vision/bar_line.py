@@ -68,7 +68,7 @@ def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Seq
         return None
     line, blur_px = _sweep(pieces, knots, off_px), None
     pieces = of_bar_alone(pieces, lambda some: _moved(some, line), knots)
-    for settled_px in _ROUGHLY if off_px else _EXACTLY:  # line, blur, and what counts as a rim depend on each other
+    for settled_px in _EXACTLY if last else _ROUGHLY:  # line, blur, and what counts as a rim depend on each other
         model = _model(pieces, line, knots)
         line, blur_px, covariance, misfit = _settle(model, line, blur_px, settled_px)
         on_line = _on_line(replace(model, blur_px=blur_px), line)
