@@ -66,8 +66,8 @@ def linearise(problem: Problem, state: State, jacobian: np.ndarray | None = None
     moved, columns = _perturbed(problem, state.vector) if jacobian is None else (state.vector[None], [])
     curves, arcs = curves_of(problem, moved, state.arcs_mm)
     alike = groupby(problem.seen, key=lambda seen: (seen.camera, seen.frame >= 0))
-    blocks = [_wire_block(problem, camera, list(group), curves, columns, state.vector) if on_wire
-              else _bar_block(problem, camera, list(group), columns, state.vector) for (camera, on_wire), group in alike]
+    blocks = [_wire_block(problem, camera, list(seen), curves, columns, state.vector) if on_wire
+              else _bar_block(problem, camera, list(seen), columns, state.vector) for (camera, on_wire), seen in alike]
     count = sum(len(block[0]) for block in blocks)
     blocks += [_contact_block(problem, moved, curves, arcs, columns, state.vector), _prior_block(problem, state.vector)]
     if problem.onset is not None:
