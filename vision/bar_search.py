@@ -67,8 +67,10 @@ class _Found:
 def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
              settings: VisionSettings) -> _Found:
     """The axis by the bar's lines, which are looked for so far away in turn."""
+    lines: dict[str, BarLine] = {}
     for most_px in off_px:
-        lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
+        known = len(lines) > 1 and all(line.told for line in lines.values())  # then the axis lies on them
+        lines = bar_lines(views, axis, rods, wires, settings, off_px=0.0 if known else most_px)
         axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
         if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
             break
@@ -96,8 +98,13 @@ def _quieter(noise: Noise, count: int) -> Noise:
 
 
 def _median_picture(view: View) -> np.ndarray:
-    """Median (of an even number the upper one) of some frames at every HALF-th pixel: a wire that moves vanishes."""
-    pictures = np.stack([picture[::HALF, ::HALF] for picture in view.some(_MEDIAN_OF)], axis=-1)
-    middle = pictures.shape[-1] // 2
-    pictures.partition(middle, axis=-1)
-    return pictures[..., middle]
+    """Median (of an even number the upper one) of some frames at every HALF-th pixel: a wire that moves vanishes.
+
+    Each pass carries the largest of the rest to its end, whole pictures at a time: no sort of single pixels is as fast.
+    """
+    pictures = [np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)]
+    for last in range(len(pictures) - 1, len(pictures) // 2 - 1, -1):
+        for k in range(last):
+            lower = np.minimum(pictures[k], pictures[k + 1])
+            pictures[k], pictures[k + 1] = lower, np.maximum(pictures[k], pictures[k + 1])
+    return pictures[len(pictures) // 2]

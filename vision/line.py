@@ -11,7 +11,7 @@ or a highlight no longer pulls the position to one side.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import correlate1d, uniform_filter1d
 
 
 @dataclass(frozen=True)
@@ -192,8 +192,8 @@ def _changes(band: Band) -> list[np.ndarray]:
     """Slope and curvature (n, k) each of the background across the rod, per px and per px²; 0 at the band's rims."""
     pitch = (band.offset_px[:, 1:2] - band.offset_px[:, :1])
     known = np.where(np.isfinite(band.background), band.background, 0.0)
-    inner = np.lib.stride_tricks.sliding_window_view(np.pad(known, ((0, 0), (2, 2)), mode="edge"), 5, axis=1)
-    return [inner @ _FIRST / pitch, inner @ _SECOND / pitch**2]
+    return [correlate1d(known, share, axis=1, mode="nearest") / pitch**order
+            for order, share in ((1, _FIRST), (2, _SECOND))]
 
 
 def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarray]:

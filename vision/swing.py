@@ -22,6 +22,7 @@ _REACH_PX = 26
 _SIGMA_PX = 1.0
 _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
+_BESIDE_BAR_PX = 8.0
 _SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
 
 
@@ -32,11 +33,14 @@ def outline_of_bar(camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray,
     return outline(camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
 
 
-def coarse_points(view: View, curves: Mapping[int, Curves], wire: Wire, axis: BarAxis,
-                  radius_mm: float) -> tuple[LinePoints, np.ndarray]:
-    """Line points to a pixel, away from the bar, and the frame of each."""
+def _bars_px(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float) -> list:
+    return [outline_of_bar(view.camera, axis, reach_mm - wire.diameter_mm / 2) for view in views]
+
+
+def coarse_points(view: View, curves: Mapping[int, Curves], wire: Wire, bar_px) -> tuple[LinePoints, np.ndarray]:
+    """Line points to a pixel, away from the bar (see `outline_of_bar`), and the frame of each."""
     pieces = wire_pieces(view, curves, wire, _PIECE_PX, _REACH_PX - 3)
-    pieces = pieces.select(clear_of_bar(pieces, *outline_of_bar(view.camera, axis, radius_mm), 8.0))
+    pieces = pieces.select(clear_of_bar(pieces, *bar_px, _BESIDE_BAR_PX))
     shift, share = strongest_shift(pieces, _REACH_PX)
     good = (share > _SHARE) & (np.abs(shift) < _REACH_PX - 4)
     px = pieces.foot_px + shift[:, None] * pieces.normal
@@ -52,11 +56,12 @@ def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis
     """
     motor = np.array(list(motor_rad.values()))
     rest = np.zeros((2, REST_POWERS))
+    bars_px = _bars_px(views, wire, axis, reach_mm)
     for _ in range(2):
         curves = {f: one_curve(rest, np.zeros(2), wire.length_mm, m, wire) for f, m in motor_rad.items()}
         seen = []
-        for number, view in enumerate(views):
-            points, source = coarse_points(view, curves, wire, axis, reach_mm - wire.diameter_mm / 2)
+        for number, (view, bar_px) in enumerate(zip(views, bars_px)):
+            points, source = coarse_points(view, curves, wire, bar_px)
             seen += [Observed(k, number, points.select(source == f)) for k, f in enumerate(motor_rad)]
         if sum(len(s.points) for s in seen) < 8 * len(motor_rad):
             raise Refused("no whisker is seen where the motor angle says it should be")
@@ -83,14 +88,13 @@ def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: flo
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
     found: dict[int, np.ndarray] = {}
-    pull = _pull(axis, len(views))
+    pull, bars_px = _pull(axis, len(views)), _bars_px(views, wire, axis, reach_mm)
     last, before = np.zeros(2), np.zeros(2)
     for frame, motor in motor_rad.items():
         guess = 2 * last - before
         arc = contact_arc(rest_mm, guess, motor, axis, wire)
         curve = one_curve(rest_mm, guess, arc, motor, wire)
-        seen = [coarse_points(view, {frame: curve}, wire, axis, reach_mm - wire.diameter_mm / 2)[0]
-                for view in views]
+        seen = [coarse_points(view, {frame: curve}, wire, bar_px)[0] for view, bar_px in zip(views, bars_px)]
         bend = _fit_bend(views, seen, rest_mm, guess, arc, motor, wire, pull)
         found[frame] = bend
         before, last = last, bend

@@ -19,7 +19,7 @@ from vision.wire import Curves
 _BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
-_BIN_PX = 0.25
+_BIN_PX = 0.4
 _STEPS, _LONGEST = np.array([0.1, 0.1, 0.1, 0.08]), np.array([0.5, 0.4, 0.4, 0.3])  # shift, tilt, bow (px), log blur
 _SETTLED = 0.05
 _FEW_PIECES, _ENOUGH_PIECES = 30, 100
@@ -121,17 +121,19 @@ def _some(pieces: Pieces, count: int) -> Pieces:
     return pieces.select(slice(None, None, max(1, round(len(pieces) / count))))
 
 
-def trace(pieces: Pieces, blur_px: float, terms: int, knots: Knots,
-          rounds: int = 5) -> tuple[Pieces, Located, float]:
+def trace(pieces: Pieces, blur_px: float, terms: int, knots: Knots, rounds: int = 5, *,
+          last: bool = True) -> tuple[Pieces, Located, float]:
     """Shading and positions by turns; the pieces come back as near as they were brought, with what is left to move.
 
-    Also the median misfit (chi² per pixel). The pieces must be near; from a rough curve, see `settle`. All turns but
-    the last are taken with averaged pixels.
+    Also the median misfit (chi² per pixel). The pieces must be near; from a rough curve, see `settle`. All turns are
+    taken with averaged pixels, but for the last where this is the last look.
     """
     rough, blurred = binned(pieces, _BIN_PX)
-    near, found, _ = _by_turns(rough, np.hypot(blur_px, np.sqrt(blurred)), terms, knots, rounds - 1)
-    there = pieces.moved(_apart(near, pieces) + found.shift_px)
-    return _by_turns(there, blur_px, terms, knots, 1, _robust(found.chi2))
+    near, found, misfit = _by_turns(rough, np.hypot(blur_px, np.sqrt(blurred)), terms, knots, rounds - 1)
+    there = pieces.moved(_apart(near, pieces))
+    if not last:
+        return there, found, misfit
+    return _by_turns(there.moved(found.shift_px), blur_px, terms, knots, 1, _robust(found.chi2))
 
 
 def _by_turns(pieces: Pieces, blur_px: float, terms: int, knots: Knots, rounds: int,

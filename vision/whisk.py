@@ -151,7 +151,7 @@ def _trace_all(views, cameras: Cameras, rods: Rods, axis: BarAxis, motor, curves
     bar = _trace_bar(views, cameras, rods, axis, wires, settings, last=last)
     seen = []
     for number, view in enumerate(views):
-        seen += _trace_wire(number, view, rods, axis, motor, curves, light, settings)
+        seen += _trace_wire(number, view, rods, axis, motor, curves, light, settings, last=last)
         seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
     for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
@@ -171,7 +171,7 @@ def _trace_bar(views, cameras: Cameras, rods: Rods, axis: BarAxis, wires, settin
 
 
 def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
-                settings: VisionSettings) -> list[Observed]:
+                settings: VisionSettings, *, last: bool = True) -> list[Observed]:
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
@@ -180,7 +180,8 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
     pieces, blur = (pieces, known.blur_px) if known else settle(pieces, knots, _SEARCH_PX)
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST)
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST,
+                                  last=last)
     light[name] = known or Lit(blur, seen_width(pieces, blur))
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))
