@@ -67,12 +67,10 @@ class _Found:
 def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
              settings: VisionSettings) -> _Found:
     """The axis by the bar's lines, which are looked for so far away in turn."""
-    lines: dict[str, BarLine] = {}
     for most_px in off_px:
-        known = len(lines) > 1 and all(line.told for line in lines.values())  # then the axis lies on them
-        lines = bar_lines(views, axis, rods, wires, settings, off_px=0.0 if known else most_px)
+        lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
         axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
-        if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
+        if all(line.told or line.moved_px < NEAR_PX for line in lines.values()):
             break
     return _Found(axis, [*lines.values()])
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit import linearise
+from vision.fit import linear_at
 from vision.place import BaseLines
 from vision.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Observed, Problem, State, wandering
 from vision.wire import REST_POWERS, rotation_z
@@ -62,7 +62,7 @@ def _count(rows: list[_Rows], frame: int) -> int:
 
 
 def _free_rows(problem: Problem, state: State) -> list[_Rows]:
-    linear, _ = linearise(problem, state)
+    linear = linear_at(problem, state)
     rows, end = [], 0
     for seen in problem.seen:
         first, end = end, end + len(seen.points)

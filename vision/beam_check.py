@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 from vision.contact import BarAxis, clearance
-from vision.fit import LAST_SCALE, linearise, robust_weights
+from vision.fit import LAST_SCALE, linear_at, robust_weights
 from vision.problem import CONTACT_SIGMA_MM, WANDER_PX, Observed, Problem, State, bar_axis, bends, curves_of, wandering
 from vision.quantities import Jacobians, Measured, camera_rows
 from vision.wire import Curves, rotation_z
@@ -106,7 +106,7 @@ def _chance(departure, spread) -> float:
 def _departure(problem: Problem, state: State, frame: int):
     """Departure (k,), its covariance (k, k) where the beam is right, what the parameters follow it by (size, k), and
     the slip in a frame (k,), the parameters standing still."""
-    linear, _ = linearise(problem, state)
+    linear = linear_at(problem, state)
     root = np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     moves = _moves(problem, state, curves)

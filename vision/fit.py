@@ -8,6 +8,7 @@ tilt per camera with a prior, and so ends up in the stated uncertainty.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
@@ -77,6 +78,12 @@ def linearise(problem: Problem, state: State, jacobian: np.ndarray | None = None
         jacobian = np.concatenate([block[1] for block in blocks])
     return (Linear(residual, jacobian, np.arange(len(residual)) < count),
             replace(state, arcs_mm=arcs[0]))
+
+
+@lru_cache(maxsize=1)
+def linear_at(problem: Problem, state: State) -> Linear:
+    """`linearise`, kept for the next who asks the same: a fit that is done is asked for each of its uncertainties."""
+    return linearise(problem, state)[0]
 
 
 def _perturbed(problem: Problem, vector):
@@ -235,7 +242,7 @@ def weighted_jacobian(problem: Problem, state: State, scale: float = LAST_SCALE,
 
     jacobian: see `linearise`.
     """
-    linear, _ = linearise(problem, state, jacobian)
+    linear = linear_at(problem, state) if jacobian is None else linearise(problem, state, jacobian)[0]
     return linear.jacobian * np.sqrt(robust_weights(linear, scale))[:, None]
 
 
@@ -253,7 +260,7 @@ def honest(problem: Problem, state: State) -> Problem:
 
 def scatter_px(problem: Problem, state: State) -> list[float]:
     """Standard deviation in px of each camera's wire points about the fit, by their median; 0 where it has none."""
-    linear, _ = linearise(problem, state)
+    linear = linear_at(problem, state)
     ends = np.cumsum([len(seen.points) for seen in problem.seen])
     parts = [np.abs(linear.residual[end - len(seen.points):end]) * seen.points.sigma_px
              for end, seen in zip(ends, problem.seen)]

@@ -42,7 +42,7 @@ class Observed:
     side: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """What is known and seen of one whisk.
 
@@ -75,7 +75,7 @@ class Problem:
         return BAR + REST + 1 + 4 * len(self.cameras)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
     """Parameters in one vector, with the contact arcs (f,) from which the next evaluation starts."""
 

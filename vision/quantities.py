@@ -5,11 +5,12 @@ contact in the contact frame, phi the direction of the deflection, alpha the ang
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from vision.contact import BarAxis, clearance, contact_frame_angles
-from vision.fit import linearise, weighted_jacobian
+from vision.fit import linear_at, weighted_jacobian
 from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of, rest_shape
 from vision.scene import N_PARAMETERS
 from vision.silhouette import grazed
@@ -136,7 +137,7 @@ def _answer(problem: Problem, state: State, covariance) -> np.ndarray:
 
     They answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees.
     """
-    linear, _ = linearise(problem, state)
+    linear = linear_at(problem, state)
     return -covariance @ (linear.jacobian[linear.is_point].T @ camera_rows(problem, state))
 
 
@@ -178,6 +179,7 @@ def _by_placement(problem: Problem, state: State, covariance, gradient) -> float
     return float(by @ cameras.placement @ by)
 
 
+@lru_cache(maxsize=1)
 def camera_rows(problem: Problem, state: State) -> np.ndarray:
     """Derivatives (n, 15 cameras) of the line points' residuals by the cameras' parameters."""
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)

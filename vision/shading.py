@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 
 from vision.cylinder import shaded, shading_basis
 from vision.line import LinePoints, Pieces
@@ -102,10 +103,11 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust
     left = left.reshape(len(knots), len(knots), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
     right = ((hats * robust[:, None]).T @ moment).reshape(size)
     stiff = 1e-6 * np.trace(left) / size * np.eye(size) if prior is None else _stiffness(prior, knots)
-    waves = np.linalg.solve(left + stiff, right)
+    factors = lu_factor(left + stiff, check_finite=False)
+    waves = lu_solve(factors, right, check_finite=False)
     misfit = float(robust @ power - 2.0 * right @ waves + waves @ left @ waves)
     if prior is not None:
-        misfit += float(waves @ stiff @ waves + np.linalg.slogdet(left + stiff)[1])
+        misfit += float(waves @ stiff @ waves + np.sum(np.log(np.abs(np.diag(factors[0])))))
     pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
     shading = Shading(knots, waves.reshape(len(knots), terms), blur_px)
     return shading, misfit / max(1.0, pixels)

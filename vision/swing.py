@@ -28,7 +28,7 @@ _SHARE = 0.35  # a rod's window holds at least this part of all difference in it
 
 def outline_of_bar(camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Middle (m, 2) and half-width (m,) of the bar in one camera, 60 mm to either side of its point."""
-    place = np.linspace(-60.0, 60.0, 241)
+    place = np.linspace(-60.0, 60.0, 121)
     points = axis.point_mm + place[:, None] * axis.direction
     return outline(camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
 

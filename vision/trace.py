@@ -20,6 +20,7 @@ _BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
 _BIN_PX = 0.4
+_NODES = 81  # of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel
 _STEPS, _LONGEST = np.array([0.1, 0.1, 0.1, 0.08]), np.array([0.5, 0.4, 0.4, 0.3])  # shift, tilt, bow (px), log blur
 _SETTLED = 0.05
 _FEW_PIECES, _ENOUGH_PIECES = 30, 100
@@ -67,7 +68,7 @@ def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px:
 
 def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Arc (n,) in mm, middle (n, 2) and half-width (n,) in px of the wire."""
-    arc = np.linspace(2.0, wire.length_mm - 1.0, 200)
+    arc = np.linspace(2.0, wire.length_mm - 1.0, _NODES)
     points, tangents = curve.at(arc)
     directions = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
     return arc, *outline(camera, points, directions, wire.radius_mm(arc))
