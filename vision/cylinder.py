@@ -13,7 +13,8 @@ _DELTA_PX = 0.05
 
 
 def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
-    """Blurred pictures (..., terms) of a cylinder whose radiance is each function of `round_the_rod` in turn.
+    """Blurred pictures (..., terms + 2) of a cylinder whose radiance is each function of `round_the_rod` in turn; the
+    last two are `rim_bells`.
 
     The first term is the share of the pixel that the rod covers. offset_px (...): distance from the axis;
     radius_px broadcasts. Where the radius is nearly the same everywhere one table serves all pixels, stretched by
@@ -40,11 +41,11 @@ def shaded(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, np.
     ratio = _one_ratio(radius_px, blur_px)
     if ratio is None:
         ends = [_integrated(offset_px + d, radius_px, blur_px, terms) for d in (-_DELTA_PX, _DELTA_PX)]
-        behind, ahead = (np.stack([np.einsum("spt,st->sp", end, waves), end[..., 0]]) for end in ends)
+        behind, ahead = (np.stack([np.einsum("spt,st->sp", end[..., :terms], waves), end[..., 0]]) for end in ends)
         return 0.5 * (ahead + behind), (ahead - behind) / (2.0 * _DELTA_PX)
     rows, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows, len(table))
-    own = table @ waves.T
+    own = table[:, :terms] @ waves.T
     each = before * len(waves) + np.arange(len(waves))[:, None]
     pictures, slopes = np.empty((2, 2, *offset_px.shape))
     for k, (profile, place, next_row) in enumerate(((own, each, len(waves)), (table[:, 0], before, 1))):
@@ -52,6 +53,17 @@ def shaded(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, np.
             here = values.take(place, mode="clip")
             into[:] = here + part * (values.take(place + next_row, mode="clip") - here)
     return pictures, slopes * (rows / radius_px)
+
+
+def rim_bells(offset_px, radius_px, blur_px: float) -> np.ndarray:
+    """Bells (..., 2) where the blurred rod begins and ends: normal densities of z, the distance from the edge over the
+    blur, and z times them; those of the edge at negative offset are taken away from the other's."""
+    bells = 0.0
+    for side in (1.0, -1.0):
+        z = (offset_px - side * radius_px) / blur_px
+        bell = np.exp(-0.5 * z * z) * (side / np.sqrt(2.0 * np.pi))
+        bells = bells + np.stack([bell, z * bell], axis=-1)
+    return bells
 
 
 def _one_ratio(radius_px, blur_px: float) -> float | None:
@@ -68,7 +80,7 @@ def _places(offset, rows: float, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _table(ratio: float, terms: int) -> tuple[float, np.ndarray]:
-    """Rows per radius, and values (n, terms) for this radius over blur; zero lies in the middle."""
+    """Rows per radius, and values (n, terms + 2) for this radius over blur; zero lies in the middle."""
     step, share = divmod(np.log(ratio) / _RATIO_STEP, 1.0)
     rows, one, other = _tables(int(step), terms)
     return rows, one + share * (other - one)
@@ -76,7 +88,7 @@ def _table(ratio: float, terms: int) -> tuple[float, np.ndarray]:
 
 @lru_cache(maxsize=512)
 def _tables(step: int, terms: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """Rows per radius, and values (n, terms) for radius over blur at this step of its logarithm and at the next.
+    """Rows per radius, and values (n, terms + 2) for radius over blur at this step of its logarithm and at the next.
 
     Counted in radii, for then edges coincide and only their blur differs: 5e-4 of the contrast between rows and steps.
     """
@@ -96,7 +108,7 @@ def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
     z = (offset_px[..., None] - radius * np.sin(t)) / blur_px
     share = 0.5 * np.pi * shares * np.cos(t) / (blur_px * np.sqrt(2 * np.pi))
     weight = np.exp(-0.5 * z * z) * (radius * share)
-    return weight @ round_the_rod(t, terms)
+    return np.concatenate([weight @ round_the_rod(t, terms), rim_bells(offset_px, radius_px, blur_px)], axis=-1)
 
 
 _legendre = lru_cache(np.polynomial.legendre.leggauss)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from vision.cylinder import shaded, shading_basis
+from vision.cylinder import rim_bells, shaded, shading_basis
 from vision.line import LinePoints, Pieces
 
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
@@ -69,19 +69,14 @@ def _hats(place_mm, knots_mm) -> np.ndarray:
     return np.clip(1.0 - np.abs(position[:, None] - np.arange(len(knots_mm))), 0.0, None)
 
 
-def _not_leaked(pieces: Pieces, offset_px, blur_px: float) -> np.ndarray:
+def _not_leaked(pieces: Pieces, bells, blur_px: float) -> np.ndarray:
     """What the blurred known picture holds (s, p) of light that the rod hides, near a border in the background.
 
     The lens blurs what is left when the rod has hidden its part; the known picture was blurred whole. The blurred
     product of two pictures is the product of the blurred ones, and blur² times that of their slopes, and blur⁴/2
-    times that of their curvatures, and so on.
+    times that of their curvatures, and so on. bells (s, p, 2): see `rim_bells`.
     """
-    leaked = 0.0
-    for side in (-1.0, 1.0):
-        z = (offset_px - side * pieces.radius_px[:, None]) * (1.0 / blur_px)
-        bell = np.exp(-0.5 * z * z) * (side / np.sqrt(2.0 * np.pi))
-        leaked = leaked + bell * (blur_px * pieces.slope - (0.5 * blur_px**2) * z * pieces.curvature)
-    return leaked
+    return bells[..., 0] * (blur_px * pieces.slope) - bells[..., 1] * ((0.5 * blur_px**2) * pieces.curvature)
 
 
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust=None,
@@ -118,12 +113,13 @@ def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
 
     Gram matrices (s, terms, terms), moments (s, terms), and the squares (s,) that the background leaves.
     """
-    rod = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
-    rod *= pieces.weight[..., None]
+    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
+    basis *= pieces.weight[..., None]
+    rod = basis[..., :terms]
     rest = np.empty((len(pieces), 3, pieces.offset_px.shape[1]))  # two of the background, and what is seen
     np.subtract(pieces.weight, rod[..., 0], out=rest[:, 1])
     np.multiply(rest[:, 1], pieces.background, out=rest[:, 0])
-    rest[:, 0] += _not_leaked(pieces, pieces.offset_px, blur_px) * pieces.weight
+    rest[:, 0] += _not_leaked(pieces, basis[..., terms:], blur_px)
     np.multiply(pieces.grey, pieces.weight, out=rest[:, 2])
     gram, mixed, own = rod.transpose(0, 2, 1) @ rod, rest @ rod, rest @ rest.transpose(0, 2, 1)
     around, seen = mixed[:, :2].transpose(0, 2, 1), own[:, :2, 2:]
@@ -208,7 +204,8 @@ def _linearise(pieces: Pieces, shading: Shading, waves, shift):
     around = np.empty((len(pieces), 2, offset.shape[1]))
     np.multiply(1.0 - cover, weight, out=around[:, 1])
     np.multiply(around[:, 1], pieces.background, out=around[:, 0])
-    around[:, 0] += _not_leaked(pieces, offset, shading.blur_px) * weight
+    bells = rim_bells(offset, pieces.radius_px[:, None], shading.blur_px)
+    around[:, 0] += _not_leaked(pieces, bells, shading.blur_px) * weight
     turned = around.transpose(0, 2, 1)
     inverse = _inverse_of_two(around @ turned + _WEAK * np.eye(2))
     seen = (pieces.grey - rod) * weight

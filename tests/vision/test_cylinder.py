@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from vision.cylinder import WAVES, round_the_rod, shaded, shading_basis
+from vision.cylinder import WAVES, rim_bells, round_the_rod, shaded, shading_basis
 
 # Linear between 12 rows a blur and between steps of 5 % in radius over blur: (1/12)²/8 and 0.05²/8, times at most the
 # 0.5 of a blurred edge's curvature; and of higher waves somewhat more.
@@ -17,7 +17,13 @@ def test_its_first_wave_is_the_blurred_box(radius, blur):
     """Coverage against the error function: exact for a box of any width."""
     u = np.linspace(-6, 6, 121)
     box = 0.5 * (erf((u + radius) / blur / np.sqrt(2)) - erf((u - radius) / blur / np.sqrt(2)))
-    assert np.allclose(shading_basis(u, np.array(radius), blur, 4)[:, 0], box, atol=TABLED)
+    found = shading_basis(u, np.array(radius), blur, 4)
+    assert np.allclose(found[:, 0], box, atol=TABLED)
+    # the bells are slopes of the box, and bend twice as much
+    assert np.allclose(found[:, 4:], rim_bells(u, radius, blur), atol=2 * TABLED)
+    # differences over 0.1 px: 0.1²/6 times the box's third derivative, 0.4/blur³ at most
+    slope = np.gradient(box, u)
+    assert np.allclose(-rim_bells(u, radius, blur)[:, 0] / blur, slope, atol=0.1**2 / 6 * 0.4 / blur**3)
 
 
 @pytest.mark.parametrize("offset", [-3.1, -0.4, 1.9, 4.0])
@@ -29,7 +35,7 @@ def test_every_wave_is_its_integral_round_the_rod(offset):
         return bell * radius * np.cos(t) * round_the_rod(np.array(t), WAVES)[k]
 
     exact = [quad(light, -np.pi / 2, np.pi / 2, args=(k,), limit=200)[0] for k in range(WAVES)]
-    assert np.allclose(shading_basis(np.array([offset]), np.array(radius), blur, WAVES)[0], exact, atol=TABLED)
+    assert np.allclose(shading_basis(np.array([offset]), np.array(radius), blur, WAVES)[0, :WAVES], exact, atol=TABLED)
 
 
 @pytest.mark.parametrize("taper", [0.05, 0.5])
@@ -39,9 +45,10 @@ def test_shaded_is_the_basis_times_its_waves_with_its_slope(rng, taper):
     radius, waves = 2.0 * np.linspace(1.0, 1.0 + taper, 6), rng.normal(0.0, 1.0, (6, WAVES))
     at = lambda d: shading_basis(offset + d, radius[:, None], 0.8, WAVES)  # noqa: E731
     (light, hidden), (slope, uncovered) = shaded(offset, radius, 0.8, waves)
-    assert np.allclose(light, np.sum(at(0.0) * waves[:, None], axis=-1), atol=TABLED * np.abs(waves).sum())
+    assert np.allclose(light, np.sum(at(0.0)[..., :WAVES] * waves[:, None], axis=-1), atol=TABLED * np.abs(waves).sum())
     assert np.allclose(hidden, at(0.0)[..., 0], atol=TABLED)
     # differences over a tenth of a pixel: the third derivative, of the order of 1/blur³, times 0.05²/6
     by_difference = (at(0.05) - at(-0.05)) / 0.1
     assert np.allclose(uncovered, by_difference[..., 0], atol=4e-3)
-    assert np.allclose(slope, np.sum(by_difference * waves[:, None], axis=-1), atol=4e-3 * np.abs(waves).sum())
+    expected = np.sum(by_difference[..., :WAVES] * waves[:, None], axis=-1)
+    assert np.allclose(slope, expected, atol=4e-3 * np.abs(waves).sum())
