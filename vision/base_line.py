@@ -74,7 +74,7 @@ def _free_rows(problem: Problem, state: State) -> list[_Rows]:
 def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian) -> _Rows:
     """Without the offsets that the whole fit gave the line, and counted from a straight whisker in its place."""
     clear = seen.points.place > _CLEAR_OF_HUB_MM
-    offsets = slice(BAR + REST + 1 + 4 * seen.camera, BAR + REST + 3 + 4 * seen.camera)
+    offsets = problem.wire_off(seen.camera)
     by_rest = jacobian[:, BAR : BAR + REST]
     away = residual - jacobian[:, offsets] @ state.vector[offsets] - by_rest @ state.vector[BAR : BAR + REST]
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]

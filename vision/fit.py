@@ -18,22 +18,21 @@ from vision.line import LinePoints
 from vision.onset import Onset
 from vision.problem import (
     BAR,
-    BAR_OFFSET_PX,
+    BAR_MODES_PX,
     BAR_TILT_ARM_MM,
-    BAR_TILT_PX,
     BEND_PRIOR_RAD,
     CONTACT_SIGMA_MM,
     REST,
     REST_PRIOR_MM,
     WIRE_LUMP,
-    WIRE_OFFSET_PX,
-    WIRE_TILT_PX,
+    WIRE_MODES_PX,
     Observed,
     Problem,
     State,
     bar_axis,
     curves_of,
     rest_shape,
+    wire_modes,
 )
 from vision.silhouette import edges
 from vision.wire import Curves, centrelines
@@ -122,14 +121,15 @@ def _wire_block(problem: Problem, number: int, group: Sequence[Observed], curves
     for (step, names), by_step in zip(columns, moved):
         bent = names[frame] >= 0
         jacobian[row[bent], names[frame][bent]] = by_step[bent] / step
-    lever = points.place / problem.wire.length_mm - 0.5
-    return _over_sigma(points, px, jacobian, BAR + REST + 1 + 4 * number, 2.0 * lever, vector)
+    modes = wire_modes(problem.wire.length_mm, points.place, problem.motor_rad[frame], problem.motor_rad)
+    return _over_sigma(points, px, jacobian, problem.wire_off(number), modes, vector)
 
 
-def _over_sigma(points: LinePoints, px, jacobian, first: int, lever, vector):
-    """Residuals of points predicted at px (n, 2), and their Jacobian, over sigma; with the line's offset and tilt."""
-    jacobian[:, first], jacobian[:, first + 1] = 1.0, lever
-    residual = np.sum(points.normal * (px - points.px), axis=1) + vector[first] + vector[first + 1] * lever
+def _over_sigma(points: LinePoints, px, jacobian, off: slice, modes, vector):
+    """Residuals of points predicted at px (n, 2), and their Jacobian, over sigma; with what the line is off by as a
+    whole, in these modes (n, k)."""
+    jacobian[:, off] = modes
+    residual = np.sum(points.normal * (px - points.px), axis=1) + modes @ vector[off]
     return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
 
 
@@ -158,7 +158,8 @@ def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns
     px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side)
     jacobian = np.zeros((len(points), problem.size))
     jacobian[:, moving] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
-    return _over_sigma(points, px[0], jacobian, BAR + REST + 1 + 4 * number + 2, points.place / BAR_TILT_ARM_MM, vector)
+    modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
+    return _over_sigma(points, px[0], jacobian, problem.bar_off(number), modes, vector)
 
 
 def _bar_px(problem: Problem, camera, vector, points: LinePoints, side) -> np.ndarray:
@@ -200,7 +201,7 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
 
 
 def _prior_block(problem: Problem, vector):
-    per_camera = np.tile([WIRE_OFFSET_PX, WIRE_TILT_PX, BAR_OFFSET_PX, BAR_TILT_PX], (len(problem.cameras), 1))
+    per_camera = np.tile([*WIRE_MODES_PX, *BAR_MODES_PX], (len(problem.cameras), 1))
     if problem.doubt_px:
         per_camera[:, 0] = np.hypot(per_camera[:, 0], problem.doubt_px)
     sigma = np.concatenate([[50.0, 50.0, 1.0, 1.0], REST_PRIOR_MM, REST_PRIOR_MM,

@@ -19,10 +19,15 @@ REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
 # How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
+# As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
+WIRE_DRIFT_PX = 0.015
+WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
 # It also wanders with what is behind it: by as much, over this length of wire.
 WANDER_PX, WANDER_MM = WIRE_OFFSET_PX, 12.0
 BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.035
 BAR_TILT_ARM_MM = 20.0
+BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
+_MODES = len(WIRE_MODES_PX) + len(BAR_MODES_PX)
 CONTACT_SIGMA_MM = 0.002
 # Neighbouring points of a wire share what is behind them, and so do the same points of the next frames: their
 # errors come in lumps of about four points, which halves what averaging gains.
@@ -66,13 +71,23 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """Number of parameters: bar, rest shape, reach, two offsets and two tilts a camera, bends."""
+        """Number of parameters: bar, rest shape, reach, how each camera's lines are off as a whole, bends."""
         return self.first_bend + 2 * int(np.sum(self.bent))
 
     @property
     def first_bend(self) -> int:
         """Index of the first bend."""
-        return BAR + REST + 1 + 4 * len(self.cameras)
+        return BAR + REST + 1 + _MODES * len(self.cameras)
+
+    def wire_off(self, camera: int) -> slice:
+        """Parameters by which a camera's lines of the wire are off as a whole, see `wire_modes`."""
+        first = BAR + REST + 1 + _MODES * camera
+        return slice(first, first + len(WIRE_MODES_PX))
+
+    def bar_off(self, camera: int) -> slice:
+        """The same of the bar: offset, and tilt over BAR_TILT_ARM_MM."""
+        first = self.wire_off(camera).stop
+        return slice(first, first + len(BAR_MODES_PX))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +134,18 @@ def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 1) -> tuple[Curve
 def start(problem: Problem, contact_arc_mm: float) -> State:
     """No bend, straight whisker, the bar where the problem counts it from."""
     return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
+
+
+def wire_modes(length_mm: float, place_mm, motor_rad, swing_rad) -> np.ndarray:
+    """Shapes (n, 6) by which lines of the wire are off: all alike, from end to end, and both of these changing with the
+    motor angle, steadily and by its square.
+
+    place_mm, motor_rad (n,): of each point; swing_rad: the whisk's motor angles.
+    """
+    lever = 2.0 * place_mm / length_mm - 1.0
+    turned = (motor_rad - np.min(swing_rad)) / max(np.ptp(swing_rad), 1e-9) * 2.0 - 1.0
+    by_turn = np.stack([np.ones(len(lever)), turned, turned**2 - 1.0 / 3.0], axis=1)
+    return (by_turn[:, :, None] * np.stack([np.ones(len(lever)), lever], axis=1)[:, None]).reshape(len(lever), 6)
 
 
 def wandering(problem: Problem, seen: Observed) -> np.ndarray:

@@ -245,13 +245,14 @@ def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Ob
 
 def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> list[Observed]:
     length, sigma, seen = scene.wire.length_mm, scene.sigmas.wire_px, []
-    offset, tilt = _whole(rng, model.WIRE_OFFSET_PX, model.WIRE_TILT_PX)
+    off_by = _whole(rng, model.WIRE_MODES_PX)
     bar = outline_of_bar(camera, scene.axis, scene.bar.radius_mm)
     place = np.arange(FIRST_POINT_MM, length - 1.0, POINT_STEP_MM)
     for frame, more_mm in enumerate(not_round):
         px = camera.project(_centreline_mm(scene, frame, place, more_mm))
         normal = normals(px)
-        off = offset + tilt * (2.0 * place / length - 1.0) + sigma * lumpy_noise(len(place), rng)
+        motor = np.full(len(place), scene.motor_rad[frame])
+        off = model.wire_modes(length, place, motor, scene.motor_rad) @ off_by + sigma * lumpy_noise(len(place), rng)
         keep = _clear(px, *bar) & np.all((px > 3) & (px < np.array(camera.size_px) - 4), axis=1)
         points = LinePoints(px + off[:, None] * normal, normal, np.full(len(px), sigma), place)
         seen.append(Observed(frame, number, points.select(keep)))
@@ -275,7 +276,7 @@ def _bar_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observed
     """Two points of the bar's middle, as vision hands it on; of its two edges where there is one camera."""
     if len(scene.cameras) == 1:
         return _edge_points(scene, number, camera, rng)
-    offset, tilt = _whole(rng, model.BAR_OFFSET_PX, model.BAR_TILT_PX)
+    offset, tilt = _whole(rng, model.BAR_MODES_PX)
     axis, sigma = scene.axis, scene.sigmas.bar_px
     points = axis.point_mm + BAR_PLACES_MM[:, None] * axis.direction
     px = outline(camera, points, np.broadcast_to(axis.direction, points.shape), scene.bar.radius_mm)[0]
@@ -296,8 +297,8 @@ def _edge_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observe
     return seen
 
 
-def _whole(rng, offset_px: float, tilt_px: float) -> np.ndarray:
-    return np.zeros(2) if rng is None else np.array([offset_px, tilt_px]) * rng.standard_normal(2)
+def _whole(rng, modes_px: np.ndarray) -> np.ndarray:
+    return np.zeros(len(modes_px)) if rng is None else modes_px * rng.standard_normal(len(modes_px))
 
 
 def lumpy_noise(count: int, rng) -> np.ndarray:

@@ -10,7 +10,7 @@ from tests.ladder.lines import SCENES, errors, first_look
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit import solve
 from vision.one_sided import Lit, SeenWidth, one_sided_lines, seen_width
-from vision.problem import BAR, REST, WIRE_OFFSET_PX
+from vision.problem import WIRE_OFFSET_PX
 from vision.quantities import jacobians
 from vision.trace import to_points
 
@@ -61,6 +61,6 @@ def test_what_is_not_seen_is_priced():
         state, covariance = solve(problem, begin(problem), scales=(1e9,) * 6)
         _, by = jacobians(problem, state)
         d_x.append(np.sqrt(by.whisk["d_x"] @ covariance @ by.whisk["d_x"]))
-        offset.append(np.sqrt(covariance[BAR + REST + 1, BAR + REST + 1]))
+        offset.append(np.sqrt(np.diag(covariance)[problem.wire_off(0)][0]))
     assert offset[1] > 1.2 * offset[0] and d_x[1] > d_x[0]
     assert offset[1] < np.hypot(WIRE_OFFSET_PX, 0.6)  # the other camera tells some of it

@@ -39,9 +39,9 @@ def alone(onset_at=None):
     """A whisk before the first camera only, its bar told by its edges; and the state that is its truth."""
     problem, truth = scene()
     (view,) = cameras = Cameras(CAMERAS.cameras[:1])
+    offsets_of_second = np.r_[problem.wire_off(1), problem.bar_off(1)]
     problem = replace(problem, cameras=cameras, onset=onset_at)
-    vector = np.concatenate([truth.vector[:17], truth.vector[21:]])  # the second camera's offsets taken out
-    truth = State(vector, truth.arcs_mm)
+    truth = State(np.delete(truth.vector, offsets_of_second), truth.arcs_mm)
     problem = with_points(problem, truth)
     wire = [seen for seen in problem.seen if seen.frame >= 0]
     edges = edge_points(view, problem.axis, REACH - 0.5)
