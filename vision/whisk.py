@@ -1,7 +1,7 @@
 """One whisk: wire and bar traced in all its frames and fitted together, by turns."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,20 @@ _NEVER_TOUCHES = "the whisker never touches"
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 
+@dataclass(frozen=True)
+class _Look:
+    """What is taken for known before a round: bar, rest shape (2, 4), bend (f, 2) and contact arc (f,) in each frame,
+    the curves by frame, and which frames touch or are free (f,)."""
+
+    axis: BarAxis
+    rest_mm: np.ndarray
+    bend_rad: np.ndarray
+    arcs_mm: np.ndarray
+    curves: Mapping[int, Curves]
+    touching: np.ndarray
+    free: np.ndarray
+
+
 def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float], light: dict[str, Lit],
               settings: VisionSettings):
     """Problem and state after the last round, the parameters' covariance, and the frames in it: all but those far
@@ -44,10 +58,23 @@ def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, flo
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
+    one_side = seen_from_one_side(cameras, axis)
+    motor, look = _first_look(views, cameras, rods, axis, motor, one_side)
+    for _ in range(settings.rounds):
+        seen = _trace_all(views, rods, look, motor, light, settings, one_side=one_side, last=False)
+        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, one_side)
+        _check_scatter(problem, state)
+        look = _next_look(problem, state, look, motor, one_side)
+    seen = _trace_all(views, rods, look, motor, light, settings, one_side=one_side, last=True)
+    return *_fit(seen, cameras, rods, look, motor, light, one_side), list(motor)
+
+
+def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float],
+                one_side: bool) -> tuple[Mapping[int, float], _Look]:
+    """The frames to fit, and what coarse points tell of them."""
     early = _early(motor)
     rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
     coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
-    one_side = seen_from_one_side(cameras, axis)
     motor = motor if one_side else _near_touch(motor, coarse)
     angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
     touching, free = frames_that_touch(angles, bend)
@@ -60,33 +87,35 @@ def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, flo
         raise Refused(_STARTS_TOUCHING)
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
     curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
-    for round_number in range(settings.rounds + 1):
-        last = round_number == settings.rounds
-        seen = _trace_all(views, cameras, rods, axis, motor, curves, light, settings, last=last)
-        doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
-        problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, axis, angles, touching, ~free, seen,
-                          doubt_px=doubt_px)
-        fitted, covariance = solve(problem, _begin(problem, rest, bend, arcs))
-        if one_side:
-            problem, fitted = touch_by_onset(problem, fitted, covariance)
-            fitted, _ = solve(problem, fitted)
-        problem = honest(problem, fitted)
-        fitted, covariance = solve(problem, fitted, scales=[LAST_SCALE] * 3)
-        if last:
-            break
-        _check_scatter(problem, fitted)
-        rest, bend, arcs = rest_shape(fitted.vector), bends(problem, fitted.vector), fitted.arcs_mm
-        axis, curves = upward(bar_axis(problem, fitted.vector)), _fitted(problem, fitted, motor)
-        if one_side:
-            touching = problem.touching
-            continue
-        touch = float(first_touch(problem, fitted.vector).motor_rad)
-        touching, free = frames_by_touch(angles, touch, np.radians(0.02))
+    return motor, _Look(axis, rest, bend, arcs, curves, touching, free)
+
+
+def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float], light: dict,
+         one_side: bool) -> tuple[Problem, State, np.ndarray]:
+    """The fit to all lines, with sigmas as large as residuals show: problem, state, and the parameters' covariance."""
+    doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
+    problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
+                      look.touching, ~look.free, seen, doubt_px=doubt_px)
+    state, covariance = solve(problem, _begin(problem, look))
+    if one_side:
+        problem, state = touch_by_onset(problem, state, covariance)
+        state, _ = solve(problem, state)
+    problem = honest(problem, state)
+    return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
+
+
+def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], one_side: bool) -> _Look:
+    """What a fit tells; which frames touch, by clearance, or where the cameras do not tell it by the onset of bending."""
+    touching, free = problem.touching, look.free
+    if not one_side:
+        touch = float(first_touch(problem, state.vector).motor_rad)
+        touching, free = frames_by_touch(problem.motor_rad, touch, np.radians(0.02))
         if np.sum(free) < FEWEST_FREE:
             raise Refused(_STARTS_TOUCHING)
         if not np.any(touching):
             raise Refused(_NEVER_TOUCHES)
-    return problem, fitted, covariance, list(motor)
+    return _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
+                 state.arcs_mm, _fitted(problem, state, motor), touching, free)
 
 
 def _check_scatter(problem: Problem, state: State) -> None:
@@ -136,22 +165,23 @@ def _fitted(problem: Problem, state: State, motor) -> dict[int, Curves]:
     return {f: Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k]) for k, f in enumerate(motor)}
 
 
-def _begin(problem: Problem, rest, bend, arcs) -> State:
+def _begin(problem: Problem, look: _Look) -> State:
     vector = np.zeros(problem.size)
-    vector[BAR:BAR + REST] = np.ravel(rest)
-    vector[problem.first_bend:] = bend[problem.bent].ravel()
-    return State(vector, np.asarray(arcs, dtype=float))
+    vector[BAR:BAR + REST] = np.ravel(look.rest_mm)
+    vector[problem.first_bend:] = look.bend_rad[problem.bent].ravel()
+    return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
 
-def _trace_all(views, cameras: Cameras, rods: Rods, axis: BarAxis, motor, curves, light: dict,
-               settings: VisionSettings, *, last: bool) -> list[Observed]:
+def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *, one_side: bool,
+               last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. last: see
     `measure_bar`."""
-    wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in curves.values()] for view in views}
-    bar = _trace_bar(views, cameras, rods, axis, wires, settings, last=last)
+    wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
+             for view in views}
+    bar = _trace_bar(views, rods, look.axis, wires, settings, one_side=one_side, last=last)
     seen = []
     for number, view in enumerate(views):
-        seen += _trace_wire(number, view, rods, axis, motor, curves, light, settings, last=last)
+        seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
         seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
     for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
@@ -160,10 +190,10 @@ def _trace_all(views, cameras: Cameras, rods: Rods, axis: BarAxis, motor, curves
     return seen
 
 
-def _trace_bar(views, cameras: Cameras, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, one_side: bool,
                last: bool) -> list[dict[int, LinePoints]]:
     """Per camera the points of the bar's middle (side 0), or of its two edges where the cameras stand on one side."""
-    if seen_from_one_side(cameras, axis):
+    if one_side:
         return [measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm, wires[view.camera.name],
                               settings) or {} for view in views]
     lines = bar_lines(views, axis, rods, wires, settings, last=last)
@@ -180,8 +210,7 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
     pieces, blur = (pieces, known.blur_px) if known else settle(pieces, knots, _SEARCH_PX)
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST,
-                                  last=last)
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST, last=last)
     light[name] = known or Lit(blur, seen_width(pieces, blur))
     points, source = to_points(pieces, found, misfit)
     return observed(points, source, number, list(curves))
