@@ -105,7 +105,7 @@ def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor:
 
 
 def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], one_side: bool) -> _Look:
-    """What a fit tells; which frames touch, by clearance, or where the cameras do not tell it by the onset of bending."""
+    """What a fit tells; which frames touch: by clearance, or where cameras do not tell it, by the onset of bending."""
     touching, free = problem.touching, look.free
     if not one_side:
         touch = float(first_touch(problem, state.vector).motor_rad)
