@@ -200,7 +200,8 @@ def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarr
     """Coarse position (s,) of a rod-wide difference from the background, and its share (s,) of all difference.
 
     For each piece the squared difference (over the noise) is summed in a window as wide as the rod; the window
-    with the largest sum wins. The background's gain and offset are those that fit the whole piece.
+    with the largest sum wins. The background's gain and offset are those that fit the whole piece. Its picture is as
+    noisy as a frame's: a dim rod must not drown in a noise that is no difference.
     """
     columns = np.stack([pieces.background, np.ones_like(pieces.background)], -1) * pieces.weight[..., None]
     seen = pieces.grey * pieces.weight
@@ -208,7 +209,8 @@ def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarr
     found = np.linalg.solve(turned @ columns + np.diag([1e-3, 1e-3]), turned @ seen[..., None])[..., 0]
     trusted = np.abs(found[:, 0] - 1.0) < 0.5
     found = np.where(trusted[:, None], found, [1.0, 0.0])
-    energy = np.clip((seen - (columns @ found[..., None])[..., 0]) ** 2, 0.0, 400.0) - 1.0
+    noise = 1.0 + found[:, :1] ** 2
+    energy = np.clip((seen - (columns @ found[..., None])[..., 0]) ** 2, 0.0, 400.0) - noise
     bins = np.clip(np.round(pieces.offset_px).astype(int) + reach_px, 0, 2 * reach_px)
     count = 2 * reach_px + 1
     place = bins + count * np.arange(len(pieces))[:, None]
