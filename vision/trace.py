@@ -1,6 +1,6 @@
 """Line points of the wire in every frame, read in narrow bands beside where it is expected."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -98,23 +98,47 @@ def settle(pieces: Pieces, knots: Knots, search_px: float) -> tuple[Pieces, floa
     rough, blurred = binned(pieces, _BIN_PX)
     near, found, typical = _by_turns(rough, _best_blur(rough, knots), WAVES, knots, 2)
     near = near.moved(found.shift_px)
-    lever = 2.0 * (near.place - near.place.min()) / max(np.ptp(near.place), 1e-9) - 1.0
-    bow = np.stack([np.ones(len(near)), lever, lever**2 - 1.0 / 3.0], axis=1)
-    plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
-    shown, bow_there = near.select(plain), bow[plain]
-    prior = wave_prior(shown, _ALL_WAVES)
-
-    def misfit(moves_and_blur, every: int) -> float:
-        some = shown.select(slice(None, None, every)).moved(bow_there[::every] @ moves_and_blur[:3])
-        return fit_shading(some, np.exp(moves_and_blur[3]), _ALL_WAVES, knots, prior=prior)[1]
-
-    turns = len(knots.turn_rad)
-    few, enough = (max(1, round(len(shown) / count)) for count in (_FEW_PIECES * turns, _ENOUGH_PIECES * turns))
+    misfit = _shared_misfit(near, found, typical, knots)
     starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
               for blur in _BLURS_PX[1:8]]
-    best = min(starts, key=lambda start: misfit(start, few))
-    best, _, _ = descend(lambda q: misfit(q, enough), best, _STEPS, _LONGEST, _SETTLED)
-    return pieces.moved(_apart(near, pieces) + bow @ best[:3]), without(np.exp(best[3]), blurred)
+    best = min(starts, key=lambda start: misfit(start[:3], np.exp(start[3]), _FEW_PIECES))
+    best, _, _ = descend(lambda q: misfit(q[:3], np.exp(q[3]), _ENOUGH_PIECES), best, _STEPS, _LONGEST, _SETTLED)
+    return pieces.moved(_apart(near, pieces) + _bow(near) @ best[:3]), without(np.exp(best[3]), blurred)
+
+
+def settle_again(pieces: Pieces, blur_px: float, knots: Knots) -> Pieces:
+    """Pieces brought from a near curve to where they are, under a lens blur that is known.
+
+    Shading and positions by turns hardly move what all frames share: before an even background, shading takes up the
+    rest. Left to them, a line stays where the fit, misled by another camera, puts its curve.
+    """
+    rough, blurred = binned(pieces, _BIN_PX)
+    blur = float(np.hypot(blur_px, np.sqrt(blurred)))
+    _, found, typical = _by_turns(rough, blur, WAVES, knots, 1)
+    misfit = _shared_misfit(rough, found, typical, knots)
+    moves, _, _ = descend(lambda q: misfit(q, blur, _ENOUGH_PIECES), np.zeros(3), _STEPS[:3], _LONGEST[:3], _SETTLED)
+    return pieces.moved(_bow(pieces) @ moves)
+
+
+def _bow(pieces: Pieces) -> np.ndarray:
+    """How far each piece moves (s, 3) by a shift, a tilt and a bow of one pixel that all frames share."""
+    lever = 2.0 * (pieces.place - pieces.place.min()) / max(np.ptp(pieces.place), 1e-9) - 1.0
+    return np.stack([np.ones(len(pieces)), lever, lever**2 - 1.0 / 3.0], axis=1)
+
+
+def _shared_misfit(near: Pieces, found: Located, typical: float, knots: Knots) -> Callable:
+    """Misfit by shift, tilt and bow (3,) of all frames in px, blur in px, and by how many pieces a turn; of those whose
+    own misfit is an ordinary one."""
+    plain = found.chi2 < _PLAIN_MISFIT * max(typical, 0.5)
+    shown, bow = near.select(plain), _bow(near)[plain]
+    prior, turns = wave_prior(shown, _ALL_WAVES), len(knots.turn_rad)
+
+    def misfit(moves, blur_px: float, count: int) -> float:
+        every = slice(None, None, max(1, round(len(shown) / (count * turns))))
+        some = shown.select(every).moved(bow[every] @ moves)
+        return fit_shading(some, blur_px, _ALL_WAVES, knots, prior=prior)[1]
+
+    return misfit
 
 
 def _some(pieces: Pieces, count: int) -> Pieces:

@@ -21,7 +21,7 @@ from vision.scene import Cameras
 from vision.shading import Knots
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
 from vision.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
-from vision.trace import View, clear_of_bar, observed, settle, to_points, trace, wire_pieces
+from vision.trace import View, clear_of_bar, observed, settle, settle_again, to_points, trace, wire_pieces
 from vision.wire import Curves
 
 _WIRE_KNOT_MM = 12.0
@@ -64,6 +64,7 @@ def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, flo
         seen = _trace_all(views, rods, look, motor, light, settings, one_side=one_side, last=False)
         problem, state, _ = _fit(seen, cameras, rods, look, motor, light, one_side)
         _check_scatter(problem, state)
+        light.update(_beside_fit(problem, state, light))
         look = _next_look(problem, state, look, motor, one_side)
     seen = _trace_all(views, rods, look, motor, light, settings, one_side=one_side, last=True)
     return *_fit(seen, cameras, rods, look, motor, light, one_side), list(motor)
@@ -116,6 +117,13 @@ def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, 
             raise Refused(_NEVER_TOUCHES)
     return _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
                  state.arcs_mm, _fitted(problem, state, motor), touching, free)
+
+
+def _beside_fit(problem: Problem, state: State, light: Mapping[str, Lit]) -> dict[str, Lit]:
+    """The same light, with where each camera's own line lies: it is looked for again from there."""
+    own = [state.vector[problem.wire_off(camera)][:2].tolist() for camera in range(len(problem.cameras))]
+    return {name: replace(light[name], off_px=off, tilt_px=tilt)
+            for name, (off, tilt) in zip(problem.cameras.names, own) if name in light}
 
 
 def _check_scatter(problem: Problem, state: State) -> None:
@@ -209,7 +217,11 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
         return []
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
-    pieces, blur = (pieces, known.blur_px) if known else settle(pieces, knots, _SEARCH_PX)
+    if known:
+        own = known.off_px + known.tilt_px * (2.0 * pieces.place / rods.wire.length_mm - 1.0)
+        pieces, blur = settle_again(pieces.moved(own), known.blur_px, knots), known.blur_px
+    else:
+        pieces, blur = settle(pieces, knots, _SEARCH_PX)
     pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST, last=last)
     light[name] = known or Lit(blur, seen_width(pieces, blur))
     points, source = to_points(pieces, found, misfit)

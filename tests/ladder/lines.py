@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from vision.cylinder import WAVES
 from vision.line import Noise, cut_pieces, read_band
 from vision.shading import Knots
-from vision.trace import clear_of_bar, settle, to_points, trace
+from vision.trace import clear_of_bar, settle, settle_again, to_points, trace
 
 FINE, FRAMES, SHAPE = 5, 13, (110, 300)
 NOISE, PIECE_PX, MARGIN_PX = 2.0, 12, 7
@@ -214,7 +214,7 @@ def find(scene: Scene, rng) -> Found:
     if scene.bar is not None:
         clear = clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX)
         pieces, bound = pieces.select(clear), bound[clear]
-    settled, found, chi2 = trace(pieces, blur, WAVES, KNOTS)
+    settled, found, chi2 = trace(settle_again(pieces, blur, KNOTS), blur, WAVES, KNOTS)
     points, source = to_points(settled, found, chi2)
     kept = np.isin(settled.place + 1e4 * settled.source, points.place + 1e4 * source)
     return Found(errors(scene, points, source), points.sigma_px, bound[kept], np.round(points.place),
