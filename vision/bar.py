@@ -62,7 +62,7 @@ def find_bar(changes: Mapping[str, np.ndarray], cameras: Cameras, radius_mm: flo
     touch = np.linspace(*motor_rad, 3)
     psi = np.radians([-8.0, 0.0, 8.0])
     grid = np.stack(np.meshgrid(x, touch, beta, psi, indexing="ij"), axis=-1).reshape(-1, 4)
-    scores = _score(grid, changes, cameras, radius_mm, reach_mm)
+    scores = _score(grid, changes, cameras, radius_mm, reach_mm, _ALONG_MM[::2])
     found, score = _climb(grid[np.argsort(scores)[-_STARTS:]], changes, cameras, radius_mm, reach_mm)
     if score < _LEAST_SCORE:
         raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
@@ -86,11 +86,12 @@ def _climb(starts, changes, cameras, radius_mm: float, reach_mm: float) -> tuple
     return best[np.argmax(score)], float(np.max(score))
 
 
-def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float) -> np.ndarray:
+def _score(angles, changes, cameras: Cameras, radius_mm: float, reach_mm: float, along_mm=_ALONG_MM) -> np.ndarray:
     """Mean over cameras of (change inside the outline) - (change beside it), (n,) for hypotheses (n, 4)."""
     axis = axis_from_angles(*angles.T, reach_mm)
     offsets = radius_mm * _INSIDE, radius_mm * _OUTSIDE
-    return sum(standing_out(axis, changes[camera.name], camera, *offsets) for camera in cameras) / len(cameras)
+    scores = [standing_out(axis, changes[camera.name], camera, *offsets, along_mm) for camera in cameras]
+    return sum(scores) / len(cameras)
 
 
 def standing_out(axis: BarAxis, change, camera, inside_mm, outside_mm, along_mm=_ALONG_MM) -> np.ndarray:
