@@ -55,7 +55,8 @@ class LinePoints:
 def read_band(grey, background, curve_px, place, radius_px, half_width_px: int) -> Band:
     """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along.
 
-    No pixel is interpolated and none is read twice, so that their noise stays independent.
+    No pixel is interpolated and none is read twice, so that their noise stays independent. Normals point to the same
+    hand of the way along which `place` grows, whichever way that is in the picture.
     """
     along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
     order = np.argsort(curve_px[:, along])
@@ -72,7 +73,8 @@ def read_band(grey, background, curve_px, place, radius_px, half_width_px: int) 
     normal[:, along], normal[:, 1 - along] = -slope * cosine, cosine
     pixels = [_pick(picture, step, line, along) for picture in (grey, background)]
     at = [np.interp(step, curve[:, along], values) for values in (place, radius)]
-    return Band(offset, *pixels, foot, normal, *at)
+    left = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
+    return Band(left * offset, *pixels, foot, left * normal, *at)
 
 
 def _pick(picture, step, line, along):

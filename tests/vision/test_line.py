@@ -45,6 +45,19 @@ def test_the_bound_of_an_even_rod_is_the_known_formula():
     assert np.median(bounds(scene, [0], np.full((110, 300), 60.0))) == pytest.approx(formula, rel=0.03)
 
 
+@pytest.mark.parametrize("angle_deg", range(5, 360, 30))
+def test_a_band_is_counted_to_the_left_of_its_way_in_any_direction(angle_deg):
+    """Pictures of the pixels' own columns and rows: offset and normal say where each of them lies."""
+    row, column = np.mgrid[:400, :400].astype(float)
+    way = np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
+    length = np.linspace(0.0, 150.0, 31)
+    band = read_band(column, row, 200.0 + length[:, None] * way, length, np.full(31, 2.0), 5)
+    assert np.allclose(band.normal[2:-2], [-way[1], way[0]])  # the ends are rounded to whole pixels
+    pixels = np.stack([band.grey, band.background], axis=-1)
+    away = np.sum((pixels - band.foot_px[:, None]) * band.normal[:, None], axis=-1)
+    assert np.allclose(away[2:-2], band.offset_px[2:-2])
+
+
 def test_no_pixel_is_read_twice_and_none_outside(rng):
     picture = np.arange(600.0).reshape(20, 30)
     band = read_band(picture, picture, np.array([[2.0, 3.0], [27.0, 9.0]]), [0.0, 1.0], [2.0, 2.0], 6)

@@ -5,7 +5,8 @@ import pytest
 
 from tests.ladder.lines import COLUMNS, FRAMES, KNOTS, NOISE, PIECE_PX, SCENES, SHAPE, axis_height, band, drawn, errors
 from tests.vision.test_fit import camera
-from vision.line import WAVES, Noise, cut_pieces
+from vision.cylinder import WAVES
+from vision.line import Noise, cut_pieces
 from vision.scene import Wire
 from vision.trace import View, settle_again, to_points, trace, wire_pieces
 from vision.wire import centrelines
