@@ -9,7 +9,7 @@ from pathlib import Path
 from bench.atomic import write_whole
 from bench.compare import whisks
 from bench.results import number
-from vision.quantities import CAUSES
+from vision.uncertainty import CAUSES
 
 # Column and key of the value; in the table each is followed by its sigma.
 _AT_TOUCH = (

@@ -19,7 +19,7 @@ from bench.seen import NO_PICTURES
 from bench.session import Session
 from bench.settings import Settings
 from bench.unit import OWN_GAUGES
-from vision.quantities import CAUSES
+from vision.uncertainty import CAUSES
 
 DONE, DOUBTFUL = 0, 1
 _SILENT = ("", NO_PICTURES, OWN_GAUGES)

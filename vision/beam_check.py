@@ -21,7 +21,8 @@ from scipy.stats import chi2
 from vision.contact import BarAxis, clearance
 from vision.fit import LAST_SCALE, linear_at, robust_weights
 from vision.problem import CONTACT_SIGMA_MM, WANDER_PX, Observed, Problem, State, bar_axis, bends, curves_of, wandering
-from vision.quantities import Jacobians, Measured, camera_rows
+from vision.quantities import Jacobians, Measured
+from vision.uncertainty import camera_rows
 from vision.wire import Curves, rotation_z
 
 # Chance by which a wire that is a beam departs from it so far, a whisk.

@@ -20,12 +20,13 @@ from vision.effort import VisionSettings
 from vision.errors import Misled, Refused
 from vision.line import measure_noise
 from vision.one_sided import Lit, one_sided_lines
-from vision.quantities import calibration_share, jacobians
+from vision.quantities import jacobians
 from vision.report import to_whisk
 from vision.rods import Rods
 from vision.scene import Bar, Cameras, Wire
 from vision.trace import View
 from vision.truth import TrialTruth, WhiskTruth
+from vision.uncertainty import uncertainty
 from vision.whisk import fit_whisk, free_stroke
 
 _FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
@@ -89,7 +90,7 @@ def _see_whisk(number: int, indices, views, cameras, rods: Rods, axis: BarAxis, 
     cameras = cameras.subset([view.camera.name for view in views])
     motor = {f: float(motor_rad[f]) for f in seen}
     try:
-        problem, state, covariance, near = fit_whisk(views, cameras, rods, axis, motor, light, settings)
+        problem, state, answer, near = fit_whisk(views, cameras, rods, axis, motor, light, settings)
     except (Refused, np.linalg.LinAlgError) as reason:
         status = str(reason) if isinstance(reason, Refused) else "the fit of wire and bar does not settle"
         if isinstance(reason, Misled) and len(views) > 1:
@@ -99,14 +100,14 @@ def _see_whisk(number: int, indices, views, cameras, rods: Rods, axis: BarAxis, 
         return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
                           status="; ".join([status, *left_out]))
     measured, by_parameter = jacobians(problem, state)
-    lens = calibration_share(problem, state, covariance)
+    known = uncertainty(problem, state, answer)
     far = set(motor) - set(near)
-    whisk = to_whisk(number, indices, near, time_s, motor_rad, problem, state, measured, by_parameter, covariance,
-                     lens, views, rods.bar.radius_mm, settings, far)
-    beam = check_beam(problem, state, covariance + lens, measured, by_parameter)
+    whisk = to_whisk(number, indices, near, time_s, motor_rad, problem, state, measured, by_parameter, known,
+                     views, rods.bar.radius_mm, settings, far)
+    beam = check_beam(problem, state, known.covariance, measured, by_parameter)
     status = "; ".join(filter(None, [whisk.status, beam.alarm, *left_out]))
     stroke = free_stroke(views, rods, problem, state, motor, near, light, settings) if far else (problem, state)
-    return replace(whisk, base=base_lines(*stroke, lens), beam=beam, status=status)
+    return replace(whisk, base=base_lines(*stroke, known.lens), beam=beam, status=status)
 
 
 def _with_frames(views, indices) -> tuple[list[View], list[str]]:

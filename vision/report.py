@@ -6,9 +6,10 @@ import numpy as np
 
 from vision.effort import VisionSettings
 from vision.problem import Problem, State, bar_axis, curves_of
-from vision.quantities import Jacobians, Measured, variance_by_cause
+from vision.quantities import Jacobians, Measured
 from vision.silhouette import normals, outline
 from vision.truth import FrameTruth, Smooth, WhiskTruth
+from vision.uncertainty import Uncertainty, variance_by_cause
 from vision.wire import Curves
 
 _MOST_GAP = 1.5  # of the median frame interval, beyond which a frame was lost
@@ -19,11 +20,10 @@ _PLAIN = ("slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha")
 
 
 def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, motor_rad, problem: Problem,
-             state: State, measured: Measured, by_parameter: Jacobians, noise, lens, views, bar_radius_mm: float,
-             settings: VisionSettings, far: Collection[int] = ()) -> WhiskTruth:
-    """The row of a whisk and its frames. seen: the frames in the fit; far: those left out of it, long before touch.
-    noise, lens: covariances (size, size) of the parameters by cause."""
-    covariance = noise + lens
+             state: State, measured: Measured, by_parameter: Jacobians, known: Uncertainty, views,
+             bar_radius_mm: float, settings: VisionSettings, far: Collection[int] = ()) -> WhiskTruth:
+    """The row of a whisk and its frames. seen: the frames in the fit; far: those left out of it, long before touch."""
+    covariance = known.covariance
     sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by_parameter.whisk.items()}
     value = {name: float(v) for name, v in measured.whisk.items()}
     clock = settings.clock_sigma_s * _speed(time_s[list(seen)], problem.motor_rad, value["touch"])
@@ -42,7 +42,7 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
     return WhiskTruth(number, frames, cameras=len(views), frames_used=len(seen), status=status,
                       overlay=_overlay(problem, state, measured, seen, views, bar_radius_mm),
                       smooth=None if lost or outside else _smooth(problem, measured, by_parameter, covariance),
-                      budget=_budget(problem, state, noise, lens, by_parameter.whisk["d_x"]), **truth)
+                      budget=_budget(problem, state, known, by_parameter.whisk["d_x"]), **truth)
 
 
 def _speed(time_s, motor_rad, at_rad: float) -> float:
@@ -116,9 +116,9 @@ def _frames(indices, seen, far, time_s, motor_rad, problem: Problem, measured: M
         arc_mm=column(measured.frame["arc"]), status=status, **plain)
 
 
-def _budget(problem: Problem, state: State, noise, lens, gradient) -> dict[str, float]:
+def _budget(problem: Problem, state: State, known: Uncertainty, gradient) -> dict[str, float]:
     """Shares of the variance by cause; those that are told add up to 1."""
-    parts = variance_by_cause(problem, state, noise, lens, gradient)
+    parts = variance_by_cause(problem, state, known, gradient)
     whole = np.nansum(list(parts.values()))
     return {name: part / whole for name, part in parts.items()}
 

@@ -6,7 +6,7 @@ import pytest
 from bench.assembly import beam_rows, budget_rows
 from bench.felt import GAUGE_DELAY_S, lateness
 from bench.summary import _beam_lines, _budget_lines, _clock_lines
-from vision.quantities import CAUSES
+from vision.uncertainty import CAUSES
 
 
 def result(clock=None, **seen) -> dict:

@@ -26,7 +26,8 @@ from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene
 from vision.beam_check import BeamCheck, check_beam
 from vision.fit import honest, solve
 from vision.problem import Observed, Problem
-from vision.quantities import calibration_share, jacobians
+from vision.quantities import jacobians
+from vision.uncertainty import uncertainty
 
 _GRID = 400  # intervals of the integrals along the wire
 # Softness (n,) along the arc (n,), mm, of a rod of this length that is 1 at the base.
@@ -94,7 +95,7 @@ def check_of(problem: Problem) -> BeamCheck:
     state, _ = solve(problem, begin(problem), scales=SCALES)
     problem = honest(problem, state)
     state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
-    covariance = lines + calibration_share(problem, state, lines)
+    covariance = uncertainty(problem, state, lines).covariance
     return check_beam(problem, state, covariance, *jacobians(problem, state))
 
 

@@ -31,7 +31,8 @@ from vision.fit import honest, solve
 from vision.observe import observe_trial
 from vision.one_view import seen_from_one_side, touch_by_onset
 from vision.problem import Problem, State
-from vision.quantities import calibration_share, jacobians
+from vision.quantities import jacobians
+from vision.uncertainty import uncertainty
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}
 # Slip of a scene is that of the frame nearest this pushing angle; its frames share most of their error.
@@ -59,7 +60,7 @@ def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
         state, _ = solve(problem, state)
     problem = honest(problem, state)
     state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
-    covariance = lines + calibration_share(problem, state, lines)
+    covariance = uncertainty(problem, state, lines).covariance
     measured, by = jacobians(problem, state)
     sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by.whisk.items()}
     sigma["slip"] = np.sqrt(np.einsum("fi,ij,fj->f", by.frame["slip"], covariance, by.frame["slip"]))

@@ -18,9 +18,10 @@ from vision.line import LinePoints
 from vision.one_view import axis_from_edges, find_bar_alone, seen_from_one_side, touch_by_onset
 from vision.onset import Onset, onset
 from vision.problem import Observed, State, bar_axis
-from vision.quantities import calibration_share, jacobians, variance_by_cause
+from vision.quantities import jacobians
 from vision.scene import Cameras
 from vision.silhouette import grazed, normals
+from vision.uncertainty import uncertainty, variance_by_cause
 
 PLACES_MM = np.array([-20.0, 20.0])
 
@@ -104,17 +105,15 @@ def test_edges_tell_how_far_away_the_bar_is():
     (view,) = problem.cameras
     sight = (problem.axis.point_mm - view.centre_mm) / np.linalg.norm(problem.axis.point_mm - view.centre_mm)
     near = replace(problem, axis=BarAxis(problem.axis.point_mm - 8.0 * sight, problem.axis.direction))
-    found, covariance = solve(near, begun(near, truth))
+    found, answer = solve(near, begun(near, truth))
     axis = bar_axis(near, found.vector)
     away = axis.point_mm - problem.axis.point_mm
     away = away - (away @ axis.direction) * axis.direction
     assert np.linalg.norm(away) < 0.3
     _, by = jacobians(near, found)
-    lens = calibration_share(near, found, covariance)
-    gradient = by.whisk["d_x"]
-    parts = variance_by_cause(near, found, covariance, lens, gradient)
-    # the covariance was taken a step of less than 0.01 sigma before the state
-    assert sum(parts.values()) == pytest.approx(gradient @ (covariance + lens) @ gradient, rel=1e-4)
+    gradient, known = by.whisk["d_x"], uncertainty(near, found, answer)
+    parts = variance_by_cause(near, found, known, gradient)
+    assert sum(parts.values()) == pytest.approx(gradient @ known.covariance @ gradient, rel=1e-6)
 
 
 def test_touch_is_when_the_whisker_begins_to_bend():

@@ -10,8 +10,9 @@ from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import Sigmas, as_problem, begin, calibrated, draw_scene, given, line_points
 from vision.cameras_file import read_cameras, write_cameras
 from vision.fit import solve
-from vision.quantities import calibration_share, jacobians, variance_by_cause
+from vision.quantities import jacobians
 from vision.scene import Cameras
+from vision.uncertainty import uncertainty, variance_by_cause
 
 
 def scene_of(rig: float):
@@ -51,19 +52,18 @@ def test_files_and_subsets_keep_it(loose, tmp_path):
 def test_the_budget_tells_rig_board_from_lenses(loose):
     scene, rng = scene_of(0.1), np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
-    state, noise = solve(problem, begin(problem), scales=SCALES)
+    state, answer = solve(problem, begin(problem), scales=SCALES)
     gradient = jacobians(problem, state)[1].whisk["d_x"]
 
     def budget(cameras):
         asked = replace(problem, cameras=cameras)
-        lens = calibration_share(asked, state, noise)
-        return variance_by_cause(asked, state, noise, lens, gradient), float(gradient @ (noise + lens) @ gradient)
+        known = uncertainty(asked, state, answer)
+        return variance_by_cause(asked, state, known, gradient), float(gradient @ known.covariance @ gradient)
 
     told, whole = budget(loose)
     untold, _ = budget(replace(loose, placement=None))
     without, _ = budget(Cameras(loose.cameras, own_covariance(loose)))
-    # the covariance is that of the last Jacobian but one or two, 0.1 mm away at most
-    assert sum(told.values()) == pytest.approx(whole, rel=1e-4)
+    assert sum(told.values()) == pytest.approx(whole, rel=1e-6)
     assert told["cameras"] == pytest.approx(without["cameras"], rel=1e-6)
     assert np.isnan(untold["placement"]) and untold["cameras"] == pytest.approx(told["cameras"] + told["placement"])
     # a board known to 0.1 mm shifts d_x by about as much, its turns on top
