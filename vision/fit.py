@@ -24,7 +24,6 @@ from vision.problem import (
     CONTACT_SIGMA_MM,
     REST,
     REST_PRIOR_MM,
-    WIRE_LUMP,
     WIRE_MODES_PX,
     Observed,
     Problem,
@@ -245,37 +244,3 @@ def weighted_jacobian(problem: Problem, state: State, scale: float = LAST_SCALE,
     """
     linear = linear_at(problem, state) if jacobian is None else linearise(problem, state, jacobian)[0]
     return linear.jacobian * np.sqrt(robust_weights(linear, scale))[:, None]
-
-
-def honest(problem: Problem, state: State) -> Problem:
-    """The same problem with the wire points' sigmas as large as their residuals show, and lumps counted once.
-
-    The excess over the points' own sigmas is one figure a camera (median of the residuals, so that outliers do
-    not set it).
-    """
-    scatter, own = scatter_px(problem, state), [_own_sigma_px(problem, k) for k in range(len(problem.cameras))]
-    excess = [float(np.sqrt(max(many**2 - few**2, 0.0))) for many, few in zip(scatter, own)]
-    return replace(problem, seen=[_honest_points(seen, excess[seen.camera]) if seen.frame >= 0 else seen
-                                  for seen in problem.seen])
-
-
-def scatter_px(problem: Problem, state: State) -> list[float]:
-    """Standard deviation in px of each camera's wire points about the fit, by their median; 0 where it has none."""
-    linear = linear_at(problem, state)
-    ends = np.cumsum([len(seen.points) for seen in problem.seen])
-    parts = [np.abs(linear.residual[end - len(seen.points):end]) * seen.points.sigma_px
-             for end, seen in zip(ends, problem.seen)]
-    each = [[part for part, seen in zip(parts, problem.seen) if seen.camera == k and seen.frame >= 0]
-            for k in range(len(problem.cameras))]
-    return [float(np.median(np.concatenate(mine))) / 0.6745 if mine else 0.0 for mine in each]
-
-
-def _own_sigma_px(problem: Problem, camera: int) -> float:
-    """Median sigma of a camera's wire points; 0 where it has none."""
-    mine = [seen.points.sigma_px for seen in problem.seen if seen.camera == camera and seen.frame >= 0]
-    return float(np.median(np.concatenate(mine))) if mine else 0.0
-
-
-def _honest_points(seen: Observed, excess_px: float) -> Observed:
-    sigma = np.hypot(seen.points.sigma_px, excess_px) * np.sqrt(WIRE_LUMP)
-    return replace(seen, points=replace(seen.points, sigma_px=sigma))

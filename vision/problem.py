@@ -20,18 +20,15 @@ BEND_PRIOR_RAD = 0.3
 # How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
 # As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
-WIRE_DRIFT_PX = 0.015
+WIRE_DRIFT_PX = 0.01
 WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
 # It also wanders with what is behind it: by as much, over this length of wire.
 WANDER_PX, WANDER_MM = WIRE_OFFSET_PX, 12.0
-BAR_OFFSET_PX, BAR_TILT_PX = 0.07, 0.035
+BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
 BAR_TILT_ARM_MM = 20.0
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
 _MODES = len(WIRE_MODES_PX) + len(BAR_MODES_PX)
 CONTACT_SIGMA_MM = 0.002
-# Neighbouring points of a wire share what is behind them, and so do the same points of the next frames: their
-# errors come in lumps of about four points, which halves what averaging gains.
-WIRE_LUMP = 4.0
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,8 @@ class Problem:
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
     axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
     cameras do not know whisker and bar well enough in space to tell when they touch. doubt_px: by camera, how far its
-    lines of the wire may be off as a whole besides the usual; none where empty.
+    lines of the wire may be off as a whole besides the usual; none where empty. alike: by camera, how much of its error
+    a point of the wire shares with the next one; nothing where empty (see `vision.scatter`).
     """
 
     cameras: Cameras
@@ -68,6 +66,7 @@ class Problem:
     seen: Sequence[Observed]
     onset: Onset | None = None
     doubt_px: Sequence[float] = ()
+    alike: Sequence[float] = ()
 
     @property
     def size(self) -> int:

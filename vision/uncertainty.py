@@ -8,11 +8,12 @@ from scipy.ndimage import correlate1d
 
 from vision.contact import BarAxis
 from vision.fit import linear_at, weighted_jacobian
-from vision.problem import BAR, REST, WIRE_LUMP, Observed, Problem, State, bar_axis, curves_of
+from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of
 from vision.scene import N_PARAMETERS
 from vision.silhouette import grazed
 from vision.wire import Curves
 
+_FARTHEST = 20  # points: beyond, nothing is shared
 CAUSES = ("wire", "bar", "touch", "diameters", "light", "beliefs", "cameras", "placement")
 
 
@@ -34,8 +35,8 @@ class Uncertainty:
 def uncertainty(problem: Problem, state: State, answer) -> Uncertainty:
     """What a fit is uncertain by. answer (size, size): what `solve` returns.
 
-    Neighbouring line points of the wire err alike: the fit counts each for a WIRE_LUMP-th, which is right for what
-    changes slowly along the wire and too much for what does not, so that its errors are propagated as they are.
+    Neighbouring line points of the wire err alike: their sigmas are as wide as is right for what changes slowly along
+    the wire, and too wide for what does not, so that their errors are propagated as they are.
     """
     by_row = answer @ weighted_jacobian(problem, state).T
     by_camera = _by_lens(problem, state, answer)
@@ -43,15 +44,15 @@ def uncertainty(problem: Problem, state: State, answer) -> Uncertainty:
 
 
 def _alike(problem: Problem, rows) -> np.ndarray:
-    """Rows (k, n) of all observations times the covariance of their residuals: 1, but that points along the wire err in
-    lumps of WIRE_LUMP, which begin anywhere, and have sigmas larger by its root."""
-    distance = np.arange(1.0 - WIRE_LUMP, WIRE_LUMP)
-    shared = (1.0 - np.abs(distance) / WIRE_LUMP) / WIRE_LUMP
+    """Rows (k, n) of all observations times the covariance of their residuals: 1, but that a point of the wire shares a
+    part of its error with the next one, of that part as much with the one after, and so on, and has a sigma wider by as
+    much as all that makes a mean of them."""
     found, end = rows.copy(), 0
     for seen in problem.seen:
         first, end = end, end + len(seen.points)
-        if seen.frame >= 0:
-            found[:, first:end] = correlate1d(rows[:, first:end], shared, axis=1, mode="constant")
+        if seen.frame >= 0 and problem.alike:
+            shared = problem.alike[seen.camera] ** np.abs(np.arange(-_FARTHEST, _FARTHEST + 1))
+            found[:, first:end] = correlate1d(rows[:, first:end], shared / shared.sum(), axis=1, mode="constant")
     return found
 
 

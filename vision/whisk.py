@@ -11,12 +11,13 @@ from vision.contact import BarAxis, upward
 from vision.cylinder import WAVES
 from vision.effort import VisionSettings
 from vision.errors import Misled, Refused
-from vision.fit import LAST_SCALE, honest, scatter_px, solve
+from vision.fit import LAST_SCALE, solve
 from vision.line import LinePoints
 from vision.one_sided import Lit, seen_width
 from vision.one_view import seen_from_one_side, touch_by_onset
 from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.rods import Rods
+from vision.scatter import honest, scatter_px
 from vision.scene import Cameras
 from vision.shading import Knots
 from vision.swing import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar

@@ -24,9 +24,10 @@ from tests.ladder.coverage import SCALES
 from tests.ladder.rows import all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, line_points
 from vision.beam_check import BeamCheck, check_beam
-from vision.fit import honest, solve
+from vision.fit import solve
 from vision.problem import Observed, Problem
 from vision.quantities import jacobians
+from vision.scatter import honest
 from vision.uncertainty import uncertainty
 
 _GRID = 400  # intervals of the integrals along the wire

@@ -27,11 +27,12 @@ from bench.rig.parts import Job, frames_of
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
 from vision.errors import Refused
-from vision.fit import honest, solve
+from vision.fit import solve
 from vision.observe import observe_trial
 from vision.one_view import seen_from_one_side, touch_by_onset
 from vision.problem import Problem, State
 from vision.quantities import jacobians
+from vision.scatter import honest
 from vision.uncertainty import uncertainty
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}

@@ -34,7 +34,7 @@ POINT_STEP_MM, FIRST_POINT_MM, BESIDE_BAR_PX = 2.4, 6.0, 4.0
 # Small pictures and few frames: a scene costs seconds, and many are wanted.
 SIZE_PX, STEP_DEG = (960, 600), 0.7
 BAR_PLACES_MM = np.array([-20.0, 20.0])
-LUMP = round(model.WIRE_LUMP)  # so many neighbouring points have one error: what the fit takes them for
+LUMP = 4  # so many neighbouring points have one error
 LEAST_SIGHT_DEG = 20.0  # between a camera's sight and bar or wire; nearer there is no line to see
 # Where the cameras' planes through the bar nearly coincide, its slope is told by nothing but offsets of whole lines:
 # sigmas of tens of degrees, where nothing is linear.

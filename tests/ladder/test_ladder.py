@@ -11,9 +11,8 @@ from tests.ladder.exactness import model_errors, own_errors, scenes
 from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
 from tests.ladder.precision import repeat
 from tests.ladder.rows import all_rows, read_rows
-from tests.ladder.scenes import draw_scene, lumpy_noise
+from tests.ladder.scenes import LUMP, draw_scene, lumpy_noise
 from tests.ladder.views import known
-from vision.problem import WIRE_LUMP
 
 FEW = PicturesTable(step_deg=1.5)  # five frames a whisk
 
@@ -92,7 +91,7 @@ def test_the_same_seed_draws_the_same_scene():
     assert one.protocol != third.protocol
 
 
-def test_lumps_make_a_mean_as_uncertain_as_the_fit_believes(rng):
+def test_lumps_make_a_mean_as_uncertain_as_so_many_fewer_points(rng):
     """2000 means of 400 points tell their variance to 3 %; three of these."""
     means = [np.mean(lumpy_noise(400, rng)) for _ in range(2000)]
-    assert 400 * np.var(means) == pytest.approx(WIRE_LUMP, rel=0.1)
+    assert 400 * np.var(means) == pytest.approx(LUMP, rel=0.1)

@@ -1,30 +1,31 @@
-"""Errors of neighbouring line points are alike: what the fit makes of them is propagated as they are."""
+"""Errors of neighbouring line points are alike: by how much is measured, and what the fit makes of them propagated."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.ladder.scenes import as_problem, begin, draw_scene, line_points, lumpy_noise
-from vision.fit import honest, solve, weighted_jacobian
-from vision.problem import WIRE_LUMP
+from tests.ladder.scenes import LUMP, as_problem, begin, draw_scene, line_points, lumpy_noise
+from vision.fit import solve, weighted_jacobian
+from vision.scatter import honest
 from vision.uncertainty import uncertainty
+
+ALIKE = 0.6  # with the next point, 0.36 with the one after …: (1 + 0.6)/(1 - 0.6) times the variance of a mean
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    """A scene whose points are exact, so that nothing is added to their sigmas but the lumps' root."""
+    """A scene of exact points whose neighbours are said to err alike."""
     scene = draw_scene(0)
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
-    problem = replace(problem, onset=None)
-    state, _ = solve(problem, begin(problem), scales=(1e9,) * 6)
-    problem = honest(problem, state)
-    state, answer = solve(problem, state, scales=(1e9,) * 4)
+    problem = replace(problem, alike=[ALIKE] * len(scene.cameras))
+    state, answer = solve(problem, begin(problem), scales=(1e9,) * 8)
     return problem, state, answer
 
 
-def test_lumps_spread_parameters_as_stated(fitted, rng):
-    """2000 draws of lumps: each standard deviation is sampled to 1.6 %, four of which are allowed.
+def test_what_neighbours_share_spreads_parameters_as_stated(fitted, rng):
+    """2000 draws of such errors: each standard deviation is sampled to 1.6 %, four of which are allowed, and 1 % for
+    the ends of a line, where nobody shares from beyond.
 
     Of all else that errs each row is drawn by itself.
     """
@@ -32,22 +33,45 @@ def test_lumps_spread_parameters_as_stated(fitted, rng):
     by_row = answer @ weighted_jacobian(problem, state).T
     draws = np.array([by_row @ _errors(problem, by_row.shape[1], rng) for _ in range(2000)])
     stated = np.sqrt(np.diag(uncertainty(problem, state, answer).noise))
-    assert np.allclose(draws.std(axis=0) / stated, 1.0, atol=4 * 0.016)
+    assert np.allclose(draws.std(axis=0) / stated, 1.0, atol=4 * 0.016 + 0.01)
 
 
 def _errors(problem, count: int, rng) -> np.ndarray:
-    """Errors (count,) of all rows over their sigmas, which are larger than the points' own by the lumps' root."""
+    """Errors (count,) of all rows over their sigmas, which are wider by as much as what is shared makes of a mean."""
     errors, end = rng.standard_normal(count), 0
     for seen in problem.seen:
         first, end = end, end + len(seen.points)
         if seen.frame >= 0:
-            errors[first:end] = lumpy_noise(len(seen.points), rng) / np.sqrt(WIRE_LUMP)
+            for k in range(first + 1, end):
+                errors[k] = ALIKE * errors[k - 1] + np.sqrt(1.0 - ALIKE**2) * errors[k]
+            errors[first:end] /= np.sqrt((1.0 + ALIKE) / (1.0 - ALIKE))
     return errors
 
 
-def test_what_changes_along_the_wire_is_told_better_than_each_lump_for_itself(fitted):
-    """Against counting each point for a quarter: never worse but for lumps' ends, and better in bends."""
+def test_what_changes_along_the_wire_is_told_better(fitted):
+    """Than were each point as uncertain by itself as what it shares makes a mean; in the bends most of all."""
     problem, state, answer = fitted
     ratio = np.sqrt(np.diag(uncertainty(problem, state, answer).noise) / np.diag(answer))
     assert np.all(ratio < 1.01)
     assert np.median(ratio[problem.first_bend:]) < 0.98
+
+
+@pytest.mark.parametrize("lump", [1, LUMP])
+def test_what_neighbours_share_is_measured(lump):
+    """Lumps of four make the variance of a mean four times as large; the fit's own freedom hides a fifth of it.
+
+    Ten frames of some thirty points tell each correlation to 0.06, and a sum of those above 0.05 to 0.3 or so.
+    """
+    scene = draw_scene(0)
+    rng = np.random.default_rng(3)
+    exact = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
+    problem = replace(exact, seen=[_with_noise(seen, lump, rng) if seen.frame >= 0 else seen for seen in exact.seen])
+    state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
+    wider = [(1.0 + alike) / (1.0 - alike) for alike in honest(problem, state).alike]
+    assert np.mean(wider) == pytest.approx({1: 1.0, LUMP: 0.8 * LUMP}[lump], abs={1: 0.3, LUMP: 0.8}[lump])
+
+
+def _with_noise(seen, lump: int, rng):
+    points = seen.points
+    off = lumpy_noise(len(points), rng) if lump == LUMP else rng.standard_normal(len(points))
+    return replace(seen, points=replace(points, px=points.px + (points.sigma_px * off)[:, None] * points.normal))
