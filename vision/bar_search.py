@@ -70,7 +70,8 @@ def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, ro
     for most_px in off_px:
         lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
         axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
-        if all(line.told or line.moved_px < NEAR_PX for line in lines.values()):
+        near = max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX
+        if near or all(line.told for line in lines.values()):
             break
     return _Found(axis, [*lines.values()])
 

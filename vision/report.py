@@ -15,6 +15,8 @@ from vision.wire import Curves
 _MOST_GAP = 1.5  # of the median frame interval, beyond which a frame was lost
 # Beyond this sigma of the slope two scenes of 380 were off by 9 and 49 degrees, the latter at a stated 10.
 _TOLD_RAD = np.radians(3.0)
+# Beyond this one nothing that is propagated linearly holds: in one scene touch was 18 of its sigmas off.
+_MOST_UNTOLD_RAD = np.radians(20.0)
 _VECTORS = ("x", "y", "z")
 _PLAIN = ("slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha")
 
@@ -33,7 +35,8 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
     lost = _lost_at_touch(indices, [*far, *seen], motor_rad, value["touch"])
     outside = _outside(problem, value)
     status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"])]))
-    truth = {} if lost or outside else {
+    untold = bool(lost or outside) or sigma["beta"] > _MOST_UNTOLD_RAD
+    truth = {} if untold else {
         "d_x_mm": value["d_x"], "d_x_sigma_mm": sigma["d_x"], "touch_rad": value["touch"],
         "touch_sigma_rad": sigma["touch"], "beta_rad": value["beta"], "beta_sigma_rad": sigma["beta"],
         "psi_rad": value["psi"], "psi_sigma_rad": sigma["psi"],
@@ -41,7 +44,7 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
         "point_sigma_mm": np.array([sigma[k] for k in _VECTORS])}
     return WhiskTruth(number, frames, cameras=len(views), frames_used=len(seen), status=status,
                       overlay=_overlay(problem, state, measured, seen, views, bar_radius_mm),
-                      smooth=None if lost or outside else _smooth(problem, measured, by_parameter, covariance),
+                      smooth=None if untold else _smooth(problem, measured, by_parameter, covariance),
                       budget=_budget(problem, state, known, by_parameter.whisk["d_x"]), **truth)
 
 
