@@ -29,7 +29,7 @@ from vision.shading import Knots, fit_shading, locate, wave_prior
 from vision.trace import View
 
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
-_UNTOLD_PX = 0.25  # a sigma that is more: the misfit has no minimum there to speak of, and may lead anywhere
+_UNTOLD_PX, _LOST_PX = 0.25, 0.6  # sigmas beyond which the misfit has no minimum to speak of, and may lead anywhere
 _LEAST_OFF_PX = 0.15
 _ROUGHLY, _EXACTLY = (0.3,), (0.1, 0.05)  # px: what a line may still move by, round by round
 _STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
@@ -50,9 +50,15 @@ class BarLine:
     misfit: float
 
     @property
+    def is_bar(self) -> bool:
+        """Whether what is seen is a bar."""
+        return self.misfit <= NO_BAR
+
+    @property
     def told(self) -> bool:
-        """Whether what is seen is a bar, and where it is."""
-        return self.misfit <= NO_BAR and bool(np.max(self.points.sigma_px) <= _UNTOLD_PX)
+        """Whether it is one, and its line is told, well somewhere and not too badly anywhere."""
+        least, most = np.min(self.points.sigma_px), np.max(self.points.sigma_px)
+        return self.is_bar and bool(least <= _UNTOLD_PX and most <= _LOST_PX)
 
 
 def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],

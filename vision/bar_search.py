@@ -1,6 +1,6 @@
 """Where the bar is, before any wire is known: looked for among what has changed, then by its lines in all cameras."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -45,7 +45,8 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
         return found[0].axis
     for view in views:
         with suppress(Refused):
-            found.append(settled(alone(view), NEAR_PX))
+            seen = settled(alone(view), NEAR_PX)
+            found += [seen] if view.camera.name in seen.told else []
     one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
     return max(found[1:] if one_side else found, key=lambda one: one.worth).axis
 
@@ -55,13 +56,17 @@ class _Found:
     """An axis and the lines of the bar by which it was settled."""
 
     axis: BarAxis
-    lines: Sequence[BarLine]
+    lines: Mapping[str, BarLine]
+
+    @property
+    def told(self) -> dict[str, BarLine]:
+        """Lines of the cameras that see a bar there."""
+        return {name: line for name, line in self.lines.items() if line.told}
 
     @property
     def worth(self) -> tuple[int, float]:
         """The more cameras see a bar there, and the better, the more."""
-        misfits = [line.misfit for line in self.lines if line.told]
-        return len(misfits), -sum(misfits)
+        return len(self.told), -sum(line.misfit for line in self.told.values())
 
 
 def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
@@ -69,11 +74,12 @@ def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, ro
     """The axis by the bar's lines, which are looked for so far away in turn."""
     for most_px in off_px:
         lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
-        axis = settle_axis(axis, cameras, {name: line.points for name, line in lines.items()}, rods.bar.radius_mm)
+        bars = {name: line.points for name, line in lines.items() if line.is_bar}
+        axis = settle_axis(axis, cameras, bars, rods.bar.radius_mm)
         near = max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX
         if near or all(line.told for line in lines.values()):
             break
-    return _Found(axis, [*lines.values()])
+    return _Found(axis, lines)
 
 
 def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
