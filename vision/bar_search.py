@@ -24,35 +24,8 @@ _WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
 
 
-def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
-    """The bar's axis from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
-
-    Where the sights of all cameras are nearly the same, or not all see the bar that two of them found, each is asked
-    alone, too: by its two edges one camera tells roughly how far away a bar is, and finds no other for it.
-    """
-    span = float(np.min(motor_rad)), float(np.max(motor_rad))
-    changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
-               for view in views}
-    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
-    alone = lambda view: see_bar_alone(changes[view.camera.name], of_mean(view), rods.wire,  # noqa: E731
-                                       rods.bar.radius_mm, motor_rad, settings)
-    settled = lambda axis, *off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
-    if len(views) == 1:
-        return alone(views[0])
-    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
-    found = [settled(axis, FAR_PX, NEAR_PX)]
-    if found[0].worth[0] == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
-        return found[0].axis
-    for view in views:
-        with suppress(Refused):
-            seen = settled(alone(view), NEAR_PX)
-            found += [seen] if view.camera.name in seen.told else []
-    one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
-    return max(found[1:] if one_side else found, key=lambda one: one.worth).axis
-
-
 @dataclass(frozen=True)
-class _Found:
+class SeenBar:
     """An axis and the lines of the bar by which it was settled."""
 
     axis: BarAxis
@@ -69,8 +42,35 @@ class _Found:
         return len(self.told), -sum(line.misfit for line in self.told.values())
 
 
+def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
+    """The bar from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
+
+    Where the sights of all cameras are nearly the same, or not all see the bar that two of them found, each is asked
+    alone, too: by its two edges one camera tells roughly how far away a bar is, and finds no other for it.
+    """
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
+               for view in views}
+    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
+    alone = lambda view: see_bar_alone(changes[view.camera.name], of_mean(view), rods.wire,  # noqa: E731
+                                       rods.bar.radius_mm, motor_rad, settings)
+    settled = lambda axis, *off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
+    if len(views) == 1:
+        return SeenBar(alone(views[0]), {})
+    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
+    found = [settled(axis, FAR_PX, NEAR_PX)]
+    if found[0].worth[0] == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
+        return found[0]
+    for view in views:
+        with suppress(Refused):
+            seen = settled(alone(view), NEAR_PX)
+            found += [seen] if view.camera.name in seen.told else []
+    one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
+    return max(found[1:] if one_side else found, key=lambda one: one.worth)
+
+
 def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
-             settings: VisionSettings) -> _Found:
+             settings: VisionSettings) -> SeenBar:
     """The axis by the bar's lines, which are looked for so far away in turn."""
     for most_px in off_px:
         lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
@@ -79,7 +79,7 @@ def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, ro
         near = max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX
         if near or all(line.told for line in lines.values()):
             break
-    return _Found(axis, lines)
+    return SeenBar(axis, lines)
 
 
 def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,

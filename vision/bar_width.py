@@ -39,7 +39,7 @@ def bar_diameter_mm(
     used, settings = cameras.subset(names), VisionSettings()
     views = [View(camera, dict(enumerate(pictures[camera.name])), np.asarray(background[camera.name], dtype=float),
                   measure_noise(*pictures[camera.name][:2])) for camera in used]
-    axis = see_bar(views, used, Rods(wire, bar), np.array(motor_rad), settings)
+    axis = see_bar(views, used, Rods(wire, bar), np.array(motor_rad), settings).axis
     shares = [_share(view, axis, wire, bar, motor_rad, settings) for view in views]
     seen = [share for share in shares if share is not None]
     return bar.diameter_mm * float(np.median(seen)) if seen else np.nan

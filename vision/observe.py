@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.bar_search import see_bar
+from vision.bar_search import SeenBar, see_bar
 from vision.base_line import base_lines
 from vision.beam_check import check_beam
-from vision.contact import BarAxis
 from vision.effort import VisionSettings
 from vision.errors import Misled, Refused
 from vision.line import measure_noise
@@ -49,12 +48,13 @@ def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_
     try:
         views = _views(frames, cameras, background)
         used = cameras.subset([view.camera.name for view in views])
-        axis = see_bar(views, used, rods, motor_rad, settings)
+        bar_seen = see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
     lights = [{} for _ in whisks]
-    rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, axis, time_s, motor_rad,
+    rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, bar_seen, time_s, motor_rad,
                        lights[number], settings) for number, where in enumerate(whisks)]
+    axis = bar_seen.axis
     return TrialTruth(axis.point_mm, axis.direction, np.full((4, 4), np.nan), tuple(rows), one_sided_lines(lights))
 
 
@@ -78,7 +78,7 @@ def _views(frames, cameras: Cameras, background) -> list[View]:
     return views
 
 
-def _see_whisk(number: int, indices, views, cameras, rods: Rods, axis: BarAxis, time_s, motor_rad,
+def _see_whisk(number: int, indices, views, cameras, rods: Rods, bar: SeenBar, time_s, motor_rad,
                light: dict[str, Lit], settings: VisionSettings, misled: Sequence[str] = ()) -> WhiskTruth:
     """Truth of one whisk; its status where there is none. misled: lines on cameras that were left out already."""
     views, left_out = _with_frames(views, indices)
@@ -90,12 +90,12 @@ def _see_whisk(number: int, indices, views, cameras, rods: Rods, axis: BarAxis, 
     cameras = cameras.subset([view.camera.name for view in views])
     motor = {f: float(motor_rad[f]) for f in seen}
     try:
-        problem, state, answer, near = fit_whisk(views, cameras, rods, axis, motor, light, settings)
+        problem, state, answer, near = fit_whisk(views, cameras, rods, bar, motor, light, settings)
     except (Refused, np.linalg.LinAlgError) as reason:
         status = str(reason) if isinstance(reason, Refused) else "the fit of wire and bar does not settle"
         if isinstance(reason, Misled) and len(views) > 1:
             others = [view for view in views if view.camera.name != reason.camera]
-            return _see_whisk(number, indices, others, cameras, rods, axis, time_s, motor_rad, light, settings,
+            return _see_whisk(number, indices, others, cameras, rods, bar, time_s, motor_rad, light, settings,
                               [*left_out, status])
         return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
                           status="; ".join([status, *left_out]))

@@ -1,12 +1,12 @@
 """One whisk: wire and bar traced in all its frames and fitted together, by turns."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vision.bar_edges import measure_edges
-from vision.bar_search import bar_lines, of_mean
+from vision.bar_search import SeenBar, bar_lines, of_mean
 from vision.contact import BarAxis, upward
 from vision.cylinder import WAVES
 from vision.effort import VisionSettings
@@ -52,35 +52,44 @@ class _Look:
     free: np.ndarray
 
 
-def fit_whisk(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float], light: dict[str, Lit],
+def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float], light: dict[str, Lit],
               settings: VisionSettings):
     """Problem and state after the last round, the parameters' covariance, and the frames in it: all but those far
     before touch.
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    one_side = seen_from_one_side(cameras, axis)
-    motor, look = _first_look(views, cameras, rods, axis, motor, one_side)
+    edges = _told_by_edges(cameras, bar)
+    motor, look = _first_look(views, cameras, rods, bar.axis, motor, bool(edges))
     for _ in range(settings.rounds):
-        seen = _trace_all(views, rods, look, motor, light, settings, one_side=one_side, last=False)
-        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, one_side)
+        seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
+        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, bool(edges))
         _check_scatter(problem, state)
         light.update(_beside_fit(problem, state, light))
-        look = _next_look(problem, state, look, motor, one_side)
-    seen = _trace_all(views, rods, look, motor, light, settings, one_side=one_side, last=True)
-    return *_fit(seen, cameras, rods, look, motor, light, one_side), list(motor)
+        look = _next_look(problem, state, look, motor, bool(edges))
+    seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
+    return *_fit(seen, cameras, rods, look, motor, light, bool(edges)), list(motor)
+
+
+def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
+    """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand on
+    one side, or a single one sees it. None where two see it from different sides."""
+    told = [name for name in cameras.names if name in bar.told]
+    if len(told) > 1 and not seen_from_one_side(cameras, bar.axis):
+        return []
+    return told or list(cameras.names)
 
 
 def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float],
-                one_side: bool) -> tuple[Mapping[int, float], _Look]:
+                by_onset: bool) -> tuple[Mapping[int, float], _Look]:
     """The frames to fit, and what coarse points tell of them."""
     early = _early(motor)
     rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
     coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
-    motor = motor if one_side else _near_touch(motor, coarse)
+    motor = motor if by_onset else _near_touch(motor, coarse)
     angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
     touching, free = frames_that_touch(angles, bend)
-    if one_side:  # a bend along the sight is not seen at first
+    if by_onset:  # a bend along the sight is not seen at first
         free = np.arange(len(angles)) < len(early)
         touching = touching & ~free
     elif not np.any(touching):
@@ -93,23 +102,23 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
 
 
 def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float], light: dict,
-         one_side: bool) -> tuple[Problem, State, np.ndarray]:
+         by_onset: bool) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and the parameters' covariance."""
     doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
     problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
                       look.touching, ~look.free, seen, doubt_px=doubt_px)
     state, covariance = solve(problem, _begin(problem, look))
-    if one_side:
+    if by_onset:
         problem, state = touch_by_onset(problem, state, covariance)
         state, _ = solve(problem, state)
     problem = honest(problem, state)
     return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
 
 
-def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], one_side: bool) -> _Look:
+def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], by_onset: bool) -> _Look:
     """What a fit tells; which frames touch: by clearance, or where cameras do not tell it, by the onset of bending."""
     touching, free = problem.touching, look.free
-    if not one_side:
+    if not by_onset:
         touch = float(first_touch(problem, state.vector).motor_rad)
         touching, free = frames_by_touch(problem.motor_rad, touch, np.radians(0.02))
         if np.sum(free) < FEWEST_FREE:
@@ -181,13 +190,13 @@ def _begin(problem: Problem, look: _Look) -> State:
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
 
-def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *, one_side: bool,
-               last: bool) -> list[Observed]:
-    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. last: see
-    `measure_bar`."""
+def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *,
+               edges: Collection[str], last: bool) -> list[Observed]:
+    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. edges: see
+    `_told_by_edges`; last: see `measure_bar`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
              for view in views}
-    bar = _trace_bar(views, rods, look.axis, wires, settings, one_side=one_side, last=last)
+    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
     seen = []
     for number, view in enumerate(views):
         seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
@@ -199,12 +208,13 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
     return seen
 
 
-def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, one_side: bool,
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
                last: bool) -> list[dict[int, LinePoints]]:
-    """Per camera the points of the bar's middle (side 0), or of its two edges where the cameras stand on one side."""
-    if one_side:
-        return [measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm, wires[view.camera.name],
-                              settings) or {} for view in views]
+    """Per camera the points of the bar's middle (side 0), or of its two edges where any tell them."""
+    if edges:
+        told = lambda view: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,  # noqa: E731
+                                          wires[view.camera.name], settings)
+        return [told(view) or {} if view.camera.name in edges else {} for view in views]
     lines = bar_lines(views, axis, rods, wires, settings, last=last)
     return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
 
