@@ -72,8 +72,8 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
 
 
 def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
-    """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand on
-    one side, or a single one sees it. None where two see it from different sides."""
+    """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand
+    on one side, or a single one sees it. None where two see it from different sides."""
     told = [name for name in cameras.names if name in bar.told]
     if len(told) > 1 and not seen_from_one_side(cameras, bar.axis):
         return []
