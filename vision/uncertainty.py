@@ -1,13 +1,13 @@
 """How uncertain a fit is, and by which causes: line points, touching, givens, beliefs, cameras, the rig's place."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import correlate1d
 
-from vision.contact import BarAxis
-from vision.fit import linear_at, weighted_jacobian
+from vision.fit import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
 from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of
 from vision.scene import N_PARAMETERS
 from vision.silhouette import grazed
@@ -59,10 +59,12 @@ def _alike(problem: Problem, rows) -> np.ndarray:
 def _by_lens(problem: Problem, state: State, answer) -> np.ndarray:
     """Derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
 
-    They answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees.
+    They answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees, and with W as in
+    the fit a move of all cameras together moves the whole scene and nothing in it.
     """
     linear = linear_at(problem, state)
-    return -answer @ (linear.jacobian[linear.is_point].T @ camera_rows(problem, state))
+    weights = robust_weights(linear, LAST_SCALE)[linear.is_point, None]
+    return -answer @ (linear.jacobian[linear.is_point].T @ (weights * camera_rows(problem, state)))
 
 
 def variance_by_cause(problem: Problem, state: State, known: Uncertainty, gradient) -> dict[str, float]:
@@ -107,10 +109,13 @@ def camera_rows(problem: Problem, state: State) -> np.ndarray:
     return np.concatenate([_by_cameras(problem, seen, _on_rod(problem, seen, state, curves)) for seen in problem.seen])
 
 
-def _by_cameras(problem: Problem, seen: Observed, on_rod_mm) -> np.ndarray:
-    """Derivatives (n, 15 cameras) of one camera's residuals by the cameras' parameters."""
-    points = seen.points
-    _, _, by_camera = problem.cameras.cameras[seen.camera].project_with_jacobians(on_rod_mm)
+def _by_cameras(problem: Problem, seen: Observed, on_rod_mm: Sequence[np.ndarray]) -> np.ndarray:
+    """Derivatives (n, 15 cameras) of one camera's residuals by the cameras' parameters: means over its points (n, 3).
+
+    Sights graze a rod's edge, so that what moves the point where they do so does not move the edge.
+    """
+    points, camera = seen.points, problem.cameras.cameras[seen.camera]
+    by_camera = np.mean([camera.project_with_jacobians(one)[2] for one in on_rod_mm], axis=0)
     rows = np.zeros((len(points), N_PARAMETERS * len(problem.cameras)))
     first = N_PARAMETERS * seen.camera
     rows[:, first:first + N_PARAMETERS] = (np.einsum("ni,nij->nj", points.normal, by_camera)
@@ -118,20 +123,14 @@ def _by_cameras(problem: Problem, seen: Observed, on_rod_mm) -> np.ndarray:
     return rows
 
 
-def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
-    """Points (n, 3) of the rods' axes, or of the bar's edge, that the line points are pictures of."""
-    if seen.frame < 0:
-        axis = bar_axis(problem, state.vector)
-        points = axis.point_mm + seen.points.place[:, None] * axis.direction
-        return _on_edge(problem, seen, points, axis) if seen.side else points
-    one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
-    return one.at(seen.points.place)[0]
-
-
-def _on_edge(problem: Problem, seen: Observed, points, axis: BarAxis) -> np.ndarray:
-    """Points (n, 3) of the bar's surface on the edge that is seen, beside points of its axis."""
-    camera = problem.cameras.cameras[seen.camera]
+def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> list[np.ndarray]:
+    """Points (n, 3) that line points are pictures of: of the wire's axis, of the bar's edge, or of both its edges."""
+    if seen.frame >= 0:
+        one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
+        return [one.at(seen.points.place)[0]]
+    axis, camera = bar_axis(problem, state.vector), problem.cameras.cameras[seen.camera]
+    points = axis.point_mm + seen.points.place[:, None] * axis.direction
     edges = grazed(camera, points, np.broadcast_to(axis.direction, points.shape),
                    problem.reach_mm - problem.wire.diameter_mm / 2)
     beside = [np.sum((camera.project(edge) - camera.project(points)) * seen.points.normal) for edge in edges]
-    return edges[int(np.argmax(seen.side * np.array(beside)))]
+    return [edges[int(np.argmax(seen.side * np.array(beside)))]] if seen.side else list(edges)

@@ -53,7 +53,8 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     scene, rng = scene_of(0.1), np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
     state, answer = solve(problem, begin(problem), scales=SCALES)
-    gradient = jacobians(problem, state)[1].whisk["d_x"]
+    _, by = jacobians(problem, state)
+    gradient = by.whisk["d_x"]
 
     def budget(cameras):
         asked = replace(problem, cameras=cameras)
@@ -66,5 +67,8 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     assert sum(told.values()) == pytest.approx(whole, rel=1e-6)
     assert told["cameras"] == pytest.approx(without["cameras"], rel=1e-6)
     assert np.isnan(untold["placement"]) and untold["cameras"] == pytest.approx(told["cameras"] + told["placement"])
+    # all cameras moved together move bar and whisker alike: when they touch stays, to a hundredth of the board's 0.1°
+    touch = variance_by_cause(problem, state, uncertainty(problem, state, answer), by.whisk["touch"])["placement"]
+    assert np.sqrt(touch) < 0.01 * np.radians(0.1)
     # a board known to 0.1 mm shifts d_x by about as much, its turns on top
     assert 0.05 < np.sqrt(told["placement"]) < 0.3
