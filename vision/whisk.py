@@ -75,9 +75,9 @@ def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
     """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand
     on one side, or a single one sees it. None where two see it from different sides."""
     told = [name for name in cameras.names if name in bar.told]
-    if len(told) > 1 and not seen_from_one_side(cameras, bar.axis):
-        return []
-    return told or list(cameras.names)
+    if seen_from_one_side(cameras, bar.axis):
+        return told or list(cameras.names)
+    return told if len(told) == 1 else []
 
 
 def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float],
