@@ -19,7 +19,7 @@ from vision.wire import Curves
 _BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
-_BIN_PX = 0.4
+_BIN_PX = 0.3
 _NODES = 81  # of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel
 _STEPS, _LONGEST = np.array([0.1, 0.1, 0.1, 0.08]), np.array([0.5, 0.4, 0.4, 0.3])  # shift, tilt, bow (px), log blur
 _SETTLED = 0.05
@@ -100,7 +100,7 @@ def settle(pieces: Pieces, knots: Knots, search_px: float) -> tuple[Pieces, floa
     near = near.moved(found.shift_px)
     misfit = _shared_misfit(near, found, typical, knots)
     starts = [np.array([shift, 0.0, 0.0, np.log(blur)]) for shift in np.arange(-search_px, search_px + 0.01, 0.375)
-              for blur in _BLURS_PX[1:8]]
+              for blur in _BLURS_PX[1:8:2]]
     best = min(starts, key=lambda start: misfit(start[:3], np.exp(start[3]), _FEW_PIECES))
     best, _, _ = descend(lambda q: misfit(q[:3], np.exp(q[3]), _ENOUGH_PIECES), best, _STEPS, _LONGEST, _SETTLED)
     return pieces.moved(_apart(near, pieces) + _bow(near) @ best[:3]), without(np.exp(best[3]), blurred)
