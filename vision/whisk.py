@@ -54,8 +54,8 @@ class _Look:
 
 def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float], light: dict[str, Lit],
               settings: VisionSettings):
-    """Problem and state after the last round, the parameters' covariance, and the frames in it: all but those far
-    before touch.
+    """Problem and state after the last round, how its parameters answer (see `Uncertainty`), and the frames in it: all
+    but those far before touch.
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
@@ -103,7 +103,7 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
 
 def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float], light: dict,
          by_onset: bool) -> tuple[Problem, State, np.ndarray]:
-    """The fit to all lines, with sigmas as large as residuals show: problem, state, and the parameters' covariance."""
+    """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
     doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
     problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
                       look.touching, ~look.free, seen, doubt_px=doubt_px)
