@@ -205,6 +205,8 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
         if not there:
             raise Refused(f"no camera shows enough of the {rod}")
+    if not edges and len({one.camera for one in seen if one.frame < 0}) < 2:
+        raise Refused("a single camera shows enough of the bar clear of the wire, and not well enough to ask it alone")
     return seen
 
 
