@@ -7,20 +7,44 @@ from bench.rig.protocol import PicturesTable
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
 from vision.effort import VisionSettings
 from vision.fit import solve
+from vision.problem import BAR
 from vision.quantities import jacobians
 from vision.report import to_whisk
 from vision.uncertainty import Uncertainty
 
 
-@pytest.mark.parametrize("less_sure, doubted", [(1.0, False), (1e4, True)])
-def test_a_slope_that_the_cameras_do_not_tell_is_doubted(less_sure, doubted):
+def row_of(noise_of):
+    """The row of a scene whose parameters have this noise, and the scene."""
     scene = draw_scene(0, pictures=PicturesTable(step_deg=1.5))
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     state, answer = solve(problem, begin(problem), scales=(1e9,) * 6)
-    frames = range(len(scene.motor_rad))
-    known = Uncertainty(answer, answer * less_sure, 0.0 * answer)
-    whisk = to_whisk(0, frames, frames, scene.recording.frames.time_s, scene.motor_rad, problem, state,
-                     *jacobians(problem, state), known, [], 3.0, VisionSettings())
+    frames, known = range(len(scene.motor_rad)), Uncertainty(answer, noise_of(answer), 0.0 * answer)
+    return scene, to_whisk(0, frames, frames, scene.recording.frames.time_s, scene.motor_rad, problem, state,
+                           *jacobians(problem, state), known, [], 3.0, VisionSettings())
+
+
+def tilted(by_deg: float):
+    """The noise of a bar whose two tilts are known to so much, and all else as it is."""
+    tilts = np.arange(BAR)[2:]
+
+    def noise(answer):
+        more = answer.copy()
+        more[tilts, tilts] += np.radians(by_deg) ** 2
+        return more
+
+    return noise
+
+
+@pytest.mark.parametrize(("by_deg", "doubted"), [(0.0, False), (5.0, True)])
+def test_a_slope_that_the_cameras_do_not_tell_is_doubted(by_deg, doubted):
+    scene, whisk = row_of(tilted(by_deg))
     assert (np.degrees(whisk.beta_sigma_rad) > 3.0) == doubted
     assert ("slope is known to" in whisk.status) == doubted
     assert whisk.d_x_mm == pytest.approx(scene.truth.d_x, abs=2e-3)
+
+
+@pytest.mark.parametrize(("noise_of", "reason"), [(tilted(30.0), "slope is known to 3"),
+                                                  (lambda answer: 1e4 * answer, "contact is known to 4")])  # fmt: skip
+def test_where_nothing_is_linear_there_is_no_truth(noise_of, reason):
+    _, whisk = row_of(noise_of)
+    assert np.isnan(whisk.d_x_mm) and reason in whisk.status
