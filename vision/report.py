@@ -17,7 +17,7 @@ _MOST_GAP = 1.5  # of the median frame interval, beyond which a frame was lost
 _TOLD_RAD = np.radians(3.0)
 # Beyond this one nothing that is propagated linearly holds: in one scene touch was 18 of its sigmas off.
 _MOST_UNTOLD_RAD = np.radians(20.0)
-# Nor beyond this one of where the contact is: in one view slope was 24 degrees off at a stated 0.04.
+# Nor beyond this one of slip: in one view, with slip known to 5 mm, slope was 24 degrees off at a stated 0.04.
 _MOST_UNTOLD_MM = 1.0
 _VECTORS = ("x", "y", "z")
 _PLAIN = ("slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha")
@@ -36,8 +36,8 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
                      value["touch"], sigma["touch"])
     lost = _lost_at_touch(indices, [*far, *seen], motor_rad, value["touch"])
     outside = _outside(problem, value)
-    status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"]), _contact_untold(sigma)]))
-    untold = bool(lost or outside or _contact_untold(sigma)) or sigma["beta"] > _MOST_UNTOLD_RAD
+    status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"]), _slip_untold(frames)]))
+    untold = bool(lost or outside or _slip_untold(frames)) or sigma["beta"] > _MOST_UNTOLD_RAD
     truth = {} if untold else {
         "d_x_mm": value["d_x"], "d_x_sigma_mm": sigma["d_x"], "touch_rad": value["touch"],
         "touch_sigma_rad": sigma["touch"], "beta_rad": value["beta"], "beta_sigma_rad": sigma["beta"],
@@ -71,11 +71,11 @@ def _slope_untold(beta_sigma_rad: float) -> str:
     return ""
 
 
-def _contact_untold(sigma) -> str:
-    """A contact that is known to a millimetre or worse is not known."""
-    sigma_mm = float(np.linalg.norm([sigma[k] for k in _VECTORS]))
+def _slip_untold(frames: FrameTruth) -> str:
+    """Slip that is known to a millimetre or worse is not known, nor is where the whisker touches."""
+    sigma_mm = float(np.max(frames.slip_sigma_mm[frames.touching], initial=0.0))
     if sigma_mm > _MOST_UNTOLD_MM:
-        return f"the contact is known to {sigma_mm:.1f} mm only, {_MOST_UNTOLD_MM:g} is allowed"
+        return f"slip is known to {sigma_mm:.1f} mm only, {_MOST_UNTOLD_MM:g} is allowed"
     return ""
 
 

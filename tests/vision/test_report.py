@@ -44,7 +44,7 @@ def test_a_slope_that_the_cameras_do_not_tell_is_doubted(by_deg, doubted):
 
 
 @pytest.mark.parametrize(("noise_of", "reason"), [(tilted(30.0), "slope is known to 3"),
-                                                  (lambda answer: 1e4 * answer, "contact is known to 4")])  # fmt: skip
+                                                  (lambda answer: 1e5 * answer, "slip is known to")])  # fmt: skip
 def test_where_nothing_is_linear_there_is_no_truth(noise_of, reason):
     _, whisk = row_of(noise_of)
     assert np.isnan(whisk.d_x_mm) and reason in whisk.status
