@@ -30,14 +30,17 @@ class Scatter:
     over_frames: float
 
 
-def honest(problem: Problem, state: State) -> Problem:
+def honest(problem: Problem, state: State, shared: float | None = None) -> Problem:
     """The same problem with the wire points' sigmas as large as their residuals show, and shared errors counted once.
 
     The excess over the points' own sigmas is one figure a camera (median of the residuals, so that outliers do
-    not set it).
+    not set it). shared: by how much a mean's variance is larger for them; measured if None, which takes a state that was
+    fitted to these points.
     """
     residuals, cameras = _residuals_px(problem, state), range(len(problem.cameras))
     scatter = [_scatter(problem, residuals, camera) for camera in cameras]
+    if shared is not None:
+        scatter = [replace(one, along=shared, over_frames=1.0) for one in scatter]
     own = [_own_sigma_px(problem, camera) for camera in cameras]
     excess = [float(np.sqrt(max(seen.sigma_px**2 - few**2, 0.0))) for seen, few in zip(scatter, own)]
     wider = [float(np.sqrt(one.along * one.over_frames)) for one in scatter]

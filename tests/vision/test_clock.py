@@ -12,6 +12,7 @@ from vision.effort import VisionSettings
 from vision.fit import linearise, solve
 from vision.quantities import jacobians
 from vision.report import to_whisk
+from vision.uncertainty import Uncertainty
 
 OFF_S = 0.025
 
@@ -39,8 +40,8 @@ def test_a_clock_that_is_off_is_an_encoder_that_is_off():
 
 
 def _whisk(problem, state, time_s, clock_sigma_s):
-    state, covariance = solve(problem, state, scales=(4.0,))
+    state, answer = solve(problem, state, scales=(4.0,))
     frames = range(len(time_s))
     settings = VisionSettings(clock_sigma_s=clock_sigma_s)
     return to_whisk(0, frames, frames, time_s, problem.motor_rad, problem, state, *jacobians(problem, state),
-                    covariance, 0.0 * covariance, [], 3.0, settings)
+                    Uncertainty(answer, answer, 0.0 * answer), [], 3.0, settings)
