@@ -119,7 +119,8 @@ def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float) -> Figure:
 
 def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean errors (a, b), NaN where nothing was measured, and the cells' edges."""
-    beta = np.arange(-0.5 * _BETA_DEG, _STEEPEST_DEG + _BETA_DEG, _BETA_DEG)
+    steepest = max(_STEEPEST_DEG, *(cell.beta_deg for cell in cells))
+    beta = np.arange(-0.5 * _BETA_DEG, steepest + 1.5 * _BETA_DEG, _BETA_DEG)
     alpha = np.arange(0.0, top + _ALPHA_DEG, _ALPHA_DEG)
     field = np.full((len(alpha) - 1, len(beta) - 1), np.nan)
     for cell in cells:

@@ -15,6 +15,7 @@ from vision.trace import View
 
 ARM_MM = 20.0  # the line is handed on as two points, this far to either side
 _INNER_SHARE = 0.72
+_LEAST_IN_PICTURE = 0.5  # of a piece's pixels
 FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
 _KNOT_MM = 14.0
@@ -30,7 +31,8 @@ def bar_pieces(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequ
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
     band = read_band(grey, view.background, middle, place, radius, half)
     pieces = cut_pieces([band], settings.bar_piece_px, view.noise)
-    return pieces.select(clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
+    in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
+    return pieces.select(in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
 
 
 def bar_knots(settings: VisionSettings) -> Knots:

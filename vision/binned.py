@@ -22,7 +22,7 @@ def binned(pieces: Pieces, width_px: float) -> tuple[Pieces, float]:
     spread = (pieces.offset_px - mean["offset_px"].ravel()[place]) ** 2
     values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__} | mean
     fewer = Pieces(**values | {"weight": np.sqrt(total)})
-    return fewer.columns(np.any(total > 0, axis=0)), float(np.average(spread, weights=weight))
+    return fewer.columns(np.any(total > 0, axis=0)), float(np.sum(spread * weight) / max(np.sum(weight), 1e-300))
 
 
 def without(blur_px: float, variance_px2: float) -> float:

@@ -31,6 +31,7 @@ _STARTS, _MOST_CLIMBS, _SHRINKS = 6, 25, 4
 _LEAST_SCORE = 0.25
 _NEAREST, _FARTHEST = 0.7, 1.4  # of the distance at first: beyond, what passed for edges is none
 _SAME_PLANE_RAD = np.radians(1.0)
+_MOST_ONSET_RAD = np.radians(0.5)  # an onset known to 2.4 degrees had free frames touch, and the bar 10 mm off
 
 
 def find_bar_alone(change: np.ndarray, camera: Camera, radius_mm: float, motor_rad: tuple[float, float],
@@ -141,6 +142,9 @@ def touch_by_onset(problem: Problem, state: State, covariance) -> tuple[Problem,
     found = onset(problem.motor_rad, values, whole)
     if found is None:
         raise Refused("no bend of the whisker is seen: it never touches, or bends along the sight of all cameras")
+    if found.sigma_rad > _MOST_ONSET_RAD:
+        raise Refused(f"when the whisker begins to bend is told to {np.degrees(found.sigma_rad):.1f} deg only, "
+                      f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known")
     touching, free = frames_by_touch(problem.motor_rad, found.motor_rad, 0.5 * found.sigma_rad)
     free[:FEWEST_FREE] |= problem.motor_rad[:FEWEST_FREE] < found.motor_rad
     if np.sum(free) < FEWEST_FREE:

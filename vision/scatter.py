@@ -30,20 +30,18 @@ class Scatter:
     over_frames: float
 
 
-def honest(problem: Problem, state: State, shared: float | None = None) -> Problem:
+def honest(problem: Problem, state: State, least_shared: float = 1.0) -> Problem:
     """The same problem with the wire points' sigmas as large as their residuals show, and shared errors counted once.
 
     The excess over the points' own sigmas is one figure a camera (median of the residuals, so that outliers do
-    not set it). shared: by how much a mean's variance is larger for them; measured if None, which takes a state that was
-    fitted to these points.
+    not set it). state: what was fitted to these points. least_shared: what is shared makes the variance of a mean this
+    many times as large at least.
     """
     residuals, cameras = _residuals_px(problem, state), range(len(problem.cameras))
     scatter = [_scatter(problem, residuals, camera) for camera in cameras]
-    if shared is not None:
-        scatter = [replace(one, along=shared, over_frames=1.0) for one in scatter]
     own = [_own_sigma_px(problem, camera) for camera in cameras]
     excess = [float(np.sqrt(max(seen.sigma_px**2 - few**2, 0.0))) for seen, few in zip(scatter, own)]
-    wider = [float(np.sqrt(one.along * one.over_frames)) for one in scatter]
+    wider = [float(np.sqrt(max(one.along * one.over_frames, least_shared))) for one in scatter]
     seen = [_honest_points(one, excess[one.camera], wider[one.camera]) if one.frame >= 0 else one
             for one in problem.seen]
     return replace(problem, seen=seen, alike=[(one.along - 1.0) / (one.along + 1.0) for one in scatter])

@@ -33,7 +33,8 @@ _ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 # Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
 # another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
-_FREE_SHARED = 4.0  # errors of a free stroke's points that neighbours share, as if each of four had the same
+# What changes slowly over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
+_FREE_SHARED = 4.0
 _MOST_SCATTER_PX = 0.7  # where a wire is seen at all its points lie on one line to a tenth of a pixel
 _NEVER_TOUCHES = "the whisker never touches"
 _STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
@@ -168,6 +169,7 @@ def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mappin
     nothing = np.zeros(len(free), dtype=bool)
     alone = replace(problem, motor_rad=np.array(list(free.values())), touching=nothing, bent=nothing, seen=seen)
     there = State(state.vector[:problem.first_bend], np.full(len(free), 0.5 * rods.wire.length_mm))
+    there, _ = solve(alone, there, scales=[LAST_SCALE] * 3)
     return honest(alone, there, _FREE_SHARED), there
 
 
