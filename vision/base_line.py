@@ -23,7 +23,7 @@ _CLEAR_OF_HUB_MM = 15.0
 _STRAIGHT_MM = np.array([1.0, 0.4])
 # Part of what a whole line is off by that changes as the whisker turns by a radian before its lamp: it passes for a
 # centre elsewhere along the whisker. Strokes of 24 degrees erred by 0.04 mm so.
-_DRIFT_PER_RAD = 0.35
+_DRIFT_PER_RAD = 0.5
 _FEWEST_POINTS = 8  # in a frame: twice the numbers that they give
 
 

@@ -54,8 +54,8 @@ def test_a_lens_s_own_uncertainty_is_shared_by_all_frames():
     lens = np.zeros((problem.size,) * 2)
     lens[4, 4] = 0.3**2  # of the rest shape's offset in y
     shared = [base_lines(problem, state, own).shared_covariance for own in (np.zeros_like(lens), lens)]
-    # 0.3 mm across, and along the whisker the 0.35 of it by which a radian's turn may change it.
-    assert np.trace((shared[1] - shared[0])[3:, 3:]) == pytest.approx(0.09 * (1 + 0.35**2), rel=1e-6)
+    # 0.3 mm across, and along the whisker the half of it by which a radian's turn may change it.
+    assert np.trace((shared[1] - shared[0])[3:, 3:]) == pytest.approx(0.09 * (1 + 0.5**2), rel=1e-6)
 
 
 def test_no_free_frame_gives_no_line():
