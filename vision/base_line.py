@@ -12,7 +12,7 @@ import numpy as np
 
 from vision.fit import linear_at
 from vision.place import BaseLines
-from vision.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Observed, Problem, State, wandering
+from vision.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Observed, Problem, State, point_rows, wandering
 from vision.wire import REST_POWERS, rotation_z
 
 # Offsets and slopes, y then z, among the rest shape's parameters.
@@ -63,12 +63,11 @@ def _count(rows: list[_Rows], frame: int) -> int:
 
 def _free_rows(problem: Problem, state: State) -> list[_Rows]:
     linear = linear_at(problem, state)
-    rows, end = [], 0
-    for seen in problem.seen:
-        first, end = end, end + len(seen.points)
-        if seen.frame >= 0 and not problem.bent[seen.frame]:
-            rows.append(_rows_of(problem, seen, state, linear.residual[first:end], linear.jacobian[first:end]))
-    return rows
+    return [
+        _rows_of(problem, seen, state, linear.residual[rows], linear.jacobian[rows])
+        for seen, rows in point_rows(problem)
+        if seen.frame >= 0 and not problem.bent[seen.frame]
+    ]
 
 
 def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian) -> _Rows:

@@ -135,13 +135,24 @@ def start(problem: Problem, contact_arc_mm: float) -> State:
     return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
 
 
+def point_rows(problem: Problem) -> list[tuple[Observed, slice]]:
+    """Each of what is seen, with the rows of its points among all residuals."""
+    ends = np.cumsum([len(seen.points) for seen in problem.seen]).tolist()
+    return [(seen, slice(end - len(seen.points), end)) for seen, end in zip(problem.seen, ends)]
+
+
+def wire_lever(length_mm: float, place_mm) -> np.ndarray:
+    """From -1 at the base to 1 at the tip, by which a line of the wire is tilted."""
+    return 2.0 * place_mm / length_mm - 1.0
+
+
 def wire_modes(length_mm: float, place_mm, motor_rad, swing_rad) -> np.ndarray:
     """Shapes (n, 6) by which lines of the wire are off: all alike, from end to end, and both of these changing with the
     motor angle, steadily and by its square.
 
     place_mm, motor_rad (n,): of each point; swing_rad: the whisk's motor angles.
     """
-    lever = 2.0 * place_mm / length_mm - 1.0
+    lever = wire_lever(length_mm, place_mm)
     turned = (motor_rad - np.min(swing_rad)) / max(np.ptp(swing_rad), 1e-9) * 2.0 - 1.0
     by_turn = np.stack([np.ones(len(lever)), turned, turned**2 - 1.0 / 3.0], axis=1)
     return (by_turn[:, :, None] * np.stack([np.ones(len(lever)), lever], axis=1)[:, None]).reshape(len(lever), 6)

@@ -36,8 +36,9 @@ def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, m
                      value["touch"], sigma["touch"])
     lost = _lost_at_touch(indices, [*far, *seen], motor_rad, value["touch"])
     outside = _outside(problem, value)
-    status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"]), _slip_untold(frames)]))
-    untold = bool(lost or outside or _slip_untold(frames)) or sigma["beta"] > _MOST_UNTOLD_RAD
+    slip_untold = _slip_untold(frames)
+    status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"]), slip_untold]))
+    untold = bool(lost or outside or slip_untold) or sigma["beta"] > _MOST_UNTOLD_RAD
     truth = {} if untold else {
         "d_x_mm": value["d_x"], "d_x_sigma_mm": sigma["d_x"], "touch_rad": value["touch"],
         "touch_sigma_rad": sigma["touch"], "beta_rad": value["beta"], "beta_sigma_rad": sigma["beta"],

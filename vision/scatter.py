@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit import linear_at
-from vision.problem import Observed, Problem, State
+from vision.problem import Observed, Problem, State, point_rows
 
 _CLIP_SIGMAS = 3.0  # of the camera's scatter: an outlier is not what all share
 _NO_MORE = 0.05  # a correlation that is less is the noise of some hundred points
@@ -55,8 +55,8 @@ def scatter_px(problem: Problem, state: State) -> list[float]:
 
 def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
     """Of each of the problem's observations, (n,) px."""
-    linear, ends = linear_at(problem, state), np.cumsum([len(seen.points) for seen in problem.seen])
-    return [linear.residual[end - len(seen.points):end] * seen.points.sigma_px for end, seen in zip(ends, problem.seen)]
+    linear = linear_at(problem, state)
+    return [linear.residual[rows] * seen.points.sigma_px for seen, rows in point_rows(problem)]
 
 
 def _of_camera(problem: Problem, residuals: Sequence[np.ndarray], camera: int) -> list[np.ndarray]:

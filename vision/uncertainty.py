@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import correlate1d
 
 from vision.fit import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
-from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of
+from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of, point_rows
 from vision.scene import N_PARAMETERS
 from vision.silhouette import grazed
 from vision.wire import Curves
@@ -47,12 +47,11 @@ def _alike(problem: Problem, rows) -> np.ndarray:
     """Rows (k, n) of all observations times the covariance of their residuals: 1, but that a point of the wire shares a
     part of its error with the next one, of that part as much with the one after, and so on, and has a sigma wider by as
     much as all that makes a mean of them."""
-    found, end = rows.copy(), 0
-    for seen in problem.seen:
-        first, end = end, end + len(seen.points)
+    found = rows.copy()
+    for seen, mine in point_rows(problem):
         if seen.frame >= 0 and problem.alike:
             shared = problem.alike[seen.camera] ** np.abs(np.arange(-_FARTHEST, _FARTHEST + 1))
-            found[:, first:end] = correlate1d(rows[:, first:end], shared / shared.sum(), axis=1, mode="constant")
+            found[:, mine] = correlate1d(rows[:, mine], shared / shared.sum(), axis=1, mode="constant")
     return found
 
 

@@ -15,7 +15,7 @@ from vision.fit import LAST_SCALE, solve
 from vision.line import LinePoints
 from vision.one_sided import Lit, seen_width
 from vision.one_view import seen_from_one_side, touch_by_onset
-from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape
+from vision.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape, wire_lever
 from vision.rods import Rods
 from vision.scatter import honest, scatter_px
 from vision.scene import Cameras
@@ -62,15 +62,16 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
     edges = _told_by_edges(cameras, bar)
-    motor, look = _first_look(views, cameras, rods, bar.axis, motor, bool(edges))
+    by_onset = bool(edges)
+    motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
     for _ in range(settings.rounds):
         seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
-        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, bool(edges))
+        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, by_onset)
         _check_scatter(problem, state)
         light.update(_beside_fit(problem, state, light))
-        look = _next_look(problem, state, look, motor, bool(edges))
+        look = _next_look(problem, state, look, motor, by_onset)
     seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
-    return *_fit(seen, cameras, rods, look, motor, light, bool(edges)), list(motor)
+    return *_fit(seen, cameras, rods, look, motor, light, by_onset), list(motor)
 
 
 def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
@@ -234,7 +235,7 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
     if known:
-        own = known.off_px + known.tilt_px * (2.0 * pieces.place / rods.wire.length_mm - 1.0)
+        own = known.off_px + known.tilt_px * wire_lever(rods.wire.length_mm, pieces.place)
         pieces, blur = settle_again(pieces.moved(own), known.blur_px, knots), known.blur_px
     else:
         pieces, blur = settle(pieces, knots, _SEARCH_PX)
