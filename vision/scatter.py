@@ -50,7 +50,7 @@ def honest(problem: Problem, state: State, least_shared: float = 1.0) -> Problem
 def scatter_px(problem: Problem, state: State) -> list[float]:
     """Standard deviation in px of each camera's wire points about the fit, by their median; 0 where it has none."""
     residuals = _residuals_px(problem, state)
-    return [_sigma_px(_of_camera(problem, residuals, camera)) for camera in range(len(problem.cameras))]
+    return [_sigma_px(_of_wire(problem, residuals, camera)) for camera in range(len(problem.cameras))]
 
 
 def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
@@ -59,9 +59,9 @@ def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
     return [linear.residual[rows] * seen.points.sigma_px for seen, rows in point_rows(problem)]
 
 
-def _of_camera(problem: Problem, residuals: Sequence[np.ndarray], camera: int) -> list[np.ndarray]:
-    """Residuals of the wire in one camera, frame by frame."""
-    return [values for values, seen in zip(residuals, problem.seen) if seen.camera == camera and seen.frame >= 0]
+def _of_wire(problem: Problem, values: Sequence, camera: int) -> list:
+    """Those of the values, one for each observation, that are of the wire in one camera, frame by frame."""
+    return [value for value, seen in zip(values, problem.seen) if seen.camera == camera and seen.frame >= 0]
 
 
 def _sigma_px(residuals: Sequence[np.ndarray]) -> float:
@@ -69,12 +69,12 @@ def _sigma_px(residuals: Sequence[np.ndarray]) -> float:
 
 
 def _scatter(problem: Problem, residuals: Sequence[np.ndarray], camera: int) -> Scatter:
-    mine = _of_camera(problem, residuals, camera)
+    mine = _of_wire(problem, residuals, camera)
     sigma = _sigma_px(mine)
     if sigma == 0.0:
         return Scatter(sigma, 1.0, 1.0)
     clipped = [np.clip(values / sigma, -_CLIP_SIGMAS, _CLIP_SIGMAS) for values in mine]
-    places = [seen.points.place for seen in problem.seen if seen.camera == camera and seen.frame >= 0]
+    places = [seen.points.place for seen in _of_wire(problem, problem.seen, camera)]
     by_place = np.array([_binned(*pair, problem.wire.length_mm) for pair in zip(places, clipped)])
     return Scatter(sigma, _inflation(_padded(clipped)), _inflation(by_place.T))
 
@@ -110,7 +110,7 @@ def _inflation(rows: np.ndarray) -> float:
 
 def _own_sigma_px(problem: Problem, camera: int) -> float:
     """Median sigma of a camera's wire points; 0 where it has none."""
-    mine = [seen.points.sigma_px for seen in problem.seen if seen.camera == camera and seen.frame >= 0]
+    mine = [seen.points.sigma_px for seen in _of_wire(problem, problem.seen, camera)]
     return float(np.median(np.concatenate(mine))) if mine else 0.0
 
 

@@ -42,37 +42,10 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
         "phi": phi,
         "alpha": abs(beta) - np.abs(phi),
     }
-    plain = {}
-    for name, column in values.items():
-        unit, sigma = ("rad", SIGMA_RAD) if name in ("phi", "alpha") else ("mm", SIGMA_MM)
-        plain |= {f"{name}_{unit}": column, f"{name}_sigma_{unit}": np.where(touching, sigma, np.nan)}
-    frames = FrameTruth(
-        index=table["frame"].astype(int),
-        time_s=table["time_s"],
-        motor_rad=np.radians(table["motor_deg"]),
-        theta_rad=theta,
-        theta_sigma_rad=np.full(len(theta), SIGMA_RAD),
-        touching=touching,
-        point_mm=points,
-        point_sigma_mm=np.full_like(points, SIGMA_MM),
-        arc_mm=table["arc_mm"],
-        status=("",) * len(theta),
-        **plain,
-    )
     first = d_x * np.array([np.cos(touch), np.sin(touch), 0.0])
-    # One parameter a value and frame: every number has the same sigma and no number shares another's error.
-    n, kinds = int(touching.sum()), len(values)
-    own = {name: np.eye(n * kinds)[k * n : (k + 1) * n] for k, name in enumerate(values)}
-    smooth = Smooth(
-        theta[touching],
-        np.zeros(n * kinds),
-        {k: v[touching] for k, v in values.items()},
-        own,
-        SIGMA_MM**2 * np.eye(n * kinds),
-    )
     return WhiskTruth(
         number,
-        frames,
+        _frames(table, theta, touching, points, values),
         touch,
         SIGMA_RAD / 5,
         first,
@@ -85,7 +58,42 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
         SIGMA_RAD,
         2,
         len(theta),
-        smooth=smooth,
+        smooth=_smooth(theta, touching, values),
+    )
+
+
+def _frames(table, theta, touching, points, values) -> FrameTruth:
+    """Rows of truth.csv as vision's frames; values: by name, whose sigmas are empty where nothing touches."""
+    plain = {}
+    for name, column in values.items():
+        unit, sigma = ("rad", SIGMA_RAD) if name in ("phi", "alpha") else ("mm", SIGMA_MM)
+        plain |= {f"{name}_{unit}": column, f"{name}_sigma_{unit}": np.where(touching, sigma, np.nan)}
+    return FrameTruth(
+        index=table["frame"].astype(int),
+        time_s=table["time_s"],
+        motor_rad=np.radians(table["motor_deg"]),
+        theta_rad=theta,
+        theta_sigma_rad=np.full(len(theta), SIGMA_RAD),
+        touching=touching,
+        point_mm=points,
+        point_sigma_mm=np.full_like(points, SIGMA_MM),
+        arc_mm=table["arc_mm"],
+        status=("",) * len(theta),
+        **plain,
+    )
+
+
+def _smooth(theta, touching, values) -> Smooth:
+    """What is told between frames."""
+    # One parameter a value and frame: every number has the same sigma and no number shares another's error.
+    n, kinds = int(touching.sum()), len(values)
+    own = {name: np.eye(n * kinds)[k * n : (k + 1) * n] for k, name in enumerate(values)}
+    return Smooth(
+        theta[touching],
+        np.zeros(n * kinds),
+        {k: v[touching] for k, v in values.items()},
+        own,
+        SIGMA_MM**2 * np.eye(n * kinds),
     )
 
 
