@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from bench.errors import BadInput
-from vision.errors import Refused
+from bench.base.errors import BadInput
+from vision.geometry.errors import Refused
 
 DONE, DOUBTFUL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
@@ -127,9 +127,9 @@ def _add_evaluate(verbs) -> None:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    from bench.environment import check_environment
+    from bench.base.environment import check_environment
+    from bench.base.settings import Settings
     from bench.evaluate import evaluate
-    from bench.settings import Settings
 
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
@@ -173,8 +173,8 @@ def _add_calibrate(verbs) -> None:
 
 
 def _calibrate_gauges(options: argparse.Namespace) -> int:
-    from bench.environment import check_environment
-    from bench.gauge_calibration import calibrate_gauges_command
+    from bench.base.environment import check_environment
+    from bench.calibrate_gauges import calibrate_gauges_command
 
     check_environment()
     return calibrate_gauges_command(
@@ -187,8 +187,8 @@ def _calibrate_gauges(options: argparse.Namespace) -> int:
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
-    from bench.calibrate_cameras import calibrate_cameras_command
-    from bench.environment import check_environment
+    from bench.base.environment import check_environment
+    from bench.cameras.calibrate import calibrate_cameras_command
 
     check_environment()
     return calibrate_cameras_command(options.session, options.out, options.lenses)
@@ -206,7 +206,7 @@ def _add_check(verbs) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from bench.check import report_doubts
+    from bench.session.check import report_doubts
 
     return report_doubts(options.session, progress=sys.stderr.isatty())
 
@@ -247,7 +247,7 @@ def _add_figures(verbs) -> None:
 
 
 def _theory_figure(options: argparse.Namespace) -> int:
-    from bench.theory_figures import write_figure
+    from bench.theory.figures import write_figure
 
     for path in write_figure(options.number, options.out):
         print(path)
@@ -255,7 +255,7 @@ def _theory_figure(options: argparse.Namespace) -> int:
 
 
 def _figure_8(options: argparse.Namespace) -> int:
-    from bench.runs import write_figure_8
+    from bench.report.pooled import write_figure_8
 
     paths, lines = write_figure_8(options.runs, options.out)
     print(*lines, *paths, sep="\n")
@@ -263,7 +263,7 @@ def _figure_8(options: argparse.Namespace) -> int:
 
 
 def _error_map(options: argparse.Namespace) -> int:
-    from bench.model_error_maps import write_map
+    from bench.theory.model_error_maps import write_map
 
     for path in write_map(options.name, options.out, workers=options.workers, progress=sys.stderr.isatty()):
         print(path)
@@ -305,7 +305,7 @@ def _add_info(verbs) -> None:
 
 
 def _info(_: argparse.Namespace) -> int:
-    from bench.environment import check_environment, versions
+    from bench.base.environment import check_environment, versions
 
     for name, version in versions().items():
         print(f"{name} {version}")

@@ -6,32 +6,32 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.assembly import write_tables
-from bench.atomic import lock_output
-from bench.calibration import calibrate_session
-from bench.check import checked_session
-from bench.doubts import Doubts
-from bench.drift import drift_rate, free_slope
-from bench.errors import BadInput
-from bench.estimates import estimators
-from bench.explained import write_explained
-from bench.felt import strokes_of
-from bench.friction_map import write_error_map
-from bench.friction_runs import with_runs
-from bench.friction_tables import SurfaceFriction, friction_of, write_friction
-from bench.gauge_checks import Undetermined, check_alive
-from bench.gauge_fit import fit_gauges
-from bench.gauge_readings import Pairs, pairs_of
-from bench.gauges import Gauges
-from bench.gauges_file import given_gauges
-from bench.placing import place_rig
-from bench.results import hash_of_files, read_result
-from bench.session import Session
-from bench.settings import Settings
-from bench.signals import read_signals
-from bench.trial import Trial
-from bench.unit import Unit, evaluate_unit, see_unit
-from bench.workers import Workers
+from bench.base.atomic import lock_output
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.results import hash_of_files, read_result
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.cameras.calibration import calibrate_session
+from bench.friction.error_map import write_error_map
+from bench.friction.explained import write_explained
+from bench.friction.runs import with_runs
+from bench.friction.tables import SurfaceFriction, friction_of, write_friction
+from bench.gauges.checks import Undetermined, check_alive
+from bench.gauges.drift import drift_rate, free_slope
+from bench.gauges.felt import strokes_of
+from bench.gauges.fit import fit_gauges
+from bench.gauges.gauges_file import given_gauges
+from bench.gauges.matrix import Gauges
+from bench.gauges.readings import Pairs, pairs_of
+from bench.report.assembly import write_tables
+from bench.session.check import checked_session
+from bench.session.session import Session
+from bench.session.signals import read_signals
+from bench.session.trial import Trial
+from bench.trials.estimates import estimators
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit, evaluate_unit, see_unit
 
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 
@@ -119,9 +119,9 @@ def report(
     figures: Sequence[str],
 ) -> int:
     """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
-    from bench.figures import write_figures
-    from bench.score import score
-    from bench.summary import write_summary
+    from bench.report.figures import write_figures
+    from bench.report.score import score
+    from bench.report.summary import write_summary
 
     figures = [*write_figures(session, out, results, settings, pool), *figures]
     scores = score(session, out, gauges)

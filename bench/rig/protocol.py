@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from bench.errors import BadInput
+from bench.base.errors import BadInput
 
 Three = tuple[float, float, float]
 Pair = tuple[float, float]

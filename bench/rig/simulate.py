@@ -7,11 +7,11 @@ from pathlib import Path
 
 import cv2
 
-from bench.errors import BadInput
+from bench.base.errors import BadInput
+from bench.base.workers import Workers
 from bench.rig import build, papers
 from bench.rig.parts import Job, Part
 from bench.rig.protocol import load
-from bench.workers import Workers
 
 _MEGABYTES = {"jpg": 0.28, "png": 0.46, "mkv": 0.45}  # a picture of 1280 × 720 (tests/speed/rig.py)
 _PICTURE_S, _WHISK_S = 0.08, 0.3  # of one core

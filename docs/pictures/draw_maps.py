@@ -12,7 +12,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.model_error_maps import MAPS, write_map
+from bench.theory.model_error_maps import MAPS, write_map
 
 HERE = Path(__file__).parent
 WIDTH_PX = 1400

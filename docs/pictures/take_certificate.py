@@ -6,10 +6,10 @@
 import argparse
 from pathlib import Path
 
-from bench.check import checked_session
-from bench.doubts import Doubts
-from bench.gauge_calibration import calibrate_gauges, chosen_trials
-from bench.gauge_certificate import page
+from bench.base.doubts import Doubts
+from bench.calibrate_gauges import calibrate_gauges, chosen_trials
+from bench.gauges.certificate import page
+from bench.session.check import checked_session
 
 HERE = Path(__file__).resolve().parent
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.calibration import SessionCalibration
-from bench.results import hash_of
-from bench.seen import whisk_record
-from bench.settings import Settings
-from bench.signals import forward_strokes
-from vision.truth import FrameTruth, Smooth, WhiskTruth
+from bench.base.results import hash_of
+from bench.base.settings import Settings
+from bench.cameras.calibration import SessionCalibration
+from bench.session.signals import forward_strokes
+from bench.trials.seen import whisk_record
+from vision.truth.records import FrameTruth, Smooth, WhiskTruth
 
 SIGMA_MM, SIGMA_RAD = 0.005, np.radians(0.05)
 
@@ -129,7 +129,7 @@ def exact_vision(monkeypatch):
         looks.append(trial.name)
         return see_exactly(session, trial, *rest)
 
-    monkeypatch.setattr("bench.unit.see_trial", see)
+    monkeypatch.setattr("bench.trials.unit.see_trial", see)
     nothing = SessionCalibration(None, {}, hash_of("exact"))
     monkeypatch.setattr("bench.evaluate.calibrate_session", lambda session, out: nothing)
     return looks

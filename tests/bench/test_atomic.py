@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from bench.atomic import lock_output, whole_file, write_whole
-from bench.errors import BadInput
+from bench.base.atomic import lock_output, whole_file, write_whole
+from bench.base.errors import BadInput
 
 
 def test_a_file_is_written_with_its_folders(tmp_path):

@@ -6,10 +6,10 @@ import shutil
 import numpy as np
 import pytest
 
-from bench.board_views import sampled_frames
-from bench.calibrate_cameras import calibrate_cameras_command
-from bench.errors import BadInput
-from vision.cameras_file import read_cameras
+from bench.base.errors import BadInput
+from bench.cameras.board_views import sampled_frames
+from bench.cameras.calibrate import calibrate_cameras_command
+from vision.calibration.cameras_file import read_cameras
 
 MANIFEST = """format = 1
 [board]

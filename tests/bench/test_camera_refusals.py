@@ -7,11 +7,11 @@ import tomllib
 import cv2
 import pytest
 
-from bench.calibration import calibrate_session
-from bench.check import checked_session
+from bench.cameras.calibration import calibrate_session
 from bench.cli import main
-from bench.session import load_session
-from vision.cameras_file import read_cameras
+from bench.session.check import checked_session
+from bench.session.session import load_session
+from vision.calibration.cameras_file import read_cameras
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from bench import cli
-from bench.errors import BadInput
+from bench.base.errors import BadInput
 
 VERBS = ["check", "calibrate cameras", "calibrate gauges", "evaluate", "simulate", "info"]
 VERBS += ["figures 5", "figures 6", "figures 8", "figures tilt", "figures radius"]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.drift import FreeSlope, allow_drift, drift_rate, free_slope
-from bench.felt import Stroke
+from bench.gauges.drift import FreeSlope, allow_drift, drift_rate, free_slope
+from bench.gauges.felt import Stroke
 
 RATE_HZ, SPEED = 2000.0, np.radians(10.0)
 

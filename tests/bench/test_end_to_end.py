@@ -4,9 +4,9 @@ import csv
 
 import pytest
 
+from bench.base.settings import Settings
 from bench.cli import main
 from bench.evaluate import evaluate
-from bench.settings import Settings
 
 
 def read(path) -> list[dict]:

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from bench import environment
-from bench.errors import BadInput
+from bench.base import environment
+from bench.base.errors import BadInput
 
 
 def distributions(*names):

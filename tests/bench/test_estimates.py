@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bench.drift import allow_drift
-from bench.errors import BadInput
-from bench.estimates import Hand, answers, as_felt, estimators, felt_whisk
-from bench.felt import Stroke
-from bench.gauges import GaugeMatrix
-from bench.settings import Settings
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.gauges.drift import allow_drift
+from bench.gauges.felt import Stroke
+from bench.gauges.matrix import GaugeMatrix
+from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
 

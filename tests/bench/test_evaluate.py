@@ -7,10 +7,10 @@ import shutil
 import numpy as np
 import pytest
 
-from bench.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
-from bench.errors import BadInput
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.settings import Settings
+from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
 
 TRUE_ALPHA = Settings(alpha_est_deg=10.5)
 
@@ -154,7 +154,7 @@ def test_truth_files_change_no_result(small_copy, exact_vision, tmp_path):
 
 def test_an_interrupted_run_goes_on_where_it_stopped(small_copy, exact_vision, tmp_path, monkeypatch):
     """Ctrl-C in the third trial: what is finished stands whole, nothing else is there, and is not done again."""
-    from bench import unit
+    from bench.trials import unit
 
     out, done = tmp_path / "out", []
     finished = unit.write_result
@@ -239,7 +239,7 @@ def test_estimators_of_ones_own_stand_beside_the_others(without_pictures, tmp_pa
 
 
 def test_two_runs_never_write_to_one_folder(without_pictures, tmp_path):
-    from bench.atomic import lock_output
+    from bench.base.atomic import lock_output
 
     with lock_output(tmp_path / "out"), pytest.raises(BadInput, match="another run"):
         run(without_pictures, tmp_path / "out")

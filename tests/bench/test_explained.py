@@ -5,13 +5,13 @@ import csv
 import numpy as np
 import pytest
 
-from bench.alphas import seen_friction
+from bench.base.results import plain
+from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.explained import by_10
-from bench.results import plain
-from bench.session import load_session
-from bench.settings import Settings
-from bench.whisker import Whisker
+from bench.friction.alphas import seen_friction
+from bench.friction.explained import by_10
+from bench.session.session import load_session
+from bench.session.whisker import Whisker
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk

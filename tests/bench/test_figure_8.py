@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from bench.base.settings import Settings
 from bench.evaluate import evaluate
+from bench.report.pooled import pooled
 from bench.rig.simulate import simulate
-from bench.runs import pooled
-from bench.settings import Settings
 
 KINETIC_DEG, STATIC_DEG = 12.3, 17.0
 # One coefficient on "smooth", stick–slip on "rough"; people set everything as they wanted, so few slopes are enough.

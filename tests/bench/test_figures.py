@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from bench.compare import Judged
-from bench.drawing import is_drawn, save
-from bench.figure_8 import figure_8
-from bench.figures import error_against_slope
-from bench.planes import contact_path, sensing_plane
-from bench.results import plain
-from bench.session import load_session
-from bench.settings import Settings
-from bench.surfaces import Felt, Surface
+from bench.base.drawing import is_drawn, save
+from bench.base.results import plain
+from bench.base.settings import Settings
+from bench.friction.surfaces import Felt, Surface
+from bench.report.figure_8 import figure_8
+from bench.report.figures import error_against_slope
+from bench.report.planes import contact_path, sensing_plane
+from bench.session.session import load_session
+from bench.trials.compare import Judged
 from estimator import slip
 from estimator.friction import fit_alpha
 

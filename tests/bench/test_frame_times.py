@@ -5,10 +5,10 @@ import shutil
 import numpy as np
 import pytest
 
-from bench.errors import BadInput
-from bench.frame_times import FrameTimes, frame_times, merge_times
-from bench.session import load_session
-from bench.signals import forward_strokes, read_signals
+from bench.base.errors import BadInput
+from bench.session.frame_times import FrameTimes, frame_times, merge_times
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, read_signals
 
 
 @pytest.fixture

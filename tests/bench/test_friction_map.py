@@ -5,9 +5,9 @@ import csv
 import numpy as np
 import pytest
 
-from bench.explained import SHARES, draw_explained, mean_row
-from bench.friction_map import draw_error_map, measured_cells, write_error_map
-from bench.friction_tables import friction_of
+from bench.friction.error_map import draw_error_map, measured_cells, write_error_map
+from bench.friction.explained import SHARES, draw_explained, mean_row
+from bench.friction.tables import friction_of
 from tests.bench.test_friction_runs import WHISKER, result
 
 ALPHA_EST = np.radians(10.0)

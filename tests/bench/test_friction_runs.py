@@ -5,13 +5,13 @@ import csv
 import numpy as np
 import pytest
 
-from bench.alphas import mean_alpha
-from bench.assembly import estimate_rows
-from bench.friction_runs import FITTED, SEEN, with_runs
-from bench.friction_tables import alpha_lines, friction_of, write_friction
-from bench.results import plain
-from bench.section_vii import Contact, by_consistency, by_tilting, weights
-from bench.whisker import Whisker
+from bench.base.results import plain
+from bench.friction.alphas import mean_alpha
+from bench.friction.runs import FITTED, SEEN, with_runs
+from bench.friction.section_vii import Contact, by_consistency, by_tilting, weights
+from bench.friction.tables import alpha_lines, friction_of, write_friction
+from bench.report.assembly import estimate_rows
+from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.distance import with_friction
 

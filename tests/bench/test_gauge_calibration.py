@@ -9,21 +9,21 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.calibration import SessionCalibration
-from bench.errors import BadInput
+from bench.base.errors import BadInput
+from bench.base.results import hash_of
+from bench.base.settings import Settings
+from bench.calibrate_gauges import calibrate_gauges_command
+from bench.cameras.calibration import SessionCalibration
 from bench.evaluate import evaluate
-from bench.gauge_calibration import calibrate_gauges_command
-from bench.gauges_file import read_gauges
-from bench.results import hash_of
+from bench.gauges.gauges_file import read_gauges
 from bench.rig.simulate import simulate
-from bench.settings import Settings
 
 
 @pytest.fixture
 def calibrate(monkeypatch, exact_vision):
     """The command with exact vision."""
     nothing = SessionCalibration(None, {}, hash_of("exact"))
-    monkeypatch.setattr("bench.gauge_calibration.calibrate_session", lambda session, out: nothing)
+    monkeypatch.setattr("bench.calibrate_gauges.calibrate_session", lambda session, out: nothing)
     return lambda session, out, **options: calibrate_gauges_command(session, out, workers=0, **options)
 
 

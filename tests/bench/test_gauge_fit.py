@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bench.errors import BadInput
-from bench.felt import Stroke
-from bench.gauge_checks import check_alive
-from bench.gauge_fit import fit_gauges, fit_matrix
-from bench.gauge_readings import Pairs
-from bench.gauges import GaugeMatrix, to_follicle
+from bench.base.errors import BadInput
+from bench.gauges.checks import check_alive
+from bench.gauges.felt import Stroke
+from bench.gauges.fit import fit_gauges, fit_matrix
+from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.gauges.readings import Pairs
 
 TRUE = np.array([[11.3, 0.32], [-0.25, 10.5]])
 THETA = np.radians([0.5, 1.5, 2.5, 3.5, 4.5])

@@ -6,19 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.drift import drift_rate, free_slope
-from bench.felt import strokes_of
-from bench.gauge_fit import fit_gauges
-from bench.gauge_readings import known_from_nominal, known_from_pictures, pairs_of
-from bench.results import plain
+from bench.base.results import plain
+from bench.base.settings import Settings
+from bench.gauges.drift import drift_rate, free_slope
+from bench.gauges.felt import strokes_of
+from bench.gauges.fit import fit_gauges
+from bench.gauges.readings import known_from_nominal, known_from_pictures, pairs_of
 from bench.rig.bar import Bar, first_touch
 from bench.rig.contact import moments_Nmm
 from bench.rig.friction import Friction, March
 from bench.rig.rod import Rod
-from bench.session import load_session
-from bench.settings import Settings
-from bench.signals import forward_strokes, read_signals
-from bench.whisker import Whisker
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, read_signals
+from bench.session.whisker import Whisker
 from estimator.signal import Touch
 
 WHISKER = Whisker("cylinder", 100.0, 1.0, 60.0)

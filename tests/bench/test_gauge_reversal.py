@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.felt import strokes_of
-from bench.gauge_reversal import in_percent, reversals
-from bench.settings import Settings
-from bench.signals import Signals
+from bench.base.settings import Settings
+from bench.gauges.felt import strokes_of
+from bench.gauges.reversal import in_percent, reversals
+from bench.session.signals import Signals
 
 TRIAL = SimpleNamespace(name="gauge", speed_deg_s=10.0)
 LAG_V, LEFT_V = 0.03, 0.008

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-from bench import model_error_maps
-from bench.model_error import ROD, Push, error_percent, predicted_percent, radius_map, tilt_map
-from bench.model_error_maps import MAPS, Map, write_map
-from bench.workers import Workers
+from bench.base.workers import Workers
+from bench.theory import model_error_maps
+from bench.theory.model_error import ROD, Push, error_percent, predicted_percent, radius_map, tilt_map
+from bench.theory.model_error_maps import MAPS, Map, write_map
 
 THIN_MM = 1e-6  # radius of a bar that is nearly a line
 

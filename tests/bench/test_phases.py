@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.felt import strokes_of
-from bench.phases import KINETIC, NO_PHASES, STATIC, felt_phases, from_plain, seen_phases
-from bench.results import plain
+from bench.base.results import plain
+from bench.base.settings import Settings
+from bench.gauges.felt import strokes_of
 from bench.rig.simulate import simulate
-from bench.session import load_session
-from bench.settings import Settings
-from bench.signals import read_signals
+from bench.session.session import load_session
+from bench.session.signals import read_signals
+from bench.trials.phases import KINETIC, NO_PHASES, STATIC, felt_phases, from_plain, seen_phases
 
 C, D_X, BETA = 8835.7, 60.0, np.radians(50.0)
 ALPHA_STATIC, ALPHA_KINETIC = np.radians(23.0), np.radians(18.5)

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.calibration import SessionCalibration
-from bench.doubts import Doubts
-from bench.errors import BadInput
-from bench.placing import place_rig
-from bench.results import plain
-from bench.session import load_session
-from bench.settings import Settings
-from bench.unit import Unit
-from bench.workers import Workers
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.results import plain
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.cameras.calibration import SessionCalibration
+from bench.session.session import load_session
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit
 from tests.vision.test_fit import CAMERAS
 from tests.vision.test_place import some_lines
 
@@ -40,7 +40,7 @@ def place(small_copy, monkeypatch):
             base = plain(lines.setdefault((unit.stage, unit.trial.name), made))
             return {"whisks": [{"base": base}, {"base": None}, {"status": "no pictures"}]}
 
-        monkeypatch.setattr("bench.placing.see_unit", see)
+        monkeypatch.setattr("bench.trials.placing.see_unit", see)
         session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)
         session = session if board else replace(session, T_rig_board=None)
         before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",), session.T_rig_board)

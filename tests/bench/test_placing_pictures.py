@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.calibration import SessionCalibration, on_the_rig
-from bench.doubts import Doubts
-from bench.errors import BadInput
-from bench.placing import place_rig
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.cameras.calibration import SessionCalibration, on_the_rig
 from bench.rig.simulate import simulate
-from bench.session import load_session
-from bench.settings import Settings
-from bench.unit import Unit, see_unit
-from bench.workers import Workers
+from bench.session.session import load_session
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit, see_unit
 from tests.rig.test_seen_by_vision import exact_cameras
-from vision.pictures import read_picture
-from vision.rotation import compose, invert_transform
-from vision.scene import Cameras
+from vision.geometry.rotation import compose, invert_transform
+from vision.geometry.scene import Cameras
+from vision.pictures.files import read_picture
 
 PROTOCOL = """
 name = "wide"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.rails import off_the_rails
+from bench.session.rails import off_the_rails
 
 
 def ramp(rng, noise=0.01):

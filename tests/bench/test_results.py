@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.results import hash_of, hash_of_files, number, plain, read_result, write_result
+from bench.base.results import hash_of, hash_of_files, number, plain, read_result, write_result
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.rod import moment_at_clamp
+from bench.gauges.rod import moment_at_clamp
 
 EI = 2945.2431  # N·mm²: 60 GPa, 1 mm
 
@@ -18,7 +18,7 @@ def elastica(end_angle: float, friction_angle: float) -> tuple[float, float]:
     """(across/along, moment · along / EI) of a clamped elastica with tangent angle `end_angle` at its contact.
 
     EI ψ'²/2 = F (sin(ψ_e − ψ + λ) − sin λ), by quadrature in u = √(ψ_e − ψ), where the integrand is smooth. No code and
-    no method is shared with the fixed point of `bench.rod`.
+    no method is shared with the fixed point of `bench.gauges.rod`.
     """
     u, w = np.polynomial.legendre.leggauss(60)
     u, w = 0.5 * np.sqrt(end_angle) * (u + 1), 0.5 * np.sqrt(end_angle) * w

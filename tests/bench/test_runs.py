@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bench import cli
-from bench.assembly import write_tables
-from bench.errors import BadInput
-from bench.results import write_result
-from bench.runs import pooled
+from bench.base.errors import BadInput
+from bench.base.results import write_result
+from bench.report.assembly import write_tables
+from bench.report.pooled import pooled
 from estimator import slip
 
 EI = 2945.2

@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from bench.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS, write_table
-from bench.friction_tables import WHISK_COLUMNS as FRICTION_COLUMNS
-from bench.gauges import GaugeMatrix, Gauges
-from bench.score import Score, score
-from bench.session import load_session
+from bench.friction.tables import WHISK_COLUMNS as FRICTION_COLUMNS
+from bench.gauges.matrix import GaugeMatrix, Gauges
+from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS, write_table
+from bench.report.score import Score, score
+from bench.session.session import load_session
 
 
 @pytest.fixture

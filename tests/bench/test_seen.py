@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from bench.calibration import _backgrounds
-from bench.frame_times import frame_times, read_trial
-from bench.seen import _lost
-from bench.session import load_session
-from vision.pictures import read_picture
-from vision.scene import Camera, Cameras
+from bench.cameras.calibration import _backgrounds
+from bench.session.frame_times import frame_times, read_trial
+from bench.session.session import load_session
+from bench.trials.seen import _lost
+from vision.geometry.scene import Camera, Cameras
+from vision.pictures.files import read_picture
 
 
 def test_damaged_frames_are_counted_and_named(small_copy):
@@ -25,7 +25,7 @@ def test_without_a_rig_picture_the_trials_median_is_the_background(small_session
     """Where neither rod ever stands, the median is the rig picture but for noise and light."""
     session = load_session(small_session)
     cameras = Cameras([Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))])
-    monkeypatch.setattr("bench.calibration._FEWEST_FOR_MEDIAN", 3)
+    monkeypatch.setattr("bench.cameras.calibration._FEWEST_FOR_MEDIAN", 3)
     rig = read_picture(session.rig_pictures["high"]).astype(float)
     session.rig_pictures.clear()
     median = _backgrounds(session, cameras)["high"]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.errors import BadInput
-from bench.session import load_session
-from bench.trial import Trial
-from bench.whisker import Whisker
+from bench.base.errors import BadInput
+from bench.session.session import load_session
+from bench.session.trial import Trial
+from bench.session.whisker import Whisker
 
 
 def add(file, text: str) -> None:

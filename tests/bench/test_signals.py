@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.session import load_session
-from bench.signals import forward_strokes, read_signals
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, read_signals
 
 
 def read(session, name="b30_3"):

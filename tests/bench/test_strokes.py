@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.strokes import forward_strokes
+from bench.session.strokes import forward_strokes
 
 RATE_HZ = 2000.0
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.assembly import beam_rows, budget_rows
-from bench.felt import GAUGE_DELAY_S, lateness
-from bench.summary import _beam_lines, _budget_lines, _clock_lines
-from vision.uncertainty import CAUSES
+from bench.gauges.felt import GAUGE_DELAY_S, lateness
+from bench.report.assembly import beam_rows, budget_rows
+from bench.report.summary import _beam_lines, _budget_lines, _clock_lines
+from vision.fit.uncertainty import CAUSES
 
 
 def result(clock=None, **seen) -> dict:

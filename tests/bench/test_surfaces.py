@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.surfaces import surfaces
+from bench.friction.surfaces import surfaces
 from estimator import slip
 
 C = 8835.7

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from bench.theory_figures import PRINTED_POINTS, figure_5, figure_6, write_figure
+from bench.theory.figures import PRINTED_POINTS, figure_5, figure_6, write_figure
 
 
 @pytest.fixture(scope="module")

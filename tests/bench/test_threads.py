@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from bench.threads import in_threads
+from bench.base.threads import in_threads
 
 
 def test_results_come_in_the_items_order():

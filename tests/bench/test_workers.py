@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from bench.errors import BadInput
-from bench.workers import Workers
+from bench.base.errors import BadInput
+from bench.base.workers import Workers
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 

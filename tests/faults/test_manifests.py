@@ -5,10 +5,10 @@ import shutil
 
 import pytest
 
-from bench.check import checked_session
-from bench.doubts import Doubts
-from bench.errors import BadInput
-from bench.session import load_session
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.session.check import checked_session
+from bench.session.session import load_session
 
 
 def refusal(session) -> str:

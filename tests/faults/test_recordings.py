@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.check import checked_session, find_damage
-from bench.doubts import Doubts
-from bench.errors import BadInput
-from bench.footage import read_frames
-from bench.frame_times import frame_times
-from bench.session import load_session
-from bench.signals import forward_strokes, read_signals
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.session.check import checked_session, find_damage
+from bench.session.footage import read_frames
+from bench.session.frame_times import frame_times
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, read_signals
 
 TRIAL = "b30_3"
 

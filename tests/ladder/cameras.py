@@ -19,15 +19,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.board_views import read_board_views
-from bench.calibrate_cameras import calibrate_from
-from bench.session import load_session
-from bench.threads import in_threads
-from vision.calibrate import calibrate_cameras
-from vision.corners import Corners, detect, find_corners
-from vision.held_out import held_out
-from vision.pictures import Frames
-from vision.scene import Board, Camera
+from bench.base.threads import in_threads
+from bench.cameras.board_views import read_board_views
+from bench.cameras.calibrate import calibrate_from
+from bench.session.session import load_session
+from vision.boards.corners import Corners, detect, find_corners
+from vision.calibration.calibrate import calibrate_cameras
+from vision.calibration.held_out import held_out
+from vision.geometry.scene import Board, Camera
+from vision.pictures.files import Frames
 
 ROOT = Path(__file__).resolve().parents[2]
 WEBCAM_BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)

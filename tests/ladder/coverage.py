@@ -26,14 +26,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from bench.rig.parts import Job, frames_of
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
-from vision.errors import Refused
-from vision.fit import solve
-from vision.observe import observe_trial
-from vision.one_view import seen_from_one_side, touch_by_onset
-from vision.problem import Problem, State
-from vision.quantities import jacobians
-from vision.scatter import honest
-from vision.uncertainty import uncertainty
+from vision.bar.one_view import seen_from_one_side, touch_by_onset
+from vision.fit.problem import Problem, State
+from vision.fit.quantities import jacobians
+from vision.fit.scatter import honest
+from vision.fit.solve import solve
+from vision.fit.uncertainty import uncertainty
+from vision.geometry.errors import Refused
+from vision.truth.observe import observe_trial
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}
 # Slip of a scene is that of the frame nearest this pushing angle; its frames share most of their error.

@@ -27,9 +27,9 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench import cli
+from bench.friction.surfaces import Surface
+from bench.report.pooled import pooled, read_run
 from bench.rig.protocol import FOLDER as PROTOCOLS
-from bench.runs import pooled, read_run
-from bench.surfaces import Surface
 from estimator.friction import fit_alpha
 
 STATIC_BY_KINETIC = {"one": 1.0, "stick-slip": 1.25}

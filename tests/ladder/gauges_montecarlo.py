@@ -16,9 +16,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.gauge_fit import fit_matrix
-from bench.gauge_readings import Pairs
-from bench.gauges import to_follicle
+from bench.gauges.fit import fit_matrix
+from bench.gauges.matrix import to_follicle
+from bench.gauges.readings import Pairs
 
 TRUE = np.array([[11.3, 0.32], [-0.25, 10.5]])
 THETA = np.radians([0.5, 1.5, 2.5, 3.5, 4.5])

@@ -18,10 +18,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.scenes import Scene, as_problem, begin, draw_scene, line_points
-from vision.fit import linearise, solve
-from vision.problem import BAR, Problem, State
-from vision.quantities import jacobians, measure
-from vision.uncertainty import camera_rows
+from vision.fit.problem import BAR, Problem, State
+from vision.fit.quantities import jacobians, measure
+from vision.fit.solve import linearise, solve
+from vision.fit.uncertainty import camera_rows
 
 # Steps of about 1e-4 px: rounding leaves 1e-8 of the residual, curvature 1e-6.
 _TILT, _BEND, _LENGTH = 1e-6, 1e-5, 1e-4

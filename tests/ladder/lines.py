@@ -24,14 +24,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from vision.cylinder import WAVES
-from vision.line import Noise, cut_pieces, read_band
-from vision.shading import Knots
-from vision.trace import clear_of_bar, settle, settle_again, to_points, trace
+from vision.lines.bands import Noise, cut_pieces, read_band
+from vision.lines.cylinder import WAVES
+from vision.lines.shading import Knots
+from vision.lines.trace import clear_of_bar, settle, settle_again, to_points, trace
 
 FINE, FRAMES, SHAPE = 5, 13, (110, 300)
 NOISE, PIECE_PX, MARGIN_PX = 2.0, 12, 7
-BESIDE_BAR_PX = 4.0  # as vision.observe has it
+BESIDE_BAR_PX = 4.0  # as vision.truth.observe has it
 
 
 @dataclass(frozen=True)

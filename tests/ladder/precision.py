@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.ladder.coverage import Seen, see_lines
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, line_points
-from vision.fit import solve
+from vision.fit.solve import solve
 
 NAMES = ("d_x", "touch", "beta", "slip")
 COLUMNS = ("trial", *(f"{name}_{what}" for name in NAMES for what in ("error", "sigma")))

@@ -20,15 +20,15 @@ from bench.rig import build
 from bench.rig.protocol import BoardTable, CameraTable, LightTable, PicturesTable, Protocol, TrialTable, WhiskerTable
 from bench.rig.recording import Recording
 from tests.ladder.board_scenes import BOARD, board_views, measured_pose, noisy, rig_view
-from vision import problem as model
-from vision.bar_edges import EDGE_PX
-from vision.calibrate import calibrate_cameras
-from vision.contact import BarAxis
-from vision.line import LinePoints
-from vision.problem import Observed, Problem, State
-from vision.scene import Bar, Camera, Cameras, Wire
-from vision.silhouette import normals, outline
-from vision.swing import outline_of_bar
+from vision.bar.edges import EDGE_PX
+from vision.calibration.calibrate import calibrate_cameras
+from vision.fit import problem as model
+from vision.fit.first_bends import outline_of_bar
+from vision.fit.problem import Observed, Problem, State
+from vision.geometry.contact import BarAxis
+from vision.geometry.scene import Bar, Camera, Cameras, Wire
+from vision.geometry.silhouette import normals, outline
+from vision.lines.bands import LinePoints
 
 POINT_STEP_MM, FIRST_POINT_MM, BESIDE_BAR_PX = 2.4, 6.0, 4.0
 # Small pictures and few frames: a scene costs seconds, and many are wanted.

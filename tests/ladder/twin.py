@@ -22,14 +22,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.atomic import write_whole
-from bench.calibration import calibrate_session
+from bench.base.atomic import write_whole
+from bench.base.settings import Settings
+from bench.cameras.calibration import calibrate_session
 from bench.rig.protocol import load
 from bench.rig.simulate import simulate
-from bench.seen import see_trial
-from bench.session import load_session
-from bench.settings import Settings
-from bench.signals import read_signals
+from bench.session.session import load_session
+from bench.session.signals import read_signals
+from bench.trials.seen import see_trial
 
 TWIN = Path(__file__).with_name("twin.toml")
 UNITS = {"d_x": "mm", "beta": "deg", "slip": "mm"}

@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.drawing import style
+from bench.base.drawing import style
 from bench.rig.protocol import CameraTable, PicturesTable, Protocol, TrialTable
 from tests.ladder.coverage import QUANTITIES, row_of, see_points
 from tests.ladder.scenes import STEP_DEG, Sigmas, make_scene

@@ -22,10 +22,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from vision.errors import Refused
-from vision.follow import Followed, follow
-from vision.line import LinePoints
-from vision.pictures import Frames, read_picture
+from vision.geometry.errors import Refused
+from vision.lines.bands import LinePoints
+from vision.lines.follow import Followed, follow
+from vision.pictures.files import Frames, read_picture
 
 PIECE_PX = 6
 ZOOM = 3

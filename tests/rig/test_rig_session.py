@@ -14,12 +14,12 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.errors import BadInput
+from bench.base.errors import BadInput
 from bench.rig.protocol import FOLDER, load
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
-from bench.session import load_session
-from bench.signals import forward_strokes, frame_times, read_signals
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, frame_times, read_signals
 
 TINY = """
 name = "tiny"

@@ -7,13 +7,13 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.footage import read_frames
 from bench.rig.simulate import simulate
-from bench.session import load_session
-from bench.signals import forward_strokes, frame_times, read_signals
-from vision.observe import observe_trial
-from vision.pictures import read_picture
-from vision.scene import Bar, Camera, Cameras, Wire
+from bench.session.footage import read_frames
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, frame_times, read_signals
+from vision.geometry.scene import Bar, Camera, Cameras, Wire
+from vision.pictures.files import read_picture
+from vision.truth.observe import observe_trial
 
 PROTOCOL = """
 name = "one"

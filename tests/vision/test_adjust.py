@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_recording, moving_board, noisy_view_at
-from vision.adjust import solve
-from vision.board_motion import Trajectory
-from vision.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
-from vision.calibrate import calibrate_alone, calibrate_cameras, lens_knowledge
-from vision.rotation import exp_rotation, left_jacobian, log_rotation
+from vision.calibration.adjust import solve
+from vision.calibration.board_motion import Trajectory
+from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
+from vision.calibration.calibrate import calibrate_alone, calibrate_cameras, lens_knowledge
+from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 
 VIEWS, CAMERAS = 4, 2
 CORNERS = np.array([[x, y, 0.0] for y in (0, 15, 30) for x in (0, 15, 30, 45)])

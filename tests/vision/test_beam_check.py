@@ -6,8 +6,8 @@ import pytest
 from bench.rig.protocol import WhiskerTable
 from tests.ladder.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
 from tests.ladder.scenes import as_problem, draw_scene, line_points
-from vision.beam_check import BeamCheck, Compared, _beside, _chance
-from vision.scene import Wire
+from vision.fit.beam_check import BeamCheck, Compared, _beside, _chance
+from vision.geometry.scene import Wire
 
 
 def checked(seed: int, softness=None, shape="cylinder", given="cylinder") -> BeamCheck:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.speed.tracer import KNOTS, NOISE, rough_bands, wire_frames
-from vision.binned import binned, without
-from vision.cylinder import WAVES
-from vision.line import Noise, cut_pieces
-from vision.shading import fit_shading, wave_prior
+from vision.lines.bands import Noise, cut_pieces
+from vision.lines.binned import binned, without
+from vision.lines.cylinder import WAVES
+from vision.lines.shading import fit_shading, wave_prior
 
 
 @pytest.fixture(scope="module")

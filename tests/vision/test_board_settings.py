@@ -7,8 +7,8 @@ import pytest
 
 from tests.ladder.board_scenes import BOARD
 from tests.vision.test_corners import picture
-from vision.board_settings import check_settings, why_not_found
-from vision.errors import Refused
+from vision.boards.diagnosis import check_settings, why_not_found
+from vision.geometry.errors import Refused
 
 
 @pytest.fixture

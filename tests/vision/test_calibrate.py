@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_recording, noisy
-from vision.calibrate import calibrate_cameras
-from vision.corners import Corners
-from vision.errors import Refused
-from vision.recording import check_lens
-from vision.scene import Camera
-from vision.static_board import camera_moved, mean_view
+from vision.boards.corners import Corners
+from vision.boards.static_board import camera_moved, mean_view
+from vision.boards.sufficiency import check_lens
+from vision.calibration.calibrate import calibrate_cameras
+from vision.geometry.errors import Refused
+from vision.geometry.scene import Camera
 
 SIGMA_PX = 0.04
 # The session's contract: 0 to 100 mm along x, a bar's ± 30 mm to either side.
@@ -21,8 +21,8 @@ RIG_POINTS = np.array([[x, 0.0, z] for x in np.linspace(0, 100, 11) for z in (-3
 
 @pytest.fixture(scope="module")
 def steel_views(steel_sample):
-    from bench.board_views import read_board_views
-    from bench.session import load_session
+    from bench.cameras.board_views import read_board_views
+    from bench.session.session import load_session
 
     session = load_session(steel_sample)
     return session, read_board_views(session)
@@ -38,7 +38,7 @@ def true_cameras(steel_sample):
 
 
 def test_a_recorded_session_against_its_truth(steel_views, true_cameras):
-    from bench.calibrate_cameras import calibrate_from
+    from bench.cameras.calibrate import calibrate_from
 
     made = calibrate_from(*steel_views)
     for camera in made.cameras:

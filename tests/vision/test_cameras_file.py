@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vision.cameras_file import read_cameras, write_cameras
-from vision.errors import Refused
-from vision.scene import Camera, Cameras
+from vision.calibration.cameras_file import read_cameras, write_cameras
+from vision.geometry.errors import Refused
+from vision.geometry.scene import Camera, Cameras
 
 
 @pytest.fixture

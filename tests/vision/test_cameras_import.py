@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD, T_RIG_BOARD, noisy, rig_view, two_cameras
-from vision.cameras_import import import_cameras, place_on_rig
-from vision.errors import Refused
-from vision.rotation import log_rotation
+from vision.calibration.cameras_import import import_cameras, place_on_rig
+from vision.geometry.errors import Refused
+from vision.geometry.rotation import log_rotation
 
 ANIPOSE = """
 [cam_0]

@@ -8,11 +8,11 @@ import pytest
 from bench.rig.protocol import PicturesTable
 from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.effort import VisionSettings
-from vision.fit import linearise, solve
-from vision.quantities import jacobians
-from vision.report import to_whisk
-from vision.uncertainty import Uncertainty
+from vision.fit.quantities import jacobians
+from vision.fit.solve import linearise, solve
+from vision.fit.uncertainty import Uncertainty
+from vision.geometry.settings import VisionSettings
+from vision.truth.rows import to_whisk
 
 OFF_S = 0.025
 

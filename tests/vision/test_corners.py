@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD
-from vision.corners import Corners, detect, find_corners, refine_corners
-from vision.scene import Board
+from vision.boards.corners import Corners, detect, find_corners, refine_corners
+from vision.geometry.scene import Board
 
 SIZE_PX = (800, 560)  # not square, and no multiple of the board
 PX_PER_SQUARE_PRINTED = 120

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from vision.cylinder import WAVES, rim_bells, round_the_rod, shaded, shading_basis
+from vision.lines.cylinder import WAVES, rim_bells, round_the_rod, shaded, shading_basis
 
 # Linear between 12 rows a blur and between steps of 5 % in radius over blur: (1/12)²/8 and 0.05²/8, times at most the
 # 0.5 of a blurred edge's curvature; and of higher waves somewhat more.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vision.descent import descend
+from vision.geometry.newton import descend
 
 STEPS, LONGEST = np.array([0.1, 0.1]), np.array([0.5, 0.5])
 

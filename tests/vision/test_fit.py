@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vision.contact import BarAxis, clearance, contact_frame_angles
-from vision.fit import bar_middle, linearise, solve
-from vision.line import LinePoints
-from vision.problem import Observed, Problem, State, bar_axis, bends, curves_of
-from vision.quantities import measure
-from vision.scene import Camera, Cameras, Wire
-from vision.silhouette import normals
-from vision.touch import first_touch
-from vision.wire import Curves, centrelines, rotation_z
+from vision.fit.problem import Observed, Problem, State, bar_axis, bends, curves_of
+from vision.fit.quantities import measure
+from vision.fit.solve import bar_middle, linearise, solve
+from vision.fit.touch import first_touch
+from vision.geometry.centreline import Curves, centrelines, rotation_z
+from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
+from vision.geometry.scene import Camera, Cameras, Wire
+from vision.geometry.silhouette import normals
+from vision.lines.bands import LinePoints
 
 WIRE = Wire("cylinder", 100.0, 1.0)
 REACH = 3.5
@@ -138,7 +138,7 @@ def test_scatter_is_as_stated(rng):
 
 
 def _gradient(problem, state, name):
-    from vision.quantities import jacobians
+    from vision.fit.quantities import jacobians
 
     return jacobians(problem, state)[1].whisk[name]
 

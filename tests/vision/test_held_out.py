@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vision.calibrate import calibrate_cameras
-from vision.corners import Corners, find_corners
-from vision.held_out import held_out
-from vision.pictures import Frames
-from vision.scene import Board
+from vision.boards.corners import Corners, find_corners
+from vision.calibration.calibrate import calibrate_cameras
+from vision.calibration.held_out import held_out
+from vision.geometry.scene import Board
+from vision.pictures.files import Frames
 
 BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)
 

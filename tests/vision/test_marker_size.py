@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.vision.test_corners import BOARD, picture
-from vision.errors import Refused
-from vision.marker_size import check_marker_size
+from vision.boards.marker_size import check_marker_size
+from vision.geometry.errors import Refused
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from vision.observe import observe_trial
-from vision.pictures import Frames, read_picture
-from vision.scene import Bar, Camera, Cameras, Wire
+from vision.geometry.scene import Bar, Camera, Cameras, Wire
+from vision.pictures.files import Frames, read_picture
+from vision.truth.observe import observe_trial
 
 WIRE, BAR = Wire("cylinder", 100.0, 1.0), Bar(6.0)
 

@@ -8,11 +8,11 @@ import pytest
 from bench.rig.protocol import PicturesTable
 from tests.ladder.lines import SCENES, errors, first_look
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.fit import solve
-from vision.one_sided import Lit, SeenWidth, one_sided_lines, seen_width
-from vision.problem import WIRE_OFFSET_PX
-from vision.quantities import jacobians
-from vision.trace import to_points
+from vision.fit.problem import WIRE_OFFSET_PX
+from vision.fit.quantities import jacobians
+from vision.fit.solve import solve
+from vision.lines.one_sided import Lit, SeenWidth, one_sided_lines, seen_width
+from vision.lines.trace import to_points
 
 
 def looked_at(name, rng):

@@ -8,20 +8,20 @@ import pytest
 from tests.ladder.bar_lines import AWAY_MM, CENTRE, RADIUS_MM, edges_px, noisy_view, painted
 from tests.ladder.lines import squares
 from tests.vision.test_fit import CAMERAS, REACH, begun, camera, scene, with_points
-from vision.bar import settle_axis
-from vision.bar_edges import measure_edges
-from vision.contact import BarAxis, upward
-from vision.effort import VisionSettings
-from vision.errors import Refused
-from vision.fit import linearise, solve
-from vision.line import LinePoints
-from vision.one_view import axis_from_edges, find_bar_alone, seen_from_one_side, touch_by_onset
-from vision.onset import Onset, onset
-from vision.problem import Observed, State, bar_axis
-from vision.quantities import jacobians
-from vision.scene import Cameras
-from vision.silhouette import grazed, normals
-from vision.uncertainty import uncertainty, variance_by_cause
+from vision.bar.axis import settle_axis
+from vision.bar.edges import measure_edges
+from vision.bar.one_view import axis_from_edges, find_bar_alone, seen_from_one_side, touch_by_onset
+from vision.fit.onset import Onset, onset
+from vision.fit.problem import Observed, State, bar_axis
+from vision.fit.quantities import jacobians
+from vision.fit.solve import linearise, solve
+from vision.fit.uncertainty import uncertainty, variance_by_cause
+from vision.geometry.contact import BarAxis, upward
+from vision.geometry.errors import Refused
+from vision.geometry.scene import Cameras
+from vision.geometry.settings import VisionSettings
+from vision.geometry.silhouette import grazed, normals
+from vision.lines.bands import LinePoints
 
 PLACES_MM = np.array([-20.0, 20.0])
 

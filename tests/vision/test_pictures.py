@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.errors import Refused
-from vision.pictures import Frames, natural_order, read_picture
+from vision.geometry.errors import Refused
+from vision.pictures.files import Frames, natural_order, read_picture
 
 WIDTH, HEIGHT = 322, 242  # not square, not a multiple of 16
 

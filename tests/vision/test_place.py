@@ -5,8 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from vision.errors import Refused
-from vision.place import (
+from vision.calibration.place import (
     BaseLines,
     Placement,
     by_board,
@@ -16,8 +15,9 @@ from vision.place import (
     combine,
     placed,
 )
-from vision.rotation import exp_rotation
-from vision.scene import Camera, Cameras
+from vision.geometry.errors import Refused
+from vision.geometry.rotation import exp_rotation
+from vision.geometry.scene import Camera, Cameras
 
 RISE = 0.01
 STEP = np.array([0.002, -0.003, 0.004, 0.05, -0.04, 0.03])

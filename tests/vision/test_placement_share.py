@@ -8,11 +8,11 @@ import pytest
 from bench.rig.protocol import PicturesTable
 from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import Sigmas, as_problem, begin, calibrated, draw_scene, given, line_points
-from vision.cameras_file import read_cameras, write_cameras
-from vision.fit import solve
-from vision.quantities import jacobians
-from vision.scene import Cameras
-from vision.uncertainty import uncertainty, variance_by_cause
+from vision.calibration.cameras_file import read_cameras, write_cameras
+from vision.fit.quantities import jacobians
+from vision.fit.solve import solve
+from vision.fit.uncertainty import uncertainty, variance_by_cause
+from vision.geometry.scene import Cameras
 
 
 def scene_of(rig: float):

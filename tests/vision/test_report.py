@@ -5,12 +5,12 @@ import pytest
 
 from bench.rig.protocol import PicturesTable
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.effort import VisionSettings
-from vision.fit import solve
-from vision.problem import BAR
-from vision.quantities import jacobians
-from vision.report import to_whisk
-from vision.uncertainty import Uncertainty
+from vision.fit.problem import BAR
+from vision.fit.quantities import jacobians
+from vision.fit.solve import solve
+from vision.fit.uncertainty import Uncertainty
+from vision.geometry.settings import VisionSettings
+from vision.truth.rows import to_whisk
 
 
 def row_of(noise_of):

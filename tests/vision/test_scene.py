@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.errors import Refused
-from vision.rotation import exp_rotation
-from vision.scene import N_PARAMETERS, Bar, Board, Camera, Cameras, Wire
+from vision.geometry.errors import Refused
+from vision.geometry.rotation import exp_rotation
+from vision.geometry.scene import N_PARAMETERS, Bar, Board, Camera, Cameras, Wire
 
 
 def a_camera(name="high", seed=0, **changes):

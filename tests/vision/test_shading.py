@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from vision.shading import Knots
+from vision.lines.shading import Knots
 
 PLACES = np.array([0.0, 10.0, 20.0])
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.touch import frames_that_touch
+from vision.fit.touch import frames_that_touch
 
 MOTOR = np.radians(np.arange(0.8, 6.5, 0.7))
 

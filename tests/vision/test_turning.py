@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.vision.test_fit import CAMERAS
-from vision.errors import Refused
-from vision.rotation import apply, compose, exp_rotation, invert_transform
-from vision.turning import MovingLines, first_rig, moving_lines
+from vision.calibration.turning import MovingLines, first_rig, moving_lines
+from vision.geometry.errors import Refused
+from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
 
 T_WORLD_RIG = np.column_stack([exp_rotation(np.array([0.4, -2.0, 0.9])), [30.0, -200.0, 410.0]])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.ladder.scenes import LUMP, as_problem, begin, draw_scene, line_points, lumpy_noise
-from vision.fit import solve, weighted_jacobian
-from vision.scatter import honest
-from vision.uncertainty import uncertainty
+from vision.fit.scatter import honest
+from vision.fit.solve import solve, weighted_jacobian
+from vision.fit.uncertainty import uncertainty
 
 ALIKE = 0.6  # with the next point, 0.36 with the one after …: (1 + 0.6)/(1 - 0.6) times the variance of a mean
 

@@ -1,0 +1,73 @@
+"""Files that are written whole or not at all, and one run at a time on one output folder."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bench.base.errors import BadInput
+
+try:
+    import fcntl
+except ImportError:  # not on Windows; there two runs on one folder are the user's to avoid
+    fcntl = None
+
+LOCK = ".lock"
+
+
+def write_whole(path: Path, data: str | bytes) -> None:
+    """The old file or the new one, never half of either, whatever stops the run. Makes folders as needed."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A temporary path beside `path`, of the same suffix, for writers that want one.
+
+    It becomes `path` on leaving; where the block raises, nothing is left of it.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+@contextmanager
+def lock_output(folder: Path) -> Iterator[None]:
+    """Hold `folder` (made as needed) for one run. Raises BadInput where another run holds it.
+
+    The lock ends with the process, however that ends.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / LOCK).open("a+") as lock:
+        _hold(lock, folder)
+        lock.truncate(0)
+        lock.write(f"{os.getpid()}\n")
+        lock.flush()
+        yield
+
+
+def _hold(lock, folder: Path) -> None:
+    if fcntl is None:
+        return
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.seek(0)
+        pid = lock.read().strip() or "unknown"
+        raise BadInput(f"another run (process {pid}) writes to this folder; wait for it", file=folder) from None

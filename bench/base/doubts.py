@@ -1,0 +1,30 @@
+"""What is wrong or doubtful in the input: `evaluate` stops at the first refusal, `check` collects all."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from bench.base.errors import BadInput
+
+
+@dataclass
+class Doubts:
+    """Refusals (bad input) and notes (usable, but look at it), in the order in which they were found."""
+
+    stop_at_first: bool = True
+    refusals: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @contextmanager
+    def guard(self) -> Iterator[None]:
+        """Run one loader: its BadInput goes up at once, or is kept so that the next file is read too."""
+        try:
+            yield
+        except BadInput as bad:
+            if self.stop_at_first:
+                raise
+            self.refusals.append(str(bad))
+
+    def note(self, line: str) -> None:
+        """Keep a line that the user should read; the run goes on."""
+        self.notes.append(line)

@@ -1,0 +1,77 @@
+"""What all figures share: look, colours, and files that are written whole with the hash of what they show."""
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from bench.base.atomic import whole_file
+
+COLOURS = {
+    "no_slip": "#b2182b",
+    "with_friction": "#2166ac",
+    "frictionless": "#e08214",
+    "with_friction_fitted": "#67a9cf",
+    "with_friction_seen": "#35978f",
+}
+OTHER_COLOURS = ("#1b7837", "#762a83", "#8c510a", "#01665e")
+LABELS = {
+    "no_slip": "(2) no slip",
+    "with_friction": "(10) with friction",
+    "frictionless": "(12) frictionless",
+    "with_friction_fitted": "(10), α fitted",
+    "with_friction_seen": "(10), α seen",
+}
+_STYLE = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "axes.linewidth": 0.8,
+}
+_STAMP = "Source"
+SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
+
+
+def style():
+    """Context in which figures are made."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def colour_of(estimator: str, number: int = 0) -> str:
+    """The built-in estimators keep their colours; others take theirs by number."""
+    return COLOURS.get(estimator, OTHER_COLOURS[number % len(OTHER_COLOURS)])
+
+
+def label_of(estimator: str) -> str:
+    """An estimator as the legend names it."""
+    return LABELS.get(estimator, estimator.partition(":")[2] or estimator)
+
+
+def save(figure: Figure, path: Path, stamp: str, dpi: int = 160) -> None:
+    """Write a PNG whole, with the hash of what it shows."""
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, metadata={"Software": None, _STAMP: stamp})
+
+
+def publish(figure: Figure, stem: Path) -> list[Path]:
+    """Write <stem>.png and <stem>.svg, each whole; the same figure gives the same bytes. The paths written."""
+    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+    with matplotlib.rc_context({"svg.hashsalt": stem.name}):
+        for path, metadata in zip(paths, ({"Software": None}, {"Date": None})):
+            with whole_file(path) as temporary:
+                figure.savefig(temporary, dpi=150, metadata=metadata)
+    return paths
+
+
+def is_drawn(path: Path, stamp: str) -> bool:
+    """Does the file show what has this hash?"""
+    try:
+        with Image.open(path) as picture:
+            return getattr(picture, "text", {}).get(_STAMP) == stamp
+    except OSError:
+        return False

@@ -1,0 +1,94 @@
+"""One file a trial, written whole, with the hash of everything it was made from."""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.atomic import write_whole
+
+_TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
+_NO_RESULTS = (  # they only parse and tell, or gather finished results anew in every run
+    *("cli.py", "environment.py", "theory_figures.py", "model_error.py", "model_error_maps.py"),
+    *("runs.py", "summary.py", "score.py"),
+    *("alphas.py", "friction_runs.py", "friction_tables.py", "section_vii.py", "explained.py", "friction_map.py"),
+    *("gauge_calibration.py", "gauge_certificate.py"),
+)
+_MANY = 1000  # values; larger arrays are hashed by their bytes
+
+
+def hash_of(*parts) -> str:
+    """Hash of plain values, in their order. Pictures count by their pixels, paths by their names: a session that was
+    moved is the same session."""
+    return hashlib.blake2b(json.dumps(_hashable(parts), sort_keys=True).encode(), digest_size=16).hexdigest()
+
+
+def _hashable(value):
+    if isinstance(value, Path):
+        return value.name
+    if isinstance(value, np.ndarray) and value.size > _MANY:
+        return [value.shape, str(value.dtype), hashlib.blake2b(np.ascontiguousarray(value).tobytes()).hexdigest()]
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _hashable(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _hashable(item) for key, item in value.items()}
+    return [_hashable(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
+
+
+def hash_of_files(paths: Iterable[Path]) -> str:
+    """Hash of names and contents of files and of all files below folders; truth files do not count."""
+    digest = hashlib.blake2b(digest_size=16)
+    for path in sorted(set(paths)):
+        for file in [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file()):
+            if file.name not in _TRUTH_FILES and not file.name.startswith("."):
+                digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
+                digest.update(hashlib.blake2b(file.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=1)
+def hash_of_code() -> str:
+    """Hash of the three packages' sources: a new version never takes an old version's results for its own."""
+    root = Path(__file__).resolve().parents[2]
+    sources = (path for name in ("bench", "vision", "estimator") for path in (root / name).glob("*.py"))
+    return hash_of_files(path for path in sources if path.name not in _NO_RESULTS)
+
+
+def plain(value):
+    """The value as JSON has it: arrays as lists, NaN as null, dataclasses as tables."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (np.bool_, np.integer)):
+        return value.item()
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+def number(value) -> float:
+    """A number read back: null is NaN."""
+    return math.nan if value is None else float(value)
+
+
+def write_result(path: Path, result: dict) -> None:
+    """One trial's result, whole."""
+    write_whole(path, json.dumps(plain(result), sort_keys=True) + "\n")
+
+
+def read_result(path: Path) -> dict | None:
+    """A result, or None where there is none that can be read."""
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None

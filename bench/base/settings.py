@@ -1,0 +1,70 @@
+"""What a run of the evaluation is told, in the user's units."""
+
+import importlib.util
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.base.errors import BadInput
+
+# The paper's 5 Hz at 10 deg/s and 45 Hz at 90 deg/s: half a hertz for each deg/s.
+CUTOFF_HZ_PER_DEG_S = 0.5
+
+
+@dataclass(frozen=True)
+class Settings:
+    """theta_deg: pushing angle of truth and estimates. alpha_est_deg: friction angle that (10) assumes.
+
+    cutoff_Hz: of the zero-phase low-pass; None goes by speed. estimators: "module:function" of one's own.
+    clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
+    (`FrameTimes.clock_sigma_s`). Raises BadInput out of range.
+    """
+
+    theta_deg: float = 3.0
+    alpha_est_deg: float = 10.0
+    cutoff_Hz: float | None = None
+    estimators: tuple[str, ...] = ()
+    clock_sigma_s: float | None = None
+
+    def __post_init__(self):
+        _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)
+        _require("--alpha-est-deg", self.alpha_est_deg, 0.0, 89.0)
+        if self.cutoff_Hz is not None:
+            _require("--cutoff-Hz", self.cutoff_Hz, 0.0, 1e5, above=True)
+        if self.clock_sigma_s is not None:
+            _require("--clock-sigma-s", self.clock_sigma_s, 0.0, 10.0)
+
+    @property
+    def theta_rad(self) -> float:
+        return math.radians(self.theta_deg)
+
+    @property
+    def alpha_est_rad(self) -> float:
+        return math.radians(self.alpha_est_deg)
+
+    def cutoff_for(self, speed_deg_s: float) -> float:
+        """Cut-off in Hz for a whisk at this speed."""
+        return self.cutoff_Hz or CUTOFF_HZ_PER_DEG_S * speed_deg_s
+
+    def seen(self) -> list:
+        """The settings that what is seen depends on."""
+        return [self.theta_deg, self.clock_sigma_s]
+
+    def own_code(self) -> list[str]:
+        """Sources of one's own estimators, so that a change in one is a change of the result."""
+        return [_source_of(name.partition(":")[0]) for name in self.estimators]
+
+
+def _source_of(module: str) -> str:
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return ""
+    is_file = spec is not None and spec.origin is not None and Path(spec.origin).is_file()
+    return Path(spec.origin).read_text(errors="replace") if is_file else ""
+
+
+def _require(option: str, value: float, low: float, high: float, *, above: bool = False) -> None:
+    inside = low < value <= high if above else low <= value <= high
+    if not inside:
+        raise BadInput(f"{option} {value:g}: must be {'above' if above else 'from'} {low:g} and at most {high:g}")

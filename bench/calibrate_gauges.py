@@ -1,0 +1,98 @@
+"""`whisker-bench calibrate gauges`: gauges.toml from a session's gauge trials, with its certificate."""
+
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from bench.base.atomic import whole_file
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.results import hash_of_files
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.cameras.calibration import calibrate_session
+from bench.evaluate import judged, session_drift
+from bench.gauges.certificate import Certificate, page
+from bench.gauges.checks import check_alive
+from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.fit import fit_gauges
+from bench.gauges.gauges_file import write_gauges
+from bench.gauges.readings import pairs_of
+from bench.gauges.reversal import reversals
+from bench.gauges.weights import scale_by_weights
+from bench.session.check import checked_session
+from bench.session.session import Session
+from bench.session.signals import read_signals
+from bench.session.trial import Trial
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit, see_unit
+
+
+def calibrate_gauges_command(
+    session: Path, out: Path, *, every_trial: bool = False, workers: int = 1, progress: bool = False
+) -> int:
+    """Calibrate, write `out` (TOML) and its certificate beside it as PDF, print it.
+
+    Returns 0, or 1 where the session is doubtful. every_trial: all trials with whisks, not only those marked "gauge".
+    Raises BadInput.
+    """
+    doubts = Doubts()
+    loaded = checked_session(session, doubts)
+    certificate = calibrate_gauges(
+        loaded, chosen_trials(loaded, every_trial), doubts, workers=workers, progress=progress
+    )
+    header = certificate.lines()
+    write_gauges(out, certificate.gauges, zeros(certificate.strokes), certificate.stiffness, header)
+    with whole_file(out.with_suffix(".pdf")) as temporary:
+        page(certificate).savefig(temporary, metadata={"CreationDate": None, "Producer": None, "Creator": None})
+    print("\n".join([*header, "", *(f"doubtful: {note}" for note in doubts.notes), f"written: {out}, {out.stem}.pdf"]))
+    return 1 if doubts.notes else 0
+
+
+def chosen_trials(session: Session, every_trial: bool) -> list[Trial]:
+    """Trials with volts that the coefficients may rest on. Raises BadInput where there is none."""
+    if all(read_signals(trial).kind == "Nmm" for trial in session.trials):
+        raise BadInput("all signals.csv hold moments already (m_y_Nmm,m_z_Nmm): no gauge to calibrate", file="trials")
+    wanted = ("gauge", "measure") if every_trial else ("gauge",)
+    trials = [t for t in session.trials if t.purpose in wanted and read_signals(t).kind == "V"]
+    if not trials:
+        raise BadInput('no trial with volts is marked purpose = "gauge"; mark them, or give --all', file="trials")
+    return trials
+
+
+def calibrate_gauges(
+    session: Session, trials: list[Trial], doubts: Doubts, *, workers: int = 1, progress: bool = False
+) -> Certificate:
+    """Coefficients from what the cameras and the gauges show of these trials. Raises BadInput."""
+    settings = Settings()
+    strokes = {trial.name: strokes_of(read_signals(trial), trial, settings) for trial in trials}
+    check_alive([stroke for many in strokes.values() for stroke in many])
+    with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
+        rate = session_drift(judged(session), settings, pool)
+        calibration = calibrate_session(session, Path(folder))
+        every = [
+            Unit(session, t, hash_of_files([t.folder]), calibration, settings, Path(folder)) for t in judged(session)
+        ]
+        calibration = place_rig(session, calibration, every, pool, doubts)
+        chosen = {unit.trial.name: replace(unit, calibration=calibration) for unit in every}
+        seen = pool.run(see_unit, [chosen[trial.name] for trial in trials], "trials")
+    pairs = [
+        pairs_of(trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
+        for trial, of_trial in zip(trials, seen)
+        for whisk, stroke in zip(of_trial["whisks"], strokes[trial.name])
+    ]
+    used = tuple(p for p in pairs if p is not None)
+    every_stroke = tuple(stroke for many in strokes.values() for stroke in many)
+    back = tuple(r for trial in trials for r in reversals(trial, read_signals(trial), settings))
+    made = Certificate(session.name, session.whisker, fit_gauges(used), used, every_stroke, rate, back)
+    made = replace(made, roll_sigma_deg=max(trial.follicle_roll_sigma_deg for trial in trials))
+    return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(every_stroke)))
+
+
+def zeros(strokes: tuple[Stroke, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean zero (2,) of the free strokes and the scatter of one, in volts."""
+    levels = np.array([touch.offset for touch in (stroke.touch() for stroke in strokes) if not touch.status])
+    scatter = levels.std(axis=0, ddof=1) if len(levels) > 1 else np.zeros(2)
+    return levels.mean(axis=0), scatter

@@ -1,0 +1,136 @@
+"""Error of (10) over slope and friction: measured cells, and what (13), (14) predict for the same α and α_est.
+
+A whisk's friction is its surface's: α as seen, where pictures show it, else as Fig. 8's fit has it. Cells in which
+nothing was measured stay empty.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bench.base.drawing import is_drawn, save, style
+from bench.base.results import hash_of
+from bench.friction.tables import SurfaceFriction
+from bench.report.assembly import write_table
+from bench.trials.compare import judge
+from estimator.threshold import distance_error
+
+NAME = "error_map"
+COLUMNS = (
+    *("beta_from_deg", "beta_to_deg", "alpha_from_deg", "alpha_to_deg", "whisks"),
+    *("error_percent", "error_sd_percent", "predicted_percent"),
+)
+_BETA_DEG, _ALPHA_DEG = 5.0, 2.5  # sizes of a cell; slopes of 0, 5, 10 … lie in the middles of theirs
+_STEEPEST_DEG = 82.5
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Whisks of alike slope and friction: lower edges of the cell, each whisk's error and prediction, per cent."""
+
+    beta_deg: float
+    alpha_deg: float
+    errors: np.ndarray
+    predicted: np.ndarray
+
+
+def write_error_map(
+    out: Path, results: Sequence[dict], found: Sequence[SurfaceFriction], alpha_est_rad: float
+) -> list[str]:
+    """error_map.csv, and error_map.png where there is a cell. Names of the pictures."""
+    cells = measured_cells(results, found, alpha_est_rad)
+    write_table(out / f"{NAME}.csv", COLUMNS, map(_row, cells))
+    if not cells:
+        return []
+    path, stamp = out / f"{NAME}.png", hash_of([vars(cell) for cell in cells], alpha_est_rad, COLUMNS)
+    if not is_drawn(path, stamp):
+        with style():
+            save(draw_error_map(cells, alpha_est_rad), path, stamp)
+    return [path.name]
+
+
+def measured_cells(
+    results: Sequence[dict], found: Sequence[SurfaceFriction], alpha_est_rad: float
+) -> list[Cell]:
+    """The cells that hold a whisk, by slope and friction."""
+    cells: dict[tuple, list[tuple[float, float]]] = {}
+    for beta_deg, alpha_rad, error in _whisks(results, found):
+        half = 0.5 * _BETA_DEG
+        edges = _edge(abs(beta_deg) + half, _BETA_DEG) - half, _edge(np.degrees(alpha_rad), _ALPHA_DEG)
+        predicted = 100.0 * float(distance_error(np.radians(abs(beta_deg)), alpha_rad, alpha_est_rad))
+        cells.setdefault(edges, []).append((error, predicted))
+    return [Cell(*edges, *np.array(values).T) for edges, values in sorted(cells.items())]
+
+
+def _edge(value: float, size: float) -> float:
+    return float(np.floor(value / size) * size)
+
+
+def _whisks(results: Sequence[dict], found: Sequence[SurfaceFriction]) -> Iterator[tuple[float, float, float]]:
+    """(β in degrees, α in rad, error in per cent) of every whisk for which all three are known."""
+    errors = {(j.trial, j.whisk): j for j in judge(results) if j.estimator == "with_friction" and not j.one_factor}
+    for surface in found:
+        seen, fitted = surface.alpha("seen")[0], surface.alpha("least_squares")[0]
+        alpha = seen if np.isfinite(seen) else fitted
+        mine = (errors[whisk.key] for whisk in surface.whisks if whisk.key in errors)
+        known = (j for j in mine if np.isfinite([alpha, j.beta_deg, j.error_percent]).all() and alpha >= 0)
+        yield from ((j.beta_deg, alpha, j.error_percent) for j in known)
+
+
+def _row(cell: Cell) -> dict:
+    many = len(cell.errors) > 1
+    return {
+        "beta_from_deg": max(cell.beta_deg, 0.0),
+        "beta_to_deg": cell.beta_deg + _BETA_DEG,
+        "alpha_from_deg": cell.alpha_deg,
+        "alpha_to_deg": cell.alpha_deg + _ALPHA_DEG,
+        "whisks": len(cell.errors),
+        "error_percent": float(cell.errors.mean()),
+        "error_sd_percent": float(cell.errors.std(ddof=1)) if many else None,
+        "predicted_percent": float(cell.predicted.mean()),
+    }
+
+
+def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float) -> Figure:
+    """Measured on the left, predicted for the whole field on the right, in one scale of colours."""
+    figure = Figure(figsize=(9.6, 3.9), layout="constrained")
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    most = max(10.0, *(abs(c.errors.mean()) for c in cells))
+    top = max(30.0, *(c.alpha_deg + _ALPHA_DEG for c in cells))
+    look = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
+    measured, beta, alpha = _field(cells, top)
+    mesh = left.pcolormesh(beta, alpha, measured, **look)
+    _tell(left, cells, most)
+    slopes, angles = np.meshgrid(np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121))
+    predicted = 100.0 * distance_error(np.radians(slopes), np.radians(angles), alpha_est_rad)
+    right.pcolormesh(slopes, angles, np.clip(predicted, -most, most), shading="nearest", **look)
+    for axes, title in ((left, "measured"), (right, "predicted by (13), (14)")):
+        axes.set(xlabel="slope β  [°]", title=title, xlim=(-2.5, _STEEPEST_DEG), ylim=(0.0, top))
+        axes.axhline(np.degrees(alpha_est_rad), color="black", lw=0.8, ls=":")
+    left.set_ylabel("friction angle α  [°]")
+    left.text(80.0, np.degrees(alpha_est_rad), "α_est", va="bottom", ha="right", fontsize=8)
+    figure.colorbar(mesh, ax=[left, right], label="error of d$_x$ by (10)  [%]", extend="both")
+    return figure
+
+
+def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean errors (a, b), NaN where nothing was measured, and the cells' edges."""
+    steepest = max(_STEEPEST_DEG, *(cell.beta_deg for cell in cells))
+    beta = np.arange(-0.5 * _BETA_DEG, steepest + 1.5 * _BETA_DEG, _BETA_DEG)
+    alpha = np.arange(0.0, top + _ALPHA_DEG, _ALPHA_DEG)
+    field = np.full((len(alpha) - 1, len(beta) - 1), np.nan)
+    for cell in cells:
+        field[np.searchsorted(alpha, cell.alpha_deg), np.searchsorted(beta, cell.beta_deg)] = cell.errors.mean()
+    return field, beta, alpha
+
+
+def _tell(axes: Axes, cells: Sequence[Cell], most: float) -> None:
+    """Each cell's mean error in figures, light on the dark ends of the scale."""
+    for cell in cells:
+        colour = "white" if abs(cell.errors.mean()) > 0.6 * most else "black"
+        middle = cell.beta_deg + 0.5 * _BETA_DEG, cell.alpha_deg + 0.5 * _ALPHA_DEG
+        axes.text(*middle, f"{cell.errors.mean():+.1f}", ha="center", va="center", fontsize=6, color=colour)

@@ -1,0 +1,163 @@
+"""Whisks by surface and speed: the points of Fig. 8 and the friction angle α that (13), (14) fit them with."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.base.results import number
+from bench.trials.compare import slope_deg, whisks
+from estimator.friction import FrictionFit, fit_alpha
+
+# From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
+# many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
+_MANY = 8
+_SAME_SLOPE_DEG = 2.5
+_FITTED = ("beta_deg", "d_x_mm", "theta_rad", "m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What was felt of one whisk: slope and distance as seen (else nominal), moments with sigma; which recording."""
+
+    beta_deg: float
+    d_x_mm: float
+    theta_rad: float
+    m_y_Nmm: float
+    m_z_Nmm: float
+    m_y_sigma_Nmm: float
+    m_z_sigma_Nmm: float
+    phi_deg: float
+    phi_sigma_deg: float
+    nominal: bool
+    recording: int = 0
+    trial: str = ""
+    whisk: int = 0
+
+    @property
+    def m_Nmm(self) -> float:
+        return float(np.hypot(self.m_y_Nmm, self.m_z_Nmm))
+
+    @property
+    def m_sigma_Nmm(self) -> float:
+        return float(np.hypot(self.m_y_Nmm * self.m_y_sigma_Nmm, self.m_z_Nmm * self.m_z_sigma_Nmm)) / self.m_Nmm
+
+
+@dataclass(frozen=True)
+class Point:
+    """Whisks of one slope: mean and standard deviation (of the ten, or the stated sigma of the one)."""
+
+    beta_deg: float
+    whisks: int
+    m_Nmm: float
+    m_sd_Nmm: float
+    phi_deg: float
+    phi_sd_deg: float
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One panel of Fig. 8: whisks of one surface and speed, and the fitted α (None where they do not hold it)."""
+
+    name: str
+    speed_deg_s: float
+    felt: tuple[Felt, ...]
+    fit: FrictionFit | None
+    C_Nmm2: float
+
+    @property
+    def title(self) -> str:
+        speed = f"{self.speed_deg_s:g}°/s" if np.isfinite(self.speed_deg_s) else ""
+        return ", ".join(filter(None, [self.name or "surface not named", speed]))
+
+    @property
+    def alpha_rad(self) -> float:
+        """Fitted α, NaN where there is none."""
+        return self.fit.alpha_rad if self.fit is not None else float("nan")
+
+    @property
+    def common_d_x_mm(self) -> float:
+        """The distance to which moments are scaled for the figure, by (13), (14): |m| goes as 1/d_x."""
+        return float(np.median([f.d_x_mm for f in self.felt]))
+
+    @property
+    def theta_rad(self) -> float:
+        """The pushing angle of the moments."""
+        return float(np.median([f.theta_rad for f in self.felt]))
+
+    def fit_without(self, trial: str, whisk: int) -> FrictionFit | None:
+        """The fit without one whisk; None where the others do not hold α."""
+        return _fit([f for f in self.felt if (f.trial, f.whisk) != (trial, whisk)], self.C_Nmm2)
+
+    def points(self) -> list[Point]:
+        """Means and standard deviations over whisks of alike slope, moments scaled to the common distance."""
+        groups: list[list[Felt]] = []
+        for felt in sorted(self.felt, key=lambda f: f.beta_deg):
+            if groups and felt.beta_deg - groups[-1][0].beta_deg < _SAME_SLOPE_DEG:
+                groups[-1].append(felt)
+            else:
+                groups.append([felt])
+        return [_point(group, self.common_d_x_mm) for group in groups]
+
+
+def surfaces(results: Iterable[dict], C_Nmm2: float) -> list[Surface]:
+    """A Surface for each surface and speed among the measure trials, in the order in which they come."""
+    groups: dict[tuple, list[Felt]] = {}
+    for key, felt in _felt(results):
+        groups.setdefault(key, []).append(felt)
+    return [Surface(*key, tuple(felt), _fit(felt, C_Nmm2), C_Nmm2) for key, felt in groups.items()]
+
+
+def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
+    """A line a surface and speed: the fitted α, or why there is none."""
+    for surface in fitted:
+        if surface.fit is None:
+            yield f"{surface.title}: {len(surface.felt)} whisks do not hold it (two slopes above α are needed)"
+            continue
+        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+        doubt = f"; {surface.fit.status}" if surface.fit.status else ""
+        yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {len(surface.felt)} whisks{doubt}"
+
+
+def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:
+    every = ((place, *whisk) for place, result in enumerate(results) for whisk in whisks([result]))
+    for recording, result, seen, felt in every:
+        trial = result["trial"]
+        d_x = number(seen.get("d_x_mm"))
+        nominal = not np.isfinite(d_x)
+        d_x = number(trial["d_x_nominal_mm"]) if nominal else d_x
+        beta = slope_deg(result, seen)
+        if trial["purpose"] == "measure" and felt.get("m_y_Nmm") is not None and np.isfinite([d_x, beta]).all():
+            values = [felt[k] for k in ("m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")]
+            phi = [float(np.degrees(felt[k])) for k in ("phi_felt_rad", "phi_felt_sigma_rad")]
+            theta = float(np.radians(result["theta_deg"]))
+            key, name = (trial["surface"], number(trial["speed_deg_s"])), (trial["name"], seen["whisk"])
+            yield key, Felt(beta, d_x, theta, *values, *phi, nominal, recording, *name)
+
+
+def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
+    if len(felt) < 2:
+        return None
+    columns = {name: np.array([getattr(f, name) for f in felt]) for name in _FITTED}
+    how = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
+    recording = np.array([f.recording for f in felt])
+    if len(set(recording)) >= _MANY:
+        how = {"recording": recording}
+    fit = fit_alpha(
+        np.radians(columns["beta_deg"]),
+        columns["m_y_Nmm"],
+        columns["m_z_Nmm"],
+        columns["d_x_mm"],
+        columns["theta_rad"],
+        C_Nmm2,
+        **how,
+    )
+    return fit if np.isfinite(fit.alpha_rad) else None
+
+
+def _point(group: list[Felt], d_x_mm: float) -> Point:
+    m = np.array([f.m_Nmm * f.d_x_mm / d_x_mm for f in group])
+    phi, beta = np.array([f.phi_deg for f in group]), float(np.mean([f.beta_deg for f in group]))
+    if len(group) == 1:
+        return Point(beta, 1, m[0], group[0].m_sigma_Nmm, phi[0], group[0].phi_sigma_deg)
+    return Point(beta, len(group), m.mean(), m.std(ddof=1), phi.mean(), phi.std(ddof=1))

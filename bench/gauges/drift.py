@@ -1,0 +1,57 @@
+"""How far the gauges' zero may wander within a stroke, from all free strokes of a session together.
+
+One free stroke of a few tenths of a second hardly tells a drift from noise, and where no free stroke follows the
+contact a steady drift looks exactly like another gauge factor. So the rate is taken from many strokes, with what they
+cannot rule out, and goes into the sigma of everything that is read from a gauge.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.gauges.felt import Stroke
+from estimator import noise
+from estimator.signal import Touch
+
+_GUARD_RAD = np.radians(0.1)
+
+
+@dataclass(frozen=True)
+class FreeSlope:
+    """Slope (2,) of the channels over a free stroke, per second, and its variance (2,) from noise alone."""
+
+    slope: np.ndarray
+    variance: np.ndarray
+
+
+def free_slope(stroke: Stroke) -> FreeSlope | None:
+    """Of a stroke's samples before felt touch; None where there is no touch."""
+    touch = stroke.touch()
+    if touch.status:
+        return None
+    free = (stroke.motor_rad < touch.motor_rad - _GUARD_RAD) & np.isfinite(stroke.channels).all(axis=1)
+    samples = np.where(free[:, None], stroke.channels, 0.0)
+    start = stroke.time_s[0]
+    per_second = noise.line_weights(stroke.time_s, free, start + 1.0) - noise.line_weights(stroke.time_s, free, start)
+    variance = np.diag(noise.Memory.of(stroke.time_s, samples, free).of_sum(per_second))
+    return FreeSlope(noise.line_slope(stroke.time_s, samples, free), variance)
+
+
+def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
+    """RMS rate (2,) of the channels' drift, per second: the slopes' mean square beyond their noise, and one standard
+    deviation of that, which is what the strokes cannot rule out. Zeros where there are no slopes."""
+    if not slopes:
+        return np.zeros(2)
+    squares, variances = np.array([s.slope**2 for s in slopes]), np.array([s.variance for s in slopes])
+    excess = np.maximum(0.0, squares.mean(axis=0) - variances.mean(axis=0))
+    undecided = np.sqrt(2.0 * np.mean((excess + variances) ** 2, axis=0) / len(slopes))
+    return np.sqrt(excess + undecided)
+
+
+def allow_drift(touch: Touch, rate, speed_rad_s: float) -> Touch:
+    """The same touch, with a zero that may drift at `rate` (k,) per second: the session's, and not the stroke's own,
+    which is mostly noise."""
+    if touch.status or speed_rad_s <= 0:
+        return touch
+    return replace(touch, level=replace(touch.level, drift=np.asarray(rate) / speed_rad_s))

@@ -1,0 +1,124 @@
+"""The felt half of a trial: gauge signals in; touch, zero and channels at an angle out. No picture is read here.
+
+Everything is in the channels' own unit. Touch and zero need no gauge factors, and moments are linear in the channels.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.base.results import number
+from bench.base.settings import Settings
+from bench.session.rails import off_the_rails
+from bench.session.signals import Signals, forward_strokes
+from bench.session.trial import Trial
+from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
+
+_GUARD_RAD = np.radians(0.2)
+_LEAST_FREE = 50  # samples
+# Of the paper's 800 Hz filter ahead of the converter, taken as of fourth order (Butterworth): 0.52 ms. The session does
+# not say which filter it had.
+GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
+
+
+def lateness(seen: dict, felt: dict) -> tuple[float, float]:
+    """Felt less seen touch of a whisk's two records, rad, and its sigma: of both touches and of the filter's delay, by
+    which what is felt comes late. (No error of θ: touch and moments are late alike.)"""
+    speed = np.median(np.diff(seen["frames"]["motor_rad"]) / np.diff(seen["frames"]["time_s"]))
+    sigmas = seen["touch_sigma_rad"], number(felt.get("touch_felt_sigma_rad")), GAUGE_DELAY_S * speed
+    return number(felt.get("touch_felt_rad")) - seen["touch_rad"], float(np.linalg.norm(sigmas))
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One forward stroke: time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered."""
+
+    time_s: np.ndarray
+    motor_rad: np.ndarray
+    channels: np.ndarray
+    filtered: np.ndarray
+
+    @property
+    def saturated(self) -> int:
+        """How many samples were left out as saturated."""
+        return int(np.isnan(self.channels).any(axis=1).sum())
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Mean speed of the motor over the stroke."""
+        return float(np.ptp(self.motor_rad) / np.ptp(self.time_s))
+
+    def touch(self) -> Touch:
+        """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
+        return felt_touch(self.motor_rad, self.channels, self.time_s)
+
+    def at(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
+        """Filtered channels above the free stroke's level, at a pushing angle past `touch`."""
+        return moment_at(theta_rad, self.motor_rad, self.filtered, touch, time_s=self.time_s, **window)
+
+    def at_as_recorded(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
+        """The same from unfiltered samples: soon after touch a low-pass of 5 Hz smears the onset, 5 % of it at 0.5°."""
+        return moment_at(theta_rad, self.motor_rad, self.channels, touch, time_s=self.time_s, **window)
+
+
+def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: bool = True) -> list[Stroke]:
+    """The forward strokes of a trial, each a whisk.
+
+    The whole recording goes through the zero-phase low-pass of section V, so that a stroke's ends are no edges of it.
+    level: take out the drift that shows between the free stroke before touch and the one after the way back, if both
+    were recorded.
+    """
+    channels, places = np.stack([signals.y, signals.z], axis=1), forward_strokes(signals)
+    if signals.kind == "V":
+        for where in places:  # elsewhere the motor may rest, and a channel stand still with it
+            channels[where] = off_the_rails(channels[where])
+    found, lowpassed = [], {}
+    for where, end in zip(places, [*(place.start for place in places[1:]), len(signals.time_s)]):
+        time, motor = signals.time_s[where], signals.motor_rad[where]
+        cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
+        if cutoff_Hz not in lowpassed:  # strokes at the stated speed share one
+            lowpassed[cutoff_Hz] = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
+        stroke, back = Stroke(time, motor, channels[where], lowpassed[cutoff_Hz][where]), slice(where.stop, end)
+        way_back = signals.time_s[back], signals.motor_rad[back], channels[back]
+        found.append(_levelled(stroke, *way_back) if level else stroke)
+    return found
+
+
+def _levelled(stroke: Stroke, time_s, motor_rad, channels) -> Stroke:
+    """The stroke without the drift of its zero from before the touch to after the way back (time_s, motor_rad (b,),
+    channels (b, 2)); as it is where either is too short."""
+    if len(time_s) < _LEAST_FREE:
+        return stroke
+    touch = stroke.touch()
+    if touch.status:
+        return stroke
+    free = touch.motor_rad - _GUARD_RAD
+    before, after = (
+        (t[m < free], c[m < free])
+        for t, m, c in ((stroke.time_s, stroke.motor_rad, stroke.channels), (time_s, motor_rad, channels))
+    )
+    if min(len(before[0]), len(after[0])) < _LEAST_FREE:
+        return stroke
+    (start, zero), (end, returned) = ((t.mean(), np.nanmean(c, axis=0)) for t, c in (before, after))
+    drift = np.outer(stroke.time_s - start, (returned - zero) / (end - start))
+    return replace(stroke, channels=stroke.channels - drift, filtered=stroke.filtered - drift)
+
+
+def _lowpass(channels, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:
+    """Filtered channels; gaps are bridged by lines for the filter and stay gaps. A cut-off that the sampling rate
+    cannot hold leaves them as they are."""
+    if cutoff_Hz >= rate_Hz / 2:
+        return channels
+    filtered = zero_phase_lowpass(_bridged(channels), rate_Hz, cutoff_Hz)
+    return np.where(np.isnan(channels), np.nan, filtered)
+
+
+def _bridged(channels) -> np.ndarray:
+    bridged, place = channels.copy(), np.arange(len(channels))
+    for column in bridged.T:
+        known = np.isfinite(column)
+        if known.any():
+            column[~known] = np.interp(place[~known], place[known], column[known])
+        else:
+            column[:] = 0.0
+    return bridged

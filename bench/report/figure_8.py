@@ -1,0 +1,123 @@
+"""Fig. 8 of the paper: |m| in EI/metre and φ against β, whisks of a surface and speed together, and the α that fits."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bench.base.drawing import SLOPES_DEG, colour_of
+from bench.friction.surfaces import Point, Surface
+from estimator.beam import moment_in_EI_per_metre
+from estimator.friction import curves
+
+COLUMNS = (
+    *("panel", "surface", "speed_deg_s", "theta_deg", "d_x_mm", "alpha_deg", "alpha_sigma_deg"),
+    *("beta_deg", "whisks", "m_EI_per_metre", "m_sd_EI_per_metre", "phi_deg", "phi_sd_deg"),
+    *("m_fit_EI_per_metre", "phi_fit_deg"),
+)
+_MOST_COLUMNS = 4
+_LETTERS = "abcdefghijklmnopqrstuvwxyz"
+
+
+def figure_8(fitted: Sequence[Surface]) -> Figure:
+    """A column for each surface and speed: |m| above, φ below."""
+    columns = min(len(fitted), _MOST_COLUMNS)
+    blocks = -(-len(fitted) // columns)
+    figure = Figure(figsize=(1.2 + 3.2 * columns, 5.2 * blocks), layout="constrained")
+    grid = figure.subplots(2 * blocks, columns, sharex=True, sharey="row", squeeze=False)
+    for number in range(blocks * columns):
+        block, column = divmod(number, columns)
+        pair = grid[2 * block : 2 * block + 2, column]
+        if number < len(fitted):
+            _panel(*pair, fitted[number], f"({_letter(number)})")
+        else:
+            for axes in pair:
+                axes.set_visible(False)
+    for axes in grid[::2, 0]:
+        axes.set_ylabel("|m|  [EI/m]")
+    for axes in grid[1::2, 0]:
+        axes.set_ylabel("slip angle φ  [°]")
+    return figure
+
+
+def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
+    """The figure as a table by COLUMNS, a row a point; |m| at the panel's common d_x. Fits are NaN where there is none.
+
+    With one whisk a point, m_sd and phi_sd are its stated sigmas.
+    """
+    for number, surface in enumerate(fitted):
+        points, EI = surface.points(), surface.C_Nmm2 / 3.0
+        panel = {
+            "panel": _letter(number),
+            "surface": surface.name,
+            "speed_deg_s": surface.speed_deg_s,
+            "theta_deg": float(np.degrees(surface.theta_rad)),
+            "d_x_mm": surface.common_d_x_mm,
+            "alpha_deg": float(np.degrees(surface.alpha_rad)),
+            "alpha_sigma_deg": float(np.degrees(surface.fit.sigma_rad)) if surface.fit is not None else float("nan"),
+        }
+        for p, m_fit, phi_fit in zip(points, *_fitted(surface, np.array([p.beta_deg for p in points]))):
+            yield panel | {
+                "beta_deg": p.beta_deg,
+                "whisks": p.whisks,
+                "m_EI_per_metre": moment_in_EI_per_metre(p.m_Nmm, EI),
+                "m_sd_EI_per_metre": moment_in_EI_per_metre(p.m_sd_Nmm, EI),
+                "phi_deg": p.phi_deg,
+                "phi_sd_deg": p.phi_sd_deg,
+                "m_fit_EI_per_metre": float(m_fit),
+                "phi_fit_deg": float(phi_fit),
+            }
+
+
+def _letter(number: int) -> str:
+    return _LETTERS[number % len(_LETTERS)]
+
+
+def _fitted(surface: Surface, beta_deg) -> tuple[np.ndarray, np.ndarray]:
+    """|m| [EI/m] and φ [°] of (13), (14) at the fitted α over slopes (n,); NaN where there is no fit."""
+    if surface.fit is None:
+        return np.full(len(beta_deg), np.nan), np.full(len(beta_deg), np.nan)
+    m, phi = curves(
+        surface.alpha_rad, np.radians(beta_deg), surface.common_d_x_mm, surface.theta_rad, surface.C_Nmm2
+    )
+    return moment_in_EI_per_metre(m, surface.C_Nmm2 / 3.0), np.degrees(phi)
+
+
+def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
+    """|m| above, φ below; negative slopes are drawn at their mirror image's place."""
+    points, EI = surface.points(), surface.C_Nmm2 / 3.0
+    beta = [abs(p.beta_deg) for p in points]
+    look = {"fmt": "o", "ms": 4, "color": "black", "capsize": 2.5, "elinewidth": 1.0, "lw": 0, "zorder": 3}
+    top.errorbar(
+        beta,
+        [moment_in_EI_per_metre(p.m_Nmm, EI) for p in points],
+        [moment_in_EI_per_metre(p.m_sd_Nmm, EI) for p in points],
+        **look,
+        label=_what(points),
+    )
+    bottom.errorbar(beta, [abs(p.phi_deg) for p in points], [p.phi_sd_deg for p in points], **look)
+    if surface.fit is not None:
+        m, phi = _fitted(surface, SLOPES_DEG)
+        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+        line = {"color": colour_of("with_friction"), "lw": 1.4}
+        top.plot(SLOPES_DEG, m, **line, label=f"(13), (14): α = {alpha:.2f} ± {sigma:.2f}°")
+        bottom.plot(SLOPES_DEG, phi, **line)
+    top.set_title(f"{letter} {surface.title}", loc="left")
+    top.legend(loc="lower left", handlelength=1.4)
+    top.set_ylim(bottom=0)
+    bottom.set(xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""), xlim=(-2, 82), ylim=(-3, 82))
+    top.annotate(
+        f"|m| scaled to d$_x$ = {surface.common_d_x_mm:.1f} mm",
+        (0.97, 0.95),
+        xycoords="axes fraction",
+        fontsize=7,
+        color="0.35",
+        ha="right",
+        va="top",
+    )
+
+
+def _what(points: Sequence[Point]) -> str:
+    most = max(p.whisks for p in points)
+    return "one whisk each, ± its sigma" if most == 1 else f"mean ± SD of up to {most} whisks"

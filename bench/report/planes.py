@@ -1,0 +1,178 @@
+"""The sensing plane of a trial as in Fig. 4, in mm: bar, contact from P0 to P, virtual point, angles, friction cone."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Arc, Circle, Polygon, Wedge
+
+from bench.base.drawing import is_drawn, save
+from bench.base.results import number
+
+_WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
+_MARGIN_MM = 2.2
+
+
+def draw_planes(result: dict, friction: tuple[float, str], out: Path, stamp: str) -> list[str]:
+    """planes/<trial>.png, a panel for each whisk that was seen to be pushed; nothing where there is none."""
+    whisks = [w for w in result["seen"]["whisks"] if w.get("d_x_mm") is not None and w["at"]["d_y_mm"] is not None]
+    if not whisks:
+        return []
+    name = f"planes/{result['trial']['name']}.png"
+    if not is_drawn(out / name, stamp):
+        columns = min(len(whisks), 3)
+        rows = -(-len(whisks) // columns)
+        figure = Figure(figsize=(6.4 * columns, 5.6 * rows), layout="constrained")
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for axes in grid.flat[len(whisks) :]:
+            axes.set_visible(False)
+        for axes, whisk in zip(grid.flat, whisks):
+            sensing_plane(axes, result, whisk, friction)
+        save(figure, out / name, stamp, dpi=130)
+    return [name]
+
+
+def sensing_plane(axes: Axes, result: dict, whisk: dict, friction: tuple[float, str]) -> None:
+    """One whisk: y to the right, z up, both in the contact frame from P0 on."""
+    path = contact_path(whisk)
+    beta, theta = whisk["beta_rad"], whisk["at"]["theta_rad"]
+    along, normal = np.array([np.sin(beta), np.cos(beta)]), np.array([-np.cos(beta), np.sin(beta)])
+    contact = whisk["at"]["slip_mm"] * along
+    virtual = contact + np.array([whisk["at"]["d_y_mm"], -whisk["at"]["d_z_mm"]])
+    _draw_bar(axes, result["seen"], along, normal)
+    _draw_cone(axes, contact, normal, friction, float(np.linalg.norm(virtual - contact)))
+    _draw_whisker(axes, result["seen"], contact, virtual, path)
+    _draw_angles(axes, whisk, contact, virtual)
+    _draw_slip(axes, contact, normal)
+    points = np.array([np.zeros(2), contact, virtual])
+    low, high = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="y  [mm]", ylabel="z  [mm]")
+    axes.set_title(f"{result['trial']['name']}, whisk {whisk['whisk']}, θ = {np.degrees(theta):.2f}°", loc="left")
+    axes.text(
+        0.98,
+        0.02,
+        _values(whisk, friction),
+        transform=axes.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=8,
+        linespacing=1.5,
+        bbox={"fc": "white", "ec": "none", "alpha": 0.8},
+    )
+
+
+def contact_path(whisk: dict) -> np.ndarray:
+    """Contact (n, 2) y, z of the touching frames in the contact frame, from P0."""
+    frames = whisk["frames"]
+    points = np.array([[number(v) for v in p] for p in frames["point_mm"]])[np.array(frames["touching"], dtype=bool)]
+    c, s = np.cos(whisk["touch_rad"]), np.sin(whisk["touch_rad"])
+    turned = (points - np.array(whisk["point_mm"])) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return turned[:, 1:]
+
+
+def _draw_bar(axes: Axes, seen: dict, along, normal) -> None:
+    """The bar's outline: its near side one whisker radius from P0, which lies on the whisker's centreline."""
+    far = 60.0 * along
+    near = -seen["wire_radius_mm"] * normal
+    width = -2.0 * seen["bar_radius_mm"] * normal
+    axes.add_patch(
+        Polygon([near - far, near + far, near + far + width, near - far + width], fc=_BAR, ec="0.45", lw=0.8, zorder=0)
+    )
+    axis = near + 0.5 * width
+    axes.plot(*zip(axis - far, axis + far), color="0.45", lw=0.7, ls=(0, (8, 3, 1, 3)), zorder=1)
+
+
+def _draw_cone(axes: Axes, contact, normal, friction: tuple[float, str], size: float) -> None:
+    """Directions that a force without slip may have, about the contact's normal."""
+    middle, half = np.degrees(np.arctan2(normal[1], normal[0])), np.degrees(friction[0])
+    reach = max(1.2, 0.75 * size)
+    axes.add_patch(
+        Wedge(
+            contact,
+            reach,
+            middle - half,
+            middle + half,
+            fc=_CONE,
+            ec="none",
+            alpha=0.9,
+            zorder=1,
+            label=f"friction cone, α = {half:.1f}° {friction[1]}",
+        )
+    )
+    axes.plot(*zip(contact, contact + reach * normal), color="0.4", lw=0.8, ls="--", zorder=2)
+
+
+def _draw_whisker(axes: Axes, seen: dict, contact, virtual, path) -> None:
+    radius = seen["wire_radius_mm"]
+    for place, fill in ((np.zeros(2), "white"), (contact, _WIRE)):
+        axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
+    axes.add_patch(Circle(virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
+    axes.plot(*path.T, "-o", color=_PATH, ms=2.5, lw=1.0, zorder=5, label="contact, frame by frame")
+    axes.annotate(
+        "",
+        contact,
+        virtual,
+        arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 1.6, "shrinkA": 0, "shrinkB": 0},
+        zorder=4,
+    )
+    axes.plot(*zip(contact, contact + 0.5 * (contact - virtual)), color=_FORCE, lw=0.8, zorder=4)
+    axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force on the whisker")
+    for place, name, shift in (
+        (np.zeros(2), "P$_0$", (-0.5, -0.75)),
+        (contact, "P", (-0.6, 0.55)),
+        (virtual, "V", (0.55, -0.55)),
+    ):
+        axes.annotate(name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6)
+    axes.legend(loc="upper left", fontsize=7)
+
+
+def _draw_slip(axes: Axes, contact, normal) -> None:
+    """σ from P0 to P, set off to the side that the whisker came from."""
+    if np.linalg.norm(contact) < 0.3:
+        return
+    aside = 0.95 * normal
+    axes.annotate(
+        "",
+        contact + aside,
+        aside,
+        arrowprops={"arrowstyle": "<->", "color": _PATH, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
+    )
+    axes.annotate("σ", 0.5 * contact + 1.25 * normal, ha="center", va="center", color=_PATH, fontsize=10)
+
+
+def _draw_angles(axes: Axes, whisk: dict, contact, virtual) -> None:
+    """β between z and the bar at P0, φ between −y and the deflection at V, and the two legs of the deflection."""
+    beta, phi = np.degrees(whisk["beta_rad"]), np.degrees(whisk["at"]["phi_rad"])
+    corner = np.array([contact[0], virtual[1]])
+    axes.plot(*zip(virtual, corner, contact), color="0.35", lw=0.8, ls=":", zorder=2)
+    axes.annotate("d$_y$", 0.5 * (virtual + corner) + [0, -0.32], ha="center", fontsize=9, color="0.25")
+    if abs(contact[1] - virtual[1]) > 0.4:
+        middle = 0.5 * (corner + contact) + [-0.35, 0]
+        axes.annotate("d$_z$", middle, ha="center", va="center", fontsize=9, color="0.25")
+    if abs(phi) > 3.0:
+        size = min(1.6, 0.9 * abs(virtual[0] - contact[0]))
+        low, high = sorted((180.0, 180.0 - phi))
+        axes.add_patch(Arc(virtual, 2 * size, 2 * size, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
+        middle = np.radians(180.0 - 0.5 * phi)
+        axes.annotate("φ", virtual + 1.25 * size * np.array([np.cos(middle), np.sin(middle)]), ha="center", va="center")
+    axes.plot([0, 0], [0, 2.0], color="0.35", lw=0.8, ls=":", zorder=2)
+    if abs(beta) > 3.0:
+        low, high = sorted((90.0, 90.0 - beta))
+        axes.add_patch(Arc((0, 0), 3.2, 3.2, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
+        middle = np.radians(90.0 - 0.25 * beta)  # beside the dimension line of σ
+        axes.annotate("β", 1.95 * np.array([np.cos(middle), np.sin(middle)]), ha="center", va="center")
+
+
+def _values(whisk: dict, friction: tuple[float, str]) -> str:
+    at = whisk["at"]
+    lines = [
+        ("d$_x$", whisk["d_x_mm"], whisk["d_x_sigma_mm"], "mm", 3),
+        ("σ", at["slip_mm"], at["slip_sigma_mm"], "mm", 3),
+        ("β", *np.degrees([whisk["beta_rad"], whisk["beta_sigma_rad"]]), "°", 2),
+        ("φ", *np.degrees([at["phi_rad"], at["phi_sigma_rad"]]), "°", 2),
+        ("α seen", *np.degrees([at["alpha_rad"], at["alpha_sigma_rad"]]), "°", 2),
+    ]
+    return "\n".join(
+        f"{name} = {value:.{digits}f} ± {sigma:.{digits}f} {unit}" for name, value, sigma, unit, digits in lines
+    )

@@ -1,0 +1,112 @@
+"""`whisker-bench figures 8`: several evaluated runs, days of one whisker, pooled into one Fig. 8."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+from bench.base.drawing import publish, style
+from bench.base.errors import BadInput
+from bench.base.results import read_result
+from bench.friction.surfaces import Surface, friction_lines, surfaces
+from bench.report.assembly import write_table
+from bench.report.figure_8 import COLUMNS, figure_8, rows
+
+TABLE = "whisks.csv"
+# A whisker's length, diameter and stiffness are written down alike on all days; this allows for rounding.
+_SAME_WHISKER = 1e-3
+# Fig. 8 is of one distance. |m| is scaled to it as 1/d_x, which takes out what a ruler leaves, not another set-up.
+_SAME_DISTANCE = 0.1
+
+
+def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list[str]]:
+    """Pool evaluated runs; write figure_8.png, .svg and .csv, each whole. The paths, and a line on α a panel.
+
+    Raises BadInput where a folder is no evaluated run, is given twice, cannot be pooled with the first, or none of them
+    holds a whisk.
+    """
+    fitted = pooled(outs)
+    stem = Path(folder) / "figure_8"
+    with style():
+        paths = publish(figure_8(fitted), stem)
+    write_table(stem.with_suffix(".csv"), COLUMNS, rows(fitted))
+    return [*paths, stem.with_suffix(".csv")], list(friction_lines(fitted))
+
+
+def pooled(outs: Sequence[Path]) -> list[Surface]:
+    """A Surface for each surface and speed, of the whisks of all runs. Raises BadInput as `write_figure_8` does."""
+    runs = [(Path(out), read_run(Path(out))) for out in outs]
+    (first, reference), *others = runs
+    _check_given_once(runs)
+    for out, results in others:
+        _check_alike(out, results[0], first, reference[0])
+    C_Nmm2 = 3.0 * reference[0]["whisker"]["EI_Nmm2"]
+    _check_distances([(out, surfaces(results, C_Nmm2)) for out, results in runs])
+    fitted = surfaces([result for _, results in runs for result in results], C_Nmm2)
+    if not fitted:
+        found = "no whisk has moments with a slope and a distance, seen or nominal (beta_deg, d_x_mm in trial.toml)"
+        raise BadInput(found, file=first)
+    return fitted
+
+
+def read_run(out: Path) -> list[dict]:
+    """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run."""
+    if not (out / TABLE).is_file():
+        raise BadInput(f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out)
+    results = [_result(out, trial) for trial in _trials(out / TABLE)]
+    if not results:
+        raise BadInput(f"holds no whisk ({TABLE} has no rows)", file=out)
+    return results
+
+
+def _trials(table: Path) -> list[str | None]:
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            return list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
+    except (UnicodeDecodeError, csv.Error) as problem:
+        raise BadInput(f"is damaged ({problem}); evaluate the session again into this folder", file=table) from None
+
+
+def _result(out: Path, trial: str | None) -> dict:
+    path = out / "trials" / f"{trial}.json"
+    result = read_result(path)
+    if result is None or "whisker" not in result:
+        found = "is of an older version" if result else "is not there or damaged"
+        raise BadInput(f"{path.relative_to(out)} {found}; evaluate the session again into this folder", file=out)
+    return result
+
+
+def _check_given_once(runs: Sequence[tuple[Path, list[dict]]]) -> None:
+    """A recording that is counted twice would look like two that agree. Raises BadInput."""
+    seen: dict[str, Path] = {}
+    for out, results in runs:
+        for result in results:
+            if result["hash"] in seen:
+                found = f"holds the same recording as {seen[result['hash']]} ({result['trial']['name']})"
+                raise BadInput(f"{found}; give each run once", file=out)
+        seen |= {result["hash"]: out for result in results}
+
+
+def _check_alike(out: Path, result: dict, first: Path, reference: dict) -> None:
+    """One whisker, one pushing angle. Raises BadInput."""
+    if result["theta_deg"] != reference["theta_deg"]:
+        found = f"was evaluated at θ = {result['theta_deg']:g}°, {first} at {reference['theta_deg']:g}°"
+        raise BadInput(f"{found}; evaluate both at one --theta-deg", file=out)
+    for name, ours in result["whisker"].items():
+        theirs = reference["whisker"][name]
+        alike = ours == theirs if isinstance(ours, str) else abs(ours / theirs - 1.0) <= _SAME_WHISKER
+        if not alike:
+            ours, theirs = (v if isinstance(v, str) else f"{v:.6g}" for v in (ours, theirs))
+            found = f"is of another whisker: {name} is {ours}, in {first} {theirs}"
+            raise BadInput(f"{found}; whisks of different whiskers cannot be pooled", file=out)
+
+
+def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
+    """One distance a panel. Raises BadInput."""
+    known: dict[tuple[str, float], tuple[Path, float]] = {}
+    for out, fitted in runs:
+        for surface in fitted:
+            d_x = surface.common_d_x_mm
+            first, reference = known.setdefault((surface.name, surface.speed_deg_s), (out, d_x))
+            if abs(d_x / reference - 1.0) > _SAME_DISTANCE:
+                found = f"{surface.title}: d_x is {d_x:.1f} mm, in {first} {reference:.1f} mm"
+                raise BadInput(f"{found}; whisks at distances {_SAME_DISTANCE:.0%} apart cannot be pooled", file=out)

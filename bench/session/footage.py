@@ -1,0 +1,81 @@
+"""Where each camera's frames are in a session: a folder named after the camera, or a video of that name."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.errors import BadInput
+from vision.geometry.errors import Refused
+from vision.pictures.files import PICTURE_SUFFIXES, VIDEO_SUFFIXES, Frames, Video, natural_order, pictures_in
+
+
+def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
+    """Camera name to its folder of pictures or its video, of what is in `folder`; empty where nothing is.
+
+    Folders without pictures are no cameras. Raises BadInput where one camera has a folder and a video, or two
+    videos.
+    """
+    sources: dict[str, Path] = {}
+    for entry in visible(folder):
+        if not _holds_frames(entry):
+            continue
+        name = entry.name if entry.is_dir() else entry.stem
+        if name in sources:
+            raise BadInput(f"camera {name} has {sources[name].name} and {entry.name}; keep one", file=shown)
+        sources[name] = entry
+    return sources
+
+
+def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
+    """Camera name to its one picture in `folder` (boards/rig)."""
+    pictures: dict[str, Path] = {}
+    for entry in visible(folder):
+        if entry.suffix.lower() not in PICTURE_SUFFIXES:
+            continue
+        if entry.stem in pictures:
+            raise BadInput(f"camera {entry.stem} has two pictures here; keep one", file=shown)
+        pictures[entry.stem] = entry
+    return pictures
+
+
+def frame_count(source: Path) -> int:
+    """How many frames a source declares; 0 for a video that cannot be opened."""
+    if source.is_dir():
+        return len(pictures_in(source))
+    try:
+        return Frames.open(source).count
+    except Refused:
+        return 0
+
+
+def decoded_count(source: Path) -> int:
+    """How many frames a source really holds; of a video, by decoding it."""
+    return len(pictures_in(source)) if source.is_dir() else Video(source).decoded_count
+
+
+def visible(folder: Path) -> list[Path]:
+    """What lies in a folder, in natural order, without hidden files; nothing where there is no folder."""
+    if not folder.is_dir():
+        return []
+    return sorted((e for e in folder.iterdir() if not e.name.startswith(".")), key=natural_order)
+
+
+def _holds_frames(entry: Path) -> bool:
+    if entry.is_dir():
+        return bool(pictures_in(entry))
+    return entry.suffix.lower() in VIDEO_SUFFIXES
+
+
+def read_frames(source: Path, indices: Iterable[int]) -> dict[int, np.ndarray | None]:
+    """The pictures of one camera with these indices; None where it is damaged or the video does not open.
+
+    Raises Refused where a picture has another size than the first.
+    """
+    wanted = set(indices)
+    try:
+        frames = Frames.open(source)
+    except Refused:
+        return dict.fromkeys(wanted)
+    span = frames.read(min(wanted), max(wanted) + 1) if wanted else ()
+    return dict.fromkeys(wanted) | {index: grey for index, grey in span if index in wanted}

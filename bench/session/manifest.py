@@ -1,0 +1,138 @@
+"""session.toml and trial.toml as people write them: which keys there are, and what values are plausible."""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+import msgspec
+
+from bench.session import plausible
+from bench.session.strict_toml import Keys
+
+Row4 = Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]
+Pair = Annotated[list[float], msgspec.Meta(min_length=2, max_length=2)]
+
+
+class WhiskerKeys(Keys, kw_only=True):
+    shape: Literal["cylinder", "cone"] = "cylinder"
+    length_mm: float
+    length_sigma_mm: float = 0.0
+    diameter_mm: float
+    diameter_sigma_mm: float = 0.0
+    youngs_modulus_GPa: float | None = None
+    youngs_modulus_sigma_GPa: float = 0.0
+    flexural_rigidity_Nmm2: float | None = None
+    flexural_rigidity_sigma_Nmm2: float = 0.0
+
+    windows: ClassVar = {
+        "length_mm": plausible.LENGTH,
+        "diameter_mm": plausible.THICKNESS,
+        "youngs_modulus_GPa": plausible.YOUNGS_MODULUS,
+        "flexural_rigidity_Nmm2": plausible.RIGIDITY,
+    }
+
+
+class BarKeys(Keys, kw_only=True):
+    diameter_mm: float
+    diameter_sigma_mm: float = 0.0
+
+    windows: ClassVar = {"diameter_mm": plausible.WIDTH}
+
+
+class BoardKeys(Keys, kw_only=True):
+    squares: Annotated[list[int], msgspec.Meta(min_length=2, max_length=2)]
+    square_mm: float
+    square_sigma_mm: float = 0.0
+    marker_mm: float
+    marker_sigma_mm: float = 0.0
+    dictionary: str
+    legacy: bool = False
+    inverted: bool = False
+
+    windows: ClassVar = {
+        "square_mm": plausible.WIDTH,
+        "marker_mm": plausible.WIDTH,
+    }
+
+
+class RigKeys(Keys, kw_only=True):
+    T_rig_board: Annotated[list[Row4], msgspec.Meta(min_length=3, max_length=3)] | None = None
+    T_rig_board_sigma_mm: float = 0.0
+    T_rig_board_sigma_deg: float = 0.0
+
+
+class CameraKeys(Keys, kw_only=True):
+    name: str
+    exposure_s: float | None = None
+    exposure_sigma_s: float = 0.0
+
+    windows: ClassVar = {"exposure_s": plausible.EXPOSURE}
+
+
+class GaugeKeys(Keys, kw_only=True):
+    offset_V: Pair
+    offset_sigma_V: Pair | None = None
+    matrix_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)]
+    matrix_sigma_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)] | None = None
+
+
+class TrialKeys(Keys, kw_only=True):
+    surface: str = ""
+    speed_deg_s: float | None = None
+    speed_sigma_deg_s: float = 0.0
+    beta_deg: float | None = None
+    beta_sigma_deg: float = 0.0
+    d_x_mm: float | None = None
+    d_x_sigma_mm: float = 0.0
+    bar_diameter_mm: float | None = None
+    bar_diameter_sigma_mm: float = 0.0
+    purpose: Literal["measure", "gauge", "weight"] = "measure"
+    force_N: float | None = None
+    force_sigma_N: float = 0.0
+    at_mm: float | None = None
+    at_sigma_mm: float = 0.0
+    frame_rate_Hz: float | None = None
+    frame_rate_sigma_Hz: float = 0.0
+    first_frame_s: float | None = None
+    first_frame_sigma_s: float = 0.0
+    follicle_roll_deg: float = 0.0
+    follicle_roll_sigma_deg: float = 0.0
+
+    windows: ClassVar = {
+        "speed_deg_s": plausible.SPEED,
+        "beta_deg": plausible.SLOPE,
+        "d_x_mm": plausible.LENGTH,
+        "bar_diameter_mm": BarKeys.windows["diameter_mm"],
+        "force_N": plausible.FORCE,
+        "at_mm": plausible.LENGTH,
+        "frame_rate_Hz": plausible.RATE,
+        "first_frame_s": plausible.CLOCK,
+        "follicle_roll_deg": plausible.ANGLE,
+    }
+
+
+class SessionKeys(Keys, kw_only=True):
+    format: int
+    name: str = ""
+    whisker: WhiskerKeys | None = None
+    bar: BarKeys | None = None
+    board: BoardKeys | None = None
+    rig: RigKeys = RigKeys()
+    cameras: tuple[CameraKeys, ...] = ()
+    gauges: GaugeKeys | None = None
+    signals: dict[str, Any] | None = None
+    trial: TrialKeys = TrialKeys()
+
+    tables: ClassVar = {
+        "whisker": WhiskerKeys,
+        "bar": BarKeys,
+        "board": BoardKeys,
+        "rig": RigKeys,
+        "cameras": CameraKeys,
+        "gauges": GaugeKeys,
+        "trial": TrialKeys,
+    }
+
+
+def sigma_key(key: str) -> str:
+    """The key of a value's standard deviation, or '' for a key that has none: 'd_x_mm' -> 'd_x_sigma_mm'."""
+    names = (n for n in TrialKeys.__struct_fields__ if "_sigma_" in n and n.replace("_sigma_", "_") == key)
+    return next(names, "")

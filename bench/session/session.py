@@ -1,0 +1,245 @@
+"""A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.session import manifest
+from bench.session.footage import camera_sources, single_pictures, visible
+from bench.session.plausible import YOUNGS_MODULUS
+from bench.session.strict_toml import as_keys, read_toml, values
+from bench.session.trial import Trial, load_trial
+from bench.session.whisker import Whisker
+from vision.geometry.errors import Refused
+from vision.geometry.rotation import nearest_rotation
+from vision.geometry.scene import Board
+from vision.pictures.files import natural_order
+
+FORMAT = 1
+MANIFEST = "session.toml"
+NMM2_PER_NM2 = 1e6
+# Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.
+_ROTATION_TOLERANCE = 2e-3
+_NEAREST_BOARD_MM = 0.5  # a board's origin this near to the whisker's base is a board placed in metres
+_FARTHEST_BOARD_MM = 5000.0
+
+
+@dataclass(frozen=True)
+class GivenGauges:
+    """[m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − offset), N·mm; sigmas 0: taken as exact."""
+
+    offset_V: np.ndarray
+    matrix_Nmm_per_V: np.ndarray
+    offset_sigma_V: np.ndarray
+    matrix_sigma_Nmm_per_V: np.ndarray
+
+
+@dataclass(frozen=True)
+class Session:
+    """What session.toml and the folders say; T_rig_board is (3, 4), mm; sigmas are 0 where taken as exact.
+
+    whisker and bar are given wherever there are trials; board wherever there is no cameras.toml but pictures.
+    """
+
+    path: Path
+    name: str
+    whisker: Whisker | None
+    bar_diameter_mm: float | None
+    bar_diameter_sigma_mm: float
+    board: Board | None
+    T_rig_board: np.ndarray | None
+    T_rig_board_sigma_mm: float
+    T_rig_board_sigma_rad: float
+    gauges: GivenGauges | None
+    camera_names: tuple[str, ...]
+    exposure_s: dict[str, float]
+    board_sources: dict[str, Path]
+    rig_pictures: dict[str, Path]
+    trials: tuple[Trial, ...]
+    cameras_toml: Path | None
+    gauges_toml: Path | None
+
+    def trial(self, name: str) -> Trial:
+        """The trial of that name. Raises BadInput, naming those that there are."""
+        for trial in self.trials:
+            if trial.name == name:
+                return trial
+        raise BadInput(f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}", file="trials")
+
+
+def load_session(path: Path | str, doubts: Doubts | None = None, *, lenses_known: bool = False) -> Session:
+    """Read the manifests and find every file of a session. Signals and frames are not read here.
+
+    lenses_known: board views of each camera are not asked for.
+
+    Raises BadInput at the first thing that is wrong; with a collecting `doubts`, reads on where it can.
+    """
+    path, doubts = Path(path), doubts or Doubts()
+    keys = _read_manifest(path, doubts)
+    whisker, bar = _whisker(keys.whisker), keys.bar
+    board_sources = camera_sources(path / "boards", "boards")
+    board_sources.pop("rig", None)
+    trials = _trials(path, keys, doubts)
+    with doubts.guard():
+        _check_whole(trials, whisker, bar)
+    session = Session(
+        path=path,
+        name=keys.name or path.resolve().name,
+        whisker=whisker,
+        bar_diameter_mm=bar and bar.diameter_mm,
+        bar_diameter_sigma_mm=bar.diameter_sigma_mm if bar else 0.0,
+        board=_board(keys.board),
+        T_rig_board=_pose(keys.rig.T_rig_board),
+        T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
+        T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
+        gauges=_gauges(keys.gauges),
+        camera_names=_camera_names(board_sources, trials),
+        exposure_s={c.name: c.exposure_s for c in keys.cameras if c.exposure_s is not None},
+        board_sources=board_sources,
+        rig_pictures=single_pictures(path / "boards" / "rig", "boards/rig"),
+        trials=trials,
+        cameras_toml=_if_there(path / "cameras.toml"),
+        gauges_toml=_if_there(path / "gauges.toml"),
+    )
+    _check_cameras(session, [c.name for c in keys.cameras], doubts, lenses_known)
+    return session
+
+
+def _read_manifest(path: Path, doubts: Doubts) -> manifest.SessionKeys:
+    if not path.is_dir():
+        raise BadInput("there is no such folder; give the session's folder", file=str(path))
+    if not (path / MANIFEST).is_file():
+        raise BadInput(f"there is no {MANIFEST} in this folder, so it is not a session", file=str(path))
+    tables = read_toml(path / MANIFEST, MANIFEST)
+    if tables.get("format", FORMAT) != FORMAT:
+        raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
+    keys = as_keys(tables, manifest.SessionKeys, MANIFEST, doubts)
+    if keys.signals is not None:
+        columns = "time_s,motor_deg,y_V,z_V"
+        fix = f"export each trial's signals as signals.csv with the columns {columns} and take [signals] out"
+        raise BadInput(f"[signals] is not yet read by this version; {fix}", file=MANIFEST)
+    return keys
+
+
+def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
+    if keys is None:
+        return None
+    try:
+        whisker = Whisker(**values(keys))
+    except ValueError as problem:
+        raise BadInput(f"[whisker] {problem}", file=MANIFEST) from None
+    _check_rigidity(whisker)
+    return whisker
+
+
+def _check_rigidity(whisker: Whisker) -> None:
+    """Rigidity and diameter must amount to a material. Raises BadInput."""
+    modulus_GPa = whisker.implied_modulus_GPa
+    if YOUNGS_MODULUS.holds(modulus_GPa):
+        return
+    in_metres = YOUNGS_MODULUS.holds(modulus_GPa * NMM2_PER_NM2)
+    hint = f" Is it in N m2? Then write {whisker.EI_Nmm2 * NMM2_PER_NM2:.6g}." if in_metres else ""
+    found = f"flexural_rigidity_Nmm2 and diameter_mm amount to a Young's modulus of {modulus_GPa:.3g} GPa"
+    raise BadInput(f"[whisker] {found}; {YOUNGS_MODULUS.allowed} is allowed.{hint}", file=MANIFEST)
+
+
+def _board(keys: manifest.BoardKeys | None) -> Board | None:
+    if keys is None:
+        return None
+    try:
+        return Board(**values(keys, leave_out=("marker_sigma_mm",)))
+    except Refused as problem:
+        raise BadInput(f"{problem}", file=MANIFEST) from None
+
+
+def _pose(rows: list[list[float]] | None) -> np.ndarray | None:
+    """T_rig_board with its rotation made exact. Raises BadInput where it is no rotation, or not in mm."""
+    if rows is None:
+        return None
+    pose = np.array(rows, dtype=float)
+    rotation, shift_mm = pose[:, :3], np.linalg.norm(pose[:, 3])
+    off = np.abs(rotation.T @ rotation - np.eye(3)).max()
+    if off > _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
+        raise BadInput(
+            "[rig] T_rig_board: the first three columns are not a right-handed rotation "
+            f"(RᵀR is off by {off:.2g}, determinant {np.linalg.det(rotation):.3g})",
+            file=MANIFEST,
+        )
+    if 0 < shift_mm < _NEAREST_BOARD_MM or shift_mm > _FARTHEST_BOARD_MM:
+        hint = " Is the last column in metres? It is mm." if shift_mm < _NEAREST_BOARD_MM else ""
+        raise BadInput(f"[rig] T_rig_board puts the board {shift_mm:.3g} mm from the base.{hint}", file=MANIFEST)
+    return np.column_stack([nearest_rotation(rotation), pose[:, 3]])
+
+
+def _gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
+    if keys is None:
+        return None
+    given = {name: np.array(value) for name, value in values(keys).items() if value is not None}
+    exact = {"offset_sigma_V": np.zeros(2), "matrix_sigma_Nmm_per_V": np.zeros((2, 2))}
+    return GivenGauges(**exact | given)
+
+
+def _trials(path: Path, keys: manifest.SessionKeys, doubts: Doubts) -> tuple[Trial, ...]:
+    found = []
+    for entry in visible(path / "trials"):
+        if entry.is_dir():
+            with doubts.guard():
+                found.append(load_trial(entry, keys, doubts))
+    return tuple(found)
+
+
+def _check_whole(trials, whisker, bar) -> None:
+    """A session with trials needs its whisker and its bar."""
+    for name, given in (("whisker", whisker), ("bar", bar)):
+        if trials and given is None:
+            raise BadInput(f"[{name}] is missing", file=MANIFEST)
+
+
+def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:
+    names = set(board_sources).union(*(t.camera_sources for t in trials))
+    return tuple(sorted(names, key=lambda name: natural_order(Path(name))))
+
+
+def _check_cameras(session: Session, named: list[str], doubts: Doubts, lenses_known: bool) -> None:
+    for name in named:
+        if session.camera_names and name not in session.camera_names:
+            doubts.note(f"{MANIFEST}: [[cameras]] {name!r} has no pictures in boards/ or trials/")
+    for trial in session.trials:
+        with doubts.guard():
+            _check_trial_cameras(trial, session.camera_names)
+    if any(t.camera_sources for t in session.trials) and session.cameras_toml is None and not lenses_known:
+        for name in session.camera_names:
+            with doubts.guard():
+                _check_camera_boards(session, name)
+
+
+def _check_trial_cameras(trial: Trial, names: tuple[str, ...]) -> None:
+    missing = [name for name in names if name not in trial.camera_sources]
+    if trial.camera_sources and missing:
+        raise BadInput(
+            f"camera {missing[0]} has no frames here, {_listed(trial.camera_sources)} has; add them or leave "
+            f"camera {missing[0]} out of the whole session (boards/ and all trials)",
+            file=f"trials/{trial.name}",
+        )
+
+
+def _check_camera_boards(session: Session, name: str) -> None:
+    """Without cameras.toml a camera is calibrated from its own board views."""
+    if session.board is None:
+        raise BadInput("[board] is missing, and there is no cameras.toml", file=MANIFEST)
+    if name not in session.board_sources:
+        raise BadInput(f"there are no board views of camera {name}, and no cameras.toml", file=f"boards/{name}")
+    if session.T_rig_board is not None and name not in session.rig_pictures:
+        raise BadInput(f"there is no picture of the board on the rig by camera {name}", file=f"boards/rig/{name}")
+
+
+def _if_there(path: Path) -> Path | None:
+    return path if path.is_file() else None
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"

@@ -1,0 +1,98 @@
+"""One trial of a session: its settings and where its files are. The files themselves are read elsewhere."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.session import manifest
+from bench.session.footage import camera_sources
+from bench.session.strict_toml import as_keys, read_toml, values
+
+MANIFEST = "trial.toml"
+SIGNALS = "signals.csv"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Settings of one recording; nominal values are None where not given, sigmas 0 where taken as exact.
+
+    purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
+    the follicle was turned about the whisker. camera_sources: camera to folder of pictures or video, empty
+    where the trial has none.
+    """
+
+    name: str
+    folder: Path
+    camera_sources: dict[str, Path]
+    signals_path: Path
+    surface: str
+    purpose: str
+    speed_deg_s: float | None
+    speed_sigma_deg_s: float
+    beta_deg: float | None
+    beta_sigma_deg: float
+    d_x_mm: float | None
+    d_x_sigma_mm: float
+    bar_diameter_mm: float
+    bar_diameter_sigma_mm: float
+    follicle_roll_deg: float
+    follicle_roll_sigma_deg: float
+    force_N: float | None
+    force_sigma_N: float
+    at_mm: float | None
+    at_sigma_mm: float
+    frame_rate_Hz: float | None
+    frame_rate_sigma_Hz: float
+    first_frame_s: float | None
+    first_frame_sigma_s: float
+
+    def shown(self, file: str) -> str:
+        """How messages name one of its files: by the path inside the session."""
+        return f"trials/{self.name}/{file}"
+
+
+def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts) -> Trial:
+    """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput."""
+    shown = f"trials/{folder.name}"
+    keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}", doubts)
+    _check_weight(keys, f"{shown}/{MANIFEST}")
+    signals_path = folder / SIGNALS
+    if not signals_path.is_file():
+        raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{SIGNALS}")
+    return Trial(
+        name=folder.name,
+        folder=folder,
+        camera_sources=camera_sources(folder, shown),
+        signals_path=signals_path,
+        **values(keys) | _bar(keys, session.bar),
+    )
+
+
+def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts) -> manifest.TrialKeys:
+    """trial.toml, absent keys from the session's [trial]; a sigma comes from where its value comes from."""
+    file = folder / MANIFEST
+    if not file.is_file():
+        return defaults
+    given = read_toml(file, shown)
+    own = as_keys(given, manifest.TrialKeys, shown, doubts)
+    decided = set(given) | {manifest.sigma_key(key) for key in given}
+    return manifest.TrialKeys(
+        **{name: value for name, value in values(own).items() if name in decided}
+        | {name: value for name, value in values(defaults).items() if name not in decided}
+    )
+
+
+def _check_weight(keys: manifest.TrialKeys, shown: str) -> None:
+    if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
+        raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
+
+
+def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:
+    """The trial's own bar diameter with its sigma, else the session's."""
+    if keys.bar_diameter_mm is not None:
+        return {"bar_diameter_mm": keys.bar_diameter_mm, "bar_diameter_sigma_mm": keys.bar_diameter_sigma_mm}
+    return {
+        "bar_diameter_mm": bar and bar.diameter_mm,
+        "bar_diameter_sigma_mm": bar.diameter_sigma_mm if bar else 0.0,
+    }

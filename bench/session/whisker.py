@@ -1,0 +1,60 @@
+"""The whisker as the session states it: what truth and estimate both need to know of it."""
+
+import math
+from dataclasses import dataclass
+
+from estimator.beam import flexural_rigidity
+from vision.geometry.scene import Wire
+
+
+@dataclass(frozen=True)
+class Whisker:
+    """Shape, size and stiffness, each with one standard deviation (0: taken as exact).
+
+    Exactly one of `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given.
+    """
+
+    shape: str
+    length_mm: float
+    diameter_mm: float
+    youngs_modulus_GPa: float | None = None
+    flexural_rigidity_Nmm2: float | None = None
+    length_sigma_mm: float = 0.0
+    diameter_sigma_mm: float = 0.0
+    youngs_modulus_sigma_GPa: float = 0.0
+    flexural_rigidity_sigma_Nmm2: float = 0.0
+
+    def __post_init__(self):
+        if (self.youngs_modulus_GPa is None) == (self.flexural_rigidity_Nmm2 is None):
+            raise ValueError("give either youngs_modulus_GPa or flexural_rigidity_Nmm2")
+
+    @property
+    def wire(self) -> Wire:
+        """What the cameras look for."""
+        return Wire(self.shape, self.length_mm, self.diameter_mm, self.length_sigma_mm, self.diameter_sigma_mm)
+
+    @property
+    def EI_Nmm2(self) -> float:
+        """Flexural rigidity at the base, N·mm²."""
+        if self.flexural_rigidity_Nmm2 is not None:
+            return self.flexural_rigidity_Nmm2
+        return flexural_rigidity(self.youngs_modulus_GPa, self.diameter_mm)
+
+    @property
+    def implied_modulus_GPa(self) -> float:
+        """Young's modulus that rigidity and diameter amount to, GPa."""
+        return self.EI_Nmm2 / flexural_rigidity(1.0, self.diameter_mm)
+
+    @property
+    def C_Nmm2(self) -> float:
+        """C = 3 E I of the paper, N·mm²."""
+        return 3.0 * self.EI_Nmm2
+
+    @property
+    def C_sigma_Nmm2(self) -> float:
+        """One standard deviation of C: from the rigidity's, or from E's and (fourfold) the diameter's."""
+        if self.flexural_rigidity_Nmm2 is not None:
+            return 3.0 * self.flexural_rigidity_sigma_Nmm2
+        by_modulus = self.youngs_modulus_sigma_GPa / self.youngs_modulus_GPa
+        by_diameter = 4.0 * self.diameter_sigma_mm / self.diameter_mm
+        return self.C_Nmm2 * math.hypot(by_modulus, by_diameter)

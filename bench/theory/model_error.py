@@ -1,0 +1,123 @@
+"""How wrong (10) is where its assumptions fail: by the rig's exact mechanics over β × ψ and over d_x × bar radius.
+
+(10) gets what a perfect robot would have: exact moments, the exact pushing angle and the true friction angle. What is
+left is the small-angle model itself, and slip along the whisker, which the paper assumes away (sections II and VII).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.base.workers import Workers
+from bench.rig.bar import Bar, first_touch
+from bench.rig.contact import moments_Nmm
+from bench.rig.friction import Friction, March
+from bench.rig.rod import Rod
+from estimator.distance import with_friction
+
+# The paper's wire. Its stiffness cancels in d_x; its length only has to reach.
+ROD = Rod("cylinder", length_mm=120.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
+_C_NMM2 = 3.0 * ROD.rigidity_Nmm2
+BETA_DEG, PSI_DEG = np.arange(0.0, 80.1, 2.5), np.arange(-60.0, 61.0, 10.0)
+D_X_MM = np.arange(15.0, 101.0, 5.0)
+BAR_RADIUS_MM = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0, 20.0, 25.0, 30.0])
+_STEPS = 6  # of the march from touch; 30 change no error by more than 0.002 % of d_x
+
+
+@dataclass(frozen=True)
+class Push:
+    """One push of a straight whisker against a bar: angles in degrees, lengths in mm."""
+
+    beta_deg: float = 0.0
+    psi_deg: float = 0.0
+    alpha_deg: float = 0.0
+    d_x_mm: float = 60.0
+    bar_radius_mm: float = 3.0
+    theta_deg: float = 3.0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A map of errors [% of d_x], (rows, columns), over values of two fields of Push; NaN where there is no contact.
+
+    predicted_percent: the same cells to first order, NaN where that is not known.
+    """
+
+    title: str
+    x: str
+    y: str
+    pushes: tuple[tuple[Push, ...], ...]
+    error_percent: np.ndarray
+    predicted_percent: np.ndarray
+
+
+def error_percent(push: Push) -> float:
+    """Error of (10) with the true α, in percent of the true d_x; NaN where the whisker finds no hold on the bar."""
+    theta, alpha = np.radians([push.theta_deg, push.alpha_deg])
+    bar = Bar.placed(
+        d_x_mm=push.d_x_mm,
+        beta_rad=np.radians(push.beta_deg),
+        psi_rad=np.radians(push.psi_deg),
+        touch_rad=0.0,
+        radius_mm=push.bar_radius_mm,
+        whisker_radius_mm=ROD.diameter_mm / 2,
+    )
+    try:
+        touch = first_touch(ROD, bar, 0.0, push.d_x_mm)
+        march = March(ROD, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
+        *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
+    except ArithmeticError:
+        return float("nan")
+    if state is None:
+        return float("nan")
+    return float(100.0 * (with_friction(theta, *moments_Nmm(state), alpha, _C_NMM2) / touch.d_x_mm - 1.0))
+
+
+def predicted_percent(push: Push) -> float:
+    """The error to first order in θ, derived in docs/maps.md.
+
+    Slipping sideways (β ≥ α): 100 θ (½ tan ψ sin φ / cos α − ⅜ (R/d_x) cos β / cos² ψ), with φ = β − α and R the radii
+    of bar and whisker together. Held at β = ψ = 0: 100 θ (−⅕ tan α − ⅜ R/d_x). NaN where it is held otherwise: there it
+    hangs on how friction is shared between the two directions.
+    """
+    theta, alpha, beta, psi = np.radians([push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg])
+    if beta >= alpha:
+        by_friction = 0.5 * np.tan(psi) * np.sin(beta - alpha) / np.cos(alpha)
+    else:
+        by_friction = -0.2 * np.tan(alpha) if beta == psi == 0 else np.nan
+    reach = (push.bar_radius_mm + ROD.diameter_mm / 2) / push.d_x_mm
+    return float(100.0 * theta * (by_friction - 0.375 * reach * np.cos(beta) / np.cos(psi) ** 2))
+
+
+def tilt_map(pool: Workers, *, beta_deg=BETA_DEG, psi_deg=PSI_DEG) -> list[Panel]:
+    """β × ψ at d_x = 60 mm on a bar of 6 mm: without friction, on the paper's steel and on its sandpaper."""
+    return [
+        _panel(pool, f"α = {alpha:g}°", Push(alpha_deg=alpha), ("beta_deg", beta_deg), ("psi_deg", psi_deg))
+        for alpha in (0.0, 10.5, 23.3)
+    ]
+
+
+def radius_map(pool: Workers, *, d_x_mm=D_X_MM, bar_radius_mm=BAR_RADIUS_MM) -> list[Panel]:
+    """d_x × bar radius at ψ = 0: slip along the whisker alone, with friction, and with slip sideways."""
+    return [
+        _panel(
+            pool,
+            f"β = {beta:g}°, α = {alpha:g}°",
+            Push(beta_deg=beta, alpha_deg=alpha),
+            ("d_x_mm", d_x_mm),
+            ("bar_radius_mm", bar_radius_mm),
+        )
+        for beta, alpha in ((0.0, 0.0), (0.0, 23.3), (60.0, 10.5))
+    ]
+
+
+def _panel(pool: Workers, title: str, push: Push, columns, rows) -> Panel:
+    (x, across), (y, up) = columns, rows
+    pushes = tuple(tuple(replace(push, **{x: float(a), y: float(b)}) for a in across) for b in up)
+    errors = pool.run(_row, pushes, title)
+    predicted = [[predicted_percent(push) for push in row] for row in pushes]
+    return Panel(title, x, y, pushes, np.array(errors), np.array(predicted))
+
+
+def _row(pushes) -> list[float]:
+    return [error_percent(push) for push in pushes]

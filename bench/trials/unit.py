@@ -1,0 +1,197 @@
+"""One trial, the unit of work: a pure function of its files, the session's calibration and the settings.
+
+The result stands whole in OUT/trials/<trial>.json with the hash of all of these. Workers, interruption, resuming, and
+redoing only what changed are this one mechanism. What is seen has a hash of its own, so that another α_est costs no
+look at the pictures.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.results import hash_of, hash_of_code, plain, read_result, write_result
+from bench.base.settings import Settings
+from bench.cameras.calibration import SessionCalibration
+from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.matrix import Gauges
+from bench.session.session import Session
+from bench.session.signals import Signals, read_signals
+from bench.session.trial import Trial
+from bench.session.whisker import Whisker
+from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
+from bench.trials.phases import NO_PHASES, Phases, felt_phases, slips
+from bench.trials.seen import see_trial
+from estimator.beam import Beam
+from estimator.signal import Touch
+
+NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
+OWN_GAUGES = "not judged: without this trial the gauges are not known"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What one trial's result is made from. files: hash of the trial's files. drift_rate: (2,), of the channels per
+    second; gauges: None where volts cannot become moments. stage: folder of what is seen before all is known."""
+
+    session: Session
+    trial: Trial
+    files: str
+    calibration: SessionCalibration
+    settings: Settings
+    out: Path
+    drift_rate: np.ndarray | None = None
+    gauges: Gauges | None = None
+    stage: str = "seen"
+
+    @property
+    def path(self) -> Path:
+        """Where the result stands."""
+        return self.out / "trials" / f"{self.trial.name}.json"
+
+    @property
+    def seen_path(self) -> Path:
+        """Where the seen half of a trial stands that is part of the session's calibration."""
+        return self.out / "calibration" / self.stage / f"{self.trial.name}.json"
+
+    @property
+    def seen_hash(self) -> str:
+        """Hash of all that the seen half depends on."""
+        session = self.session
+        return hash_of(
+            hash_of_code(),
+            self.files,
+            self.trial,
+            session.whisker,
+            session.board,
+            session.T_rig_board,
+            self.calibration.hash,
+            self.settings.seen(),
+        )
+
+    @property
+    def hash(self) -> str:
+        """Hash of all that the result depends on."""
+        return hash_of(self.seen_hash, self.drift_rate, self.gauges, self.settings, self.settings.own_code())
+
+    def with_gauges(self, drift_rate, gauges: Gauges | None) -> "Unit":
+        """The unit complete, once the gauges are known."""
+        return replace(self, drift_rate=drift_rate, gauges=gauges)
+
+
+def see_unit(unit: Unit) -> dict:
+    """The seen half, kept beside the calibration."""
+    seen = _kept_seen(unit)
+    if seen is None:
+        seen = plain(see_trial(unit.session, unit.trial, read_signals(unit.trial), unit.calibration, unit.settings))
+        write_result(unit.seen_path, {"seen_hash": unit.seen_hash, "seen": seen})
+    return seen
+
+
+def _kept_seen(unit: Unit) -> dict | None:
+    """The seen half of an earlier result, where all that it depends on is as it was."""
+    for path in (unit.path, unit.seen_path):
+        kept = read_result(path)
+        if kept and kept.get("seen_hash") == unit.seen_hash:
+            return kept["seen"]
+    return None
+
+
+def evaluate_unit(unit: Unit) -> None:
+    """The trial's whole result in its file, unless it stands there already."""
+    kept = read_result(unit.path)
+    if not kept or kept.get("hash") != unit.hash:
+        write_result(unit.path, {"hash": unit.hash, "seen_hash": unit.seen_hash} | trial_result(unit))
+
+
+def trial_result(unit: Unit) -> dict:
+    """Truth and estimates of every whisk of the trial, as plain values."""
+    signals = read_signals(unit.trial)
+    seen = _kept_seen(unit)
+    if seen is None:
+        seen = plain(see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings))
+    return {
+        "trial": _described(unit.trial),
+        "whisker": _whisker(unit.session.whisker),
+        "theta_deg": unit.settings.theta_deg,
+        "seen": seen,
+        "felt": feel_trial(unit, signals, seen["whisks"]),
+    }
+
+
+def _described(trial: Trial) -> dict:
+    return {
+        "name": trial.name,
+        "purpose": trial.purpose,
+        "surface": trial.surface,
+        "speed_deg_s": trial.speed_deg_s,
+        "d_x_nominal_mm": trial.d_x_mm,
+        "beta_nominal_deg": trial.beta_deg,
+    }
+
+
+def _whisker(whisker: Whisker) -> dict:
+    """What must be alike in results that are pooled."""
+    return {
+        "shape": whisker.shape,
+        "length_mm": whisker.length_mm,
+        "diameter_mm": whisker.diameter_mm,
+        "EI_Nmm2": whisker.EI_Nmm2,
+    }
+
+
+def feel_trial(unit: Unit, signals: Signals, seen: Sequence[dict]) -> dict:
+    """Felt touch, moments and estimates of each whisk; and its phases of stick and slip, which take the slope as seen
+    and are no estimate."""
+    strokes = strokes_of(signals, unit.trial, unit.settings)
+    return {"whisks": [{"whisk": k} | _feel(unit, signals.kind, s, seen[k]) for k, s in enumerate(strokes)]}
+
+
+def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
+    hand, missing = _hand(unit, kind)
+    beam, theta_rad = _beam(unit.session), unit.settings.theta_rad
+    touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
+    status = whisk if isinstance(whisk, str) else missing
+    known = None if status else whisk
+    if known is not None and hand.is_gauged:
+        status = unit.gauges.beyond(hand.in_follicle(known))
+    felt = as_felt(touch, known) | {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
+    if known is None:
+        return felt
+    felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.C_Nmm2)
+    asked = estimators(unit.settings.estimators)
+    return felt | {"estimates": answers(known, asked, unit.settings), "one_factor": _one_factor(unit, kind, stroke)}
+
+
+def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: dict, C_Nmm2: float) -> Phases:
+    if not slips(seen):
+        return NO_PHASES
+    moments = (stroke.channels - touch.offset) @ hand.matrix.T
+    theta = stroke.motor_rad - touch.motor_rad
+    return felt_phases(stroke.time_s, theta, moments, seen["beta_rad"], seen["d_x_mm"], C_Nmm2)
+
+
+def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:
+    """How channels become moments, or why they cannot."""
+    if kind == "Nmm":
+        return Hand.bare(), ""
+    if unit.gauges is None:
+        return None, NO_GAUGES
+    fitted = unit.gauges.for_trial(unit.trial.name)
+    return (Hand.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
+
+
+def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> list[dict]:
+    """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated."""
+    plain_gauges = unit.gauges and unit.gauges.one_factor
+    if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
+        return []
+    _, whisk = felt_whisk(
+        stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad
+    )
+    return answers(whisk, estimators(()), unit.settings)
+
+
+def _beam(session: Session) -> Beam:
+    return Beam(session.whisker.C_Nmm2, session.whisker.length_mm, session.whisker.shape)

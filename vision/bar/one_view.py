@@ -1,0 +1,155 @@
+"""The bar as one camera alone finds it: a line across the whisker, and its depth from how wide it looks.
+
+The two planes of sight that graze a bar meet in its direction, and the angle between them is that of its diameter at
+its distance: four numbers in the picture, shift and tilt of each edge, are the four of an axis in space.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from vision.bar.axis import standing_out
+from vision.bar.edges import measure_edges
+from vision.fit.first_bends import resting_lines
+from vision.fit.onset import onset, seen_bend
+from vision.fit.problem import Problem, State, bends
+from vision.fit.touch import FEWEST_FREE, frames_by_touch
+from vision.geometry.centreline import rotation_z
+from vision.geometry.contact import BarAxis, upward
+from vision.geometry.errors import Refused
+from vision.geometry.scene import Camera, Cameras, Wire
+from vision.geometry.settings import VisionSettings
+from vision.lines.bands import LinePoints
+from vision.lines.trace import View
+
+_ALONG_MM = np.arange(-16.0, 16.1, 4.0)
+_INSIDE, _OUTSIDE = np.array([-0.9, -0.75, 0.0, 0.75, 0.9]), np.array([-1.2, 1.2])
+_FIRST_STEP = np.array([0.5, np.radians(2.5), 0.02])  # along the whisker, mm; round the sight; of the depth
+_AROUND = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+_STARTS, _MOST_CLIMBS, _SHRINKS = 6, 25, 4
+_LEAST_SCORE = 0.25
+_NEAREST, _FARTHEST = 0.7, 1.4  # of the distance at first: beyond, what passed for edges is none
+_SAME_PLANE_RAD = np.radians(1.0)
+_MOST_ONSET_RAD = np.radians(0.5)  # an onset known to 2.4 degrees had free frames touch, and the bar 10 mm off
+
+
+def find_bar_alone(change: np.ndarray, camera: Camera, radius_mm: float, motor_rad: tuple[float, float],
+                   length_mm: float) -> BarAxis:
+    """Coarse axis of the bar in one camera, taken to be at right angles to the sight: its edges tell its tilt.
+
+    change: see `vision.bar.axis.changed`; motor_rad: lowest and highest motor angle, between which the whisker touches.
+    Raises Refused where nothing like a bar is seen.
+    """
+    x = np.arange(10.0, length_mm, 0.35 * radius_mm)
+    turn = np.radians(np.arange(0.0, 180.0, 5.0))
+    grid = np.stack(np.meshgrid(x, turn, [-0.05, 0.0, 0.05], indexing="ij"), axis=-1).reshape(-1, 3)
+    motor = 0.5 * sum(motor_rad)
+    score = lambda hypotheses: standing_out(_axis(hypotheses, camera, motor), change, camera,  # noqa: E731
+                                            radius_mm * _INSIDE, radius_mm * _OUTSIDE, _ALONG_MM)
+    found, best = _climb(grid[np.argsort(score(grid))[-_STARTS:]], score)
+    if best < _LEAST_SCORE:
+        raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
+                      f"{best:.2f}, needed {_LEAST_SCORE:g}); record with the bar in view of every camera")
+    axis = _axis(found[None], camera, motor)
+    return upward(BarAxis(axis.point_mm[0], axis.direction[0]))
+
+
+def _axis(hypotheses, camera: Camera, motor_rad: float) -> BarAxis:
+    """Axes (n, 3) through the straight whisker at x mm, turned round the sight, further away by a share."""
+    x, turn, further = hypotheses.T[..., None]
+    on_whisker = x * rotation_z(motor_rad)[:, 0]
+    sight = on_whisker - camera.centre_mm
+    point = camera.centre_mm + (1.0 + further) * sight
+    ahead = sight / np.linalg.norm(sight, axis=1, keepdims=True)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    return BarAxis(point, np.cos(turn) * right + np.sin(turn) * np.cross(right, ahead))
+
+
+def _climb(starts, score) -> tuple[np.ndarray, float]:
+    """Best hypothesis (3,) and its score: from each start to the best neighbour, by ever smaller steps."""
+    best, best_score, step = starts, score(starts), np.ones(len(starts))
+    for _ in range(_MOST_CLIMBS):
+        around = best[:, None] + step[:, None, None] * _FIRST_STEP * _AROUND
+        scores = score(around.reshape(-1, 3)).reshape(len(best), -1)
+        chosen, rows = np.argmax(scores, axis=1), np.arange(len(best))
+        better = scores[rows, chosen]
+        step = np.where(better > best_score + 1e-3, step, 0.5 * step)
+        best, best_score = around[rows, chosen], better
+        if np.all(step < 0.5**_SHRINKS):
+            break
+    at = int(np.argmax(best_score))
+    return best[at], float(best_score[at])
+
+
+def see_bar_alone(change: np.ndarray, view: View, wire: Wire, radius_mm: float, motor_rad,
+                  settings: VisionSettings) -> BarAxis:
+    """The bar's axis from one camera, before any wire is known. motor_rad (n,): of all frames.
+
+    Raises Refused where no bar is seen, or its edges are not.
+    """
+    camera, span = view.camera, (float(np.min(motor_rad)), float(np.max(motor_rad)))
+    first = axis = find_bar_alone(change, camera, radius_mm, span, wire.length_mm)
+    straight = resting_lines(camera, wire, np.unique(motor_rad))
+    for coarse in (True, False):
+        edges = measure_edges(view, view.mean, axis, radius_mm, straight, settings, coarse=coarse)
+        found = axis if edges is None else axis_from_edges(edges, camera, radius_mm)
+        if not _NEAREST < _distance_mm(found, camera) / _distance_mm(first, camera) < _FARTHEST or (
+                coarse and edges is None):
+            raise Refused(f"camera {camera.name} alone does not tell how far away the bar is: its edges are not seen")
+        axis = found
+    return axis
+
+
+def _distance_mm(axis: BarAxis, camera: Camera) -> float:
+    return float(np.linalg.norm(axis.point_mm - camera.centre_mm))
+
+
+def seen_from_one_side(cameras: Cameras, axis: BarAxis) -> bool:
+    """Whether all cameras' planes through the bar are the same to a degree: only its width tells how far away it is."""
+    return widest_angle_rad(cameras, axis) < _SAME_PLANE_RAD
+
+
+def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
+    """Between the planes through the bar of the two cameras that see it from the most different sides."""
+    across = np.array([np.cross(axis.direction, axis.point_mm - camera.centre_mm) for camera in cameras])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return float(np.arccos(min(np.min(np.abs(across @ across.T)), 1.0)))
+
+
+def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: float) -> BarAxis:
+    """The axis whose two grazing planes pass through the edges; its point is opposite the middle of what is seen."""
+    planes = np.array([np.cross(*camera.rays(edges[side].px)) for side in (-1, 1)])
+    one, other = planes / np.linalg.norm(planes, axis=1, keepdims=True)
+    direction = np.cross(one, other)
+    direction /= np.linalg.norm(direction)
+    distance_mm = radius_mm / np.sin(0.5 * np.arccos(np.clip(one @ other, -1.0, 1.0)))
+    middle = np.sum([camera.rays(points.px) for points in edges.values()], axis=(0, 1))
+    away = middle - (middle @ direction) * direction
+    return upward(BarAxis(camera.centre_mm + distance_mm / np.linalg.norm(away) * middle, direction))
+
+
+def touch_by_onset(problem: Problem, state: State, covariance) -> tuple[Problem, State]:
+    """The problem with what its frames, once fitted, show of when the whisker begins to bend; a state to go on from.
+
+    Raises Refused where no bend is seen, or fewer than two frames before it.
+    """
+    bent, bend = problem.bent, bends(problem, state.vector)
+    seen, spread = seen_bend(bend[bent], covariance[problem.first_bend:, problem.first_bend:])
+    values, whole = np.zeros(len(bend)), np.eye(len(bend)) * np.median(np.diag(spread))
+    values[bent], whole[np.ix_(bent, bent)] = seen, spread
+    found = onset(problem.motor_rad, values, whole)
+    if found is None:
+        raise Refused("no bend of the whisker is seen: it never touches, or bends along the sight of all cameras")
+    if found.sigma_rad > _MOST_ONSET_RAD:
+        raise Refused(f"when the whisker begins to bend is told to {np.degrees(found.sigma_rad):.1f} deg only, "
+                      f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known")
+    touching, free = frames_by_touch(problem.motor_rad, found.motor_rad, 0.5 * found.sigma_rad)
+    free[:FEWEST_FREE] |= problem.motor_rad[:FEWEST_FREE] < found.motor_rad
+    if np.sum(free) < FEWEST_FREE:
+        at_deg, sigma_deg = np.degrees([found.motor_rad, found.sigma_rad])
+        raise Refused(f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: fewer than "
+                      "two frames of free stroke")
+    vector = np.concatenate([state.vector[:problem.first_bend], bend[~free].ravel()])
+    return replace(problem, onset=found, touching=touching, bent=~free), replace(state, vector=vector)

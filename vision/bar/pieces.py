@@ -1,0 +1,82 @@
+"""What the bar's line and its edges are read from: pieces of its band, clear of wire and clamps, and their rims."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vision.geometry.contact import BarAxis
+from vision.geometry.settings import VisionSettings
+from vision.geometry.silhouette import outline
+from vision.lines.bands import Pieces, cut_pieces, read_band
+from vision.lines.cylinder import WAVES
+from vision.lines.shading import Knots, fit_shading, locate
+from vision.lines.trace import View
+
+ARM_MM = 20.0  # the line is handed on as two points, this far to either side
+_INNER_SHARE = 0.72
+_LEAST_IN_PICTURE = 0.5  # of a piece's pixels
+FEWEST_PIECES = 4
+_WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
+_KNOT_MM = 14.0
+NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
+
+
+def bar_pieces(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+               settings: VisionSettings) -> Pieces:
+    """Pieces of the bar's band in the picture `grey`, to either side of the axis's point, that show no wire."""
+    place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
+    points = axis.point_mm + place[:, None] * axis.direction
+    middle, radius = outline(view.camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
+    half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
+    band = read_band(grey, view.background, middle, place, radius, half)
+    pieces = cut_pieces([band], settings.bar_piece_px, view.noise)
+    in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
+    return pieces.select(in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
+
+
+def bar_knots(settings: VisionSettings) -> Knots:
+    """Places between which the bar's shading changes linearly."""
+    return Knots(np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM))
+
+
+def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: float) -> np.ndarray:
+    """Which pieces (s,) of the bar show no wire: each reads a rectangle along and across the bar."""
+    tangent = np.stack([pieces.normal[:, 1], -pieces.normal[:, 0]], axis=1)
+    clear = np.ones(len(pieces), dtype=bool)
+    for line in wires_px:
+        away = line[None] - pieces.foot_px[:, None]
+        along = np.abs(np.einsum("smi,si->sm", away, tangent))
+        across = np.abs(np.einsum("smi,si->sm", away, pieces.normal))
+        clear &= ~np.any((along < margin_px) & (across < pieces.radius_px[:, None] + margin_px), axis=1)
+    return clear
+
+
+def of_bar_alone(pieces: Pieces, placed: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
+    """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border.
+
+    placed: brings pieces to where the bar is taken to be.
+    """
+    for _ in range(3):
+        there = placed(pieces)
+        misfit = locate(there, fit_shading(there, 1.0, WAVES, knots)[0], rounds=1).chi2
+        good = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
+        if np.all(good) or np.sum(good) < FEWEST_PIECES:
+            break
+        pieces = pieces.select(good)
+    return pieces
+
+
+def rims_of(pieces: Pieces, placed: Pieces) -> Pieces:
+    """Pieces without their middle: highlights there say nothing about the edges. placed: the same, where the bar is."""
+    inner = np.abs(placed.offset_px) < _INNER_SHARE * placed.radius_px[:, None]
+    rims = replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
+    return rims.columns(np.any(rims.weight > 0, axis=0))
+
+
+def at_arms(pieces: Pieces) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half-width (2,), by parabolas."""
+    order, place = np.argsort(pieces.place), np.array([-ARM_MM, ARM_MM])
+    known = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order]
+    there = np.stack([np.polyval(np.polyfit(pieces.place[order], column, 2), place) for column in known.T], axis=1)
+    return place, there[:, :2], there[:, 2:4], there[:, 4]

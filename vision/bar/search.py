@@ -1,0 +1,115 @@
+"""Where the bar is, before any wire is known: looked for among what has changed, then by its lines in all cameras."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.bar.axis import HALF, changed, find_bar, settle_axis
+from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bar
+from vision.bar.one_view import see_bar_alone, seen_from_one_side, widest_angle_rad
+from vision.fit.first_bends import resting_lines
+from vision.geometry.contact import BarAxis
+from vision.geometry.errors import Refused
+from vision.geometry.rods import Rods
+from vision.geometry.scene import Cameras
+from vision.geometry.settings import VisionSettings
+from vision.lines.bands import Noise
+from vision.lines.trace import MEAN_OF, View
+
+# Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
+_NARROW_RAD = np.radians(8.0)
+_WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
+_MEDIAN_OF = 11  # frames: more would not make the bar clearer
+
+
+@dataclass(frozen=True)
+class SeenBar:
+    """An axis and the lines of the bar by which it was settled."""
+
+    axis: BarAxis
+    lines: Mapping[str, BarLine]
+
+    @property
+    def told(self) -> dict[str, BarLine]:
+        """Lines of the cameras that see a bar there."""
+        return {name: line for name, line in self.lines.items() if line.told}
+
+    @property
+    def worth(self) -> tuple[int, float]:
+        """The more cameras see a bar there, and the better, the more."""
+        return len(self.told), -sum(line.misfit for line in self.told.values())
+
+
+def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
+    """The bar from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
+
+    Where the sights of all cameras are nearly the same, or not all see the bar that two of them found, each is asked
+    alone, too: by its two edges one camera tells roughly how far away a bar is, and finds no other for it.
+    """
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
+               for view in views}
+    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
+    alone = lambda view: see_bar_alone(changes[view.camera.name], of_mean(view), rods.wire,  # noqa: E731
+                                       rods.bar.radius_mm, motor_rad, settings)
+    settled = lambda axis, *off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
+    if len(views) == 1:
+        return SeenBar(alone(views[0]), {})
+    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
+    found = [settled(axis, FAR_PX, NEAR_PX)]
+    if found[0].worth[0] == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
+        return found[0]
+    for view in views:
+        with suppress(Refused):
+            seen = settled(alone(view), NEAR_PX)
+            found += [seen] if view.camera.name in seen.told else []
+    one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
+    return max(found[1:] if one_side else found, key=lambda one: one.worth)
+
+
+def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
+             settings: VisionSettings) -> SeenBar:
+    """The axis by the bar's lines, which are looked for so far away in turn."""
+    for most_px in off_px:
+        lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
+        bars = {name: line.points for name, line in lines.items() if line.is_bar}
+        axis = settle_axis(axis, cameras, bars, rods.bar.radius_mm)
+        near = max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX
+        if near or all(line.told for line in lines.values()):
+            break
+    return SeenBar(axis, lines)
+
+
+def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
+              last: bool = False) -> dict[str, BarLine]:
+    """The bar's line in each camera that shows enough of it."""
+    found = {view.camera.name: measure_bar(of_mean(view), view.mean, axis, rods.bar.radius_mm,
+                                           wires.get(view.camera.name, []), settings, off_px=off_px, last=last)
+             for view in views}
+    return {name: line for name, line in found.items() if line is not None}
+
+
+def of_mean(view: View) -> View:
+    """The view with the noise of its mean picture."""
+    return replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF)))
+
+
+def _quieter(noise: Noise, count: int) -> Noise:
+    """Noise of a mean of `count` frames beside one picture of the background."""
+    share = 1.0 / count + 1.0
+    return Noise(noise.floor * share, noise.gain * share)
+
+
+def _median_picture(view: View) -> np.ndarray:
+    """Median (of an even number the upper one) of some frames at every HALF-th pixel: a wire that moves vanishes.
+
+    Each pass carries the largest of the rest to its end, whole pictures at a time: no sort of single pixels is as fast.
+    """
+    pictures = [np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)]
+    for last in range(len(pictures) - 1, len(pictures) // 2 - 1, -1):
+        for k in range(last):
+            lower = np.minimum(pictures[k], pictures[k + 1])
+            pictures[k], pictures[k + 1] = lower, np.maximum(pictures[k], pictures[k + 1])
+    return pictures[len(pictures) // 2]

@@ -1,0 +1,148 @@
+"""cameras.toml and its covariance beside it in cameras.npz, as the session format has them; both written
+whole.
+"""
+
+import hashlib
+import os
+import tempfile
+import tomllib
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from vision.boards.sufficiency import check_lens
+from vision.geometry.errors import Refused
+from vision.geometry.scene import PARAMETERS, Camera, Cameras
+
+_KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
+
+
+def write_cameras(path: Path | str, cameras: Cameras) -> None:
+    """Writes `path` (TOML) and, beside it with the suffix .npz, the joint covariance with the parameters'
+    names, and the part of it that is the rig frame's, where that is told.
+
+    The covariance goes first, so that a run that dies between the two leaves no TOML pointing at nothing.
+    """
+    path = Path(path)
+    packed = _pack_covariance(cameras)
+    companion = path.with_suffix(".npz")
+    document = {
+        "covariance": companion.name,
+        "covariance_sha256": hashlib.sha256(packed).hexdigest(),
+        "cameras": {camera.name: _as_table(camera) for camera in cameras},
+    }
+    _write_whole(companion, packed)
+    _write_whole(path, tomli_w.dumps(document).encode())
+
+
+def _as_table(camera: Camera) -> dict:
+    return {
+        "size_px": list(camera.size_px),
+        "matrix": camera.matrix.tolist(),
+        "distortion": camera.distortion.tolist(),
+        "T_camera_rig": camera.T_camera_rig.tolist(),
+        "rms_px": float(camera.rms_px),
+    }
+
+
+def _pack_covariance(cameras: Cameras) -> bytes:
+    buffer = BytesIO()
+    told = {} if cameras.placement is None else {"placement": cameras.placement}
+    np.savez(
+        buffer,
+        covariance=cameras.covariance,
+        cameras=np.array(cameras.names),
+        parameters=np.array(PARAMETERS),
+        **told,
+    )
+    return buffer.getvalue()
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """The old file or the new one, never half of either."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def read_cameras(path: Path | str) -> Cameras:
+    """Cameras of `path`; without a covariance in it they are taken as exact.
+
+    Raises Refused where the file is no TOML, misses a key, or its covariance is not the one it was written
+    with.
+    """
+    path = Path(path)
+    document = _parse(path)
+    tables = document.get("cameras")
+    if not isinstance(tables, dict) or not tables:
+        raise Refused("no [cameras.<name>] table found")
+    cameras = tuple(_camera(name, table) for name, table in tables.items())
+    for camera in cameras:
+        check_lens(camera)
+    return Cameras(cameras, *_read_covariance(path, document, cameras))
+
+
+def _parse(path: Path) -> dict:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise Refused(f"is not TOML: {error}") from error
+
+
+def _camera(name: str, table: dict) -> Camera:
+    if not isinstance(table, dict):
+        raise Refused(f"cameras.{name} must be a table with {', '.join(_KEYS)}")
+    if "translation" in table:
+        raise Refused(
+            f"cameras.{name} is as caliscope and aniposelib write it, in a world of its own: place it in the rig with "
+            "`whisker-bench calibrate cameras SESSION --lenses FILE --out cameras.toml`"
+        )
+    missing, unknown = sorted(set(_KEYS) - set(table)), sorted(set(table) - set(_KEYS) - {"covariance"})
+    if missing:
+        raise Refused(f"cameras.{name}: {', '.join(missing)} missing")
+    if unknown:
+        raise Refused(f"cameras.{name}: unknown key {', '.join(unknown)}; allowed are {', '.join(_KEYS)}")
+    try:
+        return Camera(name, **{key: table[key] for key in _KEYS})
+    except (TypeError, ValueError) as error:
+        raise error if isinstance(error, Refused) else Refused(f"cameras.{name}: {error}") from error
+
+
+def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) -> tuple:
+    """Joint covariance and the placement's part of it; None for what the files do not tell."""
+    name = document.get("covariance")
+    if name is None:
+        return None, None
+    companion = path.with_name(str(name))
+    if not companion.is_file():
+        raise Refused(f"names {name} for its covariance, but there is no such file beside it: copy both")
+    packed = companion.read_bytes()
+    if hashlib.sha256(packed).hexdigest() != document.get("covariance_sha256"):
+        raise Refused(
+            f"{name} is not the covariance this file was written with: copy both, or calibrate again"
+        )
+    stored = np.load(BytesIO(packed))
+    return _in_order(stored, cameras), stored.get("placement")
+
+
+def _in_order(stored: "np.lib.npyio.NpzFile", cameras: tuple[Camera, ...]) -> np.ndarray:
+    """The stored covariance in the TOML's order of cameras and this version's order of parameters."""
+    names, parameters = stored["cameras"].tolist(), stored["parameters"].tolist()
+    if sorted(names) != sorted(c.name for c in cameras) or sorted(parameters) != sorted(PARAMETERS):
+        raise Refused("covariance is of other cameras or other parameters than the ones listed")
+    rows = [len(parameters) * names.index(c.name) + parameters.index(p) for c in cameras for p in PARAMETERS]
+    return stored["covariance"][np.ix_(rows, rows)]

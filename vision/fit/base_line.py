@@ -1,0 +1,136 @@
+"""The whisker's base on each frame of a free stroke, as a line in space: `calibration.place` learns the rig from it.
+
+Two fits to the line points of the frames before touch, away from the hub. One gives the shape at rest, of which only
+what is straight counts here; how far a whole traced line may be off, and wander along the wire, enters as nuisances,
+because it is the same in all frames and no average makes it smaller. The other gives how far each frame by itself lies
+from that: offset and slope, y and z. In the hub's frame, lengths in mm, slopes in mm at the tip.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.calibration.place import BaseLines
+from vision.fit.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Observed, Problem, State, point_rows, wandering
+from vision.fit.solve import linear_at
+from vision.geometry.centreline import REST_POWERS, rotation_z
+
+# Offsets and slopes, y then z, among the rest shape's parameters.
+_LINE = np.array([0, REST_POWERS, 1, REST_POWERS + 1])
+# Nearer to the hub its shade and its edge are read as the wire's.
+_CLEAR_OF_HUB_MM = 15.0
+# A whisker's sag and set: what is more than this is seen, what is less cannot be told from a wandering line.
+_STRAIGHT_MM = np.array([1.0, 0.4])
+# Part of what a whole line is off by that changes as the whisker turns by a radian before its lamp: it passes for a
+# centre elsewhere along the whisker. Strokes of 24 degrees erred by 0.04 mm so.
+_DRIFT_PER_RAD = 0.5
+_FEWEST_POINTS = 8  # in a frame: twice the numbers that they give
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Line points of one camera in one frame: residual (n,) about a straight whisker, by rest shape (n, 8) and by
+    nuisances (n, m), all over their sigma."""
+
+    frame: int
+    residual: np.ndarray
+    by_rest: np.ndarray
+    by_nuisance: np.ndarray
+
+
+def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | None:
+    """Lines of the frames before touch. lens (size, size): what the cameras' uncertainty adds to the fit's parameters.
+
+    None where fewer than two frames are free and well seen.
+    """
+    rows = _free_rows(problem, state)
+    frames = [f for f in sorted({r.frame for r in rows}) if _count(rows, f) >= _FEWEST_POINTS]
+    if len(frames) < 2:
+        return None
+    shape, covariance = _shape_at_rest(rows)
+    covariance = covariance + lens[BAR : BAR + REST, BAR : BAR + REST]
+    motor, length = problem.motor_rad[frames], problem.wire.length_mm
+    lines = [
+        _in_space(shape[_LINE], *_own_line([r for r in rows if r.frame == f], shape), m, length)
+        for f, m in zip(frames, motor)
+    ]
+    return BaseLines(motor, *map(np.array, zip(*lines)), _shared(covariance, float(motor.mean()), length))
+
+
+def _count(rows: list[_Rows], frame: int) -> int:
+    return sum(len(r.residual) for r in rows if r.frame == frame)
+
+
+def _free_rows(problem: Problem, state: State) -> list[_Rows]:
+    linear = linear_at(problem, state)
+    return [
+        _rows_of(problem, seen, state, linear.residual[rows], linear.jacobian[rows])
+        for seen, rows in point_rows(problem)
+        if seen.frame >= 0 and not problem.bent[seen.frame]
+    ]
+
+
+def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian) -> _Rows:
+    """Without the offsets that the whole fit gave the line, and counted from a straight whisker in its place."""
+    clear = seen.points.place > _CLEAR_OF_HUB_MM
+    offsets = problem.wire_off(seen.camera)
+    by_rest = jacobian[:, BAR : BAR + REST]
+    away = residual - jacobian[:, offsets] @ state.vector[offsets] - by_rest @ state.vector[BAR : BAR + REST]
+    nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
+    return _Rows(seen.frame, away[clear], by_rest[clear], nuisance[clear])
+
+
+def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
+    """Of each camera a shift of the whole line and hats along the wire, px: (n, cameras · (1 + knots))."""
+    own = np.column_stack([np.ones(len(seen.points)), wandering(problem, seen)])
+    return np.kron(np.arange(len(problem.cameras)) == seen.camera, own)
+
+
+def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
+    """Rest shape (8,) and its covariance."""
+    J = np.concatenate([np.hstack([r.by_rest, r.by_nuisance]) for r in rows])
+    bent = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
+    prior = np.concatenate([bent, bent, np.full(J.shape[1] - REST, WANDER_PX)])
+    covariance = np.linalg.inv(J.T @ J + np.diag(prior**-2.0))
+    found = -covariance @ (J.T @ np.concatenate([r.residual for r in rows]))
+    return found[:REST], covariance[:REST, :REST]
+
+
+def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What one frame adds to the shape's offsets and slopes (4,), with its covariance (4, 4)."""
+    J = np.concatenate([r.by_rest[:, _LINE] for r in rows])
+    left = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
+    covariance = np.linalg.inv(J.T @ J)
+    return -covariance @ (J.T @ left), covariance
+
+
+def _in_space(shape: np.ndarray, step: np.ndarray, covariance: np.ndarray, motor_rad: float, length_mm: float):
+    """Point, its covariance, direction and its covariance, of offsets and slopes shape + step.
+
+    The point is taken where offset and slope err independently of each other.
+    """
+    place = -np.trace(covariance[:2, 2:]) / np.trace(covariance[2:, 2:])  # in lengths
+    R = rotation_z(motor_rad)
+    to_place = np.hstack([np.eye(2), place * np.eye(2)])
+    point = np.append(place * length_mm, to_place @ (shape + step))
+    direction = np.append(1.0, (shape + step)[2:] / length_mm)
+    spread = np.zeros((2, 3, 3))
+    spread[0, 1:, 1:] = to_place @ covariance @ to_place.T
+    spread[1, 1:, 1:] = covariance[2:, 2:] / length_mm**2
+    point_spread, direction_spread = R @ spread @ R.T
+    return R @ point, point_spread, R @ direction / np.linalg.norm(direction), direction_spread
+
+
+def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.ndarray:
+    """What the rest shape's covariance lets all lines turn and shift alike, (6, 6): w rad, v mm at the base.
+
+    An offset shifts the base; a slope in y turns it about z, one in z about −y. An offset in y that changes as the
+    whisker turns shifts the base along it.
+    """
+    hub = np.zeros((6, 4))
+    hub[4, 0] = hub[5, 1] = 1.0
+    hub[2, 2], hub[1, 3] = 1.0 / length_mm, -1.0 / length_mm
+    to_rig = np.kron(np.eye(2), rotation_z(motor_rad)) @ hub
+    along = np.append(np.zeros(3), rotation_z(motor_rad)[:, 0])
+    drift = _DRIFT_PER_RAD**2 * covariance[_LINE[0], _LINE[0]] * np.outer(along, along)
+    return to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T + drift

@@ -1,0 +1,164 @@
+"""What is known, seen and looked for of one whisk: the fit's observations and parameters, and the curves they mean."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.bar.axis import axis_frame, shifted_axis
+from vision.fit.onset import Onset
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines
+from vision.geometry.contact import BarAxis, closest_arc
+from vision.geometry.scene import Cameras, Wire
+from vision.lines.bands import LinePoints
+
+BAR, REST = 4, 2 * REST_POWERS
+# One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
+# set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
+REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
+BEND_PRIOR_RAD = 0.3
+# How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
+WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
+# As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
+WIRE_DRIFT_PX = 0.01
+WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
+# It also wanders with what is behind it: by as much, over this length of wire.
+WANDER_PX, WANDER_MM = WIRE_OFFSET_PX, 12.0
+BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
+BAR_TILT_ARM_MM = 20.0
+BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
+_MODES = len(WIRE_MODES_PX) + len(BAR_MODES_PX)
+CONTACT_SIGMA_MM = 0.002
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Line points of one camera in one frame (frame is -1 for the bar, which stands still).
+
+    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals.
+    """
+
+    frame: int
+    camera: int
+    points: LinePoints
+    side: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is known and seen of one whisk.
+
+    motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
+    axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
+    cameras do not know whisker and bar well enough in space to tell when they touch. doubt_px: by camera, how far its
+    lines of the wire may be off as a whole besides the usual; none where empty. alike: by camera, how much of its error
+    a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`).
+    """
+
+    cameras: Cameras
+    wire: Wire
+    reach_mm: float
+    reach_sigma_mm: float
+    axis: BarAxis
+    motor_rad: np.ndarray
+    touching: np.ndarray
+    bent: np.ndarray
+    seen: Sequence[Observed]
+    onset: Onset | None = None
+    doubt_px: Sequence[float] = ()
+    alike: Sequence[float] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of parameters: bar, rest shape, reach, how each camera's lines are off as a whole, bends."""
+        return self.first_bend + 2 * int(np.sum(self.bent))
+
+    @property
+    def first_bend(self) -> int:
+        """Index of the first bend."""
+        return BAR + REST + 1 + _MODES * len(self.cameras)
+
+    def wire_off(self, camera: int) -> slice:
+        """Parameters by which a camera's lines of the wire are off as a whole, see `wire_modes`."""
+        first = BAR + REST + 1 + _MODES * camera
+        return slice(first, first + len(WIRE_MODES_PX))
+
+    def bar_off(self, camera: int) -> slice:
+        """The same of the bar: offset, and tilt over BAR_TILT_ARM_MM."""
+        first = self.wire_off(camera).stop
+        return slice(first, first + len(BAR_MODES_PX))
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Parameters in one vector, with the contact arcs (f,) from which the next evaluation starts."""
+
+    vector: np.ndarray
+    arcs_mm: np.ndarray
+
+
+def bar_axis(problem: Problem, vector) -> BarAxis:
+    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start."""
+    return shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
+
+
+def rest_shape(vector) -> np.ndarray:
+    """Rest polynomials (…, 2, 4) in mm."""
+    return vector[..., BAR:BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
+
+
+def bends(problem: Problem, vector) -> np.ndarray:
+    """Tangent angles at the contact (…, f, 2); zero in frames that may not bend."""
+    angles = np.zeros((*vector.shape[:-1], len(problem.motor_rad), 2))
+    angles[..., problem.bent, :] = vector[..., problem.first_bend:].reshape(*vector.shape[:-1], -1, 2)
+    return angles
+
+
+def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 1) -> tuple[Curves, np.ndarray]:
+    """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
+    rest = rest_shape(vector)[..., None, :, :]
+    axis = bar_axis(problem, vector)
+    axis = BarAxis(axis.point_mm[..., None, :], axis.direction[..., None, :])
+    angles = bends(problem, vector)
+    shape = angles.shape[:-1]
+    arcs = np.broadcast_to(arcs_mm, shape)
+    motor = np.broadcast_to(problem.motor_rad, shape)
+    rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
+    for _ in range(rounds):
+        curves = centrelines(rest, angles, arcs, motor, problem.wire)
+        arcs = np.clip(closest_arc(curves, axis, arcs), 1.0, problem.wire.length_mm)
+    return centrelines(rest, angles, arcs, motor, problem.wire), arcs
+
+
+def start(problem: Problem, contact_arc_mm: float) -> State:
+    """No bend, straight whisker, the bar where the problem counts it from."""
+    return State(np.zeros(problem.size), np.full(len(problem.motor_rad), float(contact_arc_mm)))
+
+
+def point_rows(problem: Problem) -> list[tuple[Observed, slice]]:
+    """Each of what is seen, with the rows of its points among all residuals."""
+    ends = np.cumsum([len(seen.points) for seen in problem.seen]).tolist()
+    return [(seen, slice(end - len(seen.points), end)) for seen, end in zip(problem.seen, ends)]
+
+
+def wire_lever(length_mm: float, place_mm) -> np.ndarray:
+    """From -1 at the base to 1 at the tip, by which a line of the wire is tilted."""
+    return 2.0 * place_mm / length_mm - 1.0
+
+
+def wire_modes(length_mm: float, place_mm, motor_rad, swing_rad) -> np.ndarray:
+    """Shapes (n, 6) by which lines of the wire are off: all alike, from end to end, and both of these changing with the
+    motor angle, steadily and by its square.
+
+    place_mm, motor_rad (n,): of each point; swing_rad: the whisk's motor angles.
+    """
+    lever = wire_lever(length_mm, place_mm)
+    turned = (motor_rad - np.min(swing_rad)) / max(np.ptp(swing_rad), 1e-9) * 2.0 - 1.0
+    by_turn = np.stack([np.ones(len(lever)), turned, turned**2 - 1.0 / 3.0], axis=1)
+    return (by_turn[:, :, None] * np.stack([np.ones(len(lever)), lever], axis=1)[:, None]).reshape(len(lever), 6)
+
+
+def wandering(problem: Problem, seen: Observed) -> np.ndarray:
+    """Hats (n, knots) along the wire by which a traced line may wander, at its points."""
+    knots = np.arange(0.0, problem.wire.length_mm + WANDER_MM, WANDER_MM)
+    return np.maximum(1.0 - np.abs(seen.points.place[:, None] - knots) / WANDER_MM, 0.0)

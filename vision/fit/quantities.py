@@ -1,0 +1,122 @@
+"""From the fit's parameters to what a user asks for, and how its uncertainty carries over.
+
+Definitions are those of the contact conventions: slip along the bar, deflection between the virtual point and the
+contact in the contact frame, phi the direction of the deflection, alpha the angle from contact normal to force.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, rest_shape
+from vision.fit.touch import FirstTouch, first_touch
+from vision.geometry.centreline import Curves, centrelines
+from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
+
+_STEP = dict.fromkeys((0, 1, *range(BAR, BAR + REST + 1)), 1e-4) | dict.fromkeys((2, 3), 1e-6)
+_BEND_STEP = 1e-5
+GLOBALS = ("touch", "x", "y", "z", "d_x", "beta", "psi")
+PER_FRAME = ("x", "y", "z", "slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha", "arc")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Values by name: globals (…,) and per frame (…, f)."""
+
+    whisk: dict[str, np.ndarray]
+    frame: dict[str, np.ndarray]
+
+
+def measure(problem: Problem, vector, arcs_mm) -> Measured:
+    """All quantities for one parameter vector or a batch (b, size)."""
+    touch = first_touch(problem, vector)
+    axis = bar_axis(problem, vector)
+    each = BarAxis(axis.point_mm[..., None, :], axis.direction[..., None, :])
+    curves, _ = curves_of(problem, vector, arcs_mm)
+    _, arc, point = clearance(curves, each)
+    beta, psi = contact_frame_angles(axis.direction, touch.motor_rad)
+    whisk = {"touch": touch.motor_rad, "d_x": np.linalg.norm(touch.point_mm, axis=-1), "beta": beta, "psi": psi,
+             **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")}}
+    slip = np.sum((point - touch.point_mm[..., None, :]) * each.direction, axis=-1)
+    d_y, d_z = _deflection(problem, vector, touch, point)
+    frame = {"slip": slip, "longitudinal_slip": arc - touch.arc_mm[..., None], "d_y": d_y, "d_z": d_z, "arc": arc,
+             "phi": np.arctan2(d_z, d_y), "alpha": _force_angle(curves, each, touch, arc, point, d_y, d_z, beta),
+             **{name: point[..., k] for k, name in enumerate("xyz")}}
+    return Measured(whisk, frame)
+
+
+def _deflection(problem: Problem, vector, touch: FirstTouch, point):
+    """d_y = V_y - P_y and d_z = P_z - V_z (…, f) in the contact frame."""
+    shape = point.shape[:-1]
+    rest = np.broadcast_to(rest_shape(vector)[..., None, :, :], (*shape, 2, 4))
+    motor = np.broadcast_to(problem.motor_rad, shape)
+    unbent = centrelines(rest, np.zeros((*shape, 2)), np.full(shape, 50.0), motor, problem.wire)
+    cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
+    forward = lambda v: cosine * v[..., 0] + sine * v[..., 1]  # noqa: E731
+    wanted = forward(touch.point_mm[..., None, :])
+    arc = np.broadcast_to(touch.arc_mm[..., None], shape)
+    for _ in range(3):
+        virtual, tangent = (a[..., 0, :] for a in unbent.at(arc[..., None]))
+        arc = arc + (wanted - forward(virtual)) / forward(tangent)
+    virtual, _ = unbent.at(arc[..., None])
+    away = virtual[..., 0, :] - point
+    return -sine * away[..., 0] + cosine * away[..., 1], -away[..., 2]
+
+
+def _force_angle(curves: Curves, axis: BarAxis, touch: FirstTouch, arc, point, d_y, d_z, beta):
+    """Angle (…, f) between the contact's force, across the whisker, and its normal; |beta| - |phi| where psi = 0.
+
+    The force on the whisker points the way it was bent, from the virtual point to the contact.
+    """
+    _, tangent = curves.at(arc[..., None])
+    along = tangent[..., 0, :] / np.linalg.norm(tangent[..., 0, :], axis=-1, keepdims=True)
+    cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
+    bent = np.stack([sine * d_y, -cosine * d_y, d_z], axis=-1)
+    bent = bent - np.sum(bent * along, axis=-1, keepdims=True) * along
+    away = point - axis.point_mm
+    normal = away - np.sum(away * axis.direction, axis=-1, keepdims=True) * axis.direction
+    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    uphill = -np.sum(bent * axis.direction, axis=-1) * np.where(beta >= 0, 1.0, -1.0)[..., None]
+    return np.arctan2(uphill, np.sum(bent * normal, axis=-1))
+
+
+@dataclass(frozen=True)
+class Jacobians:
+    """Derivatives by the parameters: whisk[name] (size,), frame[name] (f, size)."""
+
+    whisk: dict[str, np.ndarray]
+    frame: dict[str, np.ndarray]
+
+
+def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
+    """All quantities and their derivatives by finite differences, the frames' bends moved all at once."""
+    rows, moves = [state.vector], []
+    order = np.cumsum(problem.bent) - 1
+    for k, step in _STEP.items():
+        rows.append(state.vector + step * (np.arange(problem.size) == k))
+        moves.append((step, np.full(len(problem.motor_rad), k)))
+    for part in range(2):
+        row = state.vector.copy()
+        row[problem.first_bend + part::2] += _BEND_STEP
+        rows.append(row)
+        moves.append((_BEND_STEP, np.where(problem.bent, problem.first_bend + 2 * order + part, -1)))
+    all_rows = measure(problem, np.stack(rows), state.arcs_mm)
+    whisk = {name: np.zeros(problem.size) for name in all_rows.whisk}
+    frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in all_rows.frame}
+    for number, (step, columns) in enumerate(moves, start=1):
+        shared = number <= len(_STEP)
+        for name, values in all_rows.whisk.items():
+            if shared:
+                whisk[name][columns[0]] = (values[number] - values[0]) / step
+        for name, values in all_rows.frame.items():
+            use = np.flatnonzero(columns >= 0)
+            frame[name][use, columns[use]] = _difference(name, values[number, use], values[0, use]) / step
+    here = Measured({name: v[0] for name, v in all_rows.whisk.items()},
+                    {name: v[0] for name, v in all_rows.frame.items()})
+    return here, Jacobians(whisk, frame)
+
+
+def _difference(name: str, moved, here):
+    """Difference of values; of angles the short way round."""
+    change = moved - here
+    return (change + np.pi) % (2 * np.pi) - np.pi if name in ("phi", "alpha") else change

@@ -1,0 +1,246 @@
+"""One reprojection fit over all cameras and frames of a whisk: bar, rest shape, and the bend in each frame.
+
+Shared by all frames: the bar's axis and the whisker's rest shape. Each touching frame adds the two components of
+its bend and one observation, that axis and centreline are bar radius + whisker radius apart. What the pictures may
+be wrong in as a whole (a shift of the seen line from the rod's axis, by light and lens) enters as an offset and a
+tilt per camera with a prior, and so ends up in the stated uncertainty.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import groupby
+
+import numpy as np
+
+from vision.fit.onset import Onset
+from vision.fit.problem import (
+    BAR,
+    BAR_MODES_PX,
+    BAR_TILT_ARM_MM,
+    BEND_PRIOR_RAD,
+    CONTACT_SIGMA_MM,
+    REST,
+    REST_PRIOR_MM,
+    WIRE_MODES_PX,
+    Observed,
+    Problem,
+    State,
+    bar_axis,
+    curves_of,
+    rest_shape,
+    wire_modes,
+)
+from vision.geometry.centreline import Curves, centrelines
+from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.silhouette import edges
+from vision.lines.bands import LinePoints
+
+LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
+_ALIKE = 1000.0  # steps of differences (0.1 mm, 1 mrad; bends 10 mrad): so near the slopes are what they were
+_STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
+
+
+def _steps(problem: Problem) -> np.ndarray:
+    """Finite-difference step of each geometric parameter: about 1e-5 of its size."""
+    step = np.full(problem.size, 1e-5)
+    step[0:2], step[2:4], step[BAR:BAR + REST] = 1e-4, 1e-6, 1e-4
+    return step
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Residuals (n,) over their sigma, their Jacobian (n, size), and which are line points (robust weights)."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    is_point: np.ndarray
+
+
+def linearise(problem: Problem, state: State, jacobian: np.ndarray | None = None) -> tuple[Linear, State]:
+    """Residuals and Jacobian at a state; the state comes back with its contact arcs brought up to date.
+
+    jacobian: that of a state nearby, taken as it is, which saves nine tenths of the work.
+    """
+    moved, columns = _perturbed(problem, state.vector) if jacobian is None else (state.vector[None], [])
+    curves, arcs = curves_of(problem, moved, state.arcs_mm)
+    alike = groupby(problem.seen, key=lambda seen: (seen.camera, seen.frame >= 0))
+    blocks = [_wire_block(problem, camera, list(seen), curves, columns, state.vector) if on_wire
+              else _bar_block(problem, camera, list(seen), columns, state.vector) for (camera, on_wire), seen in alike]
+    count = sum(len(block[0]) for block in blocks)
+    blocks += [_contact_block(problem, moved, curves, arcs, columns, state.vector), _prior_block(problem, state.vector)]
+    if problem.onset is not None:
+        blocks.append(_onset_block(problem, problem.onset, moved, columns, state.vector))
+    residual = np.concatenate([block[0] for block in blocks])
+    if jacobian is None:
+        jacobian = np.concatenate([block[1] for block in blocks])
+    return (Linear(residual, jacobian, np.arange(len(residual)) < count),
+            replace(state, arcs_mm=arcs[0]))
+
+
+@lru_cache(maxsize=1)
+def linear_at(problem: Problem, state: State) -> Linear:
+    """`linearise`, kept for the next who asks the same: a fit that is done is asked for each of its uncertainties."""
+    return linearise(problem, state)[0]
+
+
+def _perturbed(problem: Problem, vector):
+    """The vector itself and one copy per geometric degree: bar and rest each alone, all frames' bends at once.
+
+    columns: for each copy after the first, a function of the frame that names the parameter it moved.
+    """
+    step = _steps(problem)
+    rows, columns = [vector], []
+    for k in range(BAR + REST):
+        rows.append(vector + step[k] * (np.arange(problem.size) == k))
+        columns.append((step[k], np.full(len(problem.motor_rad), k)))
+    order = np.cumsum(problem.bent) - 1
+    for part in range(2):
+        row = vector.copy()
+        row[problem.first_bend + part::2] += step[-1] if np.any(problem.bent) else 0.0
+        rows.append(row)
+        columns.append((1e-5, np.where(problem.bent, problem.first_bend + 2 * order + part, -1)))
+    return np.stack(rows), columns
+
+
+def _together(group: Sequence[Observed]) -> LinePoints:
+    """The line points of all of them."""
+    return LinePoints(*(np.concatenate([getattr(seen.points, name) for seen in group])
+                        for name in LinePoints.__dataclass_fields__))
+
+
+def _wire_block(problem: Problem, number: int, group: Sequence[Observed], curves: Curves, columns, vector):
+    """Residuals and Jacobian rows of one camera's points of the wire, all frames."""
+    frame, points = np.repeat([s.frame for s in group], [len(s.points) for s in group]), _together(group)
+    positions = curves.at_one_each(frame, points.place)
+    px, by_point, _ = problem.cameras.cameras[number].project_with_jacobians(positions[0])
+    along_normal = np.einsum("ni,nij->nj", points.normal, by_point)
+    moved = np.einsum("cnj,nj->cn", positions[1:] - positions[0], along_normal)
+    jacobian, row = np.zeros((len(points), problem.size)), np.arange(len(points))
+    for (step, names), by_step in zip(columns, moved):
+        bent = names[frame] >= 0
+        jacobian[row[bent], names[frame][bent]] = by_step[bent] / step
+    modes = wire_modes(problem.wire.length_mm, points.place, problem.motor_rad[frame], problem.motor_rad)
+    return _over_sigma(points, px, jacobian, problem.wire_off(number), modes, vector)
+
+
+def _over_sigma(points: LinePoints, px, jacobian, off: slice, modes, vector):
+    """Residuals of points predicted at px (n, 2), and their Jacobian, over sigma; with what the line is off by as a
+    whole, in these modes (n, k)."""
+    jacobian[:, off] = modes
+    residual = np.sum(points.normal * (px - points.px), axis=1) + modes @ vector[off]
+    return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
+
+
+def bar_middle(problem: Problem, camera, vector, place_mm) -> np.ndarray:
+    """Middle (…, n, 2) of the bar's outline in one camera, at places (n,) along its axis; vector (…, size)."""
+    one, other = _bar_edges(problem, camera, vector, place_mm, 0.0)
+    return 0.5 * (one + other)
+
+
+def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np.ndarray, np.ndarray]:
+    """Both edges (…, n, 2) of the bar's outline; wider_mm (…, n) or a number: added to the bar's radius."""
+    axis = bar_axis(problem, vector)
+    points = axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
+    directions = np.broadcast_to(axis.direction[..., None, :], points.shape)
+    radius_mm = np.broadcast_to(problem.reach_mm - problem.wire.diameter_mm / 2 + wider_mm, points.shape[:-1])
+    one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radius_mm.ravel())
+    return one.reshape(*points.shape[:-1], 2), other.reshape(*points.shape[:-1], 2)
+
+
+def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns, vector):
+    """Residuals and Jacobian rows of one camera's points of the bar: of its middle, or of an edge."""
+    points, side = _together(group), np.repeat([s.side for s in group], [len(s.points) for s in group])
+    moving = [*range(BAR), *([BAR + REST] if np.any(side) else [])] if columns else []
+    step = _steps(problem)[moving]
+    moved = vector + step[:, None] * np.eye(problem.size)[moving]
+    px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side)
+    jacobian = np.zeros((len(points), problem.size))
+    jacobian[:, moving] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
+    modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
+    return _over_sigma(points, px[0], jacobian, problem.bar_off(number), modes, vector)
+
+
+def _bar_px(problem: Problem, camera, vector, points: LinePoints, side) -> np.ndarray:
+    """Where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's error is taken for the bar's."""
+    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., BAR + REST, None] * (side != 0))
+    half = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
+    return 0.5 * (one + other) + side[:, None] * half * points.normal
+
+
+def _contact_block(problem: Problem, moved, curves: Curves, arcs_mm, columns, vector):
+    """Touching frames: signed distance from axis to centreline is reach + its error."""
+    axis = bar_axis(problem, moved)
+    axis = BarAxis(axis.point_mm[:, None], axis.direction[:, None])
+    distance = clearance(curves, axis, arcs_mm)[0]
+    frames = np.flatnonzero(problem.touching)
+    jacobian = np.zeros((len(frames), problem.size))
+    for (step, names), row in zip(columns, distance[1:]):
+        held = names[frames] >= 0
+        jacobian[np.flatnonzero(held), names[frames[held]]] = (row - distance[0])[frames[held]] / step
+    jacobian[:, BAR + REST] = -1.0
+    residual = distance[0, frames] - problem.reach_mm - vector[BAR + REST]
+    return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
+
+
+def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
+    """At the onset of bending the unbent whisker is the reach away from the axis."""
+    rest, axis = rest_shape(moved), bar_axis(problem, moved)
+    count = len(moved)
+    curves = centrelines(rest, np.zeros((count, 2)), np.full(count, problem.wire.length_mm / 2),
+                         np.full(count, onset.motor_rad), problem.wire)
+    distance, arc, _ = clearance(curves, axis)
+    sigma_mm = onset.sigma_rad * arc[0]
+    jacobian = np.zeros((1, problem.size))
+    for k, (step, _) in enumerate(columns[:BAR + REST]):
+        jacobian[0, k] = (distance[k + 1] - distance[0]) / step
+    jacobian[0, BAR + REST] = -1.0
+    residual = distance[:1] - problem.reach_mm - vector[BAR + REST]
+    return residual / sigma_mm, jacobian / sigma_mm
+
+
+def _prior_block(problem: Problem, vector):
+    per_camera = np.tile([*WIRE_MODES_PX, *BAR_MODES_PX], (len(problem.cameras), 1))
+    if problem.doubt_px:
+        per_camera[:, 0] = np.hypot(per_camera[:, 0], problem.doubt_px)
+    sigma = np.concatenate([[50.0, 50.0, 1.0, 1.0], REST_PRIOR_MM, REST_PRIOR_MM,
+                            [max(problem.reach_sigma_mm, 1e-6)], per_camera.ravel(),
+                            np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
+    return vector / sigma, np.diag(1.0 / sigma)
+
+
+def robust_weights(linear: Linear, scale: float) -> np.ndarray:
+    """Cauchy weights of line points; observations of touch and priors keep theirs."""
+    return np.where(linear.is_point, 1.0 / (1.0 + (linear.residual / scale) ** 2), 1.0)
+
+
+def solve(problem: Problem, state: State, *,
+          scales: Sequence[float] = (30.0, 10.0, *[LAST_SCALE] * 4)) -> tuple[State, np.ndarray]:
+    """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say; ends early once it stands still.
+
+    Returns the state and its covariance (size, size) from noise and priors alone.
+    """
+    known, geometry = None, np.r_[:BAR + REST, problem.first_bend:problem.size]
+    for scale in scales:
+        linear, state = linearise(problem, state, known)
+        root = np.sqrt(robust_weights(linear, scale))
+        jacobian = linear.jacobian * root[:, None]
+        step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
+        step = step * min(1.0, 0.3 / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
+        state = replace(state, vector=state.vector + step)
+        if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
+            break
+        known = linear.jacobian if np.all(np.abs(step[geometry]) < _ALIKE * _steps(problem)[geometry]) else None
+    else:
+        jacobian = weighted_jacobian(problem, state, scales[-1], known)
+    return state, np.linalg.inv(jacobian.T @ jacobian)
+
+
+def weighted_jacobian(problem: Problem, state: State, scale: float = LAST_SCALE,
+                      jacobian: np.ndarray | None = None) -> np.ndarray:
+    """All observations' rows (n, size) over their sigma and robustly weighted: line points, touching, priors.
+
+    jacobian: see `linearise`.
+    """
+    linear = linear_at(problem, state) if jacobian is None else linearise(problem, state, jacobian)[0]
+    return linear.jacobian * np.sqrt(robust_weights(linear, scale))[:, None]

@@ -1,0 +1,79 @@
+"""First touch as the pictures show it: the motor angle at which the unbent whisker reaches the bar."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.fit.problem import Problem, bar_axis, rest_shape
+from vision.geometry.centreline import centrelines
+from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.scene import Wire
+
+FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
+_SURE_BEND_RAD = np.radians(0.25)
+_TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
+
+
+@dataclass(frozen=True)
+class FirstTouch:
+    """Motor angle (…) of first touch, contact point (…, 3) of the centreline and its arc length (…)."""
+
+    motor_rad: np.ndarray
+    point_mm: np.ndarray
+    arc_mm: np.ndarray
+
+
+def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
+    """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
+    axis = bar_axis(problem, vector)
+    reach = problem.reach_mm + vector[..., 4 + 8]
+    rest = rest_shape(vector)
+    low = np.full(vector.shape[:-1], np.min(problem.motor_rad))
+    high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
+    gap_low, gap_high = (_gap(rest, m, axis, reach, problem.wire)[0] for m in (low, high))
+    for _ in range(rounds):
+        moving = np.abs(gap_high) > _TOUCH_GAP_MM
+        slope = (gap_high - gap_low) / np.where(moving, high - low, 1.0)
+        new = np.where(moving, high - gap_high / np.where(moving, slope, 1.0), high)
+        low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
+        high, (gap_high, arc, point) = new, _gap(rest, new, axis, reach, problem.wire)
+    return FirstTouch(high, point, arc)
+
+
+def _gap(rest_mm, motor_rad, axis: BarAxis, reach_mm, wire: Wire):
+    """How far the resting whisker still is from touching, mm; contact arc and point."""
+    none = np.zeros((*motor_rad.shape, 2))
+    curves = centrelines(rest_mm, none, np.full(motor_rad.shape, wire.length_mm / 2), motor_rad, wire)
+    distance, arc, point = clearance(curves, axis)
+    return distance - reach_mm, arc, point
+
+
+def frames_that_touch(motor_rad, bend_rad) -> tuple[np.ndarray, np.ndarray]:
+    """From coarse bends (f, 2): which frames surely touch, and which surely do not; (f,) bool each.
+
+    The bend is nothing up to touch and then grows with the motor's angle, towards where it ends: the touch that
+    explains all bends best parts the frames. One frame to either side of it is left undecided, but the first two
+    are taken as free: whether they are, the fit will show. None touches where no two frames in a row are surely bent.
+    """
+    sure = np.linalg.norm(bend_rad, axis=1) > _SURE_BEND_RAD
+    if not np.any(sure & np.append(sure[1:], sure[-1])):
+        return np.zeros(len(sure), dtype=bool), np.ones(len(sure), dtype=bool)
+    touch, step = _hinge(motor_rad, bend_rad), np.median(np.abs(np.diff(motor_rad)))
+    first = np.arange(len(sure)) < 2
+    return (motor_rad > touch + step) & sure & ~first, (motor_rad < touch - step) | first
+
+
+def _hinge(motor_rad, bend_rad) -> float:
+    """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
+    towards = np.median(bend_rad[-max(2, len(bend_rad) // 3):], axis=0)
+    bend = bend_rad @ (towards / max(np.linalg.norm(towards), 1e-12))
+    starts = np.linspace(motor_rad[0], motor_rad[-2], 10 * len(motor_rad))
+    rises = np.maximum(motor_rad - starts[:, None], 0.0)
+    slopes = np.sum(rises * bend, axis=1) / np.sum(rises**2, axis=1)
+    return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
+
+
+def frames_by_touch(motor_rad, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """The same once touch is known to sigma: frames within three sigma of it are left undecided."""
+    margin = max(3.0 * sigma_rad, np.radians(0.02))
+    return motor_rad > touch_rad + margin, motor_rad < touch_rad - margin

@@ -1,0 +1,228 @@
+"""The rod's own shading, shared by all pieces of a camera, and the position of each piece under it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from vision.lines.bands import LinePoints, Pieces
+from vision.lines.cylinder import rim_bells, shaded, shading_basis
+
+_WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
+# Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
+# alike, moved all lines by half a pixel, and by a quarter of one from end to end.
+_LIT_ALIKE_RAD = np.radians(8.0)
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Between what a rod's shading is linear: places along it (m,), mm, and where it turns far, angles (k,), rad.
+
+    turns: angle of each band (`Pieces.source`), needed where k > 1.
+    """
+
+    place_mm: np.ndarray
+    turn_rad: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    turns: Mapping[int, float] = field(default_factory=dict)
+
+    @staticmethod
+    def of_turning(place_mm: np.ndarray, turns: Mapping[int, float]) -> "Knots":
+        """Knots of a rod whose bands stand at these angles, rad."""
+        angles = np.array(list(turns.values()))
+        width = float(np.ptp(angles)) if len(angles) else 0.0
+        if width <= _LIT_ALIKE_RAD:
+            return Knots(place_mm)
+        return Knots(place_mm, np.linspace(angles.min(), angles.max(), 1 + int(np.ceil(width / _LIT_ALIKE_RAD))), turns)
+
+    def __len__(self) -> int:
+        return len(self.place_mm) * len(self.turn_rad)
+
+    def weights(self, pieces: Pieces) -> np.ndarray:
+        """How much each knot has in the shading of each piece, (s, k m)."""
+        along = _hats(pieces.place, self.place_mm)
+        if len(self.turn_rad) == 1:
+            return along
+        turned = _hats(np.array([self.turns[band] for band in pieces.source.tolist()]), self.turn_rad)
+        return (turned[:, :, None] * along[:, None, :]).reshape(len(along), -1)
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Radiance round the rod. waves (k m, terms): at each knot the coefficients of 1, sin t, cos t, …, grey levels."""
+
+    knots: Knots
+    waves: np.ndarray
+    blur_px: float
+
+    def of(self, pieces: Pieces) -> np.ndarray:
+        """Coefficients (s, terms) of each piece."""
+        return self.knots.weights(pieces) @ self.waves
+
+
+def _hats(place_mm, knots_mm) -> np.ndarray:
+    """Weights (s, m) of linear interpolation between knots, constant outside."""
+    if len(knots_mm) == 1:
+        return np.ones((len(place_mm), 1))
+    position = np.clip(np.interp(place_mm, knots_mm, np.arange(len(knots_mm))), 0, len(knots_mm) - 1)
+    return np.clip(1.0 - np.abs(position[:, None] - np.arange(len(knots_mm))), 0.0, None)
+
+
+def _not_leaked(pieces: Pieces, bells, blur_px: float) -> np.ndarray:
+    """What the blurred known picture holds (s, p) of light that the rod hides, near a border in the background.
+
+    The lens blurs what is left when the rod has hidden its part; the known picture was blurred whole. The blurred
+    product of two pictures is the product of the blurred ones, and blur² times that of their slopes, and blur⁴/2
+    times that of their curvatures, and so on. bells (s, p, 2): see `rim_bells`.
+    """
+    return bells[..., 0] * (blur_px * pieces.slope) - bells[..., 1] * ((0.5 * blur_px**2) * pieces.curvature)
+
+
+def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust=None,
+                prior=None) -> tuple[Shading, float]:
+    """Most probable radiance over all pieces with their positions as they stand; also how badly it fits, per pixel.
+
+    Each piece has its own gain and offset of the background (shadow, drifting light). robust (s,): weight of
+    each piece. prior (terms,): sigma of each coefficient in grey levels (see `wave_prior`), which also is nearly the
+    same at neighbouring knots; None leaves them free. The misfit is chi², and with a prior minus twice the log
+    evidence: what a shift of the rod and a change of its shading explain alike is then not credited to the shading in
+    full.
+    """
+    gram, moment, power = _normal_equations(pieces, blur_px, terms)
+    robust = np.ones(len(pieces)) if robust is None else robust
+    hats = knots.weights(pieces)
+    size = len(knots) * terms
+    pairs = (hats[:, :, None] * hats[:, None, :] * robust[:, None, None]).reshape(len(pieces), -1)
+    left = pairs.T @ gram.reshape(len(pieces), -1)
+    left = left.reshape(len(knots), len(knots), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
+    right = ((hats * robust[:, None]).T @ moment).reshape(size)
+    stiff = 1e-6 * np.trace(left) / size * np.eye(size) if prior is None else _stiffness(prior, knots)
+    factors = lu_factor(left + stiff, check_finite=False)
+    waves = lu_solve(factors, right, check_finite=False)
+    misfit = float(robust @ power - 2.0 * right @ waves + waves @ left @ waves)
+    if prior is not None:
+        misfit += float(waves @ stiff @ waves + np.sum(np.log(np.abs(np.diag(factors[0])))))
+    pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
+    shading = Shading(knots, waves.reshape(len(knots), terms), blur_px)
+    return shading, misfit / max(1.0, pixels)
+
+
+def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
+    """Each piece's normal equations for its shading, the background's gain and offset eliminated.
+
+    Gram matrices (s, terms, terms), moments (s, terms), and the squares (s,) that the background leaves.
+    """
+    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
+    basis *= pieces.weight[..., None]
+    rod = basis[..., :terms]
+    rest = np.empty((len(pieces), 3, pieces.offset_px.shape[1]))  # two of the background, and what is seen
+    np.subtract(pieces.weight, rod[..., 0], out=rest[:, 1])
+    np.multiply(rest[:, 1], pieces.background, out=rest[:, 0])
+    rest[:, 0] += _not_leaked(pieces, basis[..., terms:], blur_px)
+    np.multiply(pieces.grey, pieces.weight, out=rest[:, 2])
+    gram, mixed, own = rod.transpose(0, 2, 1) @ rod, rest @ rod, rest @ rest.transpose(0, 2, 1)
+    around, seen = mixed[:, :2].transpose(0, 2, 1), own[:, :2, 2:]
+    inverse = _inverse_of_two(own[:, :2, :2] + _WEAK * np.eye(2))
+    explained = inverse @ seen
+    return (gram - around @ (inverse @ mixed[:, :2]), mixed[:, 2] - (around @ explained)[..., 0],
+            own[:, 2, 2] - np.sum(seen * explained, axis=(1, 2)))
+
+
+def _inverse_of_two(matrices) -> np.ndarray:
+    """Inverses of symmetric matrices (s, 2, 2)."""
+    a, b, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    return np.stack([d, -b, -b, a], axis=1).reshape(-1, 2, 2) / (a * d - b * b)[:, None, None]
+
+
+# How strong each wave round a thin, lit rod is beside its contrast: diffuse light fills the first three, a highlight
+# a quarter of the rod wide reaches the eleventh (its Fourier series).
+_WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
+# What of it changes from knot to knot: the light and the rod's finish are much the same a centimetre farther on. Left
+# to itself at every knot, shading bends the line of a wire before an even floor by up to a pixel.
+_CHANGE_SHARE = 0.1
+# The same from turn to turn of _LIT_ALIKE_RAD: light and rod keep, the angle at which they meet does not.
+_TURNED_SHARE = 0.3
+
+
+def _stiffness(prior, knots: Knots) -> np.ndarray:
+    """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
+    between = _between(len(knots.turn_rad), len(knots.place_mm))
+    both, size = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :], len(knots) * len(prior)
+    return both.reshape(size, size)
+
+
+@lru_cache
+def _between(turns: int, places: int) -> np.ndarray:
+    """Inverse covariance (knots, knots) of one wave's coefficients over its own variance."""
+    along, turned = (steps.T @ steps for steps in (np.diff(np.eye(count), axis=0) for count in (places, turns)))
+    return (np.eye(turns * places) + np.kron(np.eye(turns), along) / _CHANGE_SHARE**2
+            + np.kron(turned, np.eye(places)) / _TURNED_SHARE**2)
+
+
+def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
+    """Sigma (terms,) of the shading's coefficients in grey levels, from the rod's contrast in these pieces."""
+    inside = (np.abs(pieces.offset_px) < pieces.radius_px[:, None]) & (pieces.weight > 0)
+    contrast = np.sqrt(np.mean((pieces.grey - pieces.background)[inside] ** 2)) if np.any(inside) else 1.0
+    return max(float(contrast), 1.0) * _WAVE_SHARE[:terms]
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where each piece lies: shift_px, sigma_px (s,) along the normal; chi2 (s,) per pixel; contrast (s,).
+
+    contrast: signal of the rod against its background over the noise, over the whole piece.
+    """
+
+    shift_px: np.ndarray
+    sigma_px: np.ndarray
+    chi2: np.ndarray
+    contrast: np.ndarray
+
+
+def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
+    """Gauss–Newton on the position of each piece with the rod's shading known, background gain and offset free.
+
+    Sigma, misfit and contrast are those of the last round, before its step.
+    """
+    waves = shading.of(pieces)
+    shift = np.zeros(len(pieces))
+    for _ in range(rounds):
+        residual, slope, contrast = _linearise(pieces, shading, waves, shift)
+        power = np.maximum(np.sum(slope * slope, axis=1), 1e-9)
+        step = np.sum(slope * residual, axis=1) / power
+        shift = np.clip(shift + np.clip(step, -0.7, 0.7), -limit_px, limit_px)
+    free = np.maximum((pieces.weight > 0).sum(axis=1) - 3, 1)
+    chi2 = np.sum(residual**2, axis=1) / free
+    return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, contrast)
+
+
+def _linearise(pieces: Pieces, shading: Shading, waves, shift):
+    """Residual, its slope by position (both s, p; free of the background's gain and offset), and the contrast."""
+    offset, weight = pieces.offset_px - shift[:, None], pieces.weight
+    (rod, cover), (rod_slope, cover_slope) = shaded(offset, pieces.radius_px, shading.blur_px, waves)
+    around = np.empty((len(pieces), 2, offset.shape[1]))
+    np.multiply(1.0 - cover, weight, out=around[:, 1])
+    np.multiply(around[:, 1], pieces.background, out=around[:, 0])
+    bells = rim_bells(offset, pieces.radius_px[:, None], shading.blur_px)
+    around[:, 0] += _not_leaked(pieces, bells, shading.blur_px) * weight
+    turned = around.transpose(0, 2, 1)
+    inverse = _inverse_of_two(around @ turned + _WEAK * np.eye(2))
+    seen = (pieces.grey - rod) * weight
+    explained = inverse @ (around @ seen[..., None])  # gain and constant
+    by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
+    slope = -(rod_slope + cover_slope * by_cover) * weight
+    contrast = np.sqrt(np.sum(((rod + cover * by_cover) * weight) ** 2, axis=1))
+    free = [values - (turned @ share)[..., 0]
+            for values, share in ((seen, explained), (slope, inverse @ (around @ slope[..., None])))]
+    return *free, contrast
+
+
+def line_points(pieces: Pieces, located: Located, *, worst_chi2: float, worst_sigma_px: float,
+                worst_shift_px: float = 1.45) -> tuple[LinePoints, np.ndarray]:
+    """The pieces that can be trusted as points of the axis, and which band each came from."""
+    good = ((located.chi2 < worst_chi2) & (located.sigma_px < worst_sigma_px)
+            & (np.abs(located.shift_px) < worst_shift_px))
+    px = pieces.foot_px + located.shift_px[:, None] * pieces.normal
+    points = LinePoints(px, pieces.normal, located.sigma_px, pieces.place).select(good)
+    return points, pieces.source[good]

@@ -1,0 +1,220 @@
+"""Frames of one camera in order, from a folder of pictures or a video; read forward only, every index kept.
+
+A frame that cannot be read stays in its place as None, so that a series is never shortened and its times
+never shift. Grey is what the file holds at full depth; of a colour video it is the Y plane as stored (16 to
+235 for most codecs), because the other ways from H.264 to grey differ from it, and from each other, by up to
+16 levels.
+"""
+
+import os
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from vision.geometry.errors import Refused
+
+PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm"})
+VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv"})
+
+# FFmpeg would write about a truncated file to stderr; the caller says it in one line of its own.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+# Stored orientation and depth: a camera's pixels, not a viewer's idea of which side is up.
+_AS_STORED = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+
+# Pixel formats whose first plane is the grey picture, as OpenCV names them when asked not to convert.
+_PLANAR_GREY = frozenset({b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"})
+
+_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_JPEG_TAIL_BYTES = 1024  # cameras pad the file after the end marker
+
+
+class Frames(ABC):
+    """The frames of one camera, from 0. Made by `Frames.open`.
+
+    path: the folder or the file. count: how many frames there are (a video: how many its header declares).
+    size_px: (width, height). times_s: the container's times, shape (count,), or None for pictures.
+    """
+
+    path: Path
+    count: int
+    size_px: tuple[int, int]
+
+    @staticmethod
+    def open(path: Path | str) -> "Frames":
+        """The frames in a folder of pictures or in a video file.
+
+        Raises Refused where there is no picture that can be read, or the video cannot be opened.
+        """
+        path = Path(path)
+        return PictureFolder(path) if path.is_dir() else Video(path)
+
+    @property
+    @abstractmethod
+    def times_s(self) -> np.ndarray | None:
+        """Each frame's time as the container states it, s, or None where there is no container."""
+
+    @abstractmethod
+    def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
+        """Frames first to last − 1 as stored."""
+
+    def read(self, first: int = 0, last: int | None = None) -> Iterator[tuple[int, np.ndarray | None]]:
+        """(index, grey) for frames first to last − 1 in order; grey is (height, width), uint8 or uint16.
+
+        A damaged frame gives (index, None). Raises Refused where a frame has another size than `size_px`.
+        """
+        for index, grey in self._read(first, self.count if last is None else min(last, self.count)):
+            if grey is not None:
+                self._check_size(index, grey)
+            yield index, grey
+
+    def _check_size(self, index: int, grey: np.ndarray) -> None:
+        size = (grey.shape[1], grey.shape[0])
+        if size != self.size_px:
+            raise Refused(
+                f"frame {index} of {self.path.name} is {_size(size)}, the others are {_size(self.size_px)}: "
+                "one camera gives one size; pictures are never rescaled"
+            )
+
+
+class PictureFolder(Frames):
+    """Pictures in the natural order of their names (2 before 10)."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.files = pictures_in(path)
+        self.count = len(self.files)
+        self.size_px = self._first_size()
+
+    @property
+    def times_s(self) -> None:
+        return None
+
+    def _first_size(self) -> tuple[int, int]:
+        for file in self.files:
+            grey = read_picture(file)
+            if grey is not None:
+                return grey.shape[1], grey.shape[0]
+        raise Refused(f"no picture in {self.path.name} can be read ({self.count} found)")
+
+    def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
+        for index in range(first, last):
+            yield index, read_picture(self.files[index])
+
+
+class Video(Frames):
+    """A video, decoded forward: seeking by frame number is wrong on clips with dropped frames.
+
+    Frames that the header declares and the stream does not hold (a truncated file) are damaged frames.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        with self._opened() as capture:
+            self.size_px = (
+                _whole(capture, cv2.CAP_PROP_FRAME_WIDTH),
+                _whole(capture, cv2.CAP_PROP_FRAME_HEIGHT),
+            )
+            self.count = max(0, _whole(capture, cv2.CAP_PROP_FRAME_COUNT))
+
+    @contextmanager
+    def _opened(self) -> Iterator[cv2.VideoCapture]:
+        with _quiet_opencv():
+            capture = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG)
+            try:
+                if not capture.isOpened():
+                    raise Refused(f"{self.path.name} cannot be opened as a video: truncated, or not a video")
+                yield capture
+            finally:
+                capture.release()
+
+    @cached_property
+    def times_s(self) -> np.ndarray:
+        """The container's times of the frames that decode, s; as many as `decoded_count`."""
+        times_ms = []
+        with self._opened() as capture:
+            while capture.grab():
+                times_ms.append(capture.get(cv2.CAP_PROP_POS_MSEC))
+        return np.array(times_ms) / 1000.0
+
+    @property
+    def decoded_count(self) -> int:
+        """How many frames the stream really holds: decodes it whole, once."""
+        return len(self.times_s)
+
+    def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
+        with self._opened() as capture:
+            to_grey = _grey_reader(capture)
+            whole = all(capture.grab() for _ in range(first))
+            for index in range(first, last):
+                whole = whole and capture.grab()
+                yield index, to_grey(capture) if whole else None
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """The folder's pictures in natural order, without hidden files."""
+    files = (f for f in folder.iterdir() if f.suffix.lower() in PICTURE_SUFFIXES and f.name[0] != ".")
+    return sorted(files, key=natural_order)
+
+
+def natural_order(path: Path) -> list[tuple[int, int | str]]:
+    """Sort key under which `img_2` comes before `img_10`."""
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"([0-9]+)", path.name) if part]
+
+
+def read_picture(path: Path) -> np.ndarray | None:
+    """One picture as grey, (height, width), uint8 or uint16; None where it is damaged or cut short."""
+    data = np.fromfile(path, dtype=np.uint8)
+    if data.size == 0 or _is_cut_jpeg(data):
+        return None
+    with _quiet_opencv():
+        grey = cv2.imdecode(data, _AS_STORED)
+    return grey if grey is not None and grey.dtype in (np.uint8, np.uint16) else None
+
+
+def _is_cut_jpeg(data: np.ndarray) -> bool:
+    """A JPEG without its end marker: OpenCV decodes it and fills the lost part with grey."""
+    return data[:2].tobytes() == _JPEG_START and _JPEG_END not in data[-_JPEG_TAIL_BYTES:].tobytes()
+
+
+def _grey_reader(capture: cv2.VideoCapture):
+    """How to fetch the grabbed frame as grey: its first plane where that is grey, else from colour."""
+    pixel_format = _whole(capture, cv2.CAP_PROP_CODEC_PIXEL_FORMAT).to_bytes(4, "little", signed=True)
+    planar = pixel_format in _PLANAR_GREY
+    capture.set(cv2.CAP_PROP_CONVERT_RGB, 0 if planar else 1)
+    return _retrieve if planar else _retrieve_colour
+
+
+def _retrieve(capture: cv2.VideoCapture) -> np.ndarray | None:
+    found, frame = capture.retrieve()
+    return frame if found else None
+
+
+def _retrieve_colour(capture: cv2.VideoCapture) -> np.ndarray | None:
+    frame = _retrieve(capture)
+    return frame if frame is None or frame.ndim == 2 else cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+
+
+@contextmanager
+def _quiet_opencv() -> Iterator[None]:
+    """OpenCV warns once a frame that it hands over the Y plane, which is what was asked for."""
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
+def _whole(capture: cv2.VideoCapture, prop: int) -> int:
+    return int(round(capture.get(prop)))
+
+
+def _size(size_px: tuple[int, int]) -> str:
+    return f"{size_px[0]} x {size_px[1]} px"

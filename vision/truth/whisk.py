@@ -1,0 +1,245 @@
+"""One whisk: wire and bar traced in all its frames and fitted together, by turns."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.bar.edges import measure_edges
+from vision.bar.one_view import seen_from_one_side, touch_by_onset
+from vision.bar.search import SeenBar, bar_lines, of_mean
+from vision.fit.first_bends import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
+from vision.fit.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape, wire_lever
+from vision.fit.scatter import honest, scatter_px
+from vision.fit.solve import LAST_SCALE, solve
+from vision.fit.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
+from vision.geometry.centreline import Curves
+from vision.geometry.contact import BarAxis, upward
+from vision.geometry.errors import Misled, Refused
+from vision.geometry.rods import Rods
+from vision.geometry.scene import Cameras
+from vision.geometry.settings import VisionSettings
+from vision.lines.bands import LinePoints
+from vision.lines.cylinder import WAVES
+from vision.lines.one_sided import Lit, seen_width
+from vision.lines.shading import Knots
+from vision.lines.trace import View, clear_of_bar, observed, settle, settle_again, to_points, trace, wire_pieces
+
+_WIRE_KNOT_MM = 12.0
+_NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
+_BESIDE_BAR_PX = 4.0
+_SEARCH_PX = 1.5
+_ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
+# Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
+# another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
+_NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
+# What changes slowly over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
+_FREE_SHARED = 4.0
+_MOST_SCATTER_PX = 0.7  # where a wire is seen at all its points lie on one line to a tenth of a pixel
+_NEVER_TOUCHES = "the whisker never touches"
+_STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What is taken for known before a round: bar, rest shape (2, 4), bend (f, 2) and contact arc (f,) in each frame,
+    the curves by frame, and which frames touch or are free (f,)."""
+
+    axis: BarAxis
+    rest_mm: np.ndarray
+    bend_rad: np.ndarray
+    arcs_mm: np.ndarray
+    curves: Mapping[int, Curves]
+    touching: np.ndarray
+    free: np.ndarray
+
+
+def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float], light: dict[str, Lit],
+              settings: VisionSettings):
+    """Problem and state after the last round, how its parameters answer (see `Uncertainty`), and the frames in it: all
+    but those far before touch.
+
+    light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
+    """
+    edges = _told_by_edges(cameras, bar)
+    by_onset = bool(edges)
+    motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
+    for _ in range(settings.rounds):
+        seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
+        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, by_onset)
+        _check_scatter(problem, state)
+        light.update(_beside_fit(problem, state, light))
+        look = _next_look(problem, state, look, motor, by_onset)
+    seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
+    return *_fit(seen, cameras, rods, look, motor, light, by_onset), list(motor)
+
+
+def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
+    """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand
+    on one side, or a single one sees it. None where two see it from different sides."""
+    told = [name for name in cameras.names if name in bar.told]
+    if seen_from_one_side(cameras, bar.axis):
+        return told or list(cameras.names)
+    return told if len(told) == 1 else []
+
+
+def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float],
+                by_onset: bool) -> tuple[Mapping[int, float], _Look]:
+    """The frames to fit, and what coarse points tell of them."""
+    early = _early(motor)
+    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
+    coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
+    motor = motor if by_onset else _near_touch(motor, coarse)
+    angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
+    touching, free = frames_that_touch(angles, bend)
+    if by_onset:  # a bend along the sight is not seen at first
+        free = np.arange(len(angles)) < len(early)
+        touching = touching & ~free
+    elif not np.any(touching):
+        raise Refused(_NEVER_TOUCHES)
+    if np.sum(~touching) < FEWEST_FREE:
+        raise Refused(_STARTS_TOUCHING)
+    arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
+    curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
+    return motor, _Look(axis, rest, bend, arcs, curves, touching, free)
+
+
+def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float], light: dict,
+         by_onset: bool) -> tuple[Problem, State, np.ndarray]:
+    """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
+    doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
+    problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
+                      look.touching, ~look.free, seen, doubt_px=doubt_px)
+    state, covariance = solve(problem, _begin(problem, look))
+    if by_onset:
+        problem, state = touch_by_onset(problem, state, covariance)
+        state, _ = solve(problem, state)
+    problem = honest(problem, state)
+    return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
+
+
+def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], by_onset: bool) -> _Look:
+    """What a fit tells; which frames touch: by clearance, or where cameras do not tell it, by the onset of bending."""
+    touching, free = problem.touching, look.free
+    if not by_onset:
+        touch = float(first_touch(problem, state.vector).motor_rad)
+        touching, free = frames_by_touch(problem.motor_rad, touch, np.radians(0.02))
+        if np.sum(free) < FEWEST_FREE:
+            raise Refused(_STARTS_TOUCHING)
+        if not np.any(touching):
+            raise Refused(_NEVER_TOUCHES)
+    return _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
+                 state.arcs_mm, _fitted(problem, state, motor), touching, free)
+
+
+def _beside_fit(problem: Problem, state: State, light: Mapping[str, Lit]) -> dict[str, Lit]:
+    """The same light, with where each camera's own line lies: it is looked for again from there."""
+    own = [state.vector[problem.wire_off(camera)][:2].tolist() for camera in range(len(problem.cameras))]
+    return {name: replace(light[name], off_px=off, tilt_px=tilt)
+            for name, (off, tilt) in zip(problem.cameras.names, own) if name in light}
+
+
+def _check_scatter(problem: Problem, state: State) -> None:
+    """Raises Misled where a camera's lines are not those of one wire."""
+    scatter = scatter_px(problem, state)
+    worst = int(np.argmax(scatter))
+    if scatter[worst] > _MOST_SCATTER_PX:
+        found = f"its lines of the wire scatter by {scatter[worst]:.1f} px, {_MOST_SCATTER_PX:g} is allowed"
+        raise Misled(problem.cameras.names[worst], found)
+
+
+def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> dict[int, float]:
+    """The frames from a little before the first that surely touches."""
+    angles = np.array(list(motor.values()))
+    touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
+    if not np.any(touching):
+        return dict(motor)
+    first = int(np.argmax(touching))
+    begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
+    return dict(list(motor.items())[begin:])
+
+
+def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mapping[int, float], near, light: dict,
+                settings: VisionSettings) -> tuple[Problem, State]:
+    """All frames before touch and what is seen in them, about the bar and the shape at rest of a fit."""
+    free = {f: angle for f, angle in motor.items() if f not in near or not problem.bent[near.index(f)]}
+    rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
+    curves = {f: one_curve(rest, np.zeros(2), rods.wire.length_mm, angle, rods.wire) for f, angle in free.items()}
+    seen = [one for number, view in enumerate(views)
+            for one in _trace_wire(number, view, rods, axis, free, curves, light, settings)]
+    nothing = np.zeros(len(free), dtype=bool)
+    alone = replace(problem, motor_rad=np.array(list(free.values())), touching=nothing, bent=nothing, seen=seen)
+    there = State(state.vector[:problem.first_bend], np.full(len(free), 0.5 * rods.wire.length_mm))
+    there, _ = solve(alone, there, scales=[LAST_SCALE] * 3)
+    return honest(alone, there, _FREE_SHARED), there
+
+
+def _early(motor: Mapping[int, float]) -> dict[int, float]:
+    """The frames of the first seventh of the stroke, two at least: taken as free for a first look."""
+    angles = list(motor.values())
+    limit = angles[0] + (angles[-1] - angles[0]) / 7.0
+    count = max(2, sum(1 for angle in angles if angle <= limit))
+    return dict(list(motor.items())[:count])
+
+
+def _fitted(problem: Problem, state: State, motor) -> dict[int, Curves]:
+    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
+    return {f: Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k]) for k, f in enumerate(motor)}
+
+
+def _begin(problem: Problem, look: _Look) -> State:
+    vector = np.zeros(problem.size)
+    vector[BAR:BAR + REST] = np.ravel(look.rest_mm)
+    vector[problem.first_bend:] = look.bend_rad[problem.bent].ravel()
+    return State(vector, np.asarray(look.arcs_mm, dtype=float))
+
+
+def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *,
+               edges: Collection[str], last: bool) -> list[Observed]:
+    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. edges: see
+    `_told_by_edges`; last: see `measure_bar`."""
+    wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
+             for view in views}
+    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
+    seen = []
+    for number, view in enumerate(views):
+        seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
+        seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
+    for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
+                       ("bar clear of the wire", any(one.frame < 0 for one in seen))):
+        if not there:
+            raise Refused(f"no camera shows enough of the {rod}")
+    if not edges and len({one.camera for one in seen if one.frame < 0}) < 2:
+        raise Refused("a single camera shows enough of the bar clear of the wire, and not well enough to ask it alone")
+    return seen
+
+
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
+               last: bool) -> list[dict[int, LinePoints]]:
+    """Per camera the points of the bar's middle (side 0), or of its two edges where any tell them."""
+    if edges:
+        told = lambda view: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,  # noqa: E731
+                                          wires[view.camera.name], settings)
+        return [told(view) or {} if view.camera.name in edges else {} for view in views]
+    lines = bar_lines(views, axis, rods, wires, settings, last=last)
+    return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
+
+
+def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
+                settings: VisionSettings, *, last: bool = True) -> list[Observed]:
+    pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
+    pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
+    if len(pieces) == 0:
+        return []
+    knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
+    name, known = view.camera.name, light.get(view.camera.name)
+    if known:
+        own = known.off_px + known.tilt_px * wire_lever(rods.wire.length_mm, pieces.place)
+        pieces, blur = settle_again(pieces.moved(own), known.blur_px, knots), known.blur_px
+    else:
+        pieces, blur = settle(pieces, knots, _SEARCH_PX)
+    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST, last=last)
+    light[name] = known or Lit(blur, seen_width(pieces, blur))
+    points, source = to_points(pieces, found, misfit)
+    return observed(points, source, number, list(curves))
