@@ -13,7 +13,6 @@ from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.cameras.calibration import calibrate_session
-from bench.evaluate import judged, session_drift
 from bench.gauges.certificate import Certificate, page
 from bench.gauges.checks import check_alive
 from bench.gauges.felt import Stroke, strokes_of
@@ -26,6 +25,7 @@ from bench.session.check import checked_session
 from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
+from bench.trials.of_session import judged, session_drift
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, see_unit
 

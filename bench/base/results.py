@@ -13,12 +13,14 @@ import numpy as np
 from bench.base.atomic import write_whole
 
 _TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
-_NO_RESULTS = (  # they only parse and tell, or gather finished results anew in every run
-    *("cli.py", "environment.py", "theory_figures.py", "model_error.py", "model_error_maps.py"),
-    *("runs.py", "summary.py", "score.py"),
-    *("alphas.py", "friction_runs.py", "friction_tables.py", "section_vii.py", "explained.py", "friction_map.py"),
-    *("gauge_calibration.py", "gauge_certificate.py"),
+# What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
+SEEING = (
+    *("vision", "bench/session", "bench/cameras", "bench/trials/seen.py", "bench/trials/placing.py"),
+    *("bench/base/results.py", "bench/base/settings.py"),
 )
+ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")
+DRAWING = ("bench/report", "bench/base/drawing.py")
+_ROOT = Path(__file__).resolve().parents[2]
 _MANY = 1000  # values; larger arrays are hashed by their bytes
 
 
@@ -51,12 +53,20 @@ def hash_of_files(paths: Iterable[Path]) -> str:
     return digest.hexdigest()
 
 
-@lru_cache(maxsize=1)
-def hash_of_code() -> str:
-    """Hash of the three packages' sources: a new version never takes an old version's results for its own."""
-    root = Path(__file__).resolve().parents[2]
-    sources = (path for name in ("bench", "vision", "estimator") for path in (root / name).glob("*.py"))
-    return hash_of_files(path for path in sources if path.name not in _NO_RESULTS)
+@lru_cache
+def hash_of_code(places: tuple[str, ...], root: Path = _ROOT) -> str:
+    """Hash of the sources in these folders, with all below them, and files: a new version never takes an old version's
+    results for its own. Raises FileNotFoundError where a place is none."""
+    digest = hashlib.blake2b(digest_size=16)
+    for place in places:
+        path = root / place
+        found = [path] if path.suffix == ".py" else sorted(path.rglob("*.py"))
+        if not found:
+            raise FileNotFoundError(f"no sources in {place}")
+        for file in found:
+            digest.update(f"{file.relative_to(root).as_posix()}\0".encode())
+            digest.update(hashlib.blake2b(file.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def plain(value):

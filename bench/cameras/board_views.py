@@ -15,8 +15,8 @@ from vision.boards.corners import Corners, find_corners, refine_corners
 from vision.boards.diagnosis import why_not_found
 from vision.boards.marker_size import check_marker_size
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
+from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Board
 from vision.pictures.files import Frames, read_picture
 
 # A series longer than this is sampled in runs of neighbours, which tell how the board moved.

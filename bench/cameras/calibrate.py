@@ -16,9 +16,9 @@ from vision.calibration.cameras_file import write_cameras
 from vision.calibration.cameras_import import import_cameras, place_on_rig
 from vision.calibration.held_out import Agreement, HeldOut, held_out
 from vision.calibration.place import by_board, placed
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.lens import LENS_TERMS
-from vision.geometry.scene import Camera, Cameras
 
 # Every fourth view (index % 4 == 3) measures a calibration from the other three quarters.
 HOLD_EVERY = 4

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.base.results import hash_of, hash_of_code, hash_of_files, plain, read_result, write_result
+from bench.base.results import SEEING, hash_of, hash_of_code, hash_of_files, plain, read_result, write_result
 from bench.cameras.board_views import read_board_views
 from bench.cameras.calibrate import board_in_world, calibrate_from, report_lines
 from bench.cameras.first_look import by_first_look, first_look
@@ -21,9 +21,9 @@ from vision.boards.corners import refine_corners
 from vision.boards.static_board import camera_moved
 from vision.calibration.cameras_file import read_cameras, write_cameras
 from vision.calibration.place import Placement, placed
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
-from vision.geometry.scene import Cameras
 from vision.pictures.files import read_picture
 
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
@@ -105,7 +105,7 @@ def _key(session: Session) -> str:
     by_strokes = session.T_rig_board is None  # then motor angles count too
     frames = [p for t in session.trials for p in ([t.folder] if by_strokes else t.camera_sources.values())]
     given = [session.board, session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad]
-    return hash_of(hash_of_code(), given, session.whisker, hash_of_files([session.path / "boards", *frames]))
+    return hash_of(hash_of_code(SEEING), given, session.whisker, hash_of_files([session.path / "boards", *frames]))
 
 
 def _backgrounds(session: Session, cameras: Cameras) -> dict[str, np.ndarray | None]:

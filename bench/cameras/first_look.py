@@ -13,8 +13,8 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from vision.calibration.place import Placement
 from vision.calibration.turning import FirstRig, MovingLines, first_rig, moving_lines
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Cameras
 
 Item = TypeVar("Item")
 

@@ -13,8 +13,9 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from vision.bar.width import SIGMA_SHARE, bar_diameter_mm
 from vision.calibration.place import check_known_lengths
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Bar, Cameras
+from vision.geometry.rods import Bar
 from vision.pictures.files import read_picture
 
 _MOST_TRIALS, _MOST_PICTURES = 3, 11

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from bench.base.drawing import is_drawn, save, style
 from bench.base.results import hash_of
+from bench.base.tables import write_table
 from bench.friction.tables import SurfaceFriction
-from bench.report.assembly import write_table
 from bench.trials.compare import judge
 from estimator.threshold import distance_error
 

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from bench.base.drawing import is_drawn, save, style
 from bench.base.results import hash_of, number
+from bench.base.tables import write_table
 from bench.friction.alphas import seen_friction
 from bench.gauges.readings import known_from_pictures
-from bench.report.assembly import write_table
 from bench.session.whisker import Whisker
 from bench.trials.compare import whisks
 from estimator.distance import taper, with_friction

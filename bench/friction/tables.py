@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.tables import sigma_name, write_table
 from bench.friction.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
 from bench.friction.section_vii import Way, by_consistency, by_tilting, contacts, weights
 from bench.friction.surfaces import Surface, surfaces
-from bench.report.assembly import sigma_name, write_table
 from bench.session.whisker import Whisker
 from bench.trials.compare import judge
 from bench.trials.phases import KINETIC, STATIC

@@ -1,13 +1,11 @@
 """All trials' results to tables: whisks.csv, estimates.csv, track/<trial>.csv. Missing is an empty cell."""
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from bench.base.atomic import write_whole
 from bench.base.results import number
+from bench.base.tables import sigma_name, write_table
 from bench.trials.compare import whisks
 from vision.fit.uncertainty import CAUSES
 
@@ -29,12 +27,6 @@ _AT_ANGLE = (
 )
 _FELT = (("m_y_Nmm", "m_y_Nmm"), ("m_z_Nmm", "m_z_Nmm"), ("phi_felt_deg", "phi_felt_rad"))
 _PLACE = ("x_mm", "y_mm", "z_mm")
-
-
-def sigma_name(name: str) -> str:
-    """Column or key of one standard deviation: the sigma stands before the unit."""
-    stem, _, unit = name.rpartition("_")
-    return f"{stem}_sigma_{unit}"
 
 
 def _with_sigmas(names: Iterable[str]) -> tuple[str, ...]:
@@ -184,18 +176,3 @@ def track_rows(result: dict) -> Iterator[dict]:
             row |= {name: _degrees(frames[key][k]) for name, key in angles}
             yield row | _place(frames["point_mm"][k], frames["point_sigma_mm"][k])
 
-
-def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> None:
-    """A CSV file, whole; None and NaN are empty cells."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
-    write_whole(path, text.getvalue())
-
-
-def _cell(value) -> str:
-    """Nine digits: a time of hours keeps its 0.1 ms."""
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return ""
-    return f"{value:.9g}" if isinstance(value, float) else str(value)

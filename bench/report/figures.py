@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.base.drawing import SLOPES_DEG, colour_of, is_drawn, label_of, save, style
-from bench.base.results import hash_of, hash_of_code
+from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.friction.surfaces import Surface, surfaces
@@ -26,7 +26,7 @@ _MARKERS = "osD^vP"
 def write_figures(session: Session, out: Path, results: Sequence[dict], settings: Settings, pool: Workers) -> list[str]:
     """All figures that the results allow, each made again only where what it shows has changed. Their names."""
     fitted = surfaces(results, session.whisker.C_Nmm2)
-    stamp = hash_of([r["hash"] for r in results])
+    stamp = hash_of([r["hash"] for r in results], hash_of_code(DRAWING))
     names = ["fig8.png"] if fitted else []
     judged = [j for j in judge(results) if j.purpose == "measure" and np.isfinite(j.error_percent)]
     names += ["error_against_slope.png"] if judged else []
@@ -53,7 +53,7 @@ def _friction_of(result: dict, fitted: Sequence[Surface], settings: Settings) ->
 def draw_trial(task: tuple[Trial, dict, tuple[float, str], Path]) -> list[str]:
     """Sensing plane and overlays of one trial; names of the files, relative to the results' folder."""
     trial, result, friction, out = task
-    stamp = hash_of(result["hash"], friction, hash_of_code())
+    stamp = hash_of(result["hash"], friction, hash_of_code(DRAWING))
     with style():
         return [*draw_planes(result, friction, out, stamp), *draw_overlays(trial, result, out, stamp)]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.results import read_result
+from bench.base.tables import write_table
 from bench.friction.surfaces import Surface, friction_lines, surfaces
-from bench.report.assembly import write_table
 from bench.report.figure_8 import COLUMNS, figure_8, rows
 
 TABLE = "whisks.csv"

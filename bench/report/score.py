@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.tables import sigma_name
 from bench.gauges.matrix import Gauges
-from bench.report.assembly import sigma_name
 from bench.session.session import Session
 
 # Column of whisks.csv and key of truth.toml.

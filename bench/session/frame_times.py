@@ -3,19 +3,16 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session.footage import decoded_count, frame_count, read_frames
+from bench.session.signals import Signals
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 from vision.geometry.errors import Refused
 from vision.pictures.files import Frames
-
-if TYPE_CHECKING:
-    from bench.session.signals import Signals
 
 FRAME, TIME = "frame", "time_s"
 _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame
@@ -43,7 +40,7 @@ class FrameTimes:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def frames_in(self, signals: "Signals", stroke: slice) -> slice:
+    def frames_in(self, signals: Signals, stroke: slice) -> slice:
         """The frames taken during a stroke (a slice of samples), as a slice of frame indices."""
         half_s = 0.5 / signals.rate_Hz
         first, last = signals.time_s[stroke][[0, -1]]

@@ -14,9 +14,9 @@ from bench.session.plausible import YOUNGS_MODULUS
 from bench.session.strict_toml import as_keys, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
+from vision.geometry.board import Board
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import nearest_rotation
-from vision.geometry.scene import Board
 from vision.pictures.files import natural_order
 
 FORMAT = 1

@@ -7,12 +7,9 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session import strokes
-from bench.session.frame_times import FrameTimes, frame_times
 from bench.session.plausible import DEGREES_PER_RADIAN, MICROSECONDS, MILLISECONDS, MILLIVOLTS, Window
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
-
-__all__ = ["FrameTimes", "Signals", "forward_strokes", "frame_times", "read_signals"]
 
 TIME, MOTOR = "time_s", "motor_deg"
 VOLTS, MOMENTS = ("y_V", "z_V"), ("m_y_Nmm", "m_z_Nmm")

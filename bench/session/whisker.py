@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from estimator.beam import flexural_rigidity
-from vision.geometry.scene import Wire
+from vision.geometry.rods import Wire
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.base.drawing import publish, style
+from bench.base.tables import write_table
 from bench.base.workers import Workers
-from bench.report.assembly import write_table
 from bench.theory.model_error import Panel, Push, radius_map, tilt_map
 
 COLUMNS = (*(f.name for f in fields(Push)), "error_percent", "predicted_percent")

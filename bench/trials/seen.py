@@ -11,7 +11,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.trial import Trial
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Bar
+from vision.geometry.rods import Bar
 from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
 from vision.truth.records import WhiskTruth

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.base.results import hash_of, hash_of_code, plain, read_result, write_result
+from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, plain, read_result, write_result
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of
@@ -60,7 +60,7 @@ class Unit:
         """Hash of all that the seen half depends on."""
         session = self.session
         return hash_of(
-            hash_of_code(),
+            hash_of_code(SEEING),
             self.files,
             self.trial,
             session.whisker,
@@ -73,7 +73,8 @@ class Unit:
     @property
     def hash(self) -> str:
         """Hash of all that the result depends on."""
-        return hash_of(self.seen_hash, self.drift_rate, self.gauges, self.settings, self.settings.own_code())
+        made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
+        return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
     def with_gauges(self, drift_rate, gauges: Gauges | None) -> "Unit":
         """The unit complete, once the gauges are known."""

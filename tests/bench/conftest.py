@@ -11,7 +11,8 @@ from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.session.signals import forward_strokes
 from bench.trials.seen import whisk_record
-from vision.truth.records import FrameTruth, Smooth, WhiskTruth
+from vision.truth.at_angle import Smooth
+from vision.truth.records import FrameTruth, WhiskTruth
 
 SIGMA_MM, SIGMA_RAD = 0.005, np.radians(0.05)
 

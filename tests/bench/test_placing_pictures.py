@@ -18,8 +18,8 @@ from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, see_unit
 from tests.rig.test_seen_by_vision import exact_cameras
+from vision.geometry.camera import Cameras
 from vision.geometry.rotation import compose, invert_transform
-from vision.geometry.scene import Cameras
 from vision.pictures.files import read_picture
 
 PROTOCOL = """

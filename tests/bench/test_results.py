@@ -1,12 +1,27 @@
 """Hashes: what counts is what a result depends on, and results come back as they went."""
 
 import math
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from bench.base.results import hash_of, hash_of_files, number, plain, read_result, write_result
+from bench.base.results import (
+    DRAWING,
+    ESTIMATING,
+    SEEING,
+    hash_of,
+    hash_of_code,
+    hash_of_files,
+    number,
+    plain,
+    read_result,
+    write_result,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)
@@ -57,3 +72,35 @@ def test_plain_takes_nested_dataclasses():
     assert plain({"thing": Thing(Path("a"), np.array([True, False]))}) == {
         "thing": {"path": "a", "values": [True, False]}
     }
+
+
+FOLDERS = sorted(path.name for path in (ROOT / "vision").iterdir() if (path / "__init__.py").is_file())
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_changed_line_in_any_folder_of_vision_looks_at_the_pictures_again(folder, tmp_path):
+    for package in ("vision", "bench", "estimator"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    seeing, estimating = (hash_of_code(places, tmp_path) for places in (SEEING, ESTIMATING))
+    with (tmp_path / "vision" / folder / "__init__.py").open("a") as file:
+        file.write("# a line more\n")
+    hash_of_code.cache_clear()
+    assert hash_of_code(SEEING, tmp_path) != seeing
+    assert hash_of_code(ESTIMATING, tmp_path) != estimating
+
+
+def test_a_changed_figure_or_estimator_looks_at_no_picture_again(tmp_path):
+    for package in ("vision", "bench", "estimator"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    before = [hash_of_code(places, tmp_path) for places in (SEEING, ESTIMATING, DRAWING)]
+    for changed in ("bench/base/drawing.py", "estimator/slip.py"):
+        with (tmp_path / changed).open("a") as file:
+            file.write("# a line more\n")
+    hash_of_code.cache_clear()
+    after = [hash_of_code(places, tmp_path) for places in (SEEING, ESTIMATING, DRAWING)]
+    assert [a == b for a, b in zip(before, after)] == [True, False, False]
+
+
+def test_a_place_without_sources_is_told(tmp_path):
+    with pytest.raises(FileNotFoundError, match="vision"):
+        hash_of_code(("vision",), tmp_path)

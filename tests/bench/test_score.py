@@ -6,9 +6,10 @@ import re
 import numpy as np
 import pytest
 
+from bench.base.tables import write_table
 from bench.friction.tables import WHISK_COLUMNS as FRICTION_COLUMNS
 from bench.gauges.matrix import GaugeMatrix, Gauges
-from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS, write_table
+from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
 from bench.report.score import Score, score
 from bench.session.session import load_session
 

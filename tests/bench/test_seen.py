@@ -6,7 +6,7 @@ from bench.cameras.calibration import _backgrounds
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
 from bench.trials.seen import _lost
-from vision.geometry.scene import Camera, Cameras
+from vision.geometry.camera import Camera, Cameras
 from vision.pictures.files import read_picture
 
 

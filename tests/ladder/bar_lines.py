@@ -19,11 +19,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.lines import FINE, NOISE, coverage, squares
 from vision.bar.line import measure_bar
+from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis
-from vision.geometry.scene import Camera
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import Noise
-from vision.lines.trace import View
+from vision.pictures.pixel_noise import Noise
+from vision.pictures.view import View
 
 SIZE, FOCAL_PX, AWAY_MM, RADIUS_MM, BLUR_PX, FRAMES = (420, 300), 2010.0, 376.0, 3.0, 0.9, 13
 CENTRE = np.array([209.5, 149.5])

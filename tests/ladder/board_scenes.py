@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.boards.corners import Corners
+from vision.geometry.board import Board
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
-from vision.geometry.scene import Board, Camera, Cameras
 
 BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
 SIZE_PX = (1280, 720)

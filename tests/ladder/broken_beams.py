@@ -24,11 +24,12 @@ from tests.ladder.coverage import SCALES
 from tests.ladder.rows import all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, line_points
 from vision.fit.beam_check import BeamCheck, check_beam
-from vision.fit.problem import Observed, Problem
+from vision.fit.problem import Problem
 from vision.fit.quantities import jacobians
 from vision.fit.scatter import honest
 from vision.fit.solve import solve
 from vision.fit.uncertainty import uncertainty
+from vision.lines.points import Observed
 
 _GRID = 400  # intervals of the integrals along the wire
 # Softness (n,) along the arc (n,), mm, of a rod of this length that is 1 at the base.

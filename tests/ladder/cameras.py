@@ -26,7 +26,8 @@ from bench.session.session import load_session
 from vision.boards.corners import Corners, detect, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import held_out
-from vision.geometry.scene import Board, Camera
+from vision.geometry.board import Board
+from vision.geometry.camera import Camera
 from vision.pictures.files import Frames
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, Recording, a_recording, measured_pose
 from tests.ladder.rows import HALF_WIDTH_95
 from vision.calibration.calibrate import calibrate_cameras
-from vision.geometry.scene import Cameras
+from vision.geometry.camera import Cameras
 from vision.geometry.triangulate import triangulate
 
 SIGMA_PX = 0.05

@@ -26,11 +26,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from bench.rig.parts import Job, frames_of
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
-from vision.bar.one_view import seen_from_one_side, touch_by_onset
+from vision.bar.one_view import seen_from_one_side
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import jacobians
 from vision.fit.scatter import honest
 from vision.fit.solve import solve
+from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
 from vision.geometry.errors import Refused
 from vision.truth.observe import observe_trial

@@ -20,12 +20,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.rig.protocol import MotorTable, PicturesTable, WhiskerTable
 from tests.ladder.scenes import STEP_DEG, Scene, Sigmas, as_problem, begin, draw_scene, line_points
-from vision.fit.problem import BAR, Observed, Problem, State, curves_of
+from vision.fit.problem import BAR, Problem, State, curves_of
 from vision.fit.quantities import Measured, measure
 from vision.fit.solve import bar_middle, solve
 from vision.geometry.centreline import Curves
 from vision.geometry.silhouette import normals
-from vision.lines.bands import LinePoints
+from vision.lines.points import LinePoints, Observed
 
 QUANTITIES = ("d_x_mm", "touch_mm", "slip_mm", "beta_deg")
 # Points so loose that touching frames come to lie on the bar (sigma 0.002 mm, 0.01 px) to 1e-6 of what they were off …

@@ -24,10 +24,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from vision.lines.bands import Noise, cut_pieces, read_band
+from vision.lines.bands import cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots
 from vision.lines.trace import clear_of_bar, settle, settle_again, to_points, trace
+from vision.pictures.pixel_noise import Noise
 
 FINE, FRAMES, SHAPE = 5, 13, (110, 300)
 NOISE, PIECE_PX, MARGIN_PX = 2.0, 12, 7

@@ -23,12 +23,12 @@ from tests.ladder.board_scenes import BOARD, board_views, measured_pose, noisy, 
 from vision.bar.edges import EDGE_PX
 from vision.calibration.calibrate import calibrate_cameras
 from vision.fit import problem as model
-from vision.fit.first_bends import outline_of_bar
-from vision.fit.problem import Observed, Problem, State
-from vision.geometry.contact import BarAxis
-from vision.geometry.scene import Bar, Camera, Cameras, Wire
+from vision.fit.problem import Problem, State
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.contact import BarAxis, outline_of_bar
+from vision.geometry.rods import Bar, Wire
 from vision.geometry.silhouette import normals, outline
-from vision.lines.bands import LinePoints
+from vision.lines.points import LinePoints, Observed
 
 POINT_STEP_MM, FIRST_POINT_MM, BESIDE_BAR_PX = 2.4, 6.0, 4.0
 # Small pictures and few frames: a scene costs seconds, and many are wanted.

@@ -23,8 +23,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from vision.geometry.errors import Refused
-from vision.lines.bands import LinePoints
 from vision.lines.follow import Followed, follow
+from vision.lines.points import LinePoints
 from vision.pictures.files import Frames, read_picture
 
 PIECE_PX = 6

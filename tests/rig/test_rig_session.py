@@ -18,8 +18,9 @@ from bench.base.errors import BadInput
 from bench.rig.protocol import FOLDER, load
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
+from bench.session.frame_times import frame_times
 from bench.session.session import load_session
-from bench.session.signals import forward_strokes, frame_times, read_signals
+from bench.session.signals import forward_strokes, read_signals
 
 TINY = """
 name = "tiny"

@@ -9,9 +9,11 @@ import pytest
 
 from bench.rig.simulate import simulate
 from bench.session.footage import read_frames
+from bench.session.frame_times import frame_times
 from bench.session.session import load_session
-from bench.session.signals import forward_strokes, frame_times, read_signals
-from vision.geometry.scene import Bar, Camera, Cameras, Wire
+from bench.session.signals import forward_strokes, read_signals
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.rods import Bar, Wire
 from vision.pictures.files import read_picture
 from vision.truth.observe import observe_trial
 

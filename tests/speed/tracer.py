@@ -21,10 +21,11 @@ from scipy.special import ndtr
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.vision.test_observe import BAR, WIRE, Recorded
-from vision.lines.bands import Noise, cut_pieces, read_band
+from vision.lines.bands import cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots
 from vision.lines.trace import settle, to_points, trace
+from vision.pictures.pixel_noise import Noise
 from vision.truth.observe import observe_trial
 
 ROOT = Path(__file__).resolve().parents[2]

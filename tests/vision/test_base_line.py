@@ -9,8 +9,8 @@ from tests.vision.test_fit import CAMERAS, scene, with_points
 from vision.calibration.place import by_swing
 from vision.fit.base_line import base_lines
 from vision.fit.problem import State
+from vision.geometry.camera import Cameras
 from vision.geometry.rotation import compose, exp_rotation, invert_transform
-from vision.geometry.scene import Cameras
 
 # Turn (rad) and shift (mm) of the true rig in the frame that the board gave.
 STEP = np.array([0.0, 0.0, 0.004, 0.0, 0.3, -0.2])

@@ -7,7 +7,7 @@ from bench.rig.protocol import WhiskerTable
 from tests.ladder.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
 from tests.ladder.scenes import as_problem, draw_scene, line_points
 from vision.fit.beam_check import BeamCheck, Compared, _beside, _chance
-from vision.geometry.scene import Wire
+from vision.geometry.rods import Wire
 
 
 def checked(seed: int, softness=None, shape="cylinder", given="cylinder") -> BeamCheck:

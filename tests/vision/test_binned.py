@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tests.speed.tracer import KNOTS, NOISE, rough_bands, wire_frames
-from vision.lines.bands import Noise, cut_pieces
+from vision.lines.bands import cut_pieces
 from vision.lines.binned import binned, without
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import fit_shading, wave_prior
+from vision.pictures.pixel_noise import Noise
 
 
 @pytest.fixture(scope="module")

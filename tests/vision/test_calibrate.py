@@ -11,8 +11,8 @@ from vision.boards.corners import Corners
 from vision.boards.static_board import camera_moved, mean_view
 from vision.boards.sufficiency import check_lens
 from vision.calibration.calibrate import calibrate_cameras
+from vision.geometry.camera import Camera
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Camera
 
 SIGMA_PX = 0.04
 # The session's contract: 0 to 100 mm along x, a bar's ± 30 mm to either side.

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vision.calibration.cameras_file import read_cameras, write_cameras
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Camera, Cameras
 
 
 @pytest.fixture

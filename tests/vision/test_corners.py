@@ -8,7 +8,7 @@ import pytest
 
 from tests.ladder.board_scenes import BOARD
 from vision.boards.corners import Corners, detect, find_corners, refine_corners
-from vision.geometry.scene import Board
+from vision.geometry.board import Board
 
 SIZE_PX = (800, 560)  # not square, and no multiple of the board
 PX_PER_SQUARE_PRINTED = 120

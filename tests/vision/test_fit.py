@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vision.fit.problem import Observed, Problem, State, bar_axis, bends, curves_of
+from vision.fit.problem import Problem, State, bar_axis, bends, curves_of
 from vision.fit.quantities import measure
 from vision.fit.solve import bar_middle, linearise, solve
 from vision.fit.touch import first_touch
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, centrelines, rotation_z
 from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
-from vision.geometry.scene import Camera, Cameras, Wire
+from vision.geometry.rods import Wire
 from vision.geometry.silhouette import normals
-from vision.lines.bands import LinePoints
+from vision.lines.points import LinePoints, Observed
 
 WIRE = Wire("cylinder", 100.0, 1.0)
 REACH = 3.5

@@ -6,7 +6,7 @@ import pytest
 from vision.boards.corners import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import held_out
-from vision.geometry.scene import Board
+from vision.geometry.board import Board
 from vision.pictures.files import Frames
 
 BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.ladder.lines import NOISE, PIECE_PX, SCENES, Figures, bounds, find
-from vision.lines.bands import Band, Noise, cut_pieces, measure_noise, read_band, strongest_shift
+from vision.lines.bands import Band, cut_pieces, read_band, strongest_shift
+from vision.pictures.pixel_noise import Noise, measure_noise
 
 PLAIN = ["even rod, flat background", "step of a fifth of the contrast", "highlight and step",
          "within 2° of the rows, highlight"]  # fmt: skip

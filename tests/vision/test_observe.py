@@ -7,7 +7,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from vision.geometry.scene import Bar, Camera, Cameras, Wire
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.rods import Bar, Wire
 from vision.pictures.files import Frames, read_picture
 from vision.truth.observe import observe_trial
 

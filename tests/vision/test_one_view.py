@@ -10,18 +10,19 @@ from tests.ladder.lines import squares
 from tests.vision.test_fit import CAMERAS, REACH, begun, camera, scene, with_points
 from vision.bar.axis import settle_axis
 from vision.bar.edges import measure_edges
-from vision.bar.one_view import axis_from_edges, find_bar_alone, seen_from_one_side, touch_by_onset
+from vision.bar.one_view import axis_from_edges, find_bar_alone, seen_from_one_side
 from vision.fit.onset import Onset, onset
-from vision.fit.problem import Observed, State, bar_axis
+from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import jacobians
 from vision.fit.solve import linearise, solve
+from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty, variance_by_cause
+from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis, upward
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Cameras
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import grazed, normals
-from vision.lines.bands import LinePoints
+from vision.lines.points import LinePoints, Observed
 
 PLACES_MM = np.array([-20.0, 20.0])
 

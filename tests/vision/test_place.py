@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vision.calibration.place import (
-    BaseLines,
     Placement,
     by_board,
     by_swing,
@@ -15,9 +14,10 @@ from vision.calibration.place import (
     combine,
     placed,
 )
+from vision.geometry.base_lines import BaseLines
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import exp_rotation
-from vision.geometry.scene import Camera, Cameras
 
 RISE = 0.01
 STEP = np.array([0.002, -0.003, 0.004, 0.05, -0.04, 0.03])

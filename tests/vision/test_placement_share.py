@@ -12,7 +12,7 @@ from vision.calibration.cameras_file import read_cameras, write_cameras
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
 from vision.fit.uncertainty import uncertainty, variance_by_cause
-from vision.geometry.scene import Cameras
+from vision.geometry.camera import Cameras
 
 
 def scene_of(rig: float):

@@ -6,9 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
+from vision.geometry.board import Board
+from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
 from vision.geometry.errors import Refused
+from vision.geometry.rods import Bar, Wire
 from vision.geometry.rotation import exp_rotation
-from vision.geometry.scene import N_PARAMETERS, Bar, Board, Camera, Cameras, Wire
 
 
 def a_camera(name="high", seed=0, **changes):

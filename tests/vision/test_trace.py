@@ -6,10 +6,12 @@ import pytest
 from tests.ladder.lines import COLUMNS, FRAMES, KNOTS, NOISE, PIECE_PX, SCENES, SHAPE, axis_height, band, drawn, errors
 from tests.vision.test_fit import camera
 from vision.geometry.centreline import centrelines
-from vision.geometry.scene import Wire
-from vision.lines.bands import Noise, cut_pieces
+from vision.geometry.rods import Wire
+from vision.lines.bands import cut_pieces
 from vision.lines.cylinder import WAVES
-from vision.lines.trace import View, settle_again, to_points, trace, wire_pieces
+from vision.lines.trace import settle_again, to_points, trace, wire_pieces
+from vision.pictures.pixel_noise import Noise
+from vision.pictures.view import View
 
 
 def test_frames_of_a_wire_that_passes_a_whole_pixel_of_radius_are_read_together():

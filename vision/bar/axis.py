@@ -3,16 +3,15 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.ndimage import uniform_filter
 
+from vision.geometry.camera import Cameras
 from vision.geometry.centreline import rotation_z
-from vision.geometry.contact import BarAxis, upward
+from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Cameras
 from vision.geometry.silhouette import outline
-from vision.lines.bands import LinePoints, Noise
+from vision.lines.points import LinePoints
+from vision.pictures.change import HALF
 
-HALF = 2  # a coarse look needs no more
 _ALONG_MM = np.arange(-24.0, 24.1, 6.0)
 _INSIDE = np.array([-0.75, 0.0, 0.75])
 _OUTSIDE = np.array([-1.5, 1.5])
@@ -20,19 +19,6 @@ _STARTS, _LEAST_SCORE = 6, 0.25
 _FIRST_STEP, _SHRINKS = np.array([1.0, 0.02, 0.05, 0.07]), 5  # half a step of the grid: mm, rad, rad, rad
 _AROUND = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
 _MOST_CLIMBS = 20
-
-
-def changed(grey, background, noise: Noise) -> np.ndarray:
-    """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 3 × 3 pixels.
-
-    Both pictures are given at every HALF-th pixel. The outermost pixels are 0.
-
-    The scale is the median of the differences themselves: most of the picture has not changed, and a picture of
-    the background may be noisier than the frames.
-    """
-    difference = uniform_filter(grey - background, 3) / noise.sigma(0.5 * (grey + background))
-    z = np.abs(difference) / max(float(np.median(np.abs(difference))) / 0.6745, 1e-6)
-    return np.pad(np.clip((z - 3.0) / 6.0, 0.0, 1.0)[1:-1, 1:-1], 1)
 
 
 def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
@@ -135,20 +121,6 @@ def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints]
         vector = vector + np.linalg.lstsq(np.concatenate([r[1] for r in rows]),
                                           np.concatenate([r[0] for r in rows]), rcond=None)[0]
     return upward(shifted_axis(axis, across, vector))
-
-
-def axis_frame(direction) -> np.ndarray:
-    """Two unit vectors (2, 3) at right angles to a direction and to each other."""
-    e1 = np.cross(direction, [1.0, 0.0, 0.0])
-    e1 = e1 / np.linalg.norm(e1)
-    return np.stack([e1, np.cross(direction, e1)])
-
-
-def shifted_axis(axis: BarAxis, across, vector) -> BarAxis:
-    """An axis (batch of vectors (…, ≥ 4) allowed) moved by two shifts in mm and two tilts across itself."""
-    direction = axis.direction + vector[..., 2:4] @ across
-    return BarAxis(axis.point_mm + vector[..., 0:2] @ across,
-                   direction / np.linalg.norm(direction, axis=-1, keepdims=True))
 
 
 def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm, step):

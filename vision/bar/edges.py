@@ -14,11 +14,12 @@ from vision.bar.pieces import ARM_MM, FEWEST_PIECES, NO_BAR, at_arms, bar_knots,
 from vision.geometry.contact import BarAxis
 from vision.geometry.newton import covariance_of, descend
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import LinePoints, Pieces
+from vision.lines.bands import Pieces
 from vision.lines.binned import binned
 from vision.lines.cylinder import RIMS, WAVES
+from vision.lines.points import LinePoints
 from vision.lines.shading import fit_shading
-from vision.lines.trace import View
+from vision.pictures.view import View
 
 # An edge's error beyond its formal one, which half-widths of path-traced and painted bars show (docs/truth.md).
 EDGE_PX, FORMAL_TO_TRUE = 0.12, 2.0

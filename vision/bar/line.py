@@ -22,11 +22,12 @@ from vision.bar.pieces import (
 from vision.geometry.contact import BarAxis
 from vision.geometry.newton import covariance_of, descend
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import LinePoints, Pieces
+from vision.lines.bands import Pieces
 from vision.lines.binned import binned, without
 from vision.lines.cylinder import RIMS, WAVES
+from vision.lines.points import LinePoints
 from vision.lines.shading import Knots, fit_shading, locate, wave_prior
-from vision.lines.trace import View
+from vision.pictures.view import View
 
 _THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
 _UNTOLD_PX, _LOST_PX = 0.25, 0.6  # sigmas beyond which the misfit has no minimum to speak of, and may lead anywhere

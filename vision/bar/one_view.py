@@ -5,23 +5,19 @@ its distance: four numbers in the picture, shift and tilt of each edge, are the 
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from vision.bar.axis import standing_out
 from vision.bar.edges import measure_edges
-from vision.fit.first_bends import resting_lines
-from vision.fit.onset import onset, seen_bend
-from vision.fit.problem import Problem, State, bends
-from vision.fit.touch import FEWEST_FREE, frames_by_touch
-from vision.geometry.centreline import rotation_z
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import BarAxis, upward
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Camera, Cameras, Wire
+from vision.geometry.rods import Wire
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import LinePoints
-from vision.lines.trace import View
+from vision.lines.points import LinePoints
+from vision.pictures.view import View
 
 _ALONG_MM = np.arange(-16.0, 16.1, 4.0)
 _INSIDE, _OUTSIDE = np.array([-0.9, -0.75, 0.0, 0.75, 0.9]), np.array([-1.2, 1.2])
@@ -31,9 +27,6 @@ _STARTS, _MOST_CLIMBS, _SHRINKS = 6, 25, 4
 _LEAST_SCORE = 0.25
 _NEAREST, _FARTHEST = 0.7, 1.4  # of the distance at first: beyond, what passed for edges is none
 _SAME_PLANE_RAD = np.radians(1.0)
-_MOST_ONSET_RAD = np.radians(0.5)  # an onset known to 2.4 degrees had free frames touch, and the bar 10 mm off
-
-
 def find_bar_alone(change: np.ndarray, camera: Camera, radius_mm: float, motor_rad: tuple[float, float],
                    length_mm: float) -> BarAxis:
     """Coarse axis of the bar in one camera, taken to be at right angles to the sight: its edges tell its tilt.
@@ -129,27 +122,3 @@ def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: 
     away = middle - (middle @ direction) * direction
     return upward(BarAxis(camera.centre_mm + distance_mm / np.linalg.norm(away) * middle, direction))
 
-
-def touch_by_onset(problem: Problem, state: State, covariance) -> tuple[Problem, State]:
-    """The problem with what its frames, once fitted, show of when the whisker begins to bend; a state to go on from.
-
-    Raises Refused where no bend is seen, or fewer than two frames before it.
-    """
-    bent, bend = problem.bent, bends(problem, state.vector)
-    seen, spread = seen_bend(bend[bent], covariance[problem.first_bend:, problem.first_bend:])
-    values, whole = np.zeros(len(bend)), np.eye(len(bend)) * np.median(np.diag(spread))
-    values[bent], whole[np.ix_(bent, bent)] = seen, spread
-    found = onset(problem.motor_rad, values, whole)
-    if found is None:
-        raise Refused("no bend of the whisker is seen: it never touches, or bends along the sight of all cameras")
-    if found.sigma_rad > _MOST_ONSET_RAD:
-        raise Refused(f"when the whisker begins to bend is told to {np.degrees(found.sigma_rad):.1f} deg only, "
-                      f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known")
-    touching, free = frames_by_touch(problem.motor_rad, found.motor_rad, 0.5 * found.sigma_rad)
-    free[:FEWEST_FREE] |= problem.motor_rad[:FEWEST_FREE] < found.motor_rad
-    if np.sum(free) < FEWEST_FREE:
-        at_deg, sigma_deg = np.degrees([found.motor_rad, found.sigma_rad])
-        raise Refused(f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: fewer than "
-                      "two frames of free stroke")
-    vector = np.concatenate([state.vector[:problem.first_bend], bend[~free].ravel()])
-    return replace(problem, onset=found, touching=touching, bent=~free), replace(state, vector=vector)

@@ -11,7 +11,7 @@ from vision.geometry.silhouette import outline
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots, fit_shading, locate
-from vision.lines.trace import View
+from vision.pictures.view import View
 
 ARM_MM = 20.0  # the line is handed on as two points, this far to either side
 _INNER_SHARE = 0.72

@@ -6,17 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bar.axis import HALF, changed, find_bar, settle_axis
+from vision.bar.axis import find_bar, settle_axis
 from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bar
 from vision.bar.one_view import see_bar_alone, seen_from_one_side, widest_angle_rad
-from vision.fit.first_bends import resting_lines
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
-from vision.geometry.scene import Cameras
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import Noise
-from vision.lines.trace import MEAN_OF, View
+from vision.pictures.change import HALF, changed
+from vision.pictures.pixel_noise import Noise
+from vision.pictures.view import MEAN_OF, View
 
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)

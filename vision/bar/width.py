@@ -6,13 +6,13 @@ import numpy as np
 
 from vision.bar.edges import measure_edges
 from vision.bar.search import of_mean, see_bar
-from vision.fit.first_bends import resting_lines
-from vision.geometry.rods import Rods
-from vision.geometry.scene import Bar, Cameras, Wire
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import resting_lines
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import outline
-from vision.lines.bands import measure_noise
-from vision.lines.trace import View
+from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.view import View
 
 # Of one trial, what light on the edges and the axis leave: 28 trials at the right scale erred by 0.009 RMS, 0.024 most.
 SIGMA_SHARE = 0.015

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 
 from vision.boards.saddle import fit_saddles
+from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Board
 
 # Fewer corners than these fix no plane, so that nothing can be said about edges at a corner.
 MIN_CORNERS = 4

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, detect, to_8_bit
+from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Board
 
 # A setting is believed where it finds at least this share of the board's corners, and far more than the one entered.
 _LEAST_SHARE = 0.3

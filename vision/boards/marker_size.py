@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, to_8_bit
+from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Board
 
 _FEWEST_MARKERS = 6
 # Print and rounding; and blur, which eats or feeds a marker's rim by up to a pixel a side (0.7 px in the webcams).

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from vision.boards.corners import Corners
+from vision.geometry.board import Board
+from vision.geometry.camera import Camera
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Board, Camera
 
 # Beyond this many sigmas from the rig picture's corner, a frame's corner is another thing.
 _DISTURBED_SIGMA = 4.0

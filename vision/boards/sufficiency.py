@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 
 from vision.boards.corners import Corners
+from vision.geometry.board import Board
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.lens import fold_radius
-from vision.geometry.scene import Board, Camera, Cameras
 
 # Six corners over at least two rows and columns give a pose with something left over.
 MIN_VIEW_CORNERS = 6

@@ -35,8 +35,9 @@ from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
 from vision.calibration.place import by_board
+from vision.geometry.board import Board
+from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
 from vision.geometry.errors import Refused
-from vision.geometry.scene import N_PARAMETERS, Board, Camera, Cameras
 
 __all__ = ["Calibration", "CameraReport", "calibrate_cameras", "camera_moved"]
 

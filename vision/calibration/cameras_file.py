@@ -13,8 +13,8 @@ import numpy as np
 import tomli_w
 
 from vision.boards.sufficiency import check_lens
+from vision.geometry.camera import PARAMETERS, Camera, Cameras
 from vision.geometry.errors import Refused
-from vision.geometry.scene import PARAMETERS, Camera, Cameras
 
 _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
 

@@ -19,9 +19,10 @@ from vision.calibration.calibrate import as_cameras, lens_knowledge
 from vision.calibration.corner_noise import settle
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
+from vision.geometry.board import Board
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, exp_rotation, invert_transform
-from vision.geometry.scene import Board, Camera, Cameras
 
 _NEEDED = ("size", "matrix", "distortions", "rotation", "translation")
 

@@ -21,7 +21,8 @@ from vision.calibration.bundle import predict
 from vision.calibration.calibrate import Calibration, lens_knowledge
 from vision.calibration.first_guess import board_pose, has_pose
 from vision.calibration.layout import Alone, Layout, lay_out
-from vision.geometry.scene import Board, Camera, Cameras
+from vision.geometry.board import Board
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.triangulate import triangulate
 
 # Board poses and instants are fitted robustly, in the corners' sigmas; residuals are then counted whole.

@@ -13,9 +13,9 @@ from vision.boards.corners import Corners
 from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import Sightings, State
 from vision.calibration.first_guess import board_pose, chain_cameras, most_central
+from vision.geometry.board import Board
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
-from vision.geometry.scene import Board
 
 # Cameras looked at once if most views of one index agree on how two cameras stand to each other. Views that have
 # nothing to do with each other agree as loosely as this once in a hundred.

@@ -10,15 +10,16 @@ A narrow fan fixes its apex well across the whisker and badly along it; covarian
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from vision.geometry.base_lines import BaseLines
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, exp_rotation, skew
-from vision.geometry.scene import Cameras
 
 # Chance by which swing and board, both right, would disagree as much as calls for an alarm.
 _FALSE_ALARM = 1e-3
@@ -31,37 +32,6 @@ _MOST_AXIS_SIGMA_DEG = 3.0
 _SCALE_SIGMAS = 4.0
 _SCALE_TOLERANCE = 0.005
 _COMPONENTS = ("w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
-
-
-@dataclass(frozen=True, eq=False)
-class BaseLines:
-    """The whisker's straight piece near its base on free strokes, a row a frame, in the rig frame as the board has it.
-
-    motor_rad (n,); point_mm (n, 3) anywhere on the line and its covariance (n, 3, 3), mm²; direction (n, 3), unit, from
-    the base outward, and its covariance (n, 3, 3): errors of each frame by itself. shared_covariance (6, 6): of a turn
-    w about the base and a shift v, rad and mm, that all lines have in common (light on the wire, lenses).
-    """
-
-    motor_rad: np.ndarray
-    point_mm: np.ndarray
-    point_covariance: np.ndarray
-    direction: np.ndarray
-    direction_covariance: np.ndarray
-    shared_covariance: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
-
-    def __post_init__(self):
-        n = len(self.motor_rad)
-        vectors, matrices = ("point_mm", "direction"), ("point_covariance", "direction_covariance")
-        shapes = dict.fromkeys(vectors, (n, 3)) | dict.fromkeys(matrices, (n, 3, 3)) | {"shared_covariance": (6, 6)}
-        for name, shape in shapes.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise Refused(f"base lines: {name} of {n} frames must be {shape}, found {found}")
-
-    @property
-    def width_rad(self) -> float:
-        """How far the motor turned over the frames."""
-        return float(np.ptp(self.motor_rad)) if len(self.motor_rad) else 0.0
 
 
 _NO_LINES = BaseLines(np.zeros(0), *(np.zeros((0, 3)), np.zeros((0, 3, 3))) * 2)

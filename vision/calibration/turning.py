@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.bar.axis import HALF, changed
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import invert_transform, nearest_rotation
-from vision.geometry.scene import Camera, Cameras
-from vision.lines.bands import measure_noise
+from vision.pictures.change import HALF, changed
+from vision.pictures.pixel_noise import measure_noise
 
 # A frame is compared with such as are farther than this share of the stroke away: there the whisker stands elsewhere.
 _ELSEWHERE, _MOST_OTHERS = 0.25, 4

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.calibration.place import BaseLines
-from vision.fit.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Observed, Problem, State, point_rows, wandering
+from vision.fit.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Problem, State, point_rows, wandering
 from vision.fit.solve import linear_at
+from vision.geometry.base_lines import BaseLines
 from vision.geometry.centreline import REST_POWERS, rotation_z
+from vision.lines.points import Observed
 
 # Offsets and slopes, y then z, among the rest shape's parameters.
 _LINE = np.array([0, REST_POWERS, 1, REST_POWERS + 1])

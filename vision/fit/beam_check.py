@@ -18,22 +18,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
-from vision.fit.problem import (
-    CONTACT_SIGMA_MM,
-    WANDER_PX,
-    Observed,
-    Problem,
-    State,
-    bar_axis,
-    bends,
-    curves_of,
-    wandering,
-)
+from vision.fit.problem import CONTACT_SIGMA_MM, WANDER_PX, Problem, State, bar_axis, bends, curves_of, wandering
 from vision.fit.quantities import Jacobians, Measured
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
 from vision.fit.uncertainty import camera_rows
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
+from vision.lines.points import Observed
 
 # Chance by which a wire that is a beam departs from it so far, a whisk.
 FALSE_ALARM = 1e-3

@@ -7,15 +7,17 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vision.fit.problem import BAR, REST, Observed, Problem, start
+from vision.fit.problem import BAR, REST, Problem, start
 from vision.fit.solve import solve
-from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import BarAxis, closest_arc
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import REST_POWERS, Curves, one_curve
+from vision.geometry.contact import BarAxis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
-from vision.geometry.scene import Cameras, Wire
-from vision.geometry.silhouette import outline
-from vision.lines.bands import LinePoints, strongest_shift
-from vision.lines.trace import View, clear_of_bar, wire_pieces
+from vision.geometry.rods import Wire
+from vision.lines.bands import strongest_shift
+from vision.lines.points import LinePoints, Observed
+from vision.lines.trace import clear_of_bar, wire_pieces
+from vision.pictures.view import View
 
 _PIECE_PX = 16
 _REACH_PX = 26
@@ -24,13 +26,6 @@ _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
 _BESIDE_BAR_PX = 8.0
 _SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
-
-
-def outline_of_bar(camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middle (m, 2) and half-width (m,) of the bar in one camera, 60 mm to either side of its point."""
-    place = np.linspace(-60.0, 60.0, 121)
-    points = axis.point_mm + place[:, None] * axis.direction
-    return outline(camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
 
 
 def _bars_px(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float) -> list:
@@ -70,18 +65,6 @@ def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis
         state, _ = solve(problem, start(problem, wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
         rest = state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
     return rest
-
-
-def one_curve(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
-    """The centreline of one frame."""
-    return centrelines(np.asarray(rest_mm), np.asarray(bend_rad), np.asarray(contact_mm), np.asarray(motor_rad),
-                       wire)
-
-
-def resting_lines(camera, wire: Wire, motor_rad) -> list[np.ndarray]:
-    """Lines (m, 2) in one camera of a straight, unbent wire at each of the motor angles (n,)."""
-    return [camera.project(one_curve(np.zeros((2, REST_POWERS)), np.zeros(2), wire.length_mm, motor, wire).points_mm)
-            for motor in motor_rad]
 
 
 def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float, rest_mm,

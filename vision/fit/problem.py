@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.bar.axis import axis_frame, shifted_axis
 from vision.fit.onset import Onset
+from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import BarAxis, closest_arc
-from vision.geometry.scene import Cameras, Wire
-from vision.lines.bands import LinePoints
+from vision.geometry.contact import BarAxis, axis_frame, closest_arc, shifted_axis
+from vision.geometry.rods import Wire
+from vision.lines.points import Observed
 
 BAR, REST = 4, 2 * REST_POWERS
 # One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
@@ -29,19 +29,6 @@ BAR_TILT_ARM_MM = 20.0
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
 _MODES = len(WIRE_MODES_PX) + len(BAR_MODES_PX)
 CONTACT_SIGMA_MM = 0.002
-
-
-@dataclass(frozen=True)
-class Observed:
-    """Line points of one camera in one frame (frame is -1 for the bar, which stands still).
-
-    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals.
-    """
-
-    frame: int
-    camera: int
-    points: LinePoints
-    side: int = 0
 
 
 @dataclass(frozen=True, eq=False)

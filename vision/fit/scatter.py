@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import Observed, Problem, State, point_rows
+from vision.fit.problem import Problem, State, point_rows
 from vision.fit.solve import linear_at
+from vision.lines.points import Observed
 
 _CLIP_SIGMAS = 3.0  # of the camera's scatter: an outlier is not what all share
 _NO_MORE = 0.05  # a correlation that is less is the noise of some hundred points

@@ -23,7 +23,6 @@ from vision.fit.problem import (
     REST,
     REST_PRIOR_MM,
     WIRE_MODES_PX,
-    Observed,
     Problem,
     State,
     bar_axis,
@@ -34,7 +33,7 @@ from vision.fit.problem import (
 from vision.geometry.centreline import Curves, centrelines
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.silhouette import edges
-from vision.lines.bands import LinePoints
+from vision.lines.points import LinePoints, Observed
 
 LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
 _ALIKE = 1000.0  # steps of differences (0.1 mm, 1 mrad; bends 10 mrad): so near the slopes are what they were

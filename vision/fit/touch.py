@@ -7,7 +7,7 @@ import numpy as np
 from vision.fit.problem import Problem, bar_axis, rest_shape
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, clearance
-from vision.geometry.scene import Wire
+from vision.geometry.rods import Wire
 
 FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _SURE_BEND_RAD = np.radians(0.25)

@@ -7,11 +7,12 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import correlate1d
 
-from vision.fit.problem import BAR, REST, Observed, Problem, State, bar_axis, curves_of, point_rows
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, point_rows
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
+from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
-from vision.geometry.scene import N_PARAMETERS
 from vision.geometry.silhouette import grazed
+from vision.lines.points import Observed
 
 _FARTHEST = 20  # points: beyond, nothing is shared
 CAUSES = ("wire", "bar", "touch", "diameters", "light", "beliefs", "cameras", "placement")

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
-from vision.geometry.scene import Wire
+from vision.geometry.rods import Wire
 
 REST_POWERS = 4  # offset, slope, curvature and change of curvature, each across (y) and along the axis (z)
 _NODES = 41
@@ -115,3 +115,15 @@ def rotation_z(angle_rad) -> np.ndarray:
     zero, one = np.zeros_like(c), np.ones_like(c)
     return np.stack([np.stack([c, -s, zero], -1), np.stack([s, c, zero], -1),
                      np.stack([zero, zero, one], -1)], -2)
+
+
+def one_curve(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
+    """The centreline of one frame."""
+    return centrelines(np.asarray(rest_mm), np.asarray(bend_rad), np.asarray(contact_mm), np.asarray(motor_rad),
+                       wire)
+
+
+def resting_lines(camera, wire: Wire, motor_rad) -> list[np.ndarray]:
+    """Lines (m, 2) in one camera of a straight, unbent wire at each of the motor angles (n,)."""
+    return [camera.project(one_curve(np.zeros((2, REST_POWERS)), np.zeros(2), wire.length_mm, motor, wire).points_mm)
+            for motor in motor_rad]

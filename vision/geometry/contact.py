@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.geometry.centreline import Curves
+from vision.geometry.silhouette import outline
 
 
 @dataclass(frozen=True)
@@ -71,3 +72,24 @@ def clearance(curves: Curves, axis: BarAxis, near_mm=None) -> tuple[np.ndarray, 
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     side = np.where(normal[..., 1] > 0, -1.0, 1.0)
     return np.sum(away * normal, axis=-1) * side, arc, point[..., 0, :]
+
+
+def axis_frame(direction) -> np.ndarray:
+    """Two unit vectors (2, 3) at right angles to a direction and to each other."""
+    e1 = np.cross(direction, [1.0, 0.0, 0.0])
+    e1 = e1 / np.linalg.norm(e1)
+    return np.stack([e1, np.cross(direction, e1)])
+
+
+def shifted_axis(axis: BarAxis, across, vector) -> BarAxis:
+    """An axis (batch of vectors (…, ≥ 4) allowed) moved by two shifts in mm and two tilts across itself."""
+    direction = axis.direction + vector[..., 2:4] @ across
+    return BarAxis(axis.point_mm + vector[..., 0:2] @ across,
+                   direction / np.linalg.norm(direction, axis=-1, keepdims=True))
+
+
+def outline_of_bar(camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middle (m, 2) and half-width (m,) of the bar in one camera, 60 mm to either side of its point."""
+    place = np.linspace(-60.0, 60.0, 121)
+    points = axis.point_mm + place[:, None] * axis.direction
+    return outline(camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)

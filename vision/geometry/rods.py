@@ -4,7 +4,47 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.geometry.scene import Bar, Wire
+from vision.geometry.checks import require, require_length, require_sigma
+
+SHAPES = ("cylinder", "cone")
+
+
+@dataclass(frozen=True)
+class Wire:
+    """The whisker: a cylinder, or a cone that ends in a point at its length. Refused where a length is not > 0."""
+
+    shape: str
+    length_mm: float
+    diameter_mm: float
+    length_sigma_mm: float = 0.0
+    diameter_sigma_mm: float = 0.0
+
+    def __post_init__(self):
+        require(self.shape in SHAPES, f"wire shape {self.shape!r}: must be one of {', '.join(SHAPES)}")
+        require_length("wire", length_mm=self.length_mm, diameter_mm=self.diameter_mm)
+        require_sigma("wire", length_sigma_mm=self.length_sigma_mm, diameter_sigma_mm=self.diameter_sigma_mm)
+
+    def radius_mm(self, arc_mm: np.ndarray | float) -> np.ndarray:
+        """Radius at arc length `arc_mm` from the base, mm; the shape of `arc_mm`; 0 beyond a cone's point."""
+        arc_mm = np.asarray(arc_mm, dtype=float)
+        taper = 1.0 - arc_mm / self.length_mm if self.shape == "cone" else np.ones_like(arc_mm)
+        return 0.5 * self.diameter_mm * np.clip(taper, 0.0, None)
+
+
+@dataclass(frozen=True)
+class Bar:
+    """The bar that the whisker pushes against: a round one."""
+
+    diameter_mm: float
+    diameter_sigma_mm: float = 0.0
+
+    def __post_init__(self):
+        require_length("bar", diameter_mm=self.diameter_mm)
+        require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
+
+    @property
+    def radius_mm(self) -> float:
+        return 0.5 * self.diameter_mm
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.geometry.scene import Camera
+from vision.geometry.camera import Camera
 
 
 def outline(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.geometry.scene import N_PARAMETERS, Cameras
+from vision.geometry.camera import N_PARAMETERS, Cameras
 
 # Gauss–Newton from the meeting of rays converges quadratically; rays meet to a percent.
 _STEPS = 6

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import correlate1d, uniform_filter1d
 
+from vision.pictures.pixel_noise import Noise
+
 
 @dataclass(frozen=True)
 class Band:
@@ -30,26 +32,6 @@ class Band:
     normal: np.ndarray
     place: np.ndarray
     radius_px: np.ndarray
-
-
-@dataclass(frozen=True)
-class LinePoints:
-    """Points of a rod's axis in one picture.
-
-    px (n, 2), normal (n, 2) unit, sigma_px (n,) along the normal; place (n,) mm along the rod.
-    """
-
-    px: np.ndarray
-    normal: np.ndarray
-    sigma_px: np.ndarray
-    place: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.place)
-
-    def select(self, keep) -> "LinePoints":
-        """The points where `keep` holds."""
-        return LinePoints(self.px[keep], self.normal[keep], self.sigma_px[keep], self.place[keep])
 
 
 def read_band(grey, background, curve_px, place, radius_px, half_width_px: int) -> Band:
@@ -123,42 +105,6 @@ class Pieces:
         """The same pixels seen from curves moved by shift_px (s,) along their normals."""
         return replace(self, offset_px=self.offset_px - shift_px[:, None],
                        foot_px=self.foot_px + shift_px[:, None] * self.normal)
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Variance of a pixel at grey level g: floor + gain · g (grey levels squared)."""
-
-    floor: float
-    gain: float
-
-    def sigma(self, grey):
-        """Standard deviation at the grey level, never under a third of a level (rounding)."""
-        return np.sqrt(np.maximum(self.floor + self.gain * np.maximum(grey, 0.0), 1.0 / 12.0))
-
-
-def measure_noise(first, second) -> Noise:
-    """Noise from two pictures of the same scene: median absolute difference in classes of equal grey.
-
-    Medians leave out what moved between the two. Every third pixel of every third row is plenty.
-    """
-    first, second = first[::3, ::3], second[::3, ::3]
-    mean = 0.5 * (first.astype(float) + second)
-    return noise_by_level(mean, np.abs(first.astype(float) - second) / np.sqrt(2.0))
-
-
-def noise_by_level(level, deviation) -> Noise:
-    """Noise from absolute deviations at grey levels (both of any one shape), by medians in classes of equal grey."""
-    edges = np.unique(np.quantile(level, np.linspace(0, 1, 13)))
-    classes = np.digitize(level, edges[1:-1])
-    rows = [(np.median(level[classes == k]), (np.median(deviation[classes == k]) / 0.6745) ** 2, np.sum(classes == k))
-            for k in range(len(edges) - 1) if np.any(classes == k)]
-    middle, variance, count = np.array(rows).T
-    if len(middle) > 1 and np.ptp(middle) >= 1.0:
-        gain, floor = np.polyfit(middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, 0.1))
-        if gain > 0:
-            return Noise(max(float(floor), 0.1), float(gain))
-    return Noise(max(float(np.average(variance, weights=count)), 0.1), 0.0)
 
 
 def cut_pieces(bands, length_px: int, noise: Noise) -> Pieces:

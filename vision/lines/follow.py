@@ -17,9 +17,11 @@ from scipy.optimize import minimize
 from skimage.graph import route_through_array
 
 from vision.geometry.errors import Refused
-from vision.lines.bands import LinePoints, Noise, Pieces, cut_pieces, noise_by_level, read_band
+from vision.lines.bands import Pieces, cut_pieces, read_band
+from vision.lines.points import LinePoints
 from vision.lines.shading import Knots, fit_shading, locate, wave_prior
 from vision.lines.trace import to_points, trace
+from vision.pictures.pixel_noise import Noise, noise_by_level
 
 _AROUND_PX = 25  # a line bends no farther than this out of the rectangle of its ends
 _SNAP_PX = 3  # the given ends are taken from a screen by hand
@@ -71,7 +73,6 @@ class _Width:
     def hides(self) -> bool:
         """Whether the line is so thick that its middle shows nothing of the background."""
         return min(self.start_px, self.end_px) > _HIDES * self.blur_px
-
 
 
 def follow(grey, start_px, end_px, *, dark: bool = True, noise: Noise | None = None, piece_px: int = 8) -> Followed:

@@ -7,8 +7,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from vision.lines.bands import LinePoints, Pieces
+from vision.lines.bands import Pieces
 from vision.lines.cylinder import rim_bells, shaded, shading_basis
+from vision.lines.points import LinePoints
 
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit

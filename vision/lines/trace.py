@@ -1,23 +1,23 @@
 """Line points of the wire in every frame, read in narrow bands beside where it is expected."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
-from vision.fit.problem import Observed
+from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.newton import descend
-from vision.geometry.scene import Camera, Wire
+from vision.geometry.rods import Wire
 from vision.geometry.silhouette import outline
-from vision.lines.bands import LinePoints, Noise, Pieces, cut_pieces, read_band
+from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.binned import binned, without
 from vision.lines.cylinder import WAVES
+from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots, Located, fit_shading, line_points, locate, wave_prior
+from vision.pictures.view import View
 
 _BLURS_PX = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.0, 2.5, 3.2)
-MEAN_OF = 40  # frames: more would not make a still thing clearer
 _ALL_WAVES = 11
 _BIN_PX = 0.3
 _NODES = 81  # of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel
@@ -29,30 +29,6 @@ _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
 _WORST_MISFIT = 6.0
 _PLAIN_MISFIT = 3.0  # the same, for what the light is learnt from
-
-
-@dataclass(frozen=True)
-class View:
-    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise."""
-
-    camera: Camera
-    frames: Mapping[int, np.ndarray]
-    background: np.ndarray
-    noise: Noise
-
-    def some(self, most: int) -> list[np.ndarray]:
-        """At most so many of the pictures, spread over all of them."""
-        pictures = list(self.frames.values())
-        return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
-
-    @cached_property
-    def mean(self) -> np.ndarray:
-        """Mean (h, w) of the pictures, of MEAN_OF at most."""
-        pictures = self.some(MEAN_OF)
-        total = np.zeros(pictures[0].shape, dtype=np.float32)
-        for picture in pictures:
-            total += picture
-        return total / len(pictures)
 
 
 def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:

@@ -1,20 +1,54 @@
 """Truth at a wanted pushing angle: a local fit over touching frames, or the nearest frame where it jumps."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from vision.truth.records import Smooth, TruthAtAngle, WhiskTruth
-
+NAN = float("nan")
 _WINDOW_RAD = np.radians(1.6)
 _JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
 _BEYOND_RAD = np.radians(0.3)
 _NAMES = {"slip": "mm", "longitudinal_slip": "mm", "d_y": "mm", "d_z": "mm", "phi": "rad", "alpha": "rad"}
 
 
-def at_angle(whisk: WhiskTruth, theta_rad: float) -> TruthAtAngle:
-    """Slip, deflection, force angle at pushing angle theta, each with sigma; status where it cannot be had."""
-    smooth = whisk.smooth
+@dataclass(frozen=True)
+class TruthAtAngle:
+    """Truth at one pushing angle; NaN with a status where the whisk does not hold it."""
+
+    theta_rad: float
+    slip_mm: float = NAN
+    slip_sigma_mm: float = NAN
+    longitudinal_slip_mm: float = NAN
+    longitudinal_slip_sigma_mm: float = NAN
+    d_y_mm: float = NAN
+    d_y_sigma_mm: float = NAN
+    d_z_mm: float = NAN
+    d_z_sigma_mm: float = NAN
+    phi_rad: float = NAN
+    phi_sigma_rad: float = NAN
+    alpha_rad: float = NAN
+    alpha_sigma_rad: float = NAN
+    status: str = ""
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """What `at` needs of the touching frames: values (f,), their Jacobians (f, p), and the covariance (p, p)."""
+
+    theta_rad: np.ndarray
+    touch_jacobian: np.ndarray
+    values: dict[str, np.ndarray]
+    jacobians: dict[str, np.ndarray]
+    covariance: np.ndarray
+
+
+def at_angle(smooth: Smooth | None, theta_rad: float, without: str) -> TruthAtAngle:
+    """Slip, deflection, force angle at pushing angle theta, each with sigma; status where it cannot be had.
+
+    without: the status where there is nothing smooth.
+    """
     if smooth is None or len(smooth.theta_rad) == 0:
-        return TruthAtAngle(theta_rad, status=whisk.status or "the whisker does not touch")
+        return TruthAtAngle(theta_rad, status=without or "the whisker does not touch")
     if theta_rad > np.max(smooth.theta_rad) + _BEYOND_RAD or theta_rad <= 0:
         reached = np.degrees(np.max(smooth.theta_rad))
         return TruthAtAngle(theta_rad, status=f"pushed to {reached:.2f} deg only")

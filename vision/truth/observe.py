@@ -17,13 +17,13 @@ from vision.fit.base_line import base_lines
 from vision.fit.beam_check import check_beam
 from vision.fit.quantities import jacobians
 from vision.fit.uncertainty import uncertainty
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Misled, Refused
-from vision.geometry.rods import Rods
-from vision.geometry.scene import Bar, Cameras, Wire
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import measure_noise
 from vision.lines.one_sided import Lit, one_sided_lines
-from vision.lines.trace import View
+from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.view import View
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.whisk import fit_whisk, free_stroke

@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vision.calibration.place import BaseLines
 from vision.fit.beam_check import BeamCheck
-
-NAN = float("nan")
+from vision.geometry.base_lines import BaseLines
+from vision.truth.at_angle import NAN, Smooth, TruthAtAngle, at_angle
 
 
 @dataclass(frozen=True)
@@ -42,37 +41,6 @@ class FrameTruth:
 
 
 @dataclass(frozen=True)
-class TruthAtAngle:
-    """Truth at one pushing angle; NaN with a status where the whisk does not hold it."""
-
-    theta_rad: float
-    slip_mm: float = NAN
-    slip_sigma_mm: float = NAN
-    longitudinal_slip_mm: float = NAN
-    longitudinal_slip_sigma_mm: float = NAN
-    d_y_mm: float = NAN
-    d_y_sigma_mm: float = NAN
-    d_z_mm: float = NAN
-    d_z_sigma_mm: float = NAN
-    phi_rad: float = NAN
-    phi_sigma_rad: float = NAN
-    alpha_rad: float = NAN
-    alpha_sigma_rad: float = NAN
-    status: str = ""
-
-
-@dataclass(frozen=True)
-class Smooth:
-    """What `at` needs of the touching frames: values (f,), their Jacobians (f, p), and the covariance (p, p)."""
-
-    theta_rad: np.ndarray
-    touch_jacobian: np.ndarray
-    values: dict[str, np.ndarray]
-    jacobians: dict[str, np.ndarray]
-    covariance: np.ndarray
-
-
-@dataclass(frozen=True)
 class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
@@ -104,9 +72,7 @@ class WhiskTruth:
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""
-        from vision.truth.at_angle import at_angle
-
-        return at_angle(self, theta_rad)
+        return at_angle(self.smooth, theta_rad, self.status)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from vision.fit.uncertainty import Uncertainty, variance_by_cause
 from vision.geometry.centreline import Curves
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import normals, outline
-from vision.truth.records import FrameTruth, Smooth, WhiskTruth
+from vision.truth.at_angle import Smooth
+from vision.truth.records import FrameTruth, WhiskTruth
 
 _MOST_GAP = 1.5  # of the median frame interval, beyond which a frame was lost
 # Beyond this sigma of the slope two scenes of 380 were off by 9 and 49 degrees, the latter at a stated 10.

@@ -6,24 +6,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.bar.edges import measure_edges
-from vision.bar.one_view import seen_from_one_side, touch_by_onset
+from vision.bar.one_view import seen_from_one_side
 from vision.bar.search import SeenBar, bar_lines, of_mean
-from vision.fit.first_bends import contact_arc, find_rest, follow_bends, one_curve, outline_of_bar
-from vision.fit.problem import BAR, REST, Observed, Problem, State, bar_axis, bends, curves_of, rest_shape, wire_lever
+from vision.fit.first_bends import contact_arc, find_rest, follow_bends
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape, wire_lever
 from vision.fit.scatter import honest, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
-from vision.geometry.centreline import Curves
-from vision.geometry.contact import BarAxis, upward
+from vision.fit.touch_by_onset import touch_by_onset
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import Curves, one_curve
+from vision.geometry.contact import BarAxis, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Rods
-from vision.geometry.scene import Cameras
 from vision.geometry.settings import VisionSettings
-from vision.lines.bands import LinePoints
 from vision.lines.cylinder import WAVES
 from vision.lines.one_sided import Lit, seen_width
+from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import View, clear_of_bar, observed, settle, settle_again, to_points, trace, wire_pieces
+from vision.lines.trace import clear_of_bar, observed, settle, settle_again, to_points, trace, wire_pieces
+from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
 _NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here

@@ -1,153 +1,22 @@
-"""The things on the bench: wire, bar, board, cameras. Frozen, and checked where they are made.
+"""The cameras: calibrated and placed in the rig frame, with the covariance of all their parameters.
 
 Lengths in mm, angles in rad, picture coordinates in px with pixel centres at integers (OpenCV's convention).
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
-import cv2
 import numpy as np
 
 from vision.geometry import lens as lens_model
-from vision.geometry.errors import Refused
+from vision.geometry.checks import require
 from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew
 
 N_PARAMETERS = 15
 PARAMETERS = (*lens_model.LENS_TERMS, "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
-SHAPES = ("cylinder", "cone")
 # Written-out rotations carry rounding; beyond this the matrix is no rotation at all.
 _ROTATION_TOLERANCE = 1e-4
-
-
-def _require(condition: bool, complaint: str) -> None:
-    if not condition:
-        raise Refused(complaint)
-
-
-def _require_sigma(owner: str, **sigmas_mm: float) -> None:
-    for name, value in sigmas_mm.items():
-        _require(
-            np.isfinite(value) and value >= 0, f"{owner} {name} = {value}: must be 0 or more, and finite"
-        )
-
-
-def _require_length(owner: str, **lengths_mm: float) -> None:
-    for name, value in lengths_mm.items():
-        _require(
-            np.isfinite(value) and value > 0, f"{owner} {name} = {value}: must be above 0 mm, and finite"
-        )
-
-
-@dataclass(frozen=True)
-class Wire:
-    """The whisker: a cylinder, or a cone that ends in a point at its length. Refused where a length is not > 0."""
-
-    shape: str
-    length_mm: float
-    diameter_mm: float
-    length_sigma_mm: float = 0.0
-    diameter_sigma_mm: float = 0.0
-
-    def __post_init__(self):
-        _require(self.shape in SHAPES, f"wire shape {self.shape!r}: must be one of {', '.join(SHAPES)}")
-        _require_length("wire", length_mm=self.length_mm, diameter_mm=self.diameter_mm)
-        _require_sigma("wire", length_sigma_mm=self.length_sigma_mm, diameter_sigma_mm=self.diameter_sigma_mm)
-
-    def radius_mm(self, arc_mm: np.ndarray | float) -> np.ndarray:
-        """Radius at arc length `arc_mm` from the base, mm; the shape of `arc_mm`; 0 beyond a cone's point."""
-        arc_mm = np.asarray(arc_mm, dtype=float)
-        taper = 1.0 - arc_mm / self.length_mm if self.shape == "cone" else np.ones_like(arc_mm)
-        return 0.5 * self.diameter_mm * np.clip(taper, 0.0, None)
-
-
-@dataclass(frozen=True)
-class Bar:
-    """The bar that the whisker pushes against: a round one."""
-
-    diameter_mm: float
-    diameter_sigma_mm: float = 0.0
-
-    def __post_init__(self):
-        _require_length("bar", diameter_mm=self.diameter_mm)
-        _require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
-
-    @property
-    def radius_mm(self) -> float:
-        return 0.5 * self.diameter_mm
-
-
-@dataclass(frozen=True)
-class Board:
-    """A ChArUco board. squares = (along x, along y); frame as OpenCV's: origin top left, z into the board."""
-
-    squares: tuple[int, int]
-    square_mm: float
-    marker_mm: float
-    dictionary: str
-    legacy: bool = False
-    inverted: bool = False
-    square_sigma_mm: float = 0.0
-
-    def __post_init__(self):
-        object.__setattr__(self, "squares", tuple(int(n) for n in self.squares))
-        _require(
-            len(self.squares) == 2 and min(self.squares) >= 2,
-            f"board squares = {list(self.squares)}: two counts, each 2 or more",
-        )
-        _require_length("board", square_mm=self.square_mm, marker_mm=self.marker_mm)
-        _require_sigma("board", square_sigma_mm=self.square_sigma_mm)
-        _require(
-            self.marker_mm < self.square_mm,
-            f"board marker_mm = {self.marker_mm} is not smaller than square_mm = {self.square_mm}",
-        )
-        _require(
-            self.dictionary.startswith("DICT_") and hasattr(cv2.aruco, self.dictionary),
-            f"board dictionary {self.dictionary!r} is not one of OpenCV's, such as DICT_5X5_100",
-        )
-        _require(
-            self.marker_count <= self.markers_in_dictionary,
-            f"board of {self.squares[0]} x {self.squares[1]} squares needs {self.marker_count} markers, "
-            f"{self.dictionary} has {self.markers_in_dictionary}",
-        )
-
-    @property
-    def marker_count(self) -> int:
-        """One marker on every second square."""
-        return self.squares[0] * self.squares[1] // 2
-
-    @property
-    def markers_in_dictionary(self) -> int:
-        return len(self._opencv_dictionary().bytesList)
-
-    def _opencv_dictionary(self) -> cv2.aruco.Dictionary:
-        return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
-
-    def opencv(self) -> cv2.aruco.CharucoBoard:
-        """The same board as OpenCV's object, with no more of its dictionary than the board has: comparing what is seen
-        with a thousand markers took 40 % of detection. (Others are as far from the board's as before: not taken.)
-        """
-        return _opencv_board(self)
-
-    @cached_property
-    def corners_mm(self) -> np.ndarray:
-        """Inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the ChArUco id."""
-        x = np.arange(1, self.squares[0]) * self.square_mm
-        y = np.arange(1, self.squares[1]) * self.square_mm
-        corners = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x)), np.zeros(len(x) * len(y))])
-        corners.setflags(write=False)
-        return corners
-
-
-@lru_cache(maxsize=32)
-def _opencv_board(board: Board) -> cv2.aruco.CharucoBoard:
-    """Made once: OpenCV warns of narrow borders each time."""
-    whole = board._opencv_dictionary()
-    own = cv2.aruco.Dictionary(whole.bytesList[: board.marker_count], whole.markerSize, whole.maxCorrectionBits)
-    made = cv2.aruco.CharucoBoard(board.squares, float(board.square_mm), float(board.marker_mm), own)
-    made.setLegacyPattern(board.legacy)
-    return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +40,7 @@ class Camera:
         for name, shape in (("matrix", (3, 3)), ("distortion", (5,)), ("T_camera_rig", (3, 4))):
             object.__setattr__(self, name, self._checked(name, shape))
         object.__setattr__(self, "size_px", tuple(int(n) for n in self.size_px))
-        _require(
+        require(
             len(self.size_px) == 2 and min(self.size_px) > 0,
             f"camera {self.name}: size_px = {list(self.size_px)}, must be two counts above 0",
         )
@@ -180,7 +49,7 @@ class Camera:
 
     def _checked(self, name: str, shape: tuple[int, ...]) -> np.ndarray:
         value = np.array(getattr(self, name), dtype=float)
-        _require(
+        require(
             value.shape == shape and bool(np.all(np.isfinite(value))),
             f"camera {self.name}: {name} must be {' x '.join(map(str, shape))} finite numbers, "
             f"found {' x '.join(map(str, value.shape))}",
@@ -191,7 +60,7 @@ class Camera:
     def _check_matrix(self) -> None:
         K = self.matrix
         upper = np.array([[K[0, 0], 0, K[0, 2]], [0, K[1, 1], K[1, 2]], [0, 0, 1]])
-        _require(
+        require(
             np.allclose(K, upper) and min(K[0, 0], K[1, 1]) > 0,
             f"camera {self.name}: matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx, fy above 0",
         )
@@ -199,7 +68,7 @@ class Camera:
     def _settle_rotation(self) -> None:
         """Rounding in a file is taken out, so that every use sees an exact rotation."""
         R = nearest_rotation(self.T_camera_rig[:, :3])
-        _require(
+        require(
             bool(np.abs(R - self.T_camera_rig[:, :3]).max() < _ROTATION_TOLERANCE),
             f"camera {self.name}: the left 3 x 3 of T_camera_rig is no rotation",
         )
@@ -264,17 +133,17 @@ class Cameras:
 
     def __post_init__(self):
         object.__setattr__(self, "cameras", tuple(self.cameras))
-        _require(
+        require(
             len(set(self.names)) == len(self.cameras), f"two cameras share a name: {', '.join(self.names)}"
         )
         n = N_PARAMETERS * len(self.cameras)
         covariance = np.zeros((n, n)) if self.covariance is None else np.array(self.covariance, dtype=float)
-        _require(
+        require(
             covariance.shape == (n, n),
             f"covariance of {len(self.cameras)} cameras must be {n} x {n}, found "
             + " x ".join(map(str, covariance.shape)),
         )
-        _require(
+        require(
             bool(np.all(np.isfinite(covariance))),
             "covariance of the cameras holds a number that is not finite",
         )
@@ -290,7 +159,7 @@ class Cameras:
         if placement is None:
             return
         placement = np.array(placement, dtype=float)
-        _require(
+        require(
             placement.shape == (6, 6) and bool(np.all(np.isfinite(placement))),
             "the cameras' placement must be 6 x 6 finite numbers",
         )

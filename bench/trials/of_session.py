@@ -1,0 +1,69 @@
+"""What all trials of a session tell together before one is judged: drift of the zero, and the gauges."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.gauges.checks import Undetermined, check_alive
+from bench.gauges.drift import drift_rate, free_slope
+from bench.gauges.felt import strokes_of
+from bench.gauges.fit import fit_gauges
+from bench.gauges.gauges_file import given_gauges
+from bench.gauges.matrix import Gauges
+from bench.gauges.readings import Pairs, pairs_of
+from bench.session.session import Session
+from bench.session.signals import read_signals
+from bench.session.trial import Trial
+from bench.trials.unit import Unit, see_unit
+
+_MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
+
+
+def judged(session: Session) -> list[Trial]:
+    """The trials with whisks: all but those with a weight. Raises BadInput where there is none."""
+    trials = [trial for trial in session.trials if trial.purpose != "weight"]
+    if not trials:
+        raise BadInput("there is no trial to evaluate", file="trials")
+    return trials
+
+
+def session_drift(trials: Sequence[Trial], settings: Settings, pool: Workers) -> np.ndarray:
+    """RMS drift (2,) of the channels per second, from free strokes all over the session."""
+    every = max(1, len(trials) // _MOST_DRIFT_STROKES)
+    tasks = [(trial, settings) for trial in trials[::every]]
+    return drift_rate([slope for slopes in pool.run(_free_slopes, tasks, "free strokes") for slope in slopes])
+
+
+def _free_slopes(task: tuple[Trial, Settings]) -> list:
+    trial, settings = task
+    slopes = [free_slope(stroke) for stroke in strokes_of(read_signals(trial), trial, settings)]
+    return [slope for slope in slopes if slope is not None]
+
+
+def session_gauges(units: Sequence[Unit], rate, pool: Workers, doubts: Doubts) -> Gauges | None:
+    """Gauges as brought along, else from the gauge trials; None, and a note, where these cannot fix them."""
+    given = given_gauges(units[0].session)
+    trials = [unit for unit in units if unit.trial.purpose == "gauge" and read_signals(unit.trial).kind == "V"]
+    if given is not None or not trials:
+        return given
+    pool.run(see_unit, trials, "gauge trials")
+    try:
+        return fit_gauges([pairs for unit in trials for pairs in _pairs(unit, rate)])
+    except Undetermined as reason:
+        doubts.note(str(reason))
+        return None
+
+
+def _pairs(unit: Unit, rate) -> list[Pairs]:
+    """Pairs of moment and volts of a gauge trial's whisks."""
+    strokes, whisker = strokes_of(read_signals(unit.trial), unit.trial, unit.settings), unit.session.whisker
+    check_alive(strokes)
+    found = [
+        pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
+        for seen, stroke in zip(see_unit(unit)["whisks"], strokes)
+    ]
+    return [pairs for pairs in found if pairs is not None]

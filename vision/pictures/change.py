@@ -1,0 +1,21 @@
+"""Where a picture differs from the one without rods, and how surely."""
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from vision.pictures.pixel_noise import Noise
+
+HALF = 2  # a coarse look needs no more
+
+
+def changed(grey, background, noise: Noise) -> np.ndarray:
+    """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 3 × 3 pixels.
+
+    Both pictures are given at every HALF-th pixel. The outermost pixels are 0.
+
+    The scale is the median of the differences themselves: most of the picture has not changed, and a picture of
+    the background may be noisier than the frames.
+    """
+    difference = uniform_filter(grey - background, 3) / noise.sigma(0.5 * (grey + background))
+    z = np.abs(difference) / max(float(np.median(np.abs(difference))) / 0.6745, 1e-6)
+    return np.pad(np.clip((z - 3.0) / 6.0, 0.0, 1.0)[1:-1, 1:-1], 1)

@@ -1,0 +1,36 @@
+"""One camera's pictures of a whisk, beside the picture without rods."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vision.geometry.camera import Camera
+from vision.pictures.pixel_noise import Noise
+
+MEAN_OF = 40  # frames: more would not make a still thing clearer
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise."""
+
+    camera: Camera
+    frames: Mapping[int, np.ndarray]
+    background: np.ndarray
+    noise: Noise
+
+    def some(self, most: int) -> list[np.ndarray]:
+        """At most so many of the pictures, spread over all of them."""
+        pictures = list(self.frames.values())
+        return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """Mean (h, w) of the pictures, of MEAN_OF at most."""
+        pictures = self.some(MEAN_OF)
+        total = np.zeros(pictures[0].shape, dtype=np.float32)
+        for picture in pictures:
+            total += picture
+        return total / len(pictures)
