@@ -21,7 +21,7 @@ from bench.base.results import (
     write_result,
 )
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.base.workers import Workers
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 def test_order_is_that_of_the_tasks():

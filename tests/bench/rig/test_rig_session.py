@@ -509,7 +509,7 @@ def test_goes_on_after_a_kill(tiny, tmp_path):
     script, session = tmp_path / "run.py", tmp_path / "session"
     script.write_text(_RUN)
     path = protocol_file(tmp_path, TINY)
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
     run = subprocess.Popen([sys.executable, script, session, path], env=environment)
     deadline = time.time() + 60
     while time.time() < deadline and not whole_parts(session) and run.poll() is None:
@@ -543,7 +543,7 @@ def test_size_and_time_are_said_before_and_progress_after(tmp_path, capsys):
 
 def test_the_documents_example_loads(tmp_path):
     """And it names each table."""
-    document = (Path(__file__).resolve().parents[2] / "docs" / "rig.md").read_text()
+    document = (Path(__file__).resolve().parents[3] / "docs" / "rig.md").read_text()
     text = document.split("```toml\n")[1].split("```")[0]
     protocol = load(protocol_file(tmp_path, text))
     assert len(protocol.runs()) == 7

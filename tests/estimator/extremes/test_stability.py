@@ -2,7 +2,7 @@
 
 Run as a script it prints the worst error of each function, in units of ε max(1, κ):
 
-    python tests/extremes/test_stability.py --samples 3000
+    python tests/estimator/extremes/test_stability.py --samples 3000
 
 The bound is 8 ε max(1, κ), ε = 2⁻⁵². κ = Σ |x ∂f/∂x| / |f| over all inputs is what an error of ε in each of them
 would do to the result, so no algorithm in float64 can promise much better. On a kink the larger one-sided κ counts.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD
-from tests.vision.test_corners import picture
+from tests.vision.boards.test_corners import picture
 from vision.boards.diagnosis import check_settings, why_not_found
 from vision.geometry.errors import Refused
 

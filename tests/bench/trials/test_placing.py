@@ -16,10 +16,10 @@ from bench.cameras.calibration import SessionCalibration
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit
-from tests.vision.test_fit import CAMERAS
-from tests.vision.test_place import some_lines
+from tests.vision.calibration.test_place import some_lines
+from tests.vision.fit.test_fit import CAMERAS
 
-SMALL = Path(__file__).resolve().parents[2] / "fixtures" / "small-session"
+SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 T_RIG_BOARD = load_session(SMALL).T_rig_board
 OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.8, 0.0])  # the centre 0.8 mm across the whisker from where the board has it
 

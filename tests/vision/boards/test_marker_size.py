@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.vision.test_corners import BOARD, picture
+from tests.vision.boards.test_corners import BOARD, picture
 from vision.boards.marker_size import check_marker_size
 from vision.geometry.errors import Refused
 

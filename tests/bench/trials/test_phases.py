@@ -122,7 +122,7 @@ def test_frames_too_far_apart_show_no_phases():
 
 def test_the_rig_s_sandpaper(tmp_path):
     """Exact mechanics, ringing, hum and noise; gauges and slope as they are. The requirement is 1°."""
-    protocol = Path(__file__).parents[1] / "ladder" / "protocols" / "sandpaper.toml"
+    protocol = Path(__file__).parents[2] / "ladder" / "protocols" / "sandpaper.toml"
     simulate(tmp_path / "session", protocol=protocol, signals_only=True, seed=5, workers=1, progress=False)
     session = load_session(tmp_path / "session")
     true = json.loads((tmp_path / "session" / "truth.json").read_text())
