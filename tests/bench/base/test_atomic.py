@@ -45,7 +45,7 @@ def test_others_may_read_what_was_written(tmp_path):
 OTHER_RUN = """
 import sys
 from pathlib import Path
-from bench.atomic import lock_output
+from bench.base.atomic import lock_output
 with lock_output(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()

@@ -44,7 +44,7 @@ def _refuse(_):
 
 _LONG = """
 import os, signal, sys, time
-from bench.workers import Workers
+from bench.base.workers import Workers
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     with Workers(2) as pool:

@@ -8,7 +8,7 @@ import pytest
 from bench.friction.error_map import draw_error_map, measured_cells, write_error_map
 from bench.friction.explained import SHARES, draw_explained, mean_row
 from bench.friction.tables import friction_of
-from tests.bench.friction.test_friction_runs import WHISKER, result
+from tests.scenes.friction_results import WHISKER, result
 
 ALPHA_EST = np.radians(10.0)
 

@@ -1,7 +1,6 @@
 """What the rig paints, the cameras' side reads: two programs that share no code agree on where bar and wire are."""
 
 import csv
-import json
 import tomllib
 
 import numpy as np
@@ -12,7 +11,7 @@ from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
-from vision.geometry.camera import Camera, Cameras
+from tests.scenes.recorded import exact_cameras
 from vision.geometry.rods import Bar, Wire
 from vision.pictures.files import read_picture
 from vision.truth.observe import observe_trial
@@ -41,16 +40,6 @@ d_x_mm = 70.0
 friction = 0.185339
 bar_diameter_mm = 4.0
 """
-
-
-def exact_cameras(session):
-    """The cameras that the rig painted through."""
-    truth = json.loads((session / "truth.json").read_text())["cameras"].values()
-    return Cameras(tuple(_camera(c) for c in truth))
-
-
-def _camera(c):
-    return Camera(c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]]))
 
 
 @pytest.mark.slow

@@ -16,8 +16,8 @@ from bench.cameras.calibration import SessionCalibration
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit
-from tests.vision.calibration.test_place import some_lines
-from tests.vision.fit.test_fit import CAMERAS
+from tests.scenes.base_lines import some_lines
+from tests.scenes.model_scenes import CAMERAS
 
 SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 T_RIG_BOARD = load_session(SMALL).T_rig_board

@@ -17,7 +17,7 @@ from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, see_unit
-from tests.bench.rig.test_seen_by_vision import exact_cameras
+from tests.scenes.recorded import exact_cameras
 from vision.geometry.camera import Cameras
 from vision.geometry.rotation import compose, invert_transform
 from vision.pictures.files import read_picture

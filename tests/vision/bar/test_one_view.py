@@ -7,7 +7,7 @@ import pytest
 
 from tests.ladder.bar_lines import AWAY_MM, CENTRE, RADIUS_MM, edges_px, noisy_view, painted
 from tests.ladder.lines import squares
-from tests.vision.fit.test_fit import CAMERAS, REACH, begun, camera, scene, with_points
+from tests.scenes.model_scenes import CAMERAS, REACH, begun, camera, scene, with_points
 from vision.bar.axis import settle_axis
 from vision.bar.edges import measure_edges
 from vision.bar.one_view import axis_from_edges, find_bar_alone, seen_from_one_side

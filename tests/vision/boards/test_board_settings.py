@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD
-from tests.vision.boards.test_corners import picture
+from tests.scenes.board_pictures import picture
 from vision.boards.diagnosis import check_settings, why_not_found
 from vision.geometry.errors import Refused
 

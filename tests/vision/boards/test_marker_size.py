@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.vision.boards.test_corners import BOARD, picture
+from tests.ladder.board_scenes import BOARD
+from tests.scenes.board_pictures import picture
 from vision.boards.marker_size import check_marker_size
 from vision.geometry.errors import Refused
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.vision.fit.test_fit import CAMERAS
+from tests.scenes.model_scenes import CAMERAS
 from vision.calibration.turning import MovingLines, first_rig, moving_lines
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.vision.fit.test_fit import CAMERAS, scene, with_points
+from tests.scenes.model_scenes import CAMERAS, scene, with_points
 from vision.calibration.place import by_swing
 from vision.fit.base_line import base_lines
 from vision.fit.problem import State

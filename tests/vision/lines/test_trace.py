@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.ladder.lines import COLUMNS, FRAMES, KNOTS, NOISE, PIECE_PX, SCENES, SHAPE, axis_height, band, drawn, errors
-from tests.vision.fit.test_fit import camera
+from tests.scenes.model_scenes import camera
 from vision.geometry.centreline import centrelines
 from vision.geometry.rods import Wire
 from vision.lines.bands import cut_pieces
