@@ -18,29 +18,29 @@ from estimator.whisk import EstimatorSettings, Whisk
 
 
 @pytest.mark.parametrize("trial", ["b30_3", "b60_4"])
-def test_friction_as_seen_is_the_true_one(exact_record, steel_sample, trial):
+def test_friction_as_seen_is_the_true_one(exact_record, steel_signals, trial):
     """10.5°, within 0.3°: near |β| − α = 20° slip along the whisker takes some of the friction (equations.md)."""
-    record = plain(exact_record(load_session(steel_sample).trial(trial)))
+    record = plain(exact_record(load_session(steel_signals).trial(trial)))
     alpha, sigma = np.degrees(seen_friction(record))
     assert alpha == pytest.approx(10.5, abs=0.3)
     assert 0.0 < sigma < 0.5
 
 
-def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_sample):
-    record = plain(exact_record(load_session(steel_sample).trial("b60_4")))
+def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signals):
+    record = plain(exact_record(load_session(steel_signals).trial("b60_4")))
     before = seen_friction(record)[0]
     record["deflection"]["across_z_mm"] = [z + 0.2 for z in record["deflection"]["across_z_mm"]]
     assert seen_friction(record)[0] == pytest.approx(before, abs=1e-9)
 
 
-def test_no_slip_no_friction_angle(exact_record, steel_sample):
-    record = plain(exact_record(load_session(steel_sample).trial("b00_2")))
+def test_no_slip_no_friction_angle(exact_record, steel_signals):
+    record = plain(exact_record(load_session(steel_signals).trial("b00_2")))
     assert np.isnan(seen_friction(record)).all()
 
 
-def test_shares_add_up_and_what_remains_is_small(steel_sample, exact_vision, tmp_path):
+def test_shares_add_up_and_what_remains_is_small(steel_signals, exact_vision, tmp_path):
     """With a wrong α_est of 15° the friction angle explains the error at 60°; beam theory leaves less than 1 %."""
-    evaluate(steel_sample, tmp_path, Settings(alpha_est_deg=15.0), workers=0)
+    evaluate(steel_signals, tmp_path, Settings(alpha_est_deg=15.0), workers=0)
     with (tmp_path / "explained.csv").open(newline="") as file:
         rows = {row.pop("trial"): {k: float(v or "nan") for k, v in row.items()} for row in csv.DictReader(file)}
     for row in rows.values():

@@ -25,8 +25,8 @@ WHISKER = Whisker("cylinder", 100.0, 1.0, 60.0)
 
 
 @pytest.fixture
-def session(steel_sample):
-    return load_session(steel_sample)
+def session(steel_signals):
+    return load_session(steel_signals)
 
 
 @pytest.fixture

@@ -59,9 +59,9 @@ def test_friction_away_from_the_clamp_stiffens():
 
 
 @pytest.mark.parametrize("trial, sliding_along", [("b60_4", 0.0), ("b30_3", 0.0), ("b00_2", 1.0), ("gauge_roll0", 1.0)])
-def test_exact_mechanics_of_the_sample_session(steel_sample, trial, sliding_along):
+def test_exact_mechanics_of_the_sample_session(steel_signals, trial, sliding_along):
     """Within 0.02 %. Where the whisker slips across, friction is spent there; at β = 0 it acts along the rod."""
-    folder = steel_sample / "trials" / trial
+    folder = steel_signals / "trials" / trial
     table = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
     table = table[table["contact"] == 1]
     mu = tomllib.loads((folder / "truth.toml").read_text())["mu_kinetic"]

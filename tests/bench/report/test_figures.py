@@ -38,9 +38,9 @@ def judged(estimator, beta, error_percent, one_factor=False) -> Judged:
 
 
 @pytest.fixture
-def steep(exact_record, steel_sample):
+def steep(exact_record, steel_signals):
     """The record of the whisk at 60° as perfect pictures would give it, read back."""
-    return json.loads(json.dumps(plain(exact_record(load_session(steel_sample).trial("b60_4")))))
+    return json.loads(json.dumps(plain(exact_record(load_session(steel_signals).trial("b60_4")))))
 
 
 def lines_of(axes) -> list[np.ndarray]:

@@ -53,9 +53,9 @@ def test_meets_small_angle_theory_in_the_limit(beta, alpha_deg):
 
 
 @pytest.mark.parametrize("trial", ["b00_2", "b30_3", "b60_4", "gauge_roll0", "gauge_roll90"])
-def test_against_the_truth_of_another_rig(steel_sample, trial):
+def test_against_the_truth_of_another_rig(steel_signals, trial):
     """steel-sample's truth comes from another program. It is written to 1e-6 mm, its d_x and β to 1e-6 too."""
-    folder = steel_sample / "trials" / trial
+    folder = steel_signals / "trials" / trial
     truth = tomllib.loads((folder / "truth.toml").read_text())
     rows = [r for r in csv.DictReader((folder / "truth.csv").read_text().splitlines()) if r["contact"] == "1"]
     thetas = np.array([float(r["motor_deg"]) - truth["touch_deg"] for r in rows])

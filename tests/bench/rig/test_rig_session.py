@@ -44,11 +44,11 @@ def test_truth_agrees_with_itself(tiny):
     assert truth["slip_at_3deg_mm"] == pytest.approx(np.interp(3, [2.9, 3.4], slips[5:7]), rel=1e-3)
 
 
-def test_truth_has_the_form_of_steel_samples(tiny, steel_sample):
-    mine, other = (json.loads((s / "truth.json").read_text()) for s in (tiny, steel_sample))
+def test_truth_has_the_form_of_steel_signalss(tiny, steel_signals):
+    mine, other = (json.loads((s / "truth.json").read_text()) for s in (tiny, steel_signals))
     assert set(other) <= set(mine)
     assert set(other["cameras"]["high"]) == set(mine["cameras"]["left"])
-    mine, other = tiny / "trials" / "steel_b20_v10", steel_sample / "trials" / "b30_3"
+    mine, other = tiny / "trials" / "steel_b20_v10", steel_signals / "trials" / "b30_3"
     assert [*tomllib.loads((other / "truth.toml").read_text())] == [*tomllib.loads((mine / "truth.toml").read_text())]
     for name in ("truth.csv", "signals.csv", "frames.csv"):
         assert (mine / name).read_text().startswith((other / name).read_text().split("\n")[0])

@@ -18,9 +18,13 @@ def replace(file, old: str, new: str) -> None:
     file.write_text(file.read_text().replace(old, new))
 
 
-def test_steel_sample(steel_sample):
-    session = load_session(steel_sample)
-    assert session.camera_names == ("high", "low")
+def test_cameras_are_the_folders_that_hold_pictures(small_session, steel_signals):
+    assert load_session(small_session).camera_names == ("high", "low")
+    assert load_session(steel_signals).camera_names == ()
+
+
+def test_manifests_of_the_sample_session(steel_signals):
+    session = load_session(steel_signals)
     assert [trial.name for trial in session.trials] == ["b00_2", "b30_3", "b60_4", "gauge_roll0", "gauge_roll90"]
     assert [trial.purpose for trial in session.trials] == ["measure"] * 3 + ["gauge"] * 2
     assert session.trial("gauge_roll90").follicle_roll_deg == 90.0
@@ -31,9 +35,9 @@ def test_steel_sample(steel_sample):
     assert (session.cameras_toml, session.gauges_toml, session.gauges) == (None, None, None)
 
 
-def test_rigidity_of_the_nitinol_wire(steel_sample):
+def test_rigidity_of_the_nitinol_wire(steel_signals):
     # E I = 60 GPa · π (1 mm)⁴ / 64 = 2945.2 N·mm², as the session format has it to 0.05 N·mm²
-    assert load_session(steel_sample).whisker.C_Nmm2 == pytest.approx(3 * 2945.2, abs=3 * 0.05)
+    assert load_session(steel_signals).whisker.C_Nmm2 == pytest.approx(3 * 2945.2, abs=3 * 0.05)
 
 
 def test_natural_order_of_trials(small_copy):

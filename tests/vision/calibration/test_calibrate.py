@@ -20,17 +20,17 @@ RIG_POINTS = np.array([[x, 0.0, z] for x in np.linspace(0, 100, 11) for z in (-3
 
 
 @pytest.fixture(scope="module")
-def steel_views(steel_sample):
+def steel_views(small_session):
     from bench.cameras.board_views import read_board_views
     from bench.session.session import load_session
 
-    session = load_session(steel_sample)
+    session = load_session(small_session)
     return session, read_board_views(session)
 
 
 @pytest.fixture(scope="module")
-def true_cameras(steel_sample):
-    truth = json.loads((steel_sample / "truth.json").read_text())["cameras"]
+def true_cameras(small_session):
+    truth = json.loads((small_session / "truth.json").read_text())["cameras"]
     return {
         name: Camera(name, (t["width"], t["height"]), t["K"], t["dist"], np.column_stack([t["R"], t["t"]]))
         for name, t in truth.items()

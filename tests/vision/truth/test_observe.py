@@ -9,8 +9,8 @@ from vision.truth.observe import observe_trial
 
 
 @pytest.fixture(scope="module")
-def steep(steel_sample):
-    return Recorded(steel_sample, "b60_4")
+def steep(small_session):
+    return Recorded(small_session, "b60_4")
 
 
 def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
