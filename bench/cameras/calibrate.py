@@ -8,11 +8,11 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.cameras.board_views import BoardViews, read_board_views, rig_view
+from bench.cameras.cameras_file import write_cameras
 from bench.cameras.scale import check_scale
 from bench.session.session import Session, load_session
 from vision.boards.corners import Corners
 from vision.calibration.calibrate import Calibration, CameraReport, calibrate_cameras
-from vision.calibration.cameras_file import write_cameras
 from vision.calibration.cameras_import import import_cameras, place_on_rig
 from vision.calibration.held_out import Agreement, HeldOut, held_out
 from vision.calibration.place import by_board, placed
@@ -52,7 +52,6 @@ def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = No
 
 
 def _write(out: Path, cameras: Cameras, lines: list[str], doubts: list[str]) -> int:
-    out.parent.mkdir(parents=True, exist_ok=True)
     write_cameras(out, cameras)
     print("\n".join([*lines, *doubts, f"written: {out} and {out.with_suffix('.npz').name}"]))
     return 1 if doubts else 0

@@ -6,10 +6,10 @@ the jump is the static angle. A jump ends where the force is back on the kinetic
 would show too large an angle, as nothing tells the two apart.
 """
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import find_objects, label
 
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial import SeenWhisk
@@ -45,7 +45,7 @@ def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
         for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
             spread = float(np.hypot(alpha_sigma[k], turning[k] * way / np.sqrt(12.0)))
             angles.append(Angle(kind, float(middle), float(alpha[k] + half * way * turning[k]), spread))
-    return Phases(sum(1 for _ in _runs(rests & known)), len(jumps), tuple(angles)) if jumps else NO_PHASES
+    return Phases(len(_runs(rests & known)), len(jumps), tuple(angles)) if jumps else NO_PHASES
 
 
 def _is_jump(first: int, last: int, rests) -> bool:
@@ -61,10 +61,9 @@ def _touching(frames: FrameTruth) -> np.ndarray:
     return rows[:, frames.touching & np.isfinite(rows).all(axis=0) & (rows[0] > _FIRST_RAD)]
 
 
-def _runs(mask) -> Iterator[tuple[int, int]]:
+def _runs(mask) -> list[tuple[int, int]]:
     """(first, one past the last) of each unbroken stretch of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist())
+    return [(run.start, run.stop) for (run,) in find_objects(label(mask)[0])]
 
 
 def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, C_Nmm2: float) -> Phases:

@@ -13,7 +13,8 @@ from bench.cameras.calibration import SessionCalibration
 from bench.cameras.first_look import by_first_look, first_look, spread
 from bench.session.session import Session
 from bench.trials.unit import Unit, see_unit
-from vision.calibration.place import Placement, by_board, by_strokes, check_swing_suffices, combine, placed
+from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
+from vision.calibration.swing import by_strokes
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform
 
