@@ -1,19 +1,19 @@
 """Whisks by surface and speed: the points of Fig. 8 and the friction angle α that (13), (14) fit them with."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import slope_deg
-from estimator.friction import FrictionFit, fit_alpha
+from estimator.friction import FrictionFit, Pushes, fit_alpha
 
 # From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
 # many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
 _MANY = 8
 _SAME_SLOPE_DEG = 2.5
-_FITTED = ("beta_deg", "d_x_mm", "theta_rad", "m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")
+_FITTED = {"m_y": "m_y_Nmm", "m_z": "m_z_Nmm", "d_x": "d_x_mm", "theta": "theta_rad"}  # fields of Pushes and of Felt
 
 
 @dataclass(frozen=True)
@@ -141,20 +141,15 @@ def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | N
 def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
     if len(felt) < 2:
         return None
-    columns = {name: np.array([getattr(f, name) for f in felt]) for name in _FITTED}
-    how = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
+    columns = {name: np.array([getattr(f, field) for f in felt]) for name, field in _FITTED.items()}
+    pushes = Pushes(np.radians([f.beta_deg for f in felt]), **columns, C=C_Nmm2)
     recording = np.array([f.recording for f in felt])
     if len(set(recording)) >= _MANY:
-        how = {"recording": recording}
-    fit = fit_alpha(
-        np.radians(columns["beta_deg"]),
-        columns["m_y_Nmm"],
-        columns["m_z_Nmm"],
-        columns["d_x_mm"],
-        columns["theta_rad"],
-        C_Nmm2,
-        **how,
-    )
+        pushes = replace(pushes, recording=recording)
+    elif len(felt) < _MANY:
+        sigmas = np.array([(f.m_y_sigma_Nmm, f.m_z_sigma_Nmm) for f in felt]).T
+        pushes = replace(pushes, sigma_y=sigmas[0], sigma_z=sigmas[1])
+    fit = fit_alpha(pushes)
     return fit if np.isfinite(fit.alpha_rad) else None
 
 

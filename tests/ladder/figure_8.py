@@ -31,7 +31,7 @@ from bench.friction.surfaces import Surface
 from bench.records.trial import TrialResult
 from bench.report.pooled import pooled, read_run
 from bench.rig.protocol import FOLDER as PROTOCOLS
-from estimator.friction import fit_alpha
+from estimator.friction import Pushes, fit_alpha
 
 STATIC_BY_KINETIC = {"one": 1.0, "stick-slip": 1.25}
 WIDTH_PX = 1400
@@ -74,7 +74,7 @@ class Panel:
         """α that fits with these fields of the whisks."""
         beta, d_x, m = (np.array([getattr(w, name) for w in self.whisks]) for name in (beta_deg, d_x_mm, moments))
         theta, C = self.surface.theta_rad, self.surface.C_Nmm2
-        return float(np.degrees(fit_alpha(np.radians(beta), *m.T, d_x, theta, C).alpha_rad))
+        return float(np.degrees(fit_alpha(Pushes(np.radians(beta), *m.T, d_x, theta, C)).alpha_rad))
 
 
 HEAD = f"{'':<18}{'n':>5}{'kinetic':>8}{'static':>8}{'fitted':>15}" + "".join(
