@@ -3,7 +3,7 @@
 import importlib
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,12 +12,14 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.records.trial import EstimateRow, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
 from estimator.distance import estimated_slope, felt_slip_angle
 from estimator.signal import Touch
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
+from vision.truth.value import Value
 
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
@@ -102,51 +104,42 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
     )
 
 
-def as_felt(touch: Touch, whisk: Whisk | None) -> dict:
-    """Felt touch, moments and slip angle as plain values, rad and N·mm."""
-    felt = {"touch_felt_rad": touch.motor_rad, "touch_felt_sigma_rad": touch.sigma_rad}
+def as_felt(number: int, touch: Touch, whisk: Whisk | None) -> FeltWhisk:
+    """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`."""
+    felt = FeltWhisk(number, Value(touch.motor_rad, touch.sigma_rad))
     if whisk is None:
         return felt
-    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at))
-    phi, phi_sigma = _slip_angle(whisk)
-    return felt | {
-        "m_y_Nmm": whisk.m_y_at_Nmm,
-        "m_y_sigma_Nmm": sigma_y,
-        "m_z_Nmm": whisk.m_z_at_Nmm,
-        "m_z_sigma_Nmm": sigma_z,
-        "phi_felt_rad": phi,
-        "phi_felt_sigma_rad": phi_sigma,
-        "covariance_at": whisk.covariance_at,
-        "theta_moment_covariance_at": whisk.theta_moment_covariance_at,
-    }
+    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
+    return replace(
+        felt,
+        m_y_Nmm=Value(whisk.m_y_at_Nmm, sigma_y),
+        m_z_Nmm=Value(whisk.m_z_at_Nmm, sigma_z),
+        phi_felt_rad=_slip_angle(whisk),
+        covariance_at=whisk.covariance_at,
+        theta_moment_covariance_at=whisk.theta_moment_covariance_at,
+    )
 
 
-def _slip_angle(whisk: Whisk) -> tuple[float, float]:
+def _slip_angle(whisk: Whisk) -> Value:
     """φ, equation (8), and its sigma."""
     m_y, m_z = whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
     gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
-    return felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0))
+    return Value(felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0)))
 
 
-def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> list[dict]:
+def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> tuple[EstimateRow, ...]:
     """What each estimator says, as rows of estimates.csv without truth."""
-    return [_answer(name, estimator, whisk, settings) for name, estimator in asked.items()]
+    return tuple(_answer(name, estimator, whisk, settings) for name, estimator in asked.items())
 
 
-def _answer(name: str, estimator: Estimator, whisk: Whisk, settings: Settings) -> dict:
+def _answer(name: str, estimator: Estimator, whisk: Whisk, settings: Settings) -> EstimateRow:
     try:
         estimate = estimator(whisk, EstimatorSettings(settings.alpha_est_rad))
     except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
         estimate = Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
     if not isinstance(estimate, Estimate):
         raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
-    alpha_rad = {"no_slip": None, "frictionless": 0.0}.get(name, settings.alpha_est_rad)
-    slope = None if alpha_rad is None else estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad)
-    return {
-        "estimator": name,
-        "alpha_est_rad": alpha_rad,
-        "d_x_est_mm": estimate.d_x_mm,
-        "d_x_est_sigma_mm": estimate.sigma_mm,
-        "beta_est_rad": slope,
-        "status": estimate.status,
-    }
+    alpha_rad = {"no_slip": math.nan, "frictionless": 0.0}.get(name, settings.alpha_est_rad)
+    has_slope = math.isfinite(alpha_rad)
+    slope = float(estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad)) if has_slope else math.nan
+    return EstimateRow(name, Value(estimate.d_x_mm, estimate.sigma_mm), alpha_rad, slope, estimate.status)

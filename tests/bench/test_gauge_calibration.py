@@ -23,7 +23,7 @@ from bench.rig.simulate import simulate
 def calibrate(monkeypatch, exact_vision):
     """The command with exact vision."""
     nothing = SessionCalibration(None, {}, hash_of("exact"))
-    monkeypatch.setattr("bench.calibrate_gauges.calibrate_session", lambda session, out: nothing)
+    monkeypatch.setattr("bench.trials.of_session.calibrate_session", lambda session, out: nothing)
     return lambda session, out, **options: calibrate_gauges_command(session, out, workers=0, **options)
 
 

@@ -1,11 +1,11 @@
 """The error of (10) explained: shares add up, and α as seen is the true one."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bench.base.results import plain
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction.alphas import seen_friction
@@ -20,21 +20,21 @@ from estimator.whisk import EstimatorSettings, Whisk
 @pytest.mark.parametrize("trial", ["b30_3", "b60_4"])
 def test_friction_as_seen_is_the_true_one(exact_record, steel_signals, trial):
     """10.5°, within 0.3°: near |β| − α = 20° slip along the whisker takes some of the friction (equations.md)."""
-    record = plain(exact_record(load_session(steel_signals).trial(trial)))
+    record = exact_record(load_session(steel_signals).trial(trial))
     alpha, sigma = np.degrees(seen_friction(record))
     assert alpha == pytest.approx(10.5, abs=0.3)
     assert 0.0 < sigma < 0.5
 
 
 def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signals):
-    record = plain(exact_record(load_session(steel_signals).trial("b60_4")))
+    record = exact_record(load_session(steel_signals).trial("b60_4"))
     before = seen_friction(record)[0]
-    record["deflection"]["across_z_mm"] = [z + 0.2 for z in record["deflection"]["across_z_mm"]]
-    assert seen_friction(record)[0] == pytest.approx(before, abs=1e-9)
+    raised = replace(record.deflection, across_z_mm=record.deflection.across_z_mm + 0.2)
+    assert seen_friction(replace(record, deflection=raised))[0] == pytest.approx(before, abs=1e-9)
 
 
 def test_no_slip_no_friction_angle(exact_record, steel_signals):
-    record = plain(exact_record(load_session(steel_signals).trial("b00_2")))
+    record = exact_record(load_session(steel_signals).trial("b00_2"))
     assert np.isnan(seen_friction(record)).all()
 
 

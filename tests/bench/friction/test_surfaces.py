@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from bench.friction.surfaces import surfaces
+from bench.records.plain import from_plain
+from bench.records.trial import TrialResult
 from estimator import slip
 
 C = 8835.7
@@ -12,7 +14,7 @@ THETA = np.radians(3.0)
 
 def result(
     beta_deg, alpha_deg, d_x=60.0, *, surface="steel", speed=10.0, purpose="measure", seen=True, noise=(0, 0)
-) -> dict:
+) -> TrialResult:
     """One whisk's result as (13), (14) have it."""
     m_y, m_z = slip.moments(d_x, THETA, np.radians(beta_deg), np.radians(alpha_deg), C)
     m_y, m_z = m_y + noise[0], m_z + noise[1]
@@ -33,7 +35,9 @@ def result(
         "beta_nominal_deg": beta_deg,
         "d_x_nominal_mm": d_x,
     }
-    return {"trial": trial, "theta_deg": 3.0, "seen": {"whisks": [truth]}, "felt": {"whisks": [felt]}}
+    whisker = {"shape": "cylinder", "length_mm": 100.0, "diameter_mm": 1.0, "EI_Nmm2": C / 3}
+    whole = {"trial": trial, "whisker": whisker, "theta_deg": 3.0}
+    return from_plain(TrialResult, whole | {"seen": {"whisks": [truth]}, "felt": {"whisks": [felt]}})
 
 
 def test_fit_gives_the_friction_angle_back_with_distances_that_differ():

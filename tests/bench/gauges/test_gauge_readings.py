@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.base.results import plain
 from bench.base.settings import Settings
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import strokes_of
@@ -31,7 +30,7 @@ def session(steel_signals):
 
 @pytest.fixture
 def exactly_seen(exact_record):
-    return lambda trial: plain(exact_record(trial))
+    return exact_record
 
 
 def test_moments_from_the_deflection_seen(session, exactly_seen):

@@ -1,22 +1,33 @@
 """Figures: what is drawn is what was found, in the conventions' frame; and a figure is drawn once."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from bench.base.drawing import is_drawn, save
-from bench.base.results import plain
 from bench.base.settings import Settings
 from bench.friction.surfaces import Felt, Surface
+from bench.records.plain import from_plain, to_plain
+from bench.records.trial import (
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
 from bench.report.figure_8 import figure_8
 from bench.report.figures import error_against_slope
 from bench.report.planes import contact_path, sensing_plane
 from bench.session.session import load_session
 from bench.trials.compare import Judged
 from estimator import slip
-from estimator.friction import fit_alpha
+from estimator.friction import Pushes, fit_alpha
+from vision.truth.value import Value
 
 C, THETA = 8835.7, np.radians(3.0)
 
@@ -28,7 +39,7 @@ def surface(name="steel", alpha_deg=10.5, slopes=(0, 20, 40, -60)) -> Surface:
         Felt(b, 60.0, THETA, y, z, 0.02, 0.02, np.degrees(np.arctan2(y, z)), 0.2, False)
         for b, y, z in zip(slopes, m_y, m_z)
     )
-    return Surface(name, 10.0, felt, fit_alpha(beta, m_y, m_z, 60.0, THETA, C), C)
+    return Surface(name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), C)
 
 
 def judged(estimator, beta, error_percent, one_factor=False) -> Judged:
@@ -40,7 +51,8 @@ def judged(estimator, beta, error_percent, one_factor=False) -> Judged:
 @pytest.fixture
 def steep(exact_record, steel_signals):
     """The record of the whisk at 60° as perfect pictures would give it, read back."""
-    return json.loads(json.dumps(plain(exact_record(load_session(steel_signals).trial("b60_4")))))
+    record = exact_record(load_session(steel_signals).trial("b60_4"))
+    return from_plain(SeenWhisk, json.loads(json.dumps(to_plain(record))))
 
 
 def lines_of(axes) -> list[np.ndarray]:
@@ -82,21 +94,20 @@ def test_the_contacts_path_runs_from_p0_along_the_bar(steep):
 
 def test_the_sensing_planes_triangle_closes(steep):
     """V lies at (d_x tan θ, 0) seen from P0 for a straight whisker: contact + (d_y, −d_z) must lead there."""
-    contact = steep["at"]["slip_mm"] * np.array([np.sin(steep["beta_rad"]), np.cos(steep["beta_rad"])])
-    virtual = contact + np.array([steep["at"]["d_y_mm"], -steep["at"]["d_z_mm"]])
-    assert virtual == pytest.approx([steep["d_x_mm"] * np.tan(THETA), 0.0], abs=0.01)
+    at, beta_rad = steep.at, steep.beta_rad.value
+    contact = at.slip_mm.value * np.array([np.sin(beta_rad), np.cos(beta_rad)])
+    virtual = contact + np.array([at.d_y_mm.value, -at.d_z_mm.value])
+    assert virtual == pytest.approx([steep.d_x_mm.value * np.tan(THETA), 0.0], abs=0.01)
 
 
 def test_the_sensing_plane_can_be_drawn_for_either_side(steep):
+    facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 2945.2)
     for sign in (1, -1):
-        steep["beta_rad"] *= sign
+        whisk = replace(steep, beta_rad=Value(sign * steep.beta_rad.value, steep.beta_rad.sigma))
+        seen = SeenTrial((whisk,), bar_radius_mm=3.0, wire_radius_mm=0.5)
         axes = Figure().subplots()
-        sensing_plane(
-            axes,
-            {"trial": {"name": "t"}, "seen": {"bar_radius_mm": 3.0, "wire_radius_mm": 0.5}},
-            steep,
-            (np.radians(10.5), "fitted"),
-        )
+        result = TrialResult(*facts, 3.0, seen, FeltTrial((FeltWhisk(),)))
+        sensing_plane(axes, result, whisk, (np.radians(10.5), "fitted"))
         assert axes.get_title(loc="left").startswith("t, whisk 0")
 
 

@@ -9,7 +9,9 @@ import pytest
 
 from bench import cli
 from bench.base.errors import BadInput
-from bench.base.results import write_result
+from bench.base.results import plain, write_result
+from bench.records.plain import from_plain
+from bench.records.trial import TrialResult
 from bench.report.assembly import write_tables
 from bench.report.pooled import pooled
 from estimator import slip
@@ -48,7 +50,7 @@ def run(tmp_path):
             }
             write_result(out / "trials" / f"b{beta}.json", result)
             results.append(result)
-        write_tables(out, results)
+        write_tables(out, [from_plain(TrialResult, plain(result)) for result in results])
         return out
 
     return write

@@ -4,20 +4,33 @@ import numpy as np
 import pytest
 
 from bench.gauges.felt import GAUGE_DELAY_S, lateness
+from bench.records.trial import (
+    Clock,
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
 from bench.report.assembly import beam_rows, budget_rows
-from bench.report.summary import _beam_lines, _budget_lines, _clock_lines
+from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
+from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.uncertainty import CAUSES
+from vision.truth.records import FrameTruth
+from vision.truth.value import Value
 
 
-def result(clock=None, **seen) -> dict:
-    whisk = {"whisk": 0, "d_x_mm": 60.0, "d_x_sigma_mm": 0.01} | seen
-    return {"trial": {"name": "t"}, "seen": {"whisks": [whisk], "clock": clock}, "felt": {"whisks": [{}]}}
+def result(clock=None, **seen) -> TrialResult:
+    whisk = SeenWhisk(0, d_x_mm=Value(60.0, 0.01), **seen)
+    facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 2945.2)
+    return TrialResult(*facts, 3.0, SeenTrial((whisk,), clock=clock), FeltTrial((FeltWhisk(),)))
 
 
 def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
-    recorded = {"recorded": True, "sigma_s": 0.0, "source": "frames.csv"}  # in the order of a result's file
-    stated = {"recorded": False, "sigma_s": 0.025, "source": "frame_rate_Hz"}
-    own, other, _ = _clock_lines([result(recorded), result(stated), result(stated)])
+    recorded, stated = Clock("frames.csv", 0.0, True), Clock("frame_rate_Hz", 0.025, False)
+    own, other, _ = clock_lines([result(recorded), result(stated), result(stated)])
     assert own.endswith("(frames.csv), 1 of 3 trials; their clock is taken as that of the signals")
     assert "by frame_rate_Hz, 2 of 3 trials: no recorded edge" in other
     assert "do not tell the clock from the encoder's zero; taken as known to 25 ms" in other
@@ -25,31 +38,40 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
 
 def test_felt_touch_is_late_within_the_filters_delay():
     """At 90 deg/s 0.52 ms are 0.047 deg: what a filter of 800 Hz delays is one sigma."""
-    time = np.arange(5) * 0.01
-    seen = {"touch_rad": 0.05, "touch_sigma_rad": 1e-5}
-    seen["frames"] = {"time_s": list(time), "motor_rad": list(np.radians(90.0) * time)}
-    late, sigma = lateness(seen, {"touch_felt_rad": 0.0508, "touch_felt_sigma_rad": 1e-5})
-    assert late == pytest.approx(8e-4)
-    assert np.degrees(sigma) == pytest.approx(0.0468, abs=1e-4)
+    time_s, nothing = np.arange(5) * 0.01, np.full(5, np.nan)
+    frames = FrameTruth(
+        index=np.arange(5),
+        time_s=time_s,
+        motor_rad=np.radians(90.0) * time_s,
+        theta_rad=Value(nothing),
+        touching=np.zeros(5, dtype=bool),
+        point_mm=Value(np.full((5, 3), np.nan)),
+        arc_mm=nothing,
+        status=("",) * 5,
+    )
+    seen = SeenWhisk(0, touch_rad=Value(0.05, 1e-5), frames=frames)
+    late = lateness(seen, FeltWhisk(touch_felt_rad=Value(0.0508, 1e-5)))
+    assert late.value == pytest.approx(8e-4)
+    assert np.degrees(late.sigma) == pytest.approx(0.0468, abs=1e-4)
     assert pytest.approx(0.52e-3, rel=0.01) == GAUGE_DELAY_S
 
 
 def test_a_rig_board_that_is_not_told_apart_is_an_empty_cell_and_a_line():
     shares = dict.fromkeys(CAUSES, 0.0) | {"light": 0.8, "cameras": 0.2}
-    told, untold = result(budget=shares), result(budget=shares | {"placement": None})
+    told, untold = result(budget=shares), result(budget=shares | {"placement": np.nan})
     assert np.isnan(next(budget_rows([untold]))["placement_percent"])
-    assert len(list(_budget_lines([told]))) == 1
-    assert "`cameras` is both" in list(_budget_lines([told, untold]))[1]
+    assert len(list(budget_lines([told]))) == 1
+    assert "`cameras` is both" in list(budget_lines([told, untold]))[1]
 
 
 def test_beam_and_spline_stand_side_by_side():
     def both(beam, spline, sigma):
-        return {"beam": beam, "spline": spline, "difference_sigma": sigma, "sigma": 0.01}
+        return Compared(beam, spline, sigma, 0.01)
 
-    beam = {"d_x": both(60.0, 60.004, 0.001), "touch": both(0.04, 0.041, 1e-4), "slip": both(2.0, 1.9, 0.02)}
-    made = result(beam=beam | {"theta_rad": 0.07, "chance": 0.3})
+    compared = both(60.0, 60.004, 0.001), both(0.04, 0.041, 1e-4), both(2.0, 1.9, 0.02)
+    made = result(beam=BeamCheck(*compared, theta_rad=0.07, chance=0.3))
     (row,) = beam_rows([made])
     assert row["touch_spline_deg"] == pytest.approx(np.degrees(0.041)) and row["slip_beam_mm"] == 2.0
-    (line,) = _beam_lines([made])
+    (line,) = beam_lines([made])
     assert "d_x +0.0040 ± 0.0010 mm (t)" in line and "slip -0.1000 ± 0.0200 mm (t)" in line
-    assert list(_beam_lines([result()])) == []
+    assert list(beam_lines([result()])) == []

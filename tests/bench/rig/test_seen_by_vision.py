@@ -55,9 +55,9 @@ def test_a_dark_set_wire_on_a_tilted_thin_bar(tmp_path):
     whisks = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
     (seen,) = observe_trial(frames, times.time_s, signals.motor_at(times.time_s), whisks,
                             exact_cameras(session.path), Wire("cylinder", 100.0, 1.0), Bar(4.0), background).whisks
-    assert seen.d_x_mm == pytest.approx(truth["d_x_mm"], abs=0.10)
-    assert abs(seen.d_x_mm - truth["d_x_mm"]) < 3 * seen.d_x_sigma_mm
-    assert np.degrees(seen.beta_rad) == pytest.approx(truth["beta_deg"], abs=0.3)
+    assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=0.10)
+    assert abs(seen.d_x_mm.value - truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
+    assert np.degrees(seen.beta_rad.value) == pytest.approx(truth["beta_deg"], abs=0.3)
     slip = np.array([float(row["slip_mm"]) for row in csv.DictReader((trial.folder / "truth.csv").open())])
     touching = seen.frames.touching
-    assert np.sqrt(np.mean((seen.frames.slip_mm - slip)[touching] ** 2)) < 0.08
+    assert np.sqrt(np.mean((seen.frames.slip_mm.value - slip)[touching] ** 2)) < 0.08

@@ -102,13 +102,6 @@ def test_frames_of_each_stroke(small_copy):
     assert frame_times(trial).frames_in(signals, slice(150, 620)) == slice(2, 7)
 
 
-def test_a_dropped_frame_is_a_gap_inside_a_whisk():
-    time_s = np.array([0, 1, 2, 4, 5, 20, 21, 22.0]) * 0.05
-    found = FrameTimes(time_s, "frames.csv", {})
-    assert list(found.dropped_in(slice(0, 5))) == [2]
-    assert list(found.dropped_in(slice(5, 8))) == []
-
-
 def test_merged_times_of_unrelated_cameras_stay_apart():
     time_s, picture, _ = merge_times({"a": np.array([0.0, 0.1]), "b": np.array([5.0, 5.1])})
     np.testing.assert_array_equal(time_s, [0.0, 0.1, 5.0, 5.1])

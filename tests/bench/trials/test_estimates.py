@@ -40,12 +40,12 @@ def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
 
 def test_answers_carry_what_they_assumed(rng):
     touch, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    rows = {row["estimator"]: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))}
-    assert rows["no_slip"]["alpha_est_rad"] is None and rows["no_slip"]["beta_est_rad"] is None
-    assert rows["frictionless"]["alpha_est_rad"] == 0.0
-    assert rows["with_friction"]["d_x_est_mm"] == pytest.approx(60.0, rel=5e-3)
-    assert np.degrees(rows["with_friction"]["beta_est_rad"]) == pytest.approx(60.0, abs=0.2)
-    assert np.degrees(as_felt(touch, whisk)["phi_felt_rad"]) == pytest.approx(50.0, abs=0.2)
+    rows = {row.estimator: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))}
+    assert np.isnan([rows["no_slip"].alpha_est_rad, rows["no_slip"].beta_est_rad]).all()
+    assert rows["frictionless"].alpha_est_rad == 0.0
+    assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
+    assert np.degrees(rows["with_friction"].beta_est_rad) == pytest.approx(60.0, abs=0.2)
+    assert np.degrees(as_felt(0, touch, whisk).phi_felt_rad.value) == pytest.approx(50.0, abs=0.2)
 
 
 def test_sigma_of_10_is_its_scatter(rng):
@@ -54,8 +54,8 @@ def test_sigma_of_10_is_its_scatter(rng):
     for _ in range(200):
         _, whisk = felt_whisk(stroke(rng, noise=0.01), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
         row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
-        stated.append(row["d_x_est_sigma_mm"])
-        found.append(row["d_x_est_mm"])
+        stated.append(row.d_x_est_mm.sigma)
+        found.append(row.d_x_est_mm.value)
     assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
 
 
@@ -73,7 +73,7 @@ def test_no_touch_is_a_reason(rng):
     silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
     touch, reason = felt_whisk(silent, Hand.bare(), np.zeros(2), BEAM, THETA)
     assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
-    assert np.isnan(as_felt(touch, None)["touch_felt_rad"])
+    assert np.isnan(as_felt(0, touch, None).touch_felt_rad.value)
 
 
 @pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])
@@ -93,5 +93,5 @@ def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
         raise ZeroDivisionError("no slope")
 
     _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r["estimator"] == "mine:f")
-    assert np.isnan(row["d_x_est_mm"]) and row["status"] == "mine:f raised ZeroDivisionError: no slope"
+    row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f")
+    assert np.isnan(row.d_x_est_mm.value) and row.status == "mine:f raised ZeroDivisionError: no slope"

@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.base.results import plain
 from bench.base.settings import Settings
 from bench.gauges.felt import strokes_of
+from bench.records.phases import KINETIC, NO_PHASES, STATIC, Phases
+from bench.records.plain import from_plain, to_plain
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.trials.phases import KINETIC, NO_PHASES, STATIC, felt_phases, from_plain, seen_phases
+from bench.trials.phases import felt_phases, seen_phases
+from vision.truth.records import FrameTruth
+from vision.truth.value import Value
 
 C, D_X, BETA = 8835.7, 60.0, np.radians(50.0)
 ALPHA_STATIC, ALPHA_KINETIC = np.radians(23.0), np.radians(18.5)
@@ -54,9 +57,21 @@ def frames(theta, slip, sigma_mm=0.003):
     """Frames as in a result, from the slip at their angles."""
     d_y, d_z = deflection(theta, slip)
     alpha = BETA - np.arctan2(d_z, d_y)
-    columns = {"theta_rad": theta, "slip_mm": slip, "d_y_mm": d_y, "d_z_mm": d_z, "alpha_rad": alpha}
-    sigmas = {"slip_sigma_mm": np.full(len(theta), sigma_mm), "alpha_sigma_rad": np.full(len(theta), 0.001)}
-    return plain(columns | sigmas | {"touching": [True] * len(theta)})
+    n, untold = len(theta), np.full(len(theta), np.nan)
+    return FrameTruth(
+        index=np.arange(n),
+        time_s=untold,
+        motor_rad=untold,
+        theta_rad=Value(theta),
+        touching=np.ones(n, dtype=bool),
+        point_mm=Value(np.full((n, 3), np.nan)),
+        arc_mm=untold,
+        status=("",) * n,
+        slip_mm=Value(slip, np.full(n, sigma_mm)),
+        d_y_mm=Value(d_y),
+        d_z_mm=Value(d_z),
+        alpha_rad=Value(alpha, np.full(n, 0.001)),
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -106,7 +121,7 @@ def test_frames_tell_static_from_kinetic_where_they_are_close():
     theta = np.radians(np.arange(0.02, 4.6, 0.05))
     fine = np.radians(np.arange(0.0, 4.6, 0.001))
     slip = np.interp(theta, fine, saw_tooth(fine))
-    found = from_plain(plain(seen_phases(frames(theta, slip), BETA, D_X)))
+    found = from_plain(Phases, to_plain(seen_phases(frames(theta, slip), BETA, D_X)))
     assert found.jumps >= 5
     for kind, true in ((STATIC, 23.0), (KINETIC, 18.5)):
         assert np.degrees(found.mean(kind)[0]) == pytest.approx(true, abs=0.5)

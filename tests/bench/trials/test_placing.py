@@ -9,10 +9,10 @@ import pytest
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from bench.base.results import plain
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.cameras.calibration import SessionCalibration
+from bench.records.trial import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit
@@ -37,8 +37,8 @@ def place(small_copy, monkeypatch):
             now = unit.calibration.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
             left = step - np.append(np.zeros(3), CAMERAS["one"].T_camera_rig[:, :3].T @ now)
             made = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
-            base = plain(lines.setdefault((unit.stage, unit.trial.name), made))
-            return {"whisks": [{"base": base}, {"base": None}, {"status": "no pictures"}]}
+            base = lines.setdefault((unit.stage, unit.trial.name), made)
+            return SeenTrial((SeenWhisk(0, base=base), SeenWhisk(1), SeenWhisk(2, "no pictures")))
 
         monkeypatch.setattr("bench.trials.placing.see_unit", see)
         session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)

@@ -106,18 +106,15 @@ def test_the_swing_alone_places_the_rig(wide, tmp_path):
     _, doubts, unit = place(session, cameras, T_rig_board, tmp_path)
     assert not doubts
     truth = tomllib.loads((unit.trial.folder / "truth.toml").read_text())
-    (seen,) = see_unit(unit)["whisks"]
-    for name, true in (("d_x_mm", truth["d_x_mm"]), ("beta_rad", np.radians(truth["beta_deg"]))):
-        stem, unit_name = name.rsplit("_", 1)
-        assert abs(seen[name] - true) < 3 * seen[f"{stem}_sigma_{unit_name}"]
+    (seen,) = see_unit(unit).whisks
+    for found, true in ((seen.d_x_mm, truth["d_x_mm"]), (seen.beta_rad, np.radians(truth["beta_deg"]))):
+        assert abs(found.value - true) < 3 * found.sigma
     # What suffices is 0.05 mm along the whisker, and the bar's own place comes on top of it.
-    assert seen["d_x_sigma_mm"] < 0.08
+    assert seen.d_x_mm.sigma < 0.08
     rows = list(csv.DictReader((unit.trial.folder / "truth.csv").open()))
-    frames = seen["frames"]
-    for k, index in enumerate(frames["index"]):
-        if frames["touching"][k]:
-            error = frames["slip_mm"][k] - float(rows[index]["slip_mm"])
-            assert abs(error) < max(3 * frames["slip_sigma_mm"][k], 0.02)
+    for k in np.flatnonzero(seen.frames.touching):
+        error = seen.frames.slip_mm.value[k] - float(rows[seen.frames.index[k]]["slip_mm"])
+        assert abs(error) < max(3 * seen.frames.slip_mm.sigma[k], 0.02)
 
 
 def test_a_narrow_swing_alone_is_refused_with_the_width_that_would_do(tmp_path):

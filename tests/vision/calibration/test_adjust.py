@@ -10,6 +10,7 @@ from vision.calibration.adjust import solve
 from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
 from vision.calibration.calibrate import calibrate_alone, calibrate_cameras, lens_knowledge
+from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 
 VIEWS, CAMERAS = 4, 2
@@ -90,7 +91,7 @@ def test_left_jacobian_is_that_of_the_exponential():
 def test_without_noise_cameras_come_out_exact():
     recording = a_recording(views=8)
     boards, rig = recording.seen(0.0, np.random.default_rng(0))
-    made = calibrate_cameras(boards, rig, BOARD, dict.fromkeys(boards, SIZE_PX), T_RIG_BOARD)
+    made = calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX), rig), BOARD, MeasuredPose(T_RIG_BOARD))
     for camera in made.cameras:
         # Corners carry 1e-9 px as sigma, the lens priors weigh against that by (1e-9)²; what is left is where the
         # adjustment stops: relative changes of the cost below 1e-8.
@@ -108,7 +109,8 @@ def test_a_moving_board_seen_late_is_followed():
             boards[camera.name].append(noisy_view_at(camera, moving_board(t + late[k, c]), 0.02, rng))
     rig = recording.seen(0.02, rng)[1]
     sizes = dict.fromkeys(boards, SIZE_PX)
-    made = calibrate_cameras(boards, rig, BOARD, sizes, T_RIG_BOARD, times_s=dict.fromkeys(boards, times))
+    views = BoardViews(boards, sizes, rig, times_s=dict.fromkeys(boards, times))
+    made = calibrate_cameras(views, BOARD, MeasuredPose(T_RIG_BOARD))
     assert made.together and made.timing is not None
     # The mean of 24 latenesses that scatter by 20 ms is known to 4 ms; four of these.
     assert abs(made.timing.offset_s[1] - made.timing.offset_s[0] - 0.04) < 0.016

@@ -11,6 +11,7 @@ from vision.boards.corners import Corners
 from vision.boards.static_board import camera_moved, mean_view
 from vision.boards.sufficiency import check_lens
 from vision.calibration.calibrate import calibrate_cameras
+from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.camera import Camera
 from vision.geometry.errors import Refused
 
@@ -70,8 +71,9 @@ def test_the_mean_over_the_trials_is_better_than_one_picture(steel_views, true_c
         assert (mean.px - truth[mean.ids]).std() < 0.6 * (view.px - truth[view.ids]).std()
 
 
-def calibrated(boards, rig, **how):
-    return calibrate_cameras(boards, rig, BOARD, dict.fromkeys(boards, SIZE_PX), T_RIG_BOARD, **how)
+def calibrated(boards, rig, *sigmas, board=BOARD, **how):
+    views = BoardViews(boards, dict.fromkeys(boards, SIZE_PX), rig)
+    return calibrate_cameras(views, board, MeasuredPose(T_RIG_BOARD, *sigmas), **how)
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +111,7 @@ def test_errors_larger_than_stated_are_noticed(recording, rng):
 def test_the_rig_board_s_own_error_reaches_every_camera(recording, rng):
     boards, rig = recording.seen(SIGMA_PX, rng)
     exact = calibrated(boards, rig).cameras
-    loose = calibrated(boards, rig, T_rig_board_sigma_mm=0.5).cameras
+    loose = calibrated(boards, rig, 0.5).cameras
     added = loose.covariance - exact.covariance
     R = [c.T_camera_rig[:, :3] for c in exact]
     for a in (0, 1):
@@ -121,8 +123,7 @@ def test_the_rig_board_s_own_error_reaches_every_camera(recording, rng):
 def test_a_square_s_own_error_is_an_observation(recording, rng):
     boards, rig = recording.seen(SIGMA_PX, rng)
     unsure = replace(BOARD, square_sigma_mm=0.15)  # 1 %
-    sizes = dict.fromkeys(boards, SIZE_PX)
-    made = calibrate_cameras(boards, rig, unsure, sizes, T_RIG_BOARD)
+    made = calibrated(boards, rig, board=unsure)
     exact = calibrated(boards, rig)
     camera = made.cameras["high"]
     # A board grown about its origin looks the same from a camera that stands farther from that origin by as much.

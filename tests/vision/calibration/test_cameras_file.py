@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vision.calibration.cameras_file import read_cameras, write_cameras
+from bench.cameras.cameras_file import write_cameras
+from vision.calibration.cameras_file import read_cameras
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 

@@ -6,6 +6,7 @@ import pytest
 from vision.boards.corners import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import held_out
+from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.pictures.files import Frames
 
@@ -24,7 +25,7 @@ def measured(folder, names):
     views, sizes = views_of(folder, names)
     is_held = np.arange(len(next(iter(views.values())))) % 4 == 3
     kept = {n: [Corners.none() if out else v for v, out in zip(vs, is_held)] for n, vs in views.items()}
-    made = calibrate_cameras(kept, {}, BOARD, sizes, None)
+    made = calibrate_cameras(BoardViews(kept, sizes), BOARD, None)
     return held_out(made, views, is_held, BOARD)
 
 

@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 
 from tests.scenes.base_lines import STEP, some_lines
-from vision.calibration.place import (
-    Placement,
-    by_board,
-    by_swing,
-    check_known_lengths,
-    check_swing_suffices,
-    combine,
-    placed,
-)
+from vision.calibration.known_lengths import check_known_lengths
+from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
+from vision.calibration.swing import by_swing
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import exp_rotation

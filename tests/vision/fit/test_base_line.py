@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS, scene, with_points
-from vision.calibration.place import by_swing
+from vision.calibration.swing import by_swing
 from vision.fit.base_line import base_lines
 from vision.fit.problem import State
 from vision.geometry.camera import Cameras

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.cameras.cameras_file import write_cameras
 from bench.rig.protocol import PicturesTable
 from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import Sigmas, as_problem, begin, calibrated, draw_scene, given, line_points
-from vision.calibration.cameras_file import read_cameras, write_cameras
+from vision.calibration.cameras_file import read_cameras
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
 from vision.fit.uncertainty import uncertainty, variance_by_cause

@@ -9,8 +9,10 @@ from vision.fit.problem import BAR
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
 from vision.fit.uncertainty import Uncertainty
+from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
 from vision.truth.rows import to_whisk
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 
 def row_of(noise_of):
@@ -19,8 +21,10 @@ def row_of(noise_of):
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     state, answer = solve(problem, begin(problem), scales=(1e9,) * 6)
     frames, known = range(len(scene.motor_rad)), Uncertainty(answer, noise_of(answer), 0.0 * answer)
-    return scene, to_whisk(0, frames, frames, scene.recording.frames.time_s, scene.motor_rad, problem, state,
-                           *jacobians(problem, state), known, [], 3.0, VisionSettings())
+    fitted = FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state))
+    rods, no_bar = Rods(scene.wire, scene.bar), None
+    return scene, to_whisk(WhiskPictures(0, frames, scene.recording.frames.time_s, scene.motor_rad, (), scene.cameras,
+                                         rods, no_bar, VisionSettings()), fitted)
 
 
 def tilted(by_deg: float):
@@ -38,13 +42,13 @@ def tilted(by_deg: float):
 @pytest.mark.parametrize(("by_deg", "doubted"), [(0.0, False), (5.0, True)])
 def test_a_slope_that_the_cameras_do_not_tell_is_doubted(by_deg, doubted):
     scene, whisk = row_of(tilted(by_deg))
-    assert (np.degrees(whisk.beta_sigma_rad) > 3.0) == doubted
+    assert (np.degrees(whisk.beta_rad.sigma) > 3.0) == doubted
     assert ("slope is known to" in whisk.status) == doubted
-    assert whisk.d_x_mm == pytest.approx(scene.truth.d_x, abs=2e-3)
+    assert whisk.d_x_mm.value == pytest.approx(scene.truth.d_x, abs=2e-3)
 
 
 @pytest.mark.parametrize(("noise_of", "reason"), [(tilted(30.0), "slope is known to 3"),
                                                   (lambda answer: 1e5 * answer, "slip is known to")])  # fmt: skip
 def test_where_nothing_is_linear_there_is_no_truth(noise_of, reason):
     _, whisk = row_of(noise_of)
-    assert np.isnan(whisk.d_x_mm) and reason in whisk.status
+    assert np.isnan(whisk.d_x_mm.value) and reason in whisk.status
