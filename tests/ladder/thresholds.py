@@ -146,11 +146,20 @@ def compared(before: dict[str, dict], after: dict[str, dict]) -> str:
     return "; ".join([line, *lost])
 
 
+def put(module, constant: str, value) -> None:
+    """Set the constant in its module and in all of vision that took it by name. What was made of it on import stays."""
+    usual = getattr(module, constant)
+    for name, other in list(sys.modules.items()):
+        if name.startswith("vision.") and getattr(other, constant, None) is usual:
+            setattr(other, constant, value)
+
+
 def sweep_whisks(module, constant: str, values: list[str]) -> None:
     looks = whisks()
     usual = {name: told(look) for name, look in looks.items()}
     for value in map(literal_eval, values):
-        setattr(module, constant, np.asarray(value) if isinstance(value, tuple) else value)
+        is_array = isinstance(getattr(module, constant), np.ndarray)
+        put(module, constant, np.asarray(value) if is_array else value)
         print(f"{value!s:>20}   {compared(usual, {name: told(look) for name, look in looks.items()})}", flush=True)
 
 
@@ -163,7 +172,7 @@ def main() -> None:
     usual = getattr(module, constant)
     print(constant)
     for value in (usual, *map(literal_eval, values)):
-        setattr(module, constant, value)
+        put(module, constant, value)
         print(f"{value!s:>20} {'*' if value == usual else ' '} {measure(session)}", flush=True)
 
 
