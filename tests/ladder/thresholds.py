@@ -123,15 +123,11 @@ def _look(folder: Path, name: str, cameras: Cameras) -> partial:
 def told(look: partial) -> dict[str, tuple[float, float]]:
     """Values and sigmas of a whisk by name; nothing where there is no truth."""
     (whisk,) = look().whisks
-    if np.isnan(whisk.d_x_mm):
+    if np.isnan(whisk.d_x_mm.value):
         return {}
-    at = whisk.at(np.radians(3.0))
-    return {
-        "d_x": (whisk.d_x_mm, whisk.d_x_sigma_mm),
-        "touch": (whisk.touch_rad, whisk.touch_sigma_rad),
-        "slope": (whisk.beta_rad, whisk.beta_sigma_rad),
-        "slip": (at.slip_mm, at.slip_sigma_mm),
-    }
+    slip = whisk.at(np.radians(3.0)).slip_mm
+    found = {"d_x": whisk.d_x_mm, "touch": whisk.touch_rad, "slope": whisk.beta_rad, "slip": slip}
+    return {name: (value.value, value.sigma) for name, value in found.items()}
 
 
 def compared(before: dict[str, dict], after: dict[str, dict]) -> str:
