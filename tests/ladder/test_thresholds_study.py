@@ -12,7 +12,7 @@ def test_a_number_is_set_wherever_it_was_taken_by_name():
         assert beam_check.CONTACT_SIGMA_MM == problem.CONTACT_SIGMA_MM == 2 * usual
     finally:
         put(problem, "CONTACT_SIGMA_MM", usual)
-    assert beam_check.CONTACT_SIGMA_MM == usual
+    assert usual == beam_check.CONTACT_SIGMA_MM
 
 
 def test_moves_sigmas_and_lost_truths_are_told():
