@@ -41,10 +41,10 @@ def _own(name: str) -> Estimator:
 
 
 @dataclass(frozen=True)
-class Hand:
+class Readout:
     """How a trial's channels become moments in the hub's axes: the follicle's turn with its sigma, and the gauges.
 
-    Moments that were recorded as such need neither (`Hand.bare`).
+    Moments that were recorded as such need neither (`Readout.bare`).
     """
 
     gauges: GaugeMatrix
@@ -53,12 +53,12 @@ class Hand:
     is_gauged: bool = False
 
     @classmethod
-    def bare(cls) -> "Hand":
+    def bare(cls) -> "Readout":
         """For signals that are moments already."""
         return cls(GaugeMatrix(np.eye(2)))
 
     @classmethod
-    def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Hand":
+    def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Readout":
         """The trial's follicle with these gauges."""
         return cls(gauges, math.radians(trial.follicle_roll_deg), math.radians(trial.follicle_roll_sigma_deg), True)
 
@@ -79,7 +79,7 @@ class Hand:
         return self.matrix @ of_channels @ self.matrix.T + of_gauges + np.outer(by_roll, by_roll)
 
 
-def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: float) -> tuple[Touch, Whisk | str]:
+def felt_whisk(stroke: Stroke, readout: Readout, drift_rate, beam: Beam, theta_rad: float) -> tuple[Touch, Whisk | str]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:
@@ -87,8 +87,8 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
     at = stroke.at(theta_rad, touch)
     if at.status:
         return touch, at.status
-    moments = (stroke.filtered - touch.offset) @ hand.matrix.T
-    m_y, m_z = hand.matrix @ at.values
+    moments = (stroke.filtered - touch.offset) @ readout.matrix.T
+    m_y, m_z = readout.matrix @ at.values
     return touch, Whisk(
         stroke.time_s,
         stroke.motor_rad - touch.motor_rad,
@@ -97,10 +97,10 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
         theta_rad,
         float(m_y),
         float(m_z),
-        hand.covariance(at.values, at.covariance),
+        readout.covariance(at.values, at.covariance),
         touch.sigma_rad,
         beam,
-        hand.matrix @ at.theta_covariance,
+        readout.matrix @ at.theta_covariance,
     )
 
 

@@ -31,7 +31,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
@@ -148,40 +148,40 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
-    hand, missing = _hand(unit, kind)
+    readout, missing = _readout(unit, kind)
     beam, theta_rad = _beam(unit.session), unit.settings.theta_rad
-    touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
+    touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
-    known = None if status else whisk
-    if known is not None and hand.is_gauged:
-        status = unit.gauges.beyond(hand.in_follicle(known))
-    felt = replace(as_felt(number, touch, known), status=status, saturated=stroke.saturated)
-    if known is None:
+    usable = None if status else whisk
+    if usable is not None and readout.is_gauged:
+        status = unit.gauges.beyond(readout.in_follicle(usable))
+    felt = replace(as_felt(number, touch, usable), status=status, saturated=stroke.saturated)
+    if usable is None:
         return felt
     return replace(
         felt,
-        phases=_phases(stroke, touch, hand, seen, unit.session.whisker.C_Nmm2),
-        estimates=answers(known, estimators(unit.settings.estimators), unit.settings),
+        phases=_phases(stroke, touch, readout, seen, unit.session.whisker.C_Nmm2),
+        estimates=answers(usable, estimators(unit.settings.estimators), unit.settings),
         one_factor=_one_factor(unit, kind, stroke),
     )
 
 
-def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: SeenWhisk, C_Nmm2: float) -> Phases:
+def _phases(stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, C_Nmm2: float) -> Phases:
     if not slips(seen):
         return NO_PHASES
-    moments = (stroke.channels - touch.offset) @ hand.matrix.T
+    moments = (stroke.channels - touch.offset) @ readout.matrix.T
     theta = stroke.motor_rad - touch.motor_rad
     return felt_phases(stroke.time_s, theta, moments, seen.beta_rad.value, seen.d_x_mm.value, C_Nmm2)
 
 
-def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:
+def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
     """How channels become moments, or why they cannot."""
     if kind == "Nmm":
-        return Hand.bare(), ""
+        return Readout.bare(), ""
     if unit.gauges is None:
         return None, NO_GAUGES
     fitted = unit.gauges.for_trial(unit.trial.name)
-    return (Hand.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
+    return (Readout.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
 
 
 def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:
@@ -190,7 +190,7 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...
     if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
         return ()
     _, whisk = felt_whisk(
-        stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad
+        stroke, Readout.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad
     )
     return answers(whisk, estimators(()), unit.settings)
 
