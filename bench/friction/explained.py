@@ -78,7 +78,13 @@ def _shares(
     return {"d_x_mm": truth, "error_mm": d_x[0] - truth, **by, "remainder_mm": d_x[3] - truth}
 
 
-def by_10(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker: Whisker):
+def by_10(
+    theta_rad: float | np.ndarray,
+    m_y_Nmm: float | np.ndarray,
+    m_z_Nmm: float | np.ndarray,
+    alpha_rad: float | np.ndarray,
+    whisker: Whisker,
+) -> float | np.ndarray:
     """d_x of (10), mm, of a cylinder or a cone; arrays or floats."""
     d_x = with_friction(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker.C_Nmm2)
     return taper(d_x, whisker.length_mm) if whisker.shape == "cone" else d_x

@@ -49,7 +49,7 @@ def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
     return np.sqrt(excess + undecided)
 
 
-def allow_drift(touch: Touch, rate, speed_rad_s: float) -> Touch:
+def allow_drift(touch: Touch, rate: np.ndarray, speed_rad_s: float) -> Touch:
     """The same touch, with a zero that may drift at `rate` (k,) per second: the session's, and not the stroke's own,
     which is mostly noise."""
     if touch.status or speed_rad_s <= 0:

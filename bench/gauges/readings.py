@@ -70,7 +70,7 @@ class ReferenceMoments:
 
 
 def pairs_of(
-    trial: Trial, seen: SeenWhisk, stroke: Stroke, drift_rate, whisker: Whisker, theta_rad: float
+    trial: Trial, seen: SeenWhisk, stroke: Stroke, drift_rate: np.ndarray, whisker: Whisker, theta_rad: float
 ) -> Pairs | None:
     """Pairs of one whisk, or None where it has none. theta_rad: the paper's pushing angle."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
@@ -126,7 +126,7 @@ def _with_friction(along, across, share, whisker: Whisker) -> tuple[np.ndarray, 
     return (rough / size)[:, None] * across, ((rough - smooth) / _FRICTION / size)[:, None] * across
 
 
-def moments_per_mm(moments, across) -> np.ndarray:
+def moments_per_mm(moments: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Stiffness (n,) of each pair: moment over deflection."""
     return np.linalg.norm(moments, axis=1) / np.linalg.norm(across, axis=1)
 

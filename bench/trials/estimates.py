@@ -71,7 +71,7 @@ class Readout:
         """The whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
         return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
-    def covariance(self, channels, of_channels) -> np.ndarray:
+    def covariance(self, channels: np.ndarray, of_channels: np.ndarray) -> np.ndarray:
         """Covariance (2, 2) of the moments of `channels` (2,): from the channels', the gauges' and the turn's."""
         back = to_follicle(self.roll_rad).T
         by_roll = to_follicle(self.roll_rad + np.pi / 2).T @ self.gauges.matrix @ channels * self.roll_sigma_rad
@@ -79,7 +79,9 @@ class Readout:
         return self.matrix @ of_channels @ self.matrix.T + of_gauges + np.outer(by_roll, by_roll)
 
 
-def felt_whisk(stroke: Stroke, readout: Readout, drift_rate, beam: Beam, theta_rad: float) -> tuple[Touch, Whisk | str]:
+def felt_whisk(
+    stroke: Stroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
+) -> tuple[Touch, Whisk | str]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:

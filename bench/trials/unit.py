@@ -88,7 +88,7 @@ class Unit:
         made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
-    def with_gauges(self, drift_rate, gauges: Gauges | None) -> "Unit":
+    def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":
         """The unit complete, once the gauges are known."""
         return replace(self, drift_rate=drift_rate, gauges=gauges)
 

@@ -156,7 +156,9 @@ def _reach(camera: Camera, px: np.ndarray) -> float:
     return float(np.linalg.norm((px - camera.lens[2:4]) / camera.lens[:2], axis=1).max())
 
 
-def check_work(cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm) -> None:
+def check_work(
+    cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm: np.ndarray | None
+) -> None:
     """Refuses a camera whose board views leave out where whisker and bar will be, saying on which side."""
     if work_points_mm is None:
         return

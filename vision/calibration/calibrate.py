@@ -163,7 +163,9 @@ def _standing(rig_view: Corners, frames: Sequence[Corners], board: Board) -> Cor
     return mean_view(without_strays(rig_view, board), frames)
 
 
-def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, rough=False) -> Settled:
+def calibrate_alone(
+    views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, rough: bool = False
+) -> Settled:
     """One camera by itself, the world being the camera's frame. rough: robustly, as a start for more."""
     lens = first_lens(views, board.corners_mm, size_px)
     poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
@@ -259,7 +261,7 @@ def allow_warp(priors: Priors) -> Priors:
     return replace(priors, free=free, sigma=sigma)
 
 
-def as_cameras(names, sizes_px, settled: Settled) -> Cameras:
+def as_cameras(names: Sequence[str], sizes_px: Mapping[str, tuple[int, int]], settled: Settled) -> Cameras:
     """The cameras of a settled adjustment with the covariance of their 15 parameters each."""
     state = settled.solution.state
     cameras = tuple(
