@@ -36,10 +36,12 @@ class Settings:
 
     @property
     def theta_rad(self) -> float:
+        """The pushing angle, rad."""
         return math.radians(self.theta_deg)
 
     @property
     def alpha_est_rad(self) -> float:
+        """The friction angle that (10) assumes, rad."""
         return math.radians(self.alpha_est_deg)
 
     def cutoff_for(self, speed_deg_s: float) -> float:
