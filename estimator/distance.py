@@ -184,7 +184,7 @@ def clamp_to_length(d_x: ArrayLike, length: ArrayLike):
 
 
 @elementwise
-def contact_point(d_x: ArrayLike, touch, z_c: ArrayLike = 0.0):
+def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0):
     """(r_c, θ_c, z_c) of section II: cylindrical coordinates of the contact, in mm, rad, mm.
 
     `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All

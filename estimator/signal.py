@@ -48,7 +48,7 @@ def moment_at(
     theta_rad: ArrayLike,
     motor_rad: ArrayLike,
     moments: ArrayLike,
-    touch,
+    touch: Touch,
     *,
     time_s: ArrayLike | None = None,
     half_window_rad: ArrayLike = HALF_WINDOW_RAD,
