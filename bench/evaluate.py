@@ -39,7 +39,7 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         gauges = session_gauges(units, rate, pool, doubts)
         units = [unit.with_gauges(rate, gauges) for unit in units]
         pool.run(evaluate_unit, units, "trials")
-        results = with_runs([read_result(unit.path) for unit in units], session.whisker)
+        results = with_runs([read_result(unit.path) for unit in units], session.whisker, settings)
         write_tables(out, results)
         figures = write_explained(out, results, session.whisker)
         friction = friction_of(results, session.whisker, settings.alpha_est_rad)

@@ -5,48 +5,75 @@ judges. The run with α as seen is no estimate that a robot could make: it shows
 is known.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
 from bench.base.results import number, plain
+from bench.base.settings import Settings
 from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
 from bench.session.whisker import Whisker
+from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
-from estimator.distance import estimated_slope
-from estimator.whisk import EstimatorSettings, Whisk
+from estimator.whisk import Whisk
 
-FITTED, SEEN = "with_friction_fitted", "with_friction_seen"
+GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
 RUNS = (FITTED, SEEN)
 
 
-def with_runs(results: Iterable[dict], whisker: Whisker) -> list[dict]:
-    """The results, each whisk's estimates followed by those of (10) with α fitted and with α seen, where known."""
+def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
+    """How far α_est may be off in this session, rad, one sigma: as given, else by its surfaces.
+
+    Root mean square of fitted less assumed α over the surfaces, among which the 5° that hold without any count as one
+    (the scale of a scaled inverse χ² posterior): a single surface does not tell how much others differ.
+    """
+    first = np.radians(settings.first_alpha_est_sigma_deg)
+    fits = [s.fit for s in found if s.fit is not None]
+    if settings.alpha_est_sigma_deg is not None or not fits:
+        return float(first)
+    squares = [first**2, *((fit.alpha_rad - settings.alpha_est_rad) ** 2 + fit.sigma_rad**2 for fit in fits)]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def with_runs(results: Iterable[dict], whisker: Whisker, settings: Settings) -> list[dict]:
+    """The results, (10) with the session's sigma of α_est, and each whisk's estimates followed by those of (10) with α
+    fitted and with α seen, where known."""
     results = list(results)
-    by_key = {(s.name, s.speed_deg_s): s for s in surfaces(results, whisker.C_Nmm2)}
-    return [_with_runs(result, by_key, whisker) for result in results]
+    found = surfaces(results, whisker.C_Nmm2)
+    by_key = {(s.name, s.speed_deg_s): s for s in found}
+    return [_with_runs(result, by_key, whisker, alpha_est_sigma(found, settings)) for result in results]
 
 
-def _with_runs(result: dict, by_key: dict, whisker: Whisker) -> dict:
+def _with_runs(result: dict, by_key: dict, whisker: Whisker, sigma_rad: float) -> dict:
     trial, beam = result["trial"], Beam(whisker.C_Nmm2, whisker.length_mm, whisker.shape)
     surface = by_key.get((trial["surface"], number(trial["speed_deg_s"])))
     felt = [
-        felt | {"estimates": [*felt["estimates"], *_answers(result, seen, felt, surface, beam)]}
+        felt | _answers(result, seen, felt, surface, beam, sigma_rad)
         for seen, felt in zip(result["seen"]["whisks"], result["felt"]["whisks"])
     ]
     return result | {"felt": result["felt"] | {"whisks": felt}}
 
 
-def _answers(result: dict, seen: dict, felt: dict, surface: Surface | None, beam: Beam) -> Sequence[dict]:
+def _answers(result: dict, seen: dict, felt: dict, surface: Surface | None, beam: Beam, sigma_rad: float) -> dict:
+    """The whisk's estimates with the new ones, and those with one factor a channel."""
     if not felt["estimates"]:
-        return []
+        return {}
     fit = surface and surface.fit_without(result["trial"]["name"], seen["whisk"])
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
     whisk = _whisk(felt, np.radians(result["theta_deg"]), beam)
     known = ((FITTED, fitted), (SEEN, seen_friction(seen)))
-    return [_answer(name, whisk, max(alpha, 0.0), sigma) for name, (alpha, sigma) in known if np.isfinite(alpha)]
+    runs = [_by_10(name, whisk, max(alpha, 0.0), sigma) for name, (alpha, sigma) in known if np.isfinite(alpha)]
+    given = [
+        _by_10(a["estimator"], whisk, a["alpha_est_rad"], sigma_rad) if a["estimator"] == GIVEN else a
+        for a in felt["estimates"]
+    ]
+    return {"estimates": [*given, *runs]}
+
+
+def _by_10(name: str, whisk: Whisk, alpha_rad: float, sigma_rad: float) -> dict:
+    return plain(answer(name, with_friction, whisk, alpha_rad, sigma_rad))
 
 
 def _whisk(felt: dict, theta_rad: float, beam: Beam) -> Whisk:
@@ -55,15 +82,3 @@ def _whisk(felt: dict, theta_rad: float, beam: Beam) -> Whisk:
     covariance, with_theta = np.array(felt["covariance_at"]), np.array(felt["theta_moment_covariance_at"])
     moments = felt["m_y_Nmm"], felt["m_z_Nmm"]
     return Whisk(*no_samples, theta_rad, *moments, covariance, felt["touch_felt_sigma_rad"], beam, with_theta)
-
-
-def _answer(name: str, whisk: Whisk, alpha_rad: float, sigma_rad: float) -> dict:
-    estimate = with_friction(whisk, EstimatorSettings(alpha_rad, sigma_rad))
-    return {
-        "estimator": name,
-        "alpha_est_rad": alpha_rad,
-        "d_x_est_mm": plain(estimate.d_x_mm),
-        "d_x_est_sigma_mm": plain(estimate.sigma_mm),
-        "beta_est_rad": plain(float(estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad))),
-        "status": estimate.status,
-    }

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.results import number
+from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.friction.explained import by_10
 from bench.session.whisker import Whisker
 from bench.trials.compare import whisks
 from estimator.friction import alpha_from_tilts, confidence
 
-_ALPHA_EST_SIGMA_RAD = np.radians(5.0)  # steel's 10.5° to sandpaper's 23.3° (Fig. 8) about an assumed 10° or 15°
+_ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
 _FEWEST = 3
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.05))
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α

@@ -12,7 +12,7 @@ from bench.base.results import number
 class Judged:
     """One estimate beside the truth. Truth is NaN where there is none; slope is the seen one, else the nominal one.
 
-    one_factor: made with one gauge factor a channel.
+    one_factor: made with one gauge factor a channel. status: what the estimator or the bench says of the estimate.
     """
 
     trial: str
@@ -27,6 +27,7 @@ class Judged:
     d_x_est_mm: float
     d_x_est_sigma_mm: float
     one_factor: bool = False
+    status: str = ""
 
     @property
     def error_mm(self) -> float:
@@ -80,4 +81,5 @@ def _judged(result: dict, seen: dict, answer: dict, one_factor: bool) -> Judged:
         number(answer["d_x_est_mm"]),
         number(answer["d_x_est_sigma_mm"]),
         one_factor,
+        answer["status"],
     )

@@ -3,7 +3,7 @@
 import importlib
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +15,15 @@ from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
-from estimator.distance import estimated_slope, felt_slip_angle
+from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
+from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
+
+# What a robot allows for in an object that it does not know: as thick as the paper's bar of 6 mm, with the whisker of
+# 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
+OBJECT_REACH_MM = 3.5
+TILT_SIGMA_RAD = np.radians(5.0)
 
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
@@ -130,23 +136,61 @@ def _slip_angle(whisk: Whisk) -> tuple[float, float]:
 
 def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> list[dict]:
     """What each estimator says, as rows of estimates.csv without truth."""
-    return [_answer(name, estimator, whisk, settings) for name, estimator in asked.items()]
+    alpha = settings.alpha_est_rad, np.radians(settings.first_alpha_est_sigma_deg)
+    return [answer(name, estimator, whisk, *alpha) for name, estimator in asked.items()]
 
 
-def _answer(name: str, estimator: Estimator, whisk: Whisk, settings: Settings) -> dict:
-    try:
-        estimate = estimator(whisk, EstimatorSettings(settings.alpha_est_rad))
-    except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
-        estimate = Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
-    if not isinstance(estimate, Estimate):
-        raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
-    alpha_rad = {"no_slip": None, "frictionless": 0.0}.get(name, settings.alpha_est_rad)
-    slope = None if alpha_rad is None else estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad)
+def answer(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> dict:
+    """What one estimator says under a friction angle with its sigma; its own sigma as if that angle were right, too."""
+    known, doubted = (_asked(name, estimator, whisk, alpha_est_rad, sigma) for sigma in (0.0, float(sigma_rad)))
+    ends = (doubted.low_mm, doubted.high_mm)
+    if math.isnan(doubted.low_mm) and math.isnan(doubted.high_mm):
+        ends = (doubted.d_x_mm - Z_95 * doubted.sigma_mm, doubted.d_x_mm + Z_95 * doubted.sigma_mm)
     return {
         "estimator": name,
-        "alpha_est_rad": alpha_rad,
-        "d_x_est_mm": estimate.d_x_mm,
-        "d_x_est_sigma_mm": estimate.sigma_mm,
-        "beta_est_rad": slope,
-        "status": estimate.status,
+        "alpha_est_rad": _known(doubted.alpha_est_rad),
+        "d_x_est_mm": doubted.d_x_mm,
+        "d_x_est_sigma_mm": doubted.sigma_mm,
+        "d_x_est_sigma_alpha_exact_mm": known.sigma_mm,
+        "d_x_est_low_mm": ends[0],
+        "d_x_est_high_mm": ends[1],
+        "beta_est_rad": _known(doubted.beta_rad),
+        "status": doubted.status,
     }
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _asked(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> Estimate:
+    told = EstimatorSettings(alpha_est_rad, sigma_rad, OBJECT_REACH_MM, TILT_SIGMA_RAD)
+    try:
+        estimate = estimator(whisk, told)
+    except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
+        return Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
+    if not isinstance(estimate, Estimate):
+        raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
+    return held_to_its_word(estimate, whisk.beam.length_mm)
+
+
+def held_to_its_word(estimate: Estimate, length_mm: float) -> Estimate:
+    """The estimate, its status telling what no distance or no sigma can be. What is none becomes NaN."""
+    d_x, sigma = _float(estimate.d_x_mm), _float(estimate.sigma_mm)
+    estimate = replace(estimate, d_x_mm=d_x, sigma_mm=sigma, status=str(estimate.status))
+    if not (np.isfinite(d_x) and d_x > 0):
+        said = "gave no distance and no reason" if math.isnan(d_x) else f"gave {d_x:g} mm, which is no distance"
+        return replace(estimate, d_x_mm=math.nan, sigma_mm=math.nan, status=estimate.status or said)
+    doubts = [] if np.isfinite(sigma) and sigma > 0 else [f"gave a sigma of {sigma:g} mm, which is none"]
+    if d_x > length_mm and not estimate.status:
+        doubts.append(f"gave {d_x:.1f} mm, past the whisker's length of {length_mm:g} mm")
+    sigma = math.nan if doubts and "sigma" in doubts[0] else sigma
+    return replace(estimate, sigma_mm=sigma, status="; ".join(filter(None, [estimate.status, *doubts])))
+
+
+def _float(value) -> float:
+    """A number as it was given, however it was wrapped; NaN for anything else."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan

@@ -11,6 +11,7 @@ from bench.gauges.matrix import GaugeMatrix
 from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
+from estimator.whisk import Estimate
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
 BEAM = Beam(8835.7, 100.0)
@@ -54,7 +55,7 @@ def test_sigma_of_10_is_its_scatter(rng):
     for _ in range(200):
         _, whisk = felt_whisk(stroke(rng, noise=0.01), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
         row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
-        stated.append(row["d_x_est_sigma_mm"])
+        stated.append(row["d_x_est_sigma_alpha_exact_mm"])
         found.append(row["d_x_est_mm"])
     assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
 
@@ -95,3 +96,51 @@ def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
     _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r["estimator"] == "mine:f")
     assert np.isnan(row["d_x_est_mm"]) and row["status"] == "mine:f raised ZeroDivisionError: no slope"
+
+
+def asked(rng, function) -> dict:
+    """The row of one's own estimator on a whisk at 60 mm."""
+    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    return answers(whisk, {"mine:f": function}, Settings())[0]
+
+
+@pytest.mark.parametrize(
+    "d_x, sigma, said",
+    [
+        (np.inf, 1.0, "gave inf mm, which is no distance"),
+        (-5.0, 1.0, "gave -5 mm, which is no distance"),
+        (np.nan, 1.0, "gave no distance and no reason"),
+        ("far", 1.0, "gave no distance and no reason"),
+    ],
+)
+def test_what_is_no_distance_is_a_missing_one_with_a_status(rng, d_x, sigma, said):
+    row = asked(rng, lambda *_: Estimate(d_x, sigma))
+    assert np.isnan([row["d_x_est_mm"], row["d_x_est_sigma_mm"]]).all() and row["status"] == said
+
+
+@pytest.mark.parametrize("sigma", [0.0, -1.0, np.nan, np.inf])
+def test_a_distance_without_a_sigma_is_told(rng, sigma):
+    row = asked(rng, lambda *_: Estimate(60.0, sigma))
+    assert row["d_x_est_mm"] == 60.0 and np.isnan(row["d_x_est_sigma_mm"])
+    assert "which is none" in row["status"]
+
+
+def test_past_the_length_is_told_and_left(rng):
+    row = asked(rng, lambda *_: Estimate(130.0, 1.0))
+    assert row["d_x_est_mm"] == 130.0 and "past the whisker's length of 100 mm" in row["status"]
+
+
+def test_what_an_estimator_never_used_does_not_stand_beside_it(rng):
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0))
+    assert row["alpha_est_rad"] is None and row["beta_est_rad"] is None and row["status"] == ""
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0, beta_rad=0.5))
+    assert row["beta_est_rad"] == 0.5
+
+
+def test_an_estimator_cannot_spoil_the_whisk_of_the_next(rng):
+    def vandal(whisk, _):
+        whisk.m_z_Nmm[:] = 0.0
+        return Estimate(60.0, 1.0)
+
+    row = asked(rng, vandal)
+    assert "read-only" in row["status"] and np.isnan(row["d_x_est_mm"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bench.base.results import plain
+from bench.base.settings import Settings
 from bench.friction.alphas import mean_alpha
 from bench.friction.runs import FITTED, SEEN, with_runs
 from bench.friction.section_vii import Contact, by_consistency, by_tilting, weights
@@ -56,36 +57,55 @@ def errors(results, name) -> dict[str, float]:
 
 
 def test_with_the_right_friction_nothing_is_left_of_the_error():
-    results = with_runs([result(b) for b in SLOPES], WHISKER)
+    results = with_runs([result(b) for b in SLOPES], WHISKER, Settings())
     assert abs(errors(results, "with_friction")["b70"]) > 5.0
     for name in (FITTED, SEEN):
         assert list(errors(results, name)) == [f"b{b}" for b in SLOPES]
         assert np.allclose(list(errors(results, name).values()), 0.0, atol=1e-3)
 
 
+def test_sigma_holds_what_alpha_est_may_be_off_by():
+    """One surface at 14° and 10° assumed: √(½(5² + 4²)) = 4.53°; as given where it is given. At β = 70° that is
+    what the error of (10) is made of, and without it the sigma is far too small."""
+    results = [result(b) for b in SLOPES]
+    rows = {r["trial"]: r for r in estimate_rows(with_runs(results, WHISKER, Settings())) if _is_10(r)}
+    steep = rows["b70"]
+    by_alpha = np.sqrt(steep["d_x_est_sigma_mm"] ** 2 - steep["d_x_est_sigma_alpha_exact_mm"] ** 2)
+    sensitivity = np.tan(np.radians(66.0)) - np.tan(np.radians(10.0))  # φ = 56°
+    assert by_alpha == pytest.approx(steep["d_x_est_mm"] * sensitivity * np.radians(np.sqrt((25 + 16) / 2)), rel=1e-3)
+    assert abs(steep["error_mm"]) > 2 * steep["d_x_est_sigma_alpha_exact_mm"]
+    assert steep["d_x_est_low_mm"] < 60.0 < steep["d_x_est_high_mm"]
+    given = [r for r in estimate_rows(with_runs(results, WHISKER, Settings(alpha_est_sigma_deg=1.0))) if _is_10(r)]
+    assert all(g["d_x_est_sigma_mm"] < rows[g["trial"]]["d_x_est_sigma_mm"] for g in given)
+
+
+def _is_10(row) -> bool:
+    return row["estimator"] == "with_friction"
+
+
 def test_the_fit_leaves_out_the_whisk_that_it_judges():
     """One whisk whose friction is its own: its own run has the others' α, theirs are spoilt by it."""
     odd = result(60, alpha=np.radians(25.0), name="odd")
-    results = with_runs([*(result(b) for b in SLOPES), odd], WHISKER)
+    results = with_runs([*(result(b) for b in SLOPES), odd], WHISKER, Settings())
     alphas = {r["trial"]: r["alpha_est_deg"] for r in estimate_rows(results) if r["estimator"] == FITTED}
     assert alphas["odd"] == pytest.approx(14.0, abs=1e-4)
     assert alphas["b30"] > 15.0
 
 
 def test_a_whisk_alone_on_its_surface_has_no_fitted_run_but_a_seen_one():
-    results = with_runs([result(60)], WHISKER)
+    results = with_runs([result(60)], WHISKER, Settings())
     assert errors(results, FITTED) == {}
     assert list(errors(results, SEEN)) == ["b60"]
 
 
 def test_doubt_about_friction_is_in_the_sigma():
-    row = next(r for r in estimate_rows(with_runs([result(70)], WHISKER)) if r["estimator"] == SEEN)
+    row = next(r for r in estimate_rows(with_runs([result(70)], WHISKER, Settings())) if r["estimator"] == SEEN)
     by_alpha = (np.tan(np.radians(70.0)) - np.tan(ALPHA)) * np.radians(0.1)  # ∂ln d_x/∂α_est times β's sigma, at least
     assert row["d_x_est_sigma_mm"] > 60.0 * by_alpha
 
 
 def test_every_way_finds_the_friction_angle(tmp_path):
-    results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER)
+    results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER, Settings())
     found = friction_of(results, WHISKER, np.radians(10.0))
     (surface,) = found
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
