@@ -114,7 +114,9 @@ def _add_evaluate(verbs) -> None:
         metavar="X",
         help="how far that may be off, one sigma (default: by the spread of the session's surfaces, 5 without any)",
     )
-    verb.add_argument("--cutoff-Hz", type=float, metavar="X", help="of the low-pass (default: 0.5 for each deg/s)")
+    verb.add_argument(
+        "--cutoff-Hz", type=float, metavar="X", help="of the low-pass ahead of one's own estimators (0.5 a deg/s)"
+    )
     verb.add_argument(
         "--clock-sigma-s",
         type=float,

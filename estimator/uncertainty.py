@@ -115,8 +115,8 @@ def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0
 
     (10) falls with α_est, and by more than a line where its sigma is large. So each side is its own: the change that
     the end of α_est's interval makes and 1.96 sigma of the rest (`sigmas` as of `sigma`), added in squares (MOVER:
-    Zou & Donner, Statistics in Medicine 27, 2008). model_sigma: of the equation itself, a share of d_x. A low end at zero or
-    below says that no distance is too short: it is 0.
+    Zou & Donner, Statistics in Medicine 27, 2008). model_sigma: of the equation itself, a share of d_x. A low end at
+    zero or below says that no distance is too short: it is 0.
     """
     require_sigma("alpha_est_sigma", alpha_est_sigma)
     require_friction_angle("alpha_est", alpha_est)

@@ -81,4 +81,4 @@ def _whisk(felt: dict, theta_rad: float, beam: Beam) -> Whisk:
     no_samples = (np.zeros(0),) * 4
     covariance, with_theta = np.array(felt["covariance_at"]), np.array(felt["theta_moment_covariance_at"])
     moments = felt["m_y_Nmm"], felt["m_z_Nmm"]
-    return Whisk(*no_samples, theta_rad, *moments, covariance, felt["touch_felt_sigma_rad"], beam, with_theta)
+    return Whisk(*no_samples, theta_rad, *moments, covariance, felt["theta_sigma_rad"], beam, with_theta)

@@ -22,10 +22,8 @@ GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
 
 
 def lateness(seen: dict, felt: dict) -> tuple[float, float]:
-    """Felt less seen touch of a whisk's two records, rad, and its sigma: of both touches and of the filter's delay, by
-    which what is felt comes late. (No error of θ: touch and moments are late alike.)"""
-    speed = np.median(np.diff(seen["frames"]["motor_rad"]) / np.diff(seen["frames"]["time_s"]))
-    sigmas = seen["touch_sigma_rad"], number(felt.get("touch_felt_sigma_rad")), GAUGE_DELAY_S * speed
+    """Felt less seen touch of a whisk's two records, rad, and its sigma."""
+    sigmas = seen["touch_sigma_rad"], number(felt.get("touch_felt_sigma_rad"))
     return number(felt.get("touch_felt_rad")) - seen["touch_rad"], float(np.linalg.norm(sigmas))
 
 
@@ -53,11 +51,8 @@ class Stroke:
         return felt_touch(self.motor_rad, self.channels, self.time_s)
 
     def at(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
-        """Filtered channels above the free stroke's level, at a pushing angle past `touch`."""
-        return moment_at(theta_rad, self.motor_rad, self.filtered, touch, time_s=self.time_s, **window)
-
-    def at_as_recorded(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
-        """The same from unfiltered samples: soon after touch a low-pass of 5 Hz smears the onset, 5 % of it at 0.5°."""
+        """Channels above the free stroke's level, at a pushing angle past `touch`: a line through the samples as
+        recorded, which averages as section V's low-pass does. That smears the onset, by 5 % of it at 0.5°."""
         return moment_at(theta_rad, self.motor_rad, self.channels, touch, time_s=self.time_s, **window)
 
 

@@ -159,7 +159,7 @@ def _paired(
     theta = known.motor_rad - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(known.motor_rad), initial=np.inf))
     after = theta > 0.5 * _LEAST_THETA_RAD
-    read = [stroke.at_as_recorded(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
+    read = [stroke.at(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
     kept = np.array([r is not None and not r.status for r in read], dtype=bool)
     if not kept.any():
         return None

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from estimator.beam import flexural_rigidity
+from estimator.beam import Beam, flexural_rigidity
 from vision.geometry.rods import Wire
 
 
@@ -49,6 +49,11 @@ class Whisker:
     def C_Nmm2(self) -> float:
         """C = 3 E I of the paper, N·mm²."""
         return 3.0 * self.EI_Nmm2
+
+    @property
+    def beam(self) -> Beam:
+        """What an estimator may know of it."""
+        return Beam(self.C_Nmm2, self.length_mm, self.shape)
 
     @property
     def C_sigma_Nmm2(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import GAUGE_DELAY_S, Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.session.trial import Trial
 from estimator.beam import Beam
@@ -108,9 +108,14 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
     )
 
 
-def as_felt(touch: Touch, whisk: Whisk | None) -> dict:
-    """Felt touch, moments and slip angle as plain values, rad and N·mm."""
-    felt = {"touch_felt_rad": touch.motor_rad, "touch_felt_sigma_rad": touch.sigma_rad}
+def as_felt(touch: Touch, whisk: Whisk | None, speed_rad_s: float) -> dict:
+    """Felt touch, moments and slip angle as plain values, rad and N·mm.
+
+    The gauges' own filter makes all that is felt late: that is in the touch's sigma, and not in θ's, since touch and
+    moments are late alike.
+    """
+    late = math.hypot(touch.sigma_rad, GAUGE_DELAY_S * speed_rad_s)
+    felt = {"touch_felt_rad": touch.motor_rad, "touch_felt_sigma_rad": late, "theta_sigma_rad": touch.sigma_rad}
     if whisk is None:
         return felt
     sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at))

@@ -157,7 +157,8 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     known = None if status else whisk
     if known is not None and hand.is_gauged:
         status = unit.gauges.beyond(hand.in_follicle(known))
-    felt = as_felt(touch, known) | {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
+    felt = as_felt(touch, known, stroke.speed_rad_s)
+    felt |= {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
     if known is None:
         return felt
     felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.C_Nmm2)

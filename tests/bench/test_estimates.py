@@ -46,7 +46,7 @@ def test_answers_carry_what_they_assumed(rng):
     assert rows["frictionless"]["alpha_est_rad"] == 0.0
     assert rows["with_friction"]["d_x_est_mm"] == pytest.approx(60.0, rel=5e-3)
     assert np.degrees(rows["with_friction"]["beta_est_rad"]) == pytest.approx(60.0, abs=0.2)
-    assert np.degrees(as_felt(touch, whisk)["phi_felt_rad"]) == pytest.approx(50.0, abs=0.2)
+    assert np.degrees(as_felt(touch, whisk, 0.17)["phi_felt_rad"]) == pytest.approx(50.0, abs=0.2)
 
 
 def test_sigma_of_10_is_its_scatter(rng):
@@ -74,7 +74,7 @@ def test_no_touch_is_a_reason(rng):
     silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
     touch, reason = felt_whisk(silent, Hand.bare(), np.zeros(2), BEAM, THETA)
     assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
-    assert np.isnan(as_felt(touch, None)["touch_felt_rad"])
+    assert np.isnan(as_felt(touch, None, 0.17)["touch_felt_rad"])
 
 
 @pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])

@@ -6,6 +6,8 @@ import pytest
 from bench.gauges.felt import GAUGE_DELAY_S, lateness
 from bench.report.assembly import beam_rows, budget_rows
 from bench.report.summary import _beam_lines, _budget_lines, _clock_lines
+from bench.trials.estimates import as_felt
+from estimator.signal import Touch
 from vision.fit.uncertainty import CAUSES
 
 
@@ -25,12 +27,12 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
 
 def test_felt_touch_is_late_within_the_filters_delay():
     """At 90 deg/s 0.52 ms are 0.047 deg: what a filter of 800 Hz delays is one sigma."""
-    time = np.arange(5) * 0.01
-    seen = {"touch_rad": 0.05, "touch_sigma_rad": 1e-5}
-    seen["frames"] = {"time_s": list(time), "motor_rad": list(np.radians(90.0) * time)}
-    late, sigma = lateness(seen, {"touch_felt_rad": 0.0508, "touch_felt_sigma_rad": 1e-5})
+    felt = as_felt(Touch(0.0508, 1e-5), None, np.radians(90.0))
+    late, sigma = lateness({"touch_rad": 0.05, "touch_sigma_rad": 1e-5}, felt)
     assert late == pytest.approx(8e-4)
     assert np.degrees(sigma) == pytest.approx(0.0468, abs=1e-4)
+    assert felt["touch_felt_sigma_rad"] == pytest.approx(sigma, rel=1e-3)
+    assert felt["theta_sigma_rad"] == 1e-5  # touch and moments are late alike
     assert pytest.approx(0.52e-3, rel=0.01) == GAUGE_DELAY_S
 
 
