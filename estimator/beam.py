@@ -116,9 +116,18 @@ class Beam:
         """Distance at which the base's cylinder is as stiff as this whisker at d_x; infinite at a cone's point."""
         return _inverse_sum(d_x_mm, -self.taper / self.length_mm)
 
+    def moment_Nmm(self, theta_rad, d_x_mm):
+        """m_z of (2): of a push by θ against a contact at d_x, without slip."""
+        return self.C_Nmm2 * theta_rad / self.as_cylinder_mm(d_x_mm)
+
     def distance_mm(self, as_cylinder_mm):
         """d_x from the distance that the base's cylinder would give; NaN unless that is positive."""
         return _inverse_sum(as_cylinder_mm, self.taper / self.length_mm)
+
+    def error_share(self, d_x_mm, of_cylinder):
+        """Relative error of d_x from that of the distance that its base's cylinder would give; −1: there is none."""
+        wrong = self.distance_mm(self.as_cylinder_mm(d_x_mm) * (1.0 + np.asarray(of_cylinder)))
+        return np.where(np.asarray(of_cylinder) > -1, wrong / d_x_mm, 0.0)[()] - 1.0
 
 
 @elementwise

@@ -44,6 +44,19 @@ def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     return _assuming(whisk, _without_friction(settings), d_x, gradient)
 
 
+def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
+    """Equations (16), (17) as printed, ν(θ, |m|) cos φ with the whisker's own ν: far off where a tapered whisker slips,
+    for the slip takes its share of the angle and not of the distance. Not among ESTIMATORS; to be asked for by name."""
+    felt, beam = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm), whisk.beam
+    d_x = distance.general_printed(*felt, lambda theta, m: beam.distance_mm(beam.C_Nmm2 * theta / m))
+    if d_x != d_x:
+        return Estimate(nan, nan, distance.why_not(*felt))
+    noise = {"theta_sigma": whisk.theta_sigma_rad, "covariance": whisk.covariance_at}
+    gradient = uncertainty.gradient_printed(*felt, beam.C_Nmm2, beam.taper / beam.length_mm)
+    mixed = whisk.theta_moment_covariance_at
+    return Estimate(d_x, uncertainty.sigma(gradient, **noise, theta_moment_covariance=mixed))
+
+
 ESTIMATORS = {
     "no_slip": no_slip,
     "with_friction": with_friction,

@@ -51,6 +51,16 @@ def gradient_cone(theta, m_y, m_z, alpha_est, C, length):
     return np.asarray(shrink)[..., None] * gradient_with_friction(theta, m_y, m_z, alpha_est, C)
 
 
+@elementwise
+def gradient_printed(theta, m_y, m_z, C, taper_per_mm):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of (16) as printed, cos φ / (|m|/(Cθ) + τ/L); the last one is 0."""
+    m = np.hypot(m_y, m_z)
+    d_x = (m_z / m) / (m / (C * theta) + taper_per_mm)
+    shrink = 1 / (1 + taper_per_mm * C * theta / m)  # of a relative error of Cθ/|m|
+    by_m = -(1 + shrink) / m**2
+    return _stack(d_x, shrink / theta, by_m * m_y, by_m * m_z + 1 / m_z, 0.0)
+
+
 def sigma(
     gradient,
     *,

@@ -41,13 +41,13 @@ def with_runs(results: Iterable[dict], whisker: Whisker, settings: Settings) -> 
     """The results, (10) with the session's sigma of α_est, and each whisk's estimates followed by those of (10) with α
     fitted and with α seen, where known."""
     results = list(results)
-    found = surfaces(results, whisker.C_Nmm2)
+    found = surfaces(results, whisker.beam)
     by_key = {(s.name, s.speed_deg_s): s for s in found}
     return [_with_runs(result, by_key, whisker, alpha_est_sigma(found, settings)) for result in results]
 
 
 def _with_runs(result: dict, by_key: dict, whisker: Whisker, sigma_rad: float) -> dict:
-    trial, beam = result["trial"], Beam(whisker.C_Nmm2, whisker.length_mm, whisker.shape)
+    trial, beam = result["trial"], whisker.beam
     surface = by_key.get((trial["surface"], number(trial["speed_deg_s"])))
     felt = [
         felt | _answers(result, seen, felt, surface, beam, sigma_rad)

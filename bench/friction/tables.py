@@ -66,7 +66,7 @@ class SurfaceFriction:
 def friction_of(results: Sequence[dict], whisker: Whisker, alpha_est_rad: float) -> list[SurfaceFriction]:
     """Every surface and speed among the measure trials."""
     alphas = alphas_of(results)
-    return [_friction(s, results, alphas, whisker, alpha_est_rad) for s in surfaces(results, whisker.C_Nmm2)]
+    return [_friction(s, results, alphas, whisker, alpha_est_rad) for s in surfaces(results, whisker.beam)]
 
 
 def _friction(surface: Surface, results, alphas, whisker: Whisker, alpha_est_rad: float) -> SurfaceFriction:

@@ -77,7 +77,8 @@ def pairs_of(trial: Trial, seen: dict, stroke: Stroke, drift_rate, whisker: Whis
     known = known_from_pictures(seen, whisker) if seen.get("deflection") else known_from_nominal(trial, touch, whisker)
     if known is None:
         return None
-    return _paired(trial, seen["whisk"], known, stroke, touch, whisker.C_Nmm2 * theta_rad / known.d_x_mm, theta_rad)
+    rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, known.d_x_mm)
+    return _paired(trial, seen["whisk"], known, stroke, touch, rigid_Nmm, theta_rad)
 
 
 def known_from_pictures(seen: dict, whisker: Whisker) -> Known | None:
@@ -114,7 +115,7 @@ def _with_friction(along, across, share, whisker: Whisker) -> tuple[np.ndarray, 
     size = np.linalg.norm(across, axis=1)
 
     def rigidity(arc):
-        return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, 1.0 if whisker.shape == "cone" else 0.0)
+        return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
 
     def moment(friction: float):
         return np.concatenate([moment_at_clamp(x, w, rigidity, -friction * s) for x, w, s in zip(along, size, share)])
@@ -141,7 +142,7 @@ def known_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Known | 
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
     theta = _NOMINAL_THETA_RAD
-    radii_mm = 0.5 * (trial.bar_diameter_mm + whisker.diameter_mm)
+    radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
     x, y = trial.d_x_mm - radii_mm * np.sin(theta / 2), radii_mm * (1.0 - np.cos(theta / 2))
     along, across = x * np.cos(theta) + y * np.sin(theta), x * np.sin(theta) - y * np.cos(theta)
     deflection = np.stack([np.zeros_like(across), across], axis=1)

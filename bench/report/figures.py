@@ -25,7 +25,7 @@ _MARKERS = "osD^vP"
 
 def write_figures(session: Session, out: Path, results: Sequence[dict], settings: Settings, pool: Workers) -> list[str]:
     """All figures that the results allow, each made again only where what it shows has changed. Their names."""
-    fitted = surfaces(results, session.whisker.C_Nmm2)
+    fitted = surfaces(results, session.whisker.beam)
     stamp = hash_of([r["hash"] for r in results], hash_of_code(DRAWING))
     names = ["fig8.png"] if fitted else []
     judged = [j for j in judge(results) if j.purpose == "measure" and np.isfinite(j.error_percent)]
@@ -93,6 +93,7 @@ def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], se
     for surface in fitted if assumed is not None else ():
         if surface.fit is not None:
             error = distance_error(np.radians(SLOPES_DEG), surface.alpha_rad, assumed, equation=equation)
+            error = surface.beam.error_share(surface.common_d_x_mm, error)
             axes.plot(
                 SLOPES_DEG,
                 100.0 * error,

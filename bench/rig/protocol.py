@@ -27,9 +27,10 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class WhiskerTable(Table):
-    shape: Literal["cylinder", "cone"] = "cylinder"
+    shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     length_mm: Positive = 100.0
     diameter_mm: Positive = 1.0
+    tip_diameter_mm: Positive | None = None  # of "tapered"
     youngs_modulus_GPa: Positive = 60.0
     density_kg_m3: Positive = 6450.0
     sag_mm: float = 0.0  # the tip's drop under its own weight

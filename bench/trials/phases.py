@@ -12,6 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from estimator.beam import Beam
+
 STATIC, KINETIC = "static", "kinetic"
 _LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3
 _FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
@@ -97,7 +99,7 @@ def _runs(mask) -> Iterator[tuple[int, int]]:
     yield from zip(edges[::2].tolist(), edges[1::2].tolist())
 
 
-def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, C_Nmm2: float) -> Phases:
+def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, beam: Beam) -> Phases:
     """Phases from the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left out.
 
     Between two jumps both moments are lines, whose ends give the friction angles.
@@ -105,7 +107,8 @@ def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, 
     good = np.isfinite(moments_Nmm).all(axis=1)
     time, theta, moments = time_s[good], theta_rad[good], moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slope = abs(beta_rad)
-    slip = d_x_mm**2 / C_Nmm2 * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
+    mm_per_Nmm = d_x_mm / beam.moment_Nmm(1.0, d_x_mm)
+    slip = mm_per_Nmm * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
     jumps = _jumps(time, theta, slip)
     if not len(jumps):
         return NO_PHASES

@@ -139,6 +139,7 @@ def _whisker(whisker: Whisker) -> dict:
         "length_mm": whisker.length_mm,
         "diameter_mm": whisker.diameter_mm,
         "EI_Nmm2": whisker.EI_Nmm2,
+        "tip_share": whisker.beam.tip_share,
     }
 
 
@@ -151,7 +152,7 @@ def feel_trial(unit: Unit, signals: Signals, seen: Sequence[dict]) -> dict:
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     hand, missing = _hand(unit, kind)
-    beam, theta_rad = _beam(unit.session), unit.settings.theta_rad
+    beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
     known = None if status else whisk
@@ -161,17 +162,17 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     felt |= {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
     if known is None:
         return felt
-    felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.C_Nmm2)
+    felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.beam)
     asked = estimators(unit.settings.estimators)
     return felt | {"estimates": answers(known, asked, unit.settings), "one_factor": _one_factor(unit, kind, stroke)}
 
 
-def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: dict, C_Nmm2: float) -> Phases:
+def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: dict, beam: Beam) -> Phases:
     if not slips(seen):
         return NO_PHASES
     moments = (stroke.channels - touch.offset) @ hand.matrix.T
     theta = stroke.motor_rad - touch.motor_rad
-    return felt_phases(stroke.time_s, theta, moments, seen["beta_rad"], seen["d_x_mm"], C_Nmm2)
+    return felt_phases(stroke.time_s, theta, moments, seen["beta_rad"], seen["d_x_mm"], beam)
 
 
 def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:
@@ -190,10 +191,7 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> list[dict]:
     if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
         return []
     _, whisk = felt_whisk(
-        stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad
+        stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, unit.session.whisker.beam, unit.settings.theta_rad
     )
     return answers(whisk, estimators(()), unit.settings)
 
-
-def _beam(session: Session) -> Beam:
-    return Beam(session.whisker.C_Nmm2, session.whisker.length_mm, session.whisker.shape)

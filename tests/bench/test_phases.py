@@ -14,6 +14,7 @@ from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.phases import KINETIC, NO_PHASES, STATIC, felt_phases, from_plain, seen_phases
+from estimator.beam import Beam
 
 C, D_X, BETA = 8835.7, 60.0, np.radians(50.0)
 ALPHA_STATIC, ALPHA_KINETIC = np.radians(23.0), np.radians(18.5)
@@ -66,7 +67,7 @@ def test_moments_tell_static_from_kinetic(seed, mirror):
     time, theta = samples()
     slip = saw_tooth(theta)
     felt = moments(theta, slip, np.random.default_rng(seed)) * [mirror, 1.0]
-    found = felt_phases(time, theta, felt, mirror * BETA, D_X, C)
+    found = felt_phases(time, theta, felt, mirror * BETA, D_X, Beam(C, 100.0))
     teeth = np.count_nonzero(np.diff(slip[theta > np.radians(2.3)]) > 0.02)
     assert teeth <= found.jumps <= teeth + 6  # earlier, smaller ones may drown in the noise
     for kind, true in ((STATIC, ALPHA_STATIC), (KINETIC, ALPHA_KINETIC)):
@@ -84,7 +85,7 @@ def test_ringing_after_a_jump_is_no_jump():
         since = np.maximum(time - time[k], 0.0) * 2 * np.pi * 165
         ringing += np.where(since > 0, 0.5 * (slip[k + 1] - slip[k]) * np.exp(-0.02 * since) * np.cos(since), 0.0)
     felt = moments(theta, slip - ringing, np.random.default_rng(1))
-    found = felt_phases(time, theta, felt, BETA, D_X, C)
+    found = felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0))
     assert found.jumps <= len(rung)
     assert np.degrees(found.mean(STATIC)[0]) == pytest.approx(23.0, abs=1.0)
     assert np.degrees(found.mean(KINETIC)[0]) == pytest.approx(18.5, abs=1.0)
@@ -96,7 +97,7 @@ def test_a_whisker_that_slides_neither_rests_nor_jumps(seed):
     tangent = np.tan(BETA - ALPHA_KINETIC)
     slip = D_X * np.maximum(theta, 0.0) * tangent / (np.cos(BETA) + np.sin(BETA) * tangent)
     felt = moments(theta, slip, np.random.default_rng(seed))
-    assert felt_phases(time, theta, felt, BETA, D_X, C) == NO_PHASES
+    assert felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0)) == NO_PHASES
     touching = theta > 0
     assert seen_phases(frames(theta[touching][::40], slip[touching][::40]), BETA, D_X) == NO_PHASES
 
@@ -132,7 +133,7 @@ def test_the_rig_s_sandpaper(tmp_path):
         touch = stroke.touch()
         felt = (stroke.channels - touch.offset) @ np.array(true["gauge_matrix_Nmm_per_V"]).T
         theta, beta = stroke.motor_rad - touch.motor_rad, np.radians(told["beta_deg"])
-        found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.C_Nmm2)
+        found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.beam)
         assert found.jumps >= 7
         for kind, mu in ((STATIC, told["mu_static"]), (KINETIC, told["mu_kinetic"])):
             assert np.degrees(found.mean(kind)[0] - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)

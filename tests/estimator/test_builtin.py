@@ -132,6 +132,23 @@ def test_estimators_on_a_felt_stroke(stroke):
     assert 0.5 < np.std(scores) < 1.3
 
 
+@pytest.mark.parametrize("shape", [("cylinder",), ("cone",), ("tapered", 0.4)])
+def test_17_as_printed_has_its_own_name_and_sigma(shape):
+    """Of a cylinder it is (12), of others it falls short under slip; its sigma is that of numeric derivatives."""
+    beam = Beam.from_modulus(60.0, 1.0, 100.0, *shape)
+    beta, d_x = np.radians(50.0), 60.0
+    moments = np.array(slip.moments(beam.as_cylinder_mm(d_x), THETA, beta, 0.0, beam.C_Nmm2))
+    told, right = (f(whisk_of(*moments, beam=beam), SETTINGS) for f in (builtin.printed_17, builtin.frictionless))
+    assert right.d_x_mm == pytest.approx(d_x) and (told.d_x_mm < 0.95 * d_x) == (shape[0] != "cylinder")
+
+    def d(theta, m_y, m_z):
+        return builtin.printed_17(whisk_of(m_y, m_z, beam=beam, theta=theta), SETTINGS).d_x_mm
+
+    at = np.array([THETA, *moments])
+    numeric = [(d(*(at + h)) - d(*(at - h))) / 2e-6 for h in 1e-6 * np.eye(3)]
+    assert told.sigma_mm == pytest.approx(np.linalg.norm(numeric * np.array([1e-4, 0.01, 0.01])), rel=1e-5)
+
+
 # ---- where (10) loses its root
 
 
