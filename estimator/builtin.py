@@ -87,16 +87,16 @@ def _estimate(whisk, settings, d_x, gradient, *, m_y, clamp=True):
         "alpha_est_sigma": settings.alpha_est_sigma_rad,
         "theta_moment_covariance": whisk.theta_moment_covariance_at,
     }
-    model = _model_share(whisk, settings, d_x)
+    tapered = beam.distance_mm(d_x)
+    left = tapered / d_x  # of the base's diameter at the contact; of a relative error on the base's cylinder, too
+    model = _model_share(whisk, settings, tapered, left)
     ends = uncertainty.interval_with_friction(
-        theta, m_y, m_z, settings.alpha_est_rad, beam.C_Nmm2, model_sigma=model, **knows
+        theta, m_y, m_z, settings.alpha_est_rad, beam.C_Nmm2, model_sigma=model / left if model else 0.0, **knows
     )
     low, high = (min(beam.distance_mm(end), beam.length_mm) if end > 0 else end for end in ends)
     if d_x != d_x:
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
-    sigma = hypot(uncertainty.sigma(gradient, **knows), model * d_x)
-    tapered = beam.distance_mm(d_x)
-    sigma *= (tapered / d_x) ** 2
+    sigma = hypot(uncertainty.sigma(gradient, **knows) * left**2, model * tapered)
     clamped, at_tip = distance.clamp_to_length(tapered, beam.length_mm)
     if at_tip and not clamp:
         return Estimate(tapered, sigma, BEYOND)
@@ -105,12 +105,13 @@ def _estimate(whisk, settings, d_x, gradient, *, m_y, clamp=True):
     return Estimate(clamped, sigma, NEARER.format(high) if low == 0 else "", low, high)
 
 
-def _model_share(whisk, settings, d_x):
-    """What (10) may be off by itself, as a share of d_x; 0 where there is no distance to take it at."""
+def _model_share(whisk, settings, d_x, left):
+    """What (10) may be off by itself, as a share of d_x; 0 where nothing is said of the object, or without distance."""
+    if d_x != d_x or settings.object_reach_mm == 0:
+        return 0.0
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    known = {"reach": settings.object_reach_mm, "tilt_sigma": settings.tilt_sigma_rad}
-    share = uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, **known)
-    return share if share == share and settings.object_reach_mm > 0 else 0.0
+    known = {"reach": settings.object_reach_mm, "tilt_sigma": settings.tilt_sigma_rad, "left": left}
+    return uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, **known)
 
 
 def _reason(whisk, alpha_est, high):

@@ -125,7 +125,7 @@ def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0
 
     (10) falls with α_est, and by more than a line where its sigma is large. So each side is its own: the change that
     the end of α_est's interval makes and 1.96 sigma of the rest (`sigmas` as of `sigma`), added in squares (MOVER:
-    Zou & Donner, Statistics in Medicine 27, 2008). model_sigma: of the equation itself, a share of d_x. A low end at
+    Zou & Donner, Statistics in Medicine 27, 2008). model_sigma: of the equation itself, a share of it. A low end at
     zero or below says that no distance is too short: it is 0.
     """
     require_sigma("alpha_est_sigma", alpha_est_sigma)
@@ -140,15 +140,17 @@ def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0
     return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(push, np.maximum(high, 0.0), np.nan)[()]
 
 
-def model_share(theta, phi, alpha, d_x, *, reach=0.0, tilt_sigma=0.0):
-    """How far (10) may be off by itself, as a share of d_x: the first order in θ, derived in docs/maps.md.
+def model_share(theta, phi, alpha, d_x, *, reach=0.0, tilt_sigma=0.0, left=1.0):
+    """How far (10) may be off by itself, as a share of d_x: leading terms in θ, derived in docs/maps.md.
 
-    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad. A held contact drags along
-    the whisker by up to tan α; where it slips, that is far less than what α_est does.
+    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left: share of the base's
+    diameter that is left at d_x. A held contact drags along the whisker by up to tan α; where it slips, that is far
+    less than what α_est does.
     """
-    leaning = 0.5 * np.tan(tilt_sigma) * np.sin(np.abs(phi)) / np.cos(alpha)
-    rolling = 0.375 * reach / np.asarray(d_x) * np.cos(np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE))
-    return theta * np.sqrt(leaning**2 + rolling**2 + (0.2 * np.tan(alpha)) ** 2)
+    leaning = 0.5 * theta * np.tan(tilt_sigma) * np.sin(np.abs(phi)) / np.cos(alpha)
+    slope = np.cos(np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE))
+    rolling = theta * reach / np.asarray(d_x) * slope * (0.5 / left - 0.125)
+    return np.sqrt(leaning**2 + rolling**2 + (0.2 * theta * np.tan(alpha)) ** 2 + (theta**2 / (6 * left)) ** 2)
 
 
 @elementwise

@@ -78,9 +78,10 @@ def seen_friction(seen: dict) -> tuple[float, float]:
 
 
 def felt_friction(seen: dict, felt: dict) -> tuple[float, float]:
-    """α = |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip."""
+    """α = |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip; unknown
+    where the moments are not those of the seen shape."""
     phi = number(felt.get("phi_felt_rad"))
-    if not (slips(seen) and np.isfinite(phi)):
+    if not (slips(seen) and np.isfinite(phi)) or felt.get("apart"):
         return UNKNOWN
     alpha = abs(number(seen["beta_rad"])) - abs(phi)
     return alpha, float(np.hypot(number(seen["beta_sigma_rad"]), number(felt["phi_felt_sigma_rad"])))

@@ -61,6 +61,7 @@ def contacts(results: Sequence[dict], surface: str, speed_deg_s: float) -> list[
         if r["trial"]["purpose"] == "measure"
         and (r["trial"]["surface"], number(r["trial"]["speed_deg_s"])) == (surface, speed_deg_s)
         and felt.get("phi_felt_rad") is not None
+        and not felt.get("apart")
     ]
 
 

@@ -128,7 +128,8 @@ def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:
         nominal = not np.isfinite(d_x)
         d_x = number(trial["d_x_nominal_mm"]) if nominal else d_x
         beta = slope_deg(result, seen)
-        if trial["purpose"] == "measure" and felt.get("m_y_Nmm") is not None and np.isfinite([d_x, beta]).all():
+        sound = felt.get("m_y_Nmm") is not None and not felt.get("apart")
+        if trial["purpose"] == "measure" and sound and np.isfinite([d_x, beta]).all():
             values = [felt[k] for k in ("m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")]
             phi = [float(np.degrees(felt[k])) for k in ("phi_felt_rad", "phi_felt_sigma_rad")]
             theta = float(np.radians(result["theta_deg"]))

@@ -50,7 +50,7 @@ def pooled(outs: Sequence[Path]) -> list[Surface]:
 
 
 def _beam(whisker: dict) -> Beam:
-    return Beam.from_rigidity(whisker["EI_Nmm2"], whisker["length_mm"], whisker["shape"], whisker["tip_share"])
+    return Beam.from_rigidity(whisker["EI_Nmm2"], whisker["length_mm"], whisker["shape"], whisker.get("tip_share"))
 
 
 def read_run(out: Path) -> list[dict]:

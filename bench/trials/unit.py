@@ -15,11 +15,13 @@ from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, plain,
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of
-from bench.gauges.matrix import Gauges
+from bench.gauges.matrix import FROM_TRIALS, Gauges
+from bench.gauges.readings import pairs_of
 from bench.session.session import Session
 from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
+from bench.trials.agreement import agreement
 from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
 from bench.trials.phases import NO_PHASES, Phases, felt_phases, slips
 from bench.trials.seen import see_trial
@@ -162,9 +164,24 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     felt |= {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
     if known is None:
         return felt
+    felt |= _against_pictures(unit, stroke, hand, seen, felt["status"])
     felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.beam)
     asked = estimators(unit.settings.estimators)
     return felt | {"estimates": answers(known, asked, unit.settings), "one_factor": _one_factor(unit, kind, stroke)}
+
+
+def _against_pictures(unit: Unit, stroke: Stroke, hand: Hand, seen: dict, status: str) -> dict:
+    """Whether the felt moments are those of the seen shape: χ², and the status with what is likely wrong."""
+    if not seen.get("deflection"):
+        return {}
+    whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
+    pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
+    if pairs is None:
+        return {}
+    own_newtons = not hand.is_gauged or unit.gauges.source != FROM_TRIALS
+    found = agreement(pairs, hand.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
+    status = "; ".join(filter(None, [status, found.status]))
+    return {"agreement": {"chi2": found.chi2, "chance": found.chance}, "apart": bool(found.status), "status": status}
 
 
 def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: dict, beam: Beam) -> Phases:
