@@ -1,6 +1,7 @@
 """(10) with α fitted by the other whisks and with α seen; and what a session tells of α, by every way."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,7 +122,8 @@ def test_every_way_finds_the_friction_angle(tmp_path):
 
 def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
-    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, np.arctan2(m_y, m_z), PHI_SIGMA)
+    phi = np.arctan2(m_y, m_z), PHI_SIGMA
+    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, *phi, f"b{beta_deg}")
 
 
 def test_ways_say_what_they_lack():
@@ -140,3 +142,25 @@ def test_mean_does_not_shrink_a_shared_sigma():
     assert mean_alpha([(0.2, 0.01)] * 16) == pytest.approx((0.2, 0.01))
     assert np.isnan(mean_alpha([(np.nan, np.nan)])).all()
     assert mean_alpha([(0.1, 0.001), (0.3, 0.001)])[1] == pytest.approx(0.1 / np.sqrt(2))
+
+
+def test_repeats_of_one_recording_are_no_independent_ones():
+    """Bars a little off: ten whisks a recording say no more of α than one, and its sigma holds the error."""
+    bars = [replace(contact(b + off), beta_rad=np.radians(b), trial=f"b{b}") for b, off in OFF.items()]
+    sizes = 1.004, 0.996, 1.003, 0.998
+    bars = [replace(c, m_y_Nmm=c.m_y_Nmm * k, m_z_Nmm=c.m_z_Nmm * k) for c, k in zip(bars, sizes)]
+    one, ten = by_consistency(bars, WHISKER), by_consistency(bars * 10, WHISKER)
+    assert ten.alpha_rad == pytest.approx(one.alpha_rad, abs=1e-5)
+    assert ten.sigma_rad == pytest.approx(one.sigma_rad, rel=1e-2)
+    assert abs(one.alpha_rad - ALPHA) < 2 * one.sigma_rad < np.radians(6.0)
+
+
+OFF = {20: 0.3, 40: -0.4, 55: 0.2, 65: -0.2}
+
+
+def test_at_the_bound_of_the_search_there_is_no_angle():
+    """Distances that shrink with the slope, as no friction angle makes them: the bound is told, and is no result."""
+    bars = [replace(c, m_y_Nmm=c.m_y_Nmm * k, m_z_Nmm=c.m_z_Nmm * k)
+            for c, k in ((contact(20), 1.0), (contact(40), 2.0), (contact(60), 4.0))]  # fmt: skip
+    way = by_consistency(bars, WHISKER)
+    assert np.isnan([way.alpha_rad, way.sigma_rad]).all() and "at the bound of the search" in way.status
