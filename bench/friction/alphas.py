@@ -10,6 +10,7 @@ from bench.trials.compare import whisks
 from bench.trials.phases import NO_PHASES, Phases, from_plain, seen_phases, slips
 
 UNKNOWN = (float("nan"), float("nan"))
+BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture tells it
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class WhiskAlphas:
     phases_felt: Phases
     shared_seen_rad: float  # sigma that all angles of this whisk share: of β, and felt also of the moments
     shared_felt_rad: float
+    nominal: bool = False  # β is that of the manifest: no picture shows it
 
     def apart(self, kind: str, record: str) -> tuple[float, float]:
         """Static or kinetic α from the record "seen" or "felt"; NaN where it shows no stick–slip."""
@@ -50,12 +52,15 @@ def alphas_of(results: Iterable[dict]) -> list[WhiskAlphas]:
 
 def _alphas(trial: dict, seen: dict, felt: dict) -> WhiskAlphas:
     beta, by_beta = number(seen.get("beta_rad")), number(seen.get("beta_sigma_rad"))
+    nominal = not np.isfinite(beta)
+    if nominal:
+        beta, by_beta = np.radians(number(trial["beta_nominal_deg"])), BETA_BY_HAND_RAD
     kind = (trial["purpose"], trial["surface"], number(trial["speed_deg_s"]), beta)
     of_seen = seen_phases(seen["frames"], beta, number(seen["d_x_mm"])) if slips(seen) else NO_PHASES
     of_felt = from_plain(felt.get("phases"))
     shared = by_beta, float(np.hypot(by_beta, number(felt.get("phi_felt_sigma_rad"))))
     angles = seen_friction(seen), felt_friction(seen, felt)
-    return WhiskAlphas(trial["name"], seen["whisk"], *kind, *angles, of_seen, of_felt, *shared)
+    return WhiskAlphas(trial["name"], seen["whisk"], *kind, *angles, of_seen, of_felt, *shared, nominal)
 
 
 def seen_friction(seen: dict) -> tuple[float, float]:

@@ -133,6 +133,7 @@ class MotorTable(Table):
 
 class FrictionTable(Table):
     scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
+    irregular: Zero = 0.0  # sigma (of a log-normal) of how much of its excess over motion each single rest reaches
     finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
 
 

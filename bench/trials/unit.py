@@ -165,7 +165,7 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     if known is None:
         return felt
     felt |= _against_pictures(unit, stroke, hand, seen, felt["status"])
-    felt["phases"] = _phases(stroke, touch, hand, seen, unit.session.whisker.beam)
+    felt["phases"] = _phases(unit.trial, stroke, touch, hand, seen, unit.session.whisker.beam)
     asked = estimators(unit.settings.estimators)
     return felt | {"estimates": answers(known, asked, unit.settings), "one_factor": _one_factor(unit, kind, stroke)}
 
@@ -184,12 +184,17 @@ def _against_pictures(unit: Unit, stroke: Stroke, hand: Hand, seen: dict, status
     return {"agreement": {"chi2": found.chi2, "chance": found.chance}, "apart": bool(found.status), "status": status}
 
 
-def _phases(stroke: Stroke, touch: Touch, hand: Hand, seen: dict, beam: Beam) -> Phases:
-    if not slips(seen):
+def _phases(trial: Trial, stroke: Stroke, touch: Touch, hand: Hand, seen: dict, beam: Beam) -> Phases:
+    """With the slope and distance as seen, or the nominal ones where no picture tells of them."""
+    if seen.get("deflection"):
+        beta_rad, d_x_mm = (seen["beta_rad"], seen["d_x_mm"]) if slips(seen) else (None, None)
+    else:
+        beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
+    if not beta_rad or not d_x_mm:
         return NO_PHASES
     moments = (stroke.channels - touch.offset) @ hand.matrix.T
     theta = stroke.motor_rad - touch.motor_rad
-    return felt_phases(stroke.time_s, theta, moments, seen["beta_rad"], seen["d_x_mm"], beam)
+    return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
 
 
 def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:

@@ -9,6 +9,7 @@ import pytest
 
 from bench.base.results import plain
 from bench.base.settings import Settings
+from bench.evaluate import evaluate
 from bench.gauges.felt import strokes_of
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
@@ -137,3 +138,18 @@ def test_the_rig_s_sandpaper(tmp_path):
         assert found.jumps >= 7
         for kind, mu in ((STATIC, told["mu_static"]), (KINETIC, told["mu_kinetic"])):
             assert np.degrees(found.mean(kind)[0] - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)
+
+
+def test_without_pictures_the_nominal_slope_serves(tmp_path):
+    """Slopes as set by hand: phases.csv has both angles, and friction.csv says where the slope is from."""
+    text = (Path(__file__).parents[1] / "ladder" / "protocols" / "sandpaper.toml").read_text()
+    text = text.replace("vibration = true", "vibration = true\nknown = true")
+    text = text.replace("beta_deg = [45, 60]", "beta_deg = 60")
+    (tmp_path / "p.toml").write_text(text)
+    session = simulate(tmp_path / "session", protocol=tmp_path / "p.toml", signals_only=True, seed=5)
+    evaluate(session, tmp_path / "out", Settings())
+    kinds = (tmp_path / "out" / "phases.csv").read_text()
+    assert kinds.count("felt,static") >= 5 and kinds.count("felt,kinetic") >= 5
+    assert "sandpaper,10,60,manifest" in (tmp_path / "out" / "friction.csv").read_text()
+    summary = (tmp_path / "out" / "summary.txt").read_text()
+    assert "stick–slip felt, slopes as the manifest has them" in summary

@@ -18,7 +18,8 @@ C = 3 * WIRE.rigidity_Nmm2
 MU_10 = math.tan(math.radians(10))
 
 
-def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, static=None, radius=3.0, touch_deg=0.0):
+def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, static=None, radius=3.0, touch_deg=0.0,
+          rests=(1.0,)):  # fmt: skip
     """(march, touch, states) along pushing angles."""
     touch_rad = math.radians(touch_deg)
     bar = Bar.placed(
@@ -30,7 +31,7 @@ def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, stati
         whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
     touch = first_touch(rod, bar, touch_rad, d_x)
-    march = March(rod, bar, Friction(mu if static is None else static, mu), touch)
+    march = March(rod, bar, Friction(mu if static is None else static, mu, rests=rests), touch)
     _, states = march.along(touch.motor_rad + np.radians(thetas_deg))
     return march, touch, states
 
@@ -173,6 +174,16 @@ def test_stick_slip_is_a_saw_tooth_between_the_two_cones():
     )  # material holds; the centreline's point rolls a little
     phi = np.array([polar(s)[1] for s in states[20:]])
     assert 60 - math.degrees(math.atan(0.25)) - 0.3 < phi.min() and phi.max() < 60 - math.degrees(math.atan(0.18)) + 0.3
+
+
+def test_each_rest_reaches_its_own_coefficient():
+    """Rests that reach all of the excess and half of it in turn, round and round."""
+    _, _, states = whisk(np.arange(0.1, 6.01, 0.1), mu=0.18, static=0.26, rests=(1.0, 0.5))
+    angles = np.array([s.motor_rad for s in states])
+    shares = [states[i].share for i in np.nonzero(np.diff(angles) == 0)[0]]
+    assert len(shares) > 20
+    expected = np.where(np.arange(len(shares)) % 2, 0.22, 0.26)
+    assert shares == pytest.approx(expected, rel=1e-3)
 
 
 def test_below_the_static_cone_the_whisker_never_slips_along_the_bar():
