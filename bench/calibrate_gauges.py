@@ -9,10 +9,8 @@ import numpy as np
 from bench.base.atomic import whole_file
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.calibration import calibrate_session
 from bench.gauges.certificate import Certificate, page
 from bench.gauges.checks import check_alive
 from bench.gauges.felt import Stroke, strokes_of
@@ -25,9 +23,8 @@ from bench.session.check import checked_session
 from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
-from bench.trials.of_session import judged, session_drift
-from bench.trials.placing import place_rig
-from bench.trials.unit import Unit, see_unit
+from bench.trials.of_session import judged, placed_units, session_drift
+from bench.trials.unit import see_unit
 
 
 def calibrate_gauges_command(
@@ -70,18 +67,15 @@ def calibrate_gauges(
     strokes = {trial.name: strokes_of(read_signals(trial), trial, settings) for trial in trials}
     check_alive([stroke for many in strokes.values() for stroke in many])
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
-        rate = session_drift(judged(session), settings, pool)
-        calibration = calibrate_session(session, Path(folder))
-        every = [
-            Unit(session, t, hash_of_files([t.folder]), calibration, settings, Path(folder)) for t in judged(session)
-        ]
-        calibration = place_rig(session, calibration, every, pool, doubts)
-        chosen = {unit.trial.name: replace(unit, calibration=calibration) for unit in every}
+        every = judged(session)
+        rate = session_drift(every, settings, pool)
+        _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
+        chosen = {unit.trial.name: unit for unit in units}
         seen = pool.run(see_unit, [chosen[trial.name] for trial in trials], "trials")
     pairs = [
         pairs_of(trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
         for trial, of_trial in zip(trials, seen)
-        for whisk, stroke in zip(of_trial["whisks"], strokes[trial.name])
+        for whisk, stroke in zip(of_trial.whisks, strokes[trial.name])
     ]
     used = tuple(p for p in pairs if p is not None)
     every_stroke = tuple(stroke for many in strokes.values() for stroke in many)

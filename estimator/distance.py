@@ -4,6 +4,9 @@ Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the ar
 surface the distance is NaN, never negative and never infinite, and `why_not` says which condition failed.
 β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0 and α_est outside [0°, 90°) raise
 ValueError.
+
+Products and quotients take numbers near one and powers of two apart (frexp, ldexp): C, moments and their squares may be
+doubles where what stands between them in an equation is none. So no distance that a double holds is lost on the way.
 """
 
 import numpy as np

@@ -17,6 +17,7 @@ __all__ = [
     "Consistency",
     "Contacts",
     "FrictionFit",
+    "Pushes",
     "alpha_from_tilts",
     "confidence",
     "curves",
@@ -51,34 +52,52 @@ class FrictionFit:
     status: str
 
 
-def fit_alpha(
-    beta, m_y, m_z, d_x, theta, C, *, reading="moments", sigma_y=None, sigma_z=None, recording=None
-) -> FrictionFit:
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """Moments over slopes: what one surface showed.
+
+    beta (n,), rad; m_y and m_z (..., n), N·mm, with any leading axes, each run of them fitted by itself; d_x (mm),
+    theta (rad) and C (N·mm²) scalars or (n,). sigma_y and sigma_z (..., n): the moments' own standard deviations, both
+    or none. recording (n,): names what was set up once, whose points share what is wrong with the slope and the
+    distance. Raises ValueError where C, d_x or theta is not positive.
+    """
+
+    beta: np.ndarray
+    m_y: np.ndarray
+    m_z: np.ndarray
+    d_x: float | np.ndarray
+    theta: float | np.ndarray
+    C: float | np.ndarray
+    sigma_y: np.ndarray | None = None
+    sigma_z: np.ndarray | None = None
+    recording: np.ndarray | None = None
+
+    def __post_init__(self):
+        for name, unit in (("C", "N·mm²"), ("d_x", "mm"), ("theta", "rad")):
+            require_positive(name, getattr(self, name), unit)
+
+
+def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
     """Friction cone angle that fits moments over slopes best, as in Fig. 8.
 
-    beta (n,), m_y and m_z (..., n) with any leading axes, each run fitted by itself; d_x, theta and C
-    scalars or (n,). reading: "moments" takes the residuals of (13) and (14); "magnitude" those of |m|²
-    alone, the other reading of the paper's "LMS fits on the sum of the squares of (13) and (14)".
+    reading: "moments" takes the residuals of (13) and (14); "magnitude" those of |m|² alone, the other reading of the
+    paper's "LMS fits on the sum of the squares of (13) and (14)". The fit weighs all points alike, as the paper's.
 
-    sigma_y and sigma_z (..., n) are the moments' own standard deviations; with them the interval is that
-    of the normal distribution. Without them the sigma comes from each residual's square and leverage, so
-    that it holds as well for noise that grows with the moment, and the interval takes Student's t; below
-    about 30 residuals it is somewhat short. recording (n,) names what was set up once: its points share what
-    is wrong with the slope and the distance, and count as one in the sigma. The fit weighs all points alike,
-    as the paper's. NaN among the data raises ValueError.
+    With the moments' own sigmas the interval is that of the normal distribution. Without them the sigma comes from each
+    residual's square and leverage, so that it holds as well for noise that grows with the moment, and the interval
+    takes Student's t; below about 30 residuals it is somewhat short. The points of a recording count as one in it.
+    Raises ValueError where a moment or slope is NaN, or their numbers differ.
     """
     if reading not in READINGS:
         raise ValueError(f"reading = {reading!r}: must be one of {', '.join(READINGS)}")
-    for name, value, unit in (("C", C, "N·mm²"), ("d_x", d_x, "mm"), ("theta", theta, "rad")):
-        require_positive(name, value, unit)
-    beta, data, scale = _observations(beta, m_y, m_z, d_x, theta, C, reading)
+    beta, data, scale = _observations(pushes, reading)
     alpha = _least_squares(beta, data, scale, reading)
     residuals = data - _model(alpha, beta, scale, reading)
     slopes = _derivative(alpha, beta, scale, reading)
-    if sigma_y is None or sigma_z is None:
-        sigma, freedom = _sigma_of_residuals(residuals, slopes, recording)
+    if pushes.sigma_y is None or pushes.sigma_z is None:
+        sigma, freedom = _sigma_of_residuals(residuals, slopes, pushes.recording)
     else:
-        sigma, freedom = _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading), np.inf
+        sigma, freedom = _sigma_of_data(pushes, slopes, reading), np.inf
     return _fit(alpha, sigma, freedom, residuals, _fits_as_well_without_slip(residuals, beta, data, scale, reading))
 
 
@@ -87,9 +106,12 @@ def curves(alpha, beta, d_x, theta, C):
     return slip.moment_magnitude(d_x, theta, beta, alpha, C), slip.slip_angle(beta, alpha)
 
 
-def _observations(beta, m_y, m_z, d_x, theta, C, reading):
-    m_y, m_z = np.broadcast_arrays(np.asarray(m_y, dtype=float), np.asarray(m_z, dtype=float))
-    beta, scale = np.broadcast_arrays(np.asarray(beta, dtype=float), C * np.divide(theta, d_x))
+def _observations(pushes, reading):
+    """Slopes (n,), data (..., n) or (..., 2n) and Cθ/d_x (n,)."""
+    m_y, m_z = np.broadcast_arrays(np.asarray(pushes.m_y, dtype=float), np.asarray(pushes.m_z, dtype=float))
+    beta, scale = np.broadcast_arrays(
+        np.asarray(pushes.beta, dtype=float), pushes.C * np.divide(pushes.theta, pushes.d_x)
+    )
     if m_y.shape[-1:] != beta.shape or beta.size < 2:
         raise ValueError(f"slopes {beta.shape} and moments {m_y.shape}: need one slope a moment, two at least")
     if not (np.isfinite(m_y).all() and np.isfinite(m_z).all() and np.isfinite(beta).all()):
@@ -155,9 +177,9 @@ def _sigma_of_residuals(residuals, slopes, recording):
     return sigma, n - 1 if recording is None else (leverage > 0).sum(axis=-1) - 1
 
 
-def _sigma_of_data(m_y, m_z, sigma_y, sigma_z, slopes, reading):
+def _sigma_of_data(pushes, slopes, reading):
     """Sigma of α from the moments' own: √(Σ J² σ²) / Σ J²."""
-    sigma_y, sigma_z, m_y, m_z = np.broadcast_arrays(sigma_y, sigma_z, m_y, m_z)
+    sigma_y, sigma_z, m_y, m_z = np.broadcast_arrays(pushes.sigma_y, pushes.sigma_z, pushes.m_y, pushes.m_z)
     if reading == "magnitude":
         sigmas = 2 * np.hypot(m_y * sigma_y, m_z * sigma_z)
     else:

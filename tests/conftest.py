@@ -45,6 +45,12 @@ def small_session() -> Path:
     return REPOSITORY / "fixtures" / "small-session"
 
 
+@pytest.fixture(scope="session")
+def steel_signals() -> Path:
+    """All trials of the recording that the small session is cut from, without pictures; read only."""
+    return REPOSITORY / "fixtures" / "steel-signals"
+
+
 @pytest.fixture
 def small_copy(small_session, tmp_path) -> Path:
     """A small session to spoil: text files are copies, pictures are links (replace them, never write)."""

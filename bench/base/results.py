@@ -16,7 +16,7 @@ _TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
 SEEING = (
     *("vision", "bench/session", "bench/cameras", "bench/trials/seen.py", "bench/trials/placing.py"),
-    *("bench/base/results.py", "bench/base/settings.py"),
+    *("bench/records", "bench/base/results.py", "bench/base/settings.py"),
 )
 ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")
 DRAWING = ("bench/report", "bench/base/drawing.py")
@@ -84,11 +84,6 @@ def plain(value):
     if isinstance(value, (float, np.floating)):
         return float(value) if math.isfinite(value) else None
     return str(value) if isinstance(value, Path) else value
-
-
-def number(value) -> float:
-    """A number read back: null is NaN."""
-    return math.nan if value is None else float(value)
 
 
 def write_result(path: Path, result: dict) -> None:

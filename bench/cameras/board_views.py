@@ -1,7 +1,7 @@
 """Every view of the board in a session: held before the cameras, standing on the rig, and in the trials' frames."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from vision.boards.corners import Corners, find_corners, refine_corners
 from vision.boards.diagnosis import why_not_found
 from vision.boards.marker_size import check_marker_size
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
+from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.errors import Refused
 from vision.pictures.files import Frames, read_picture
@@ -29,29 +30,14 @@ _MOVED_PX = 0.5
 _SAMPLES = 4
 
 
-@dataclass(frozen=True)
-class BoardViews:
-    """Corners by camera. boards: a view a frame of its series, empty where the board is not seen; rig: the board on the
-    rig, absent where there is no picture; trials: the same board in the trials' frames; times_s: of the frames of the
-    series, None where not recorded; notes: what was left out and why."""
+@dataclass(frozen=True, eq=False)
+class SessionViews(BoardViews):
+    """The views of a session; notes: what was left out and why."""
 
-    boards: Mapping[str, list[Corners]]
-    rig: Mapping[str, Corners]
-    trials: Mapping[str, list[Corners]]
-    sizes_px: Mapping[str, tuple[int, int]]
-    times_s: Mapping[str, np.ndarray] | None
     notes: tuple[str, ...] = ()
 
-    def without(self, is_held) -> "BoardViews":
-        """The same without the views k with is_held[k]."""
-        kept = {
-            name: [Corners.none() if out else view for view, out in zip(views, is_held)]
-            for name, views in self.boards.items()
-        }
-        return replace(self, boards=kept)
 
-
-def read_board_views(session: Session) -> BoardViews:
+def read_board_views(session: Session) -> SessionViews:
     """Finds the board everywhere. Raises BadInput where it is not found, naming the setting that would find it."""
     if session.board is None:
         raise BadInput("[board] is missing: the cameras are calibrated from it", file="session.toml")
@@ -66,7 +52,7 @@ def read_board_views(session: Session) -> BoardViews:
             rig[name] = rig_view(session, name, frames.size_px)
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
-    return BoardViews(boards, rig, trials, sizes, _times(session, boards), tuple(notes))
+    return SessionViews(boards, sizes, rig, trials, _times(session, boards), tuple(notes))
 
 
 def _open(source: Path, name: str) -> Frames:

@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.cameras.board_views import BoardViews, read_board_views, rig_view
+from bench.cameras.board_views import SessionViews, read_board_views, rig_view
+from bench.cameras.cameras_file import write_cameras
 from bench.cameras.scale import check_scale
 from bench.session.session import Session, load_session
 from vision.boards.corners import Corners
 from vision.calibration.calibrate import Calibration, CameraReport, calibrate_cameras
-from vision.calibration.cameras_file import write_cameras
 from vision.calibration.cameras_import import import_cameras, place_on_rig
 from vision.calibration.held_out import Agreement, HeldOut, held_out
 from vision.calibration.place import by_board, placed
+from vision.calibration.views import MeasuredPose
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.lens import LENS_TERMS
@@ -52,7 +53,6 @@ def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = No
 
 
 def _write(out: Path, cameras: Cameras, lines: list[str], doubts: list[str]) -> int:
-    out.parent.mkdir(parents=True, exist_ok=True)
     write_cameras(out, cameras)
     print("\n".join([*lines, *doubts, f"written: {out} and {out.with_suffix('.npz').name}"]))
     return 1 if doubts else 0
@@ -75,30 +75,25 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
     return placed(exact, replace(board, covariance=np.zeros((6, 6))), board)
 
 
-def calibrate_from(session: Session, views: BoardViews) -> Calibration:
+def calibrate_from(session: Session, views: SessionViews) -> Calibration:
     """The session's cameras from its views, in the rig frame; without T_rig_board in that of the board on the rig, or
     of the first camera where not all see that board. Raises BadInput."""
     missing = [name for name in views.boards if name not in views.rig]
     if missing and session.T_rig_board is not None:
         raise BadInput(f"has no picture {missing[0]}.png: record the board standing on the rig", file="boards/rig")
+    T = board_in_world(session, views)
     try:
         return calibrate_cameras(
-            views.boards,
-            {} if missing else views.rig,
+            replace(views, rig={}) if missing else views,
             session.board,
-            views.sizes_px,
-            board_in_world(session, views),
-            T_rig_board_sigma_mm=session.T_rig_board_sigma_mm,
-            T_rig_board_sigma_rad=session.T_rig_board_sigma_rad,
-            trial_views=views.trials,
-            times_s=views.times_s,
+            None if T is None else MeasuredPose(T, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad),
             work_points_mm=_work_points(session),
         )
     except Refused as reason:
         raise BadInput(str(reason), file="boards") from None
 
 
-def board_in_world(session: Session, views: BoardViews) -> np.ndarray | None:
+def board_in_world(session: Session, views: SessionViews) -> np.ndarray | None:
     """Where the board on the rig stands, (3, 4), in the frame that `calibrate_from` gives the cameras in; None where
     not all cameras see it."""
     if session.T_rig_board is not None:
@@ -116,7 +111,7 @@ def _work_points(session: Session) -> np.ndarray | None:
     return np.array([*([x, 0.0, 0.0] for x in along), *bars])
 
 
-def measure_held_out(session: Session, views: BoardViews) -> HeldOut | None:
+def measure_held_out(session: Session, views: SessionViews) -> HeldOut | None:
     """Cameras from three quarters of the views, measured on the last. None where too few are left.
 
     Where cameras did not look at the board at once, they see it at once on the rig only: then every other row of the
@@ -138,10 +133,10 @@ def measure_held_out(session: Session, views: BoardViews) -> HeldOut | None:
     return replace(on_rig, alone_px=alone)
 
 
-def _with_even_rows(views: BoardViews, session: Session) -> BoardViews:
+def _with_even_rows(views: SessionViews, session: Session) -> SessionViews:
     rig = {name: _rows(view, session, 0) for name, view in views.rig.items()}
     trials = {name: [_rows(view, session, 0) for view in many] for name, many in views.trials.items()}
-    return BoardViews(views.boards, rig, trials, views.sizes_px, views.times_s, views.notes)
+    return replace(views, rig=rig, trials=trials)
 
 
 def _rows(view: Corners, session: Session, parity: int) -> Corners:

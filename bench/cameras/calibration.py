@@ -13,13 +13,14 @@ from bench.base.errors import BadInput
 from bench.base.results import SEEING, hash_of, hash_of_code, hash_of_files, plain, read_result, write_result
 from bench.cameras.board_views import read_board_views
 from bench.cameras.calibrate import board_in_world, calibrate_from, report_lines
+from bench.cameras.cameras_file import write_cameras
 from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.scale import check_scale
 from bench.session.footage import frame_count, read_frames
 from bench.session.session import Session
 from vision.boards.corners import refine_corners
 from vision.boards.static_board import camera_moved
-from vision.calibration.cameras_file import read_cameras, write_cameras
+from vision.calibration.cameras_file import read_cameras
 from vision.calibration.place import Placement, placed
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused

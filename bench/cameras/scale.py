@@ -12,7 +12,7 @@ from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from vision.bar.width import SIGMA_SHARE, bar_diameter_mm
-from vision.calibration.place import check_known_lengths
+from vision.calibration.known_lengths import check_known_lengths
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.base.results import number
-from bench.trials.compare import whisks
-from bench.trials.phases import NO_PHASES, Phases, from_plain, seen_phases, slips
+from bench.records.phases import NO_PHASES, Phases
+from bench.records.trial import FeltWhisk, SeenWhisk, TrialFacts, TrialResult, whisks
+from bench.trials.phases import seen_phases, slips
+from vision.truth.value import Value
 
 UNKNOWN = (float("nan"), float("nan"))
 BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture tells it
@@ -21,7 +22,7 @@ class WhiskAlphas:
     whisk: int
     purpose: str
     surface: str
-    speed_deg_s: float
+    speed_deg_s: float | None
     beta_rad: float
     seen: tuple[float, float]
     felt: tuple[float, float]
@@ -40,56 +41,67 @@ class WhiskAlphas:
         return mean, float(np.hypot(sigma, shared))
 
     @property
+    def panel(self) -> tuple[str, float | None]:
+        """Surface and speed, as `TrialFacts.panel` has them."""
+        return self.surface, self.speed_deg_s
+
+    @property
     def key(self) -> tuple[str, int]:
         """Which whisk."""
         return self.trial, self.whisk
 
 
-def alphas_of(results: Iterable[dict]) -> list[WhiskAlphas]:
+def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     """α of every whisk, in their order."""
-    return [_alphas(result["trial"], seen, felt) for result, seen, felt in whisks(results)]
+    return [_alphas(result.trial, seen, felt) for result, seen, felt in whisks(results)]
 
 
-def _alphas(trial: dict, seen: dict, felt: dict) -> WhiskAlphas:
-    beta, by_beta = number(seen.get("beta_rad")), number(seen.get("beta_sigma_rad"))
-    nominal = not np.isfinite(beta)
+def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk) -> WhiskAlphas:
+    beta, nominal = seen.beta_rad, not np.isfinite(seen.beta_rad.value)
     if nominal:
-        beta, by_beta = np.radians(number(trial["beta_nominal_deg"])), BETA_BY_HAND_RAD
-    kind = (trial["purpose"], trial["surface"], number(trial["speed_deg_s"]), beta)
-    of_seen = seen_phases(seen["frames"], beta, number(seen["d_x_mm"])) if slips(seen) else NO_PHASES
-    of_felt = from_plain(felt.get("phases"))
-    shared = by_beta, float(np.hypot(by_beta, number(felt.get("phi_felt_sigma_rad"))))
-    angles = seen_friction(seen), felt_friction(seen, felt)
-    return WhiskAlphas(trial["name"], seen["whisk"], *kind, *angles, of_seen, of_felt, *shared, nominal)
+        beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
+    of_seen = seen_phases(seen.frames, beta.value, seen.d_x_mm.value) if slips(seen) else NO_PHASES
+    shared = beta.sigma, float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma))
+    return WhiskAlphas(
+        trial.name,
+        seen.whisk,
+        trial.purpose,
+        *trial.panel,
+        beta.value,
+        seen_friction(seen),
+        felt_friction(seen, felt),
+        of_seen,
+        felt.phases,
+        *shared,
+        nominal,
+    )
 
 
-def seen_friction(seen: dict) -> tuple[float, float]:
+def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     """α from the slope of d_z against d_y over the frames of a slipping whisk, and β. NaN where it hardly slips.
 
     A line's slope is free of what offsets all deflections alike.
     """
     if not slips(seen):
         return UNKNOWN
-    d = seen["deflection"]
-    y, z = np.array(d["across_y_mm"]), np.array(d["across_z_mm"])
+    y, z = seen.deflection.across_y_mm, seen.deflection.across_z_mm
     weights = (y - y.mean()) / np.sum((y - y.mean()) ** 2)
     slope = float(weights @ z)
     n = len(y)
     by_z, by_y = np.eye(2 * n)[0::2], np.eye(2 * n)[1::2]
     through = weights @ (by_z - slope * by_y)  # to first order an error of d_y acts as one of d_z times the slope
-    slope_sigma = float(np.sqrt(through @ np.array(d["covariance"]) @ through))
-    alpha = abs(seen["beta_rad"]) - abs(np.arctan(slope))
-    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen["beta_sigma_rad"]))
+    slope_sigma = float(np.sqrt(through @ seen.deflection.covariance @ through))
+    alpha = abs(seen.beta_rad.value) - abs(np.arctan(slope))
+    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
 
 
-def felt_friction(seen: dict, felt: dict) -> tuple[float, float]:
+def felt_friction(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, float]:
     """α = |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip; unknown
     where the moments are not those of the seen shape."""
-    phi = number(felt.get("phi_felt_rad"))
-    if not (slips(seen) and np.isfinite(phi)) or felt.get("apart"):
+    beta, phi = seen.beta_rad, felt.phi_felt_rad
+    if not (slips(seen) and np.isfinite(phi.value)) or felt.apart:
         return UNKNOWN
-    alpha = abs(number(seen["beta_rad"])) - abs(phi)
-    return alpha, float(np.hypot(number(seen["beta_sigma_rad"]), number(felt["phi_felt_sigma_rad"])))
+    return abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma))
 
 
 def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:

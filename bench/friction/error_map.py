@@ -17,6 +17,7 @@ from bench.base.drawing import is_drawn, save, style
 from bench.base.results import hash_of
 from bench.base.tables import write_table
 from bench.friction.tables import SurfaceFriction
+from bench.records.trial import TrialResult
 from bench.trials.compare import judge
 from estimator.threshold import distance_error
 
@@ -40,7 +41,7 @@ class Cell:
 
 
 def write_error_map(
-    out: Path, results: Sequence[dict], found: Sequence[SurfaceFriction], alpha_est_rad: float
+    out: Path, results: Sequence[TrialResult], found: Sequence[SurfaceFriction], alpha_est_rad: float
 ) -> list[str]:
     """error_map.csv, and error_map.png where there is a cell. Names of the pictures."""
     cells = measured_cells(results, found, alpha_est_rad)
@@ -55,7 +56,7 @@ def write_error_map(
 
 
 def measured_cells(
-    results: Sequence[dict], found: Sequence[SurfaceFriction], alpha_est_rad: float
+    results: Sequence[TrialResult], found: Sequence[SurfaceFriction], alpha_est_rad: float
 ) -> list[Cell]:
     """The cells that hold a whisk, by slope and friction."""
     cells: dict[tuple, list[tuple[float, float]]] = {}
@@ -71,7 +72,7 @@ def _edge(value: float, size: float) -> float:
     return float(np.floor(value / size) * size)
 
 
-def _whisks(results: Sequence[dict], found: Sequence[SurfaceFriction]) -> Iterator[tuple]:
+def _whisks(results: Sequence[TrialResult], found: Sequence[SurfaceFriction]) -> Iterator[tuple]:
     """(β in degrees, α in rad, error in per cent) of every whisk for which all three are known, and how its whisker's
     taper changes a relative error."""
     errors = {(j.trial, j.whisk): j for j in judge(results) if j.estimator == "with_friction" and not j.one_factor}

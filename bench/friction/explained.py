@@ -12,12 +12,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.base.drawing import is_drawn, save, style
-from bench.base.results import hash_of, number
+from bench.base.results import hash_of
 from bench.base.tables import write_table
 from bench.friction.alphas import seen_friction
 from bench.gauges.readings import known_from_pictures
+from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
-from bench.trials.compare import whisks
 from estimator.distance import with_friction
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
@@ -32,7 +32,7 @@ _LOOK = {
 _MOST_NAMED = 40  # whisks; more bars than that have no room for a name each
 
 
-def write_explained(out: Path, results: Iterable[dict], whisker: Whisker) -> list[str]:
+def write_explained(out: Path, results: Iterable[TrialResult], whisker: Whisker) -> list[str]:
     """explained.csv: a row for each whisk that has a truth and an estimate by (10), and their mean; its bar chart.
 
     Names of the pictures.
@@ -49,29 +49,31 @@ def write_explained(out: Path, results: Iterable[dict], whisker: Whisker) -> lis
     return [path.name]
 
 
-def explained_rows(results: Iterable[dict], whisker: Whisker) -> Iterator[dict]:
+def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator[dict]:
     """Rows by column; cells that cannot be known are NaN."""
     for result, seen, felt in whisks(results):
-        answer = next((a for a in felt["estimates"] if a["estimator"] == "with_friction"), None)
-        if answer is None or not seen.get("deflection"):
+        answer = next((a for a in felt.estimates if a.estimator == "with_friction"), None)
+        if answer is None or seen.deflection is None:
             continue
         alpha, sigma = seen_friction(seen)
-        row = {"trial": result["trial"]["name"], "whisk": seen["whisk"]}
+        row = {"trial": result.trial.name, "whisk": seen.whisk}
         row |= {"alpha_seen_deg": float(np.degrees(alpha)), "alpha_seen_sigma_deg": float(np.degrees(sigma))}
         yield row | _shares(result, seen, felt, answer, alpha, whisker)
 
 
-def _shares(result: dict, seen: dict, felt: dict, answer: dict, alpha_seen: float, whisker: Whisker) -> dict:
+def _shares(
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow, alpha_seen: float, whisker: Whisker
+) -> dict:
     """The error of (10) and what each replacement changes, mm."""
-    theta, alpha_est = np.radians(result["theta_deg"]), answer["alpha_est_rad"]
-    late = felt["touch_felt_rad"] - seen["touch_rad"]
-    m_felt = (felt["m_y_Nmm"], felt["m_z_Nmm"])
+    theta, alpha_est = np.radians(result.theta_deg), answer.alpha_est_rad
+    late = felt.touch_felt_rad.value - seen.touch_rad.value
+    m_felt = (felt.m_y_Nmm.value, felt.m_z_Nmm.value)
     m_seen = _moments_seen(seen, theta + late, whisker)
     alpha_used = alpha_seen if np.isfinite(alpha_seen) else alpha_est
     steps = [(theta, m_felt, alpha_est), (theta + late, m_felt, alpha_est), (theta + late, m_seen, alpha_est)]
     steps.append((theta + late, m_seen, max(alpha_used, 0.0)))
     d_x = [by_10(t, *m, a, whisker) for t, m, a in steps]
-    truth = number(seen["d_x_mm"])
+    truth = seen.d_x_mm.value
     by = {name: d_x[k] - d_x[k + 1] for k, name in enumerate(("by_touch_mm", "by_moments_mm", "by_alpha_mm"))}
     return {"d_x_mm": truth, "error_mm": d_x[0] - truth, **by, "remainder_mm": d_x[3] - truth}
 
@@ -82,7 +84,7 @@ def by_10(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker: Whisker):
     return beam.distance_mm(with_friction(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, beam.C_Nmm2))
 
 
-def _moments_seen(seen: dict, theta: float, whisker: Whisker) -> tuple[float, float]:
+def _moments_seen(seen: SeenWhisk, theta: float, whisker: Whisker) -> tuple[float, float]:
     """(m_y, m_z) of the exact rod through the contact seen, at a pushing angle: per angle, between the frames."""
     known = known_from_pictures(seen, whisker)
     if known is None:

@@ -5,14 +5,15 @@ judges. The run with α as seen is no estimate that a robot could make: it shows
 is known.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from bench.base.results import number, plain
 from bench.base.settings import Settings
 from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
+from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.estimates import answer
 from estimator.beam import Beam
@@ -37,48 +38,45 @@ def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
-def with_runs(results: Iterable[dict], whisker: Whisker, settings: Settings) -> list[dict]:
+def with_runs(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> list[TrialResult]:
     """The results, (10) with the session's sigma of α_est, and each whisk's estimates followed by those of (10) with α
     fitted and with α seen, where known."""
     results = list(results)
     found = surfaces(results, whisker.beam)
-    by_key = {(s.name, s.speed_deg_s): s for s in found}
-    return [_with_runs(result, by_key, whisker, alpha_est_sigma(found, settings)) for result in results]
+    by_panel, sigma_rad = {s.panel: s for s in found}, alpha_est_sigma(found, settings)
+    return [_with_runs(result, by_panel, whisker.beam, sigma_rad) for result in results]
 
 
-def _with_runs(result: dict, by_key: dict, whisker: Whisker, sigma_rad: float) -> dict:
-    trial, beam = result["trial"], whisker.beam
-    surface = by_key.get((trial["surface"], number(trial["speed_deg_s"])))
-    felt = [
-        felt | _answers(result, seen, felt, surface, beam, sigma_rad)
-        for seen, felt in zip(result["seen"]["whisks"], result["felt"]["whisks"])
-    ]
-    return result | {"felt": result["felt"] | {"whisks": felt}}
+def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, sigma_rad: float) -> TrialResult:
+    surface = by_panel.get(result.trial.panel)
+    felt = tuple(
+        replace(felt, estimates=_answers(result, seen, felt, surface, beam, sigma_rad))
+        for _, seen, felt in whisks([result])
+    )
+    return replace(result, felt=replace(result.felt, whisks=felt))
 
 
-def _answers(result: dict, seen: dict, felt: dict, surface: Surface | None, beam: Beam, sigma_rad: float) -> dict:
-    """The whisk's estimates with the new ones, and those with one factor a channel."""
-    if not felt["estimates"]:
-        return {}
-    fit = surface and surface.fit_without(result["trial"]["name"], seen["whisk"])
+def _answers(
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, surface: Surface | None, beam: Beam, sigma_rad: float
+) -> tuple[EstimateRow, ...]:
+    """The whisk's estimates with the new ones."""
+    if not felt.estimates:
+        return ()
+    fit = surface and surface.fit_without(result.trial.name, seen.whisk)
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
-    whisk = _whisk(felt, np.radians(result["theta_deg"]), beam)
-    known = ((FITTED, fitted), (SEEN, seen_friction(seen)))
-    runs = [_by_10(name, whisk, max(alpha, 0.0), sigma) for name, (alpha, sigma) in known if np.isfinite(alpha)]
+    whisk = _whisk(felt, np.radians(result.theta_deg), beam)
+    angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
+    runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma) for name, (a, sigma) in angles if np.isfinite(a)]
     given = [
-        _by_10(a["estimator"], whisk, a["alpha_est_rad"], sigma_rad) if a["estimator"] == GIVEN else a
-        for a in felt["estimates"]
+        answer(a.estimator, with_friction, whisk, a.alpha_est_rad, sigma_rad) if a.estimator == GIVEN else a
+        for a in felt.estimates
     ]
-    return {"estimates": [*given, *runs]}
+    return (*given, *runs)
 
 
-def _by_10(name: str, whisk: Whisk, alpha_rad: float, sigma_rad: float) -> dict:
-    return plain(answer(name, with_friction, whisk, alpha_rad, sigma_rad))
-
-
-def _whisk(felt: dict, theta_rad: float, beam: Beam) -> Whisk:
+def _whisk(felt: FeltWhisk, theta_rad: float, beam: Beam) -> Whisk:
     """The whisk at the wanted angle: all that (10) looks at."""
     no_samples = (np.zeros(0),) * 4
-    covariance, with_theta = np.array(felt["covariance_at"]), np.array(felt["theta_moment_covariance_at"])
-    moments = felt["m_y_Nmm"], felt["m_z_Nmm"]
-    return Whisk(*no_samples, theta_rad, *moments, covariance, felt["theta_sigma_rad"], beam, with_theta)
+    moments = felt.m_y_Nmm.value, felt.m_z_Nmm.value
+    covariances = felt.covariance_at, felt.theta_sigma_rad, beam, felt.theta_moment_covariance_at
+    return Whisk(*no_samples, theta_rad, *moments, *covariances)

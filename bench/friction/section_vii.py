@@ -14,11 +14,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import stdtrit
 
-from bench.base.results import number
 from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.friction.explained import by_10
+from bench.records.trial import TrialResult, whisks
 from bench.session.whisker import Whisker
-from bench.trials.compare import whisks
 from estimator.friction import alpha_from_tilts, confidence
 from estimator.uncertainty import Z_95
 
@@ -58,21 +57,24 @@ class Contact:
         return replace(self, phi_rad=phi, m_y_Nmm=float(m * np.sin(phi)), m_z_Nmm=float(m * np.cos(phi)))
 
 
-def contacts(results: Sequence[dict], surface: str, speed_deg_s: float) -> list[Contact]:
+def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[Contact]:
     """The measured whisks of one surface and speed."""
     return [
         Contact(
-            np.radians(number(r["trial"]["beta_nominal_deg"])),
-            number(r["trial"]["d_x_nominal_mm"]),
-            float(np.radians(r["theta_deg"])),
-            *(felt[name] for name in ("m_y_Nmm", "m_z_Nmm", "phi_felt_rad", "phi_felt_sigma_rad")),
-            r["trial"]["name"],
+            np.radians(result.trial.beta_nominal_deg),
+            result.trial.d_x_nominal_mm,
+            float(np.radians(result.theta_deg)),
+            felt.m_y_Nmm.value,
+            felt.m_z_Nmm.value,
+            felt.phi_felt_rad.value,
+            felt.phi_felt_rad.sigma,
+            result.trial.name,
         )
-        for r, _, felt in whisks(results)
-        if r["trial"]["purpose"] == "measure"
-        and (r["trial"]["surface"], number(r["trial"]["speed_deg_s"])) == (surface, speed_deg_s)
-        and felt.get("phi_felt_rad") is not None
-        and not felt.get("apart")
+        for result, _, felt in whisks(results)
+        if result.trial.purpose == "measure"
+        and result.trial.panel == panel
+        and felt.has_moments
+        and not felt.apart
     ]
 
 

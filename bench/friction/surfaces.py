@@ -1,20 +1,20 @@
 """Whisks by surface and speed: the points of Fig. 8 and the friction angle α that (13), (14) fit them with."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.base.results import number
-from bench.trials.compare import slope_deg, whisks
+from bench.records.trial import TrialResult, whisks
+from bench.trials.compare import slope_deg
 from estimator.beam import Beam
-from estimator.friction import FrictionFit, fit_alpha
+from estimator.friction import FrictionFit, Pushes, fit_alpha
 
 # From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
 # many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
 _MANY = 8
 _SAME_SLOPE_DEG = 2.5
-_FITTED = ("beta_deg", "d_x_mm", "theta_rad", "m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")
+_FITTED = {"m_y": "m_y_Nmm", "m_z": "m_z_Nmm", "d_x": "d_x_mm", "theta": "theta_rad"}  # fields of Pushes and of Felt
 
 
 @dataclass(frozen=True)
@@ -61,14 +61,19 @@ class Surface:
     """One panel of Fig. 8: whisks of one surface and speed, and the fitted α (None where they do not hold it)."""
 
     name: str
-    speed_deg_s: float
+    speed_deg_s: float | None
     felt: tuple[Felt, ...]
     fit: FrictionFit | None
     beam: Beam
 
     @property
+    def panel(self) -> tuple[str, float | None]:
+        """Surface and speed, as `TrialFacts.panel` has them."""
+        return self.name, self.speed_deg_s
+
+    @property
     def title(self) -> str:
-        speed = f"{self.speed_deg_s:g}°/s" if np.isfinite(self.speed_deg_s) else ""
+        speed = f"{self.speed_deg_s:g}°/s" if self.speed_deg_s is not None else ""
         return ", ".join(filter(None, [self.name or "surface not named", speed]))
 
     @property
@@ -101,9 +106,9 @@ class Surface:
         return [_point(group, self.common_d_x_mm, self.beam) for group in groups]
 
 
-def surfaces(results: Iterable[dict], beam: Beam) -> list[Surface]:
+def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[Surface]:
     """A Surface for each surface and speed among the measure trials, in the order in which they come."""
-    groups: dict[tuple, list[Felt]] = {}
+    groups: dict[tuple[str, float | None], list[Felt]] = {}
     for key, felt in _felt(results):
         groups.setdefault(key, []).append(felt)
     return [Surface(*key, tuple(felt), _fit(felt, beam), beam) for key, felt in groups.items()]
@@ -120,40 +125,34 @@ def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
         yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {len(surface.felt)} whisks{doubt}"
 
 
-def _felt(results: Iterable[dict]) -> Iterator[tuple[tuple[str, float], Felt]]:
+def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | None], Felt]]:
     every = ((place, *whisk) for place, result in enumerate(results) for whisk in whisks([result]))
     for recording, result, seen, felt in every:
-        trial = result["trial"]
-        d_x = number(seen.get("d_x_mm"))
-        nominal = not np.isfinite(d_x)
-        d_x = number(trial["d_x_nominal_mm"]) if nominal else d_x
+        trial, nominal = result.trial, not seen.has_truth
+        d_x = trial.d_x_nominal_mm if nominal else seen.d_x_mm.value
         beta = slope_deg(result, seen)
-        sound = felt.get("m_y_Nmm") is not None and not felt.get("apart")
-        if trial["purpose"] == "measure" and sound and np.isfinite([d_x, beta]).all():
-            values = [felt[k] for k in ("m_y_Nmm", "m_z_Nmm", "m_y_sigma_Nmm", "m_z_sigma_Nmm")]
-            phi = [float(np.degrees(felt[k])) for k in ("phi_felt_rad", "phi_felt_sigma_rad")]
-            theta = float(np.radians(result["theta_deg"]))
-            key, name = (trial["surface"], number(trial["speed_deg_s"])), (trial["name"], seen["whisk"])
-            yield key, Felt(beta, d_x, theta, *values, *phi, nominal, recording, *name)
+        sound = felt.has_moments and not felt.apart
+        if trial.purpose == "measure" and sound and np.isfinite([d_x, beta]).all():
+            m_y, m_z, phi = felt.m_y_Nmm, felt.m_z_Nmm, felt.phi_felt_rad
+            moments = m_y.value, m_z.value, m_y.sigma, m_z.sigma
+            angle = float(np.degrees(phi.value)), float(np.degrees(phi.sigma))
+            theta = float(np.radians(result.theta_deg))
+            yield trial.panel, Felt(beta, d_x, theta, *moments, *angle, nominal, recording, trial.name, seen.whisk)
 
 
 def _fit(felt: list[Felt], beam: Beam) -> FrictionFit | None:
     if len(felt) < 2:
         return None
-    columns = {name: np.array([getattr(f, name) for f in felt]) for name in _FITTED}
-    how = {} if len(felt) >= _MANY else {"sigma_y": columns["m_y_sigma_Nmm"], "sigma_z": columns["m_z_sigma_Nmm"]}
+    columns = {name: np.array([getattr(f, field) for f in felt]) for name, field in _FITTED.items()}
+    columns["d_x"] = beam.as_cylinder_mm(columns["d_x"])
+    pushes = Pushes(np.radians([f.beta_deg for f in felt]), **columns, C=beam.C_Nmm2)
     recording = np.array([f.recording for f in felt])
     if len(set(recording)) >= _MANY:
-        how = {"recording": recording}
-    fit = fit_alpha(
-        np.radians(columns["beta_deg"]),
-        columns["m_y_Nmm"],
-        columns["m_z_Nmm"],
-        beam.as_cylinder_mm(columns["d_x_mm"]),
-        columns["theta_rad"],
-        beam.C_Nmm2,
-        **how,
-    )
+        pushes = replace(pushes, recording=recording)
+    elif len(felt) < _MANY:
+        sigmas = np.array([(f.m_y_sigma_Nmm, f.m_z_sigma_Nmm) for f in felt]).T
+        pushes = replace(pushes, sigma_y=sigmas[0], sigma_z=sigmas[1])
+    fit = fit_alpha(pushes)
     return fit if np.isfinite(fit.alpha_rad) else None
 
 

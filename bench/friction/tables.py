@@ -10,9 +10,10 @@ from bench.base.tables import sigma_name, write_table
 from bench.friction.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
 from bench.friction.section_vii import Way, by_consistency, by_tilting, contacts, weights
 from bench.friction.surfaces import Surface, surfaces
+from bench.records.phases import KINETIC, STATIC
+from bench.records.trial import TrialResult
 from bench.session.whisker import Whisker
-from bench.trials.compare import judge
-from bench.trials.phases import KINETIC, STATIC
+from bench.trials.compare import Judged, judge
 
 RECORDS = ("seen", "felt")
 _APART = tuple((kind, record) for kind in (STATIC, KINETIC) for record in RECORDS)
@@ -63,16 +64,21 @@ class SurfaceFriction:
         return way.alpha_rad, way.sigma_rad
 
 
-def friction_of(results: Sequence[dict], whisker: Whisker, alpha_est_rad: float) -> list[SurfaceFriction]:
+def friction_of(results: Sequence[TrialResult], whisker: Whisker, alpha_est_rad: float) -> list[SurfaceFriction]:
     """Every surface and speed among the measure trials."""
     alphas = alphas_of(results)
     return [_friction(s, results, alphas, whisker, alpha_est_rad) for s in surfaces(results, whisker.beam)]
 
 
-def _friction(surface: Surface, results, alphas, whisker: Whisker, alpha_est_rad: float) -> SurfaceFriction:
-    key = (surface.name, surface.speed_deg_s)
-    mine = tuple(a for a in alphas if a.purpose == "measure" and _same(key, (a.surface, a.speed_deg_s)))
-    felt = contacts(results, *key)
+def _friction(
+    surface: Surface,
+    results: Sequence[TrialResult],
+    alphas: Sequence[WhiskAlphas],
+    whisker: Whisker,
+    alpha_est_rad: float,
+) -> SurfaceFriction:
+    mine = tuple(a for a in alphas if a.purpose == "measure" and a.panel == surface.panel)
+    felt = contacts(results, surface.panel)
     ways = (by_tilting(felt), by_consistency(felt, whisker))
     errors = {(j.trial, j.whisk): j.error_percent for j in judge(results) if _is_given(j)}
     phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for f in surface.felt}
@@ -82,12 +88,7 @@ def _friction(surface: Surface, results, alphas, whisker: Whisker, alpha_est_rad
     return SurfaceFriction(surface, mine, ways, _rms(squares, np.ones(len(squares))), _rms(squares, trusted))
 
 
-def _same(one: tuple, other: tuple) -> bool:
-    """Speeds that are not given (NaN) are alike."""
-    return one[0] == other[0] and (one[1] == other[1] or (np.isnan(one[1]) and np.isnan(other[1])))
-
-
-def _is_given(judged) -> bool:
+def _is_given(judged: Judged) -> bool:
     return judged.estimator == "with_friction" and not judged.one_factor
 
 
@@ -95,7 +96,9 @@ def _rms(squares, shares) -> float:
     return float(np.sqrt(shares @ squares / shares.sum())) if len(squares) and shares.sum() > 0 else float("nan")
 
 
-def write_friction(out: Path, results: Sequence[dict], found: Sequence[SurfaceFriction], alpha_est_rad: float) -> None:
+def write_friction(
+    out: Path, results: Sequence[TrialResult], found: Sequence[SurfaceFriction], alpha_est_rad: float
+) -> None:
     """friction.csv, phases.csv and surfaces.csv."""
     alphas = alphas_of(results)
     phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for s in found for f in s.surface.felt}

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.base.results import number
 from bench.base.settings import Settings
+from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, forward_strokes
 from bench.session.trial import Trial
 from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
+from vision.truth.value import Value
 
 _GUARD_RAD = np.radians(0.2)
 _LEAST_FREE = 50  # samples
@@ -21,10 +22,10 @@ _LEAST_FREE = 50  # samples
 GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
 
 
-def lateness(seen: dict, felt: dict) -> tuple[float, float]:
-    """Felt less seen touch of a whisk's two records, rad, and its sigma."""
-    sigmas = seen["touch_sigma_rad"], number(felt.get("touch_felt_sigma_rad"))
-    return number(felt.get("touch_felt_rad")) - seen["touch_rad"], float(np.linalg.norm(sigmas))
+def lateness(seen: SeenWhisk, felt: FeltWhisk) -> Value:
+    """Felt less seen touch of a whisk, rad."""
+    sigma = float(np.hypot(seen.touch_rad.sigma, felt.touch_felt_rad.sigma))
+    return Value(felt.touch_felt_rad.value - seen.touch_rad.value, sigma)
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.base.results import number
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke
 from bench.gauges.matrix import to_follicle
 from bench.gauges.rod import moment_at_clamp
+from bench.records.trial import SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.beam import rigidity_at
@@ -69,39 +69,41 @@ class Known:
     scale_sigma: float
 
 
-def pairs_of(trial: Trial, seen: dict, stroke: Stroke, drift_rate, whisker: Whisker, theta_rad: float) -> Pairs | None:
+def pairs_of(
+    trial: Trial, seen: SeenWhisk, stroke: Stroke, drift_rate, whisker: Whisker, theta_rad: float
+) -> Pairs | None:
     """Pairs of one whisk, or None where it has none. theta_rad: the paper's pushing angle."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:
         return None
-    known = known_from_pictures(seen, whisker) if seen.get("deflection") else known_from_nominal(trial, touch, whisker)
+    is_seen = seen.deflection is not None
+    known = known_from_pictures(seen, whisker) if is_seen else known_from_nominal(trial, touch, whisker)
     if known is None:
         return None
     rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, known.d_x_mm)
-    return _paired(trial, seen["whisk"], known, stroke, touch, rigid_Nmm, theta_rad)
+    return _paired(trial, seen.whisk, known, stroke, touch, rigid_Nmm, theta_rad)
 
 
-def known_from_pictures(seen: dict, whisker: Whisker) -> Known | None:
+def known_from_pictures(seen: SeenWhisk, whisker: Whisker) -> Known | None:
     """Moments of the frames in which the whisker touches, from the exact rod through the contact that was seen.
 
     The deflection is from the unbent whisker as the free stroke shows it, so a sag or a set of the wire is no moment.
     """
-    d = seen["deflection"]
-    theta = np.array(d["theta_rad"], dtype=float)
-    good = theta > _LEAST_THETA_RAD
+    d = seen.deflection
+    good = d.theta_rad > _LEAST_THETA_RAD
     if not good.any():
         return None
-    across = np.stack([d["across_z_mm"], d["across_y_mm"]], axis=1)[good]
-    along, d_x = np.array(d["along_mm"])[good], number(seen["d_x_mm"])
-    share = _drawn_share(across, along, np.array(d["slip_mm"])[good])
+    across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
+    along, d_x = d.along_mm[good], seen.d_x_mm
+    share = _drawn_share(across, along, d.slip_mm[good])
     moments, by_friction = _with_friction(along, across, share, whisker)
     stiffness = np.repeat(moments_per_mm(moments, across), 2)
     rows = np.repeat(good, 2)
-    covariance = np.array(d["covariance"])[np.ix_(rows, rows)] * np.outer(stiffness, stiffness)
+    covariance = d.covariance[np.ix_(rows, rows)] * np.outer(stiffness, stiffness)
     covariance = covariance + _shared(_FRICTION_SIGMA * by_friction)
-    by_distance = 2.0 * number(seen["d_x_sigma_mm"]) / d_x
-    motor = np.array(d["motor_rad"])[good]
-    return Known(number(seen["touch_rad"]), d_x, motor, theta[good], moments, covariance, by_distance)
+    by_distance = 2.0 * d_x.sigma / d_x.value
+    theta, motor = d.theta_rad[good], d.motor_rad[good]
+    return Known(seen.touch_rad.value, d_x.value, motor, theta, moments, covariance, by_distance)
 
 
 def _drawn_share(across, along, slip) -> np.ndarray:

@@ -11,11 +11,12 @@ from bench.base.drawing import SLOPES_DEG, colour_of, is_drawn, label_of, save, 
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.friction.surfaces import Surface, surfaces
+from bench.friction.surfaces import Surface
+from bench.records.trial import TrialResult
+from bench.report.evaluation import Evaluation
 from bench.report.figure_8 import figure_8
 from bench.report.overlays import draw_overlays
 from bench.report.planes import draw_planes
-from bench.session.session import Session
 from bench.session.trial import Trial
 from bench.trials.compare import Judged, judge
 from estimator.threshold import distance_error
@@ -23,10 +24,11 @@ from estimator.threshold import distance_error
 _MARKERS = "osD^vP"
 
 
-def write_figures(session: Session, out: Path, results: Sequence[dict], settings: Settings, pool: Workers) -> list[str]:
+def write_figures(evaluation: Evaluation, pool: Workers) -> list[str]:
     """All figures that the results allow, each made again only where what it shows has changed. Their names."""
-    fitted = surfaces(results, session.whisker.beam)
-    stamp = hash_of([r["hash"] for r in results], hash_of_code(DRAWING))
+    results, out, settings = evaluation.results, evaluation.out, evaluation.settings
+    fitted = [friction.surface for friction in evaluation.friction]
+    stamp = hash_of([r.hash for r in results], hash_of_code(DRAWING))
     names = ["fig8.png"] if fitted else []
     judged = [j for j in judge(results) if j.purpose == "measure" and np.isfinite(j.error_percent)]
     names += ["error_against_slope.png"] if judged else []
@@ -36,24 +38,23 @@ def write_figures(session: Session, out: Path, results: Sequence[dict], settings
     if judged and not is_drawn(out / names[-1], stamp):
         with style():
             save(error_against_slope(judged, fitted, settings), out / names[-1], stamp)
-    tasks = [(session.trial(r["trial"]["name"]), r, _friction_of(r, fitted, settings), out) for r in results]
+    tasks = [(evaluation.session.trial(r.trial.name), r, _friction_of(r, fitted, settings), out) for r in results]
     drawn = pool.run(draw_trial, tasks, "figures")
     return [*names, *(name for group in drawn for name in group)]
 
 
-def _friction_of(result: dict, fitted: Sequence[Surface], settings: Settings) -> tuple[float, str]:
+def _friction_of(result: TrialResult, fitted: Sequence[Surface], settings: Settings) -> tuple[float, str]:
     """Half opening of the friction cone to draw, rad, and where it comes from."""
-    trial = result["trial"]
     for surface in fitted:
-        if (surface.name, surface.speed_deg_s) == (trial["surface"], trial["speed_deg_s"]) and surface.fit is not None:
+        if surface.panel == result.trial.panel and surface.fit is not None:
             return surface.alpha_rad, "fitted"
     return settings.alpha_est_rad, "assumed"
 
 
-def draw_trial(task: tuple[Trial, dict, tuple[float, str], Path]) -> list[str]:
+def draw_trial(task: tuple[Trial, TrialResult, tuple[float, str], Path]) -> list[str]:
     """Sensing plane and overlays of one trial; names of the files, relative to the results' folder."""
     trial, result, friction, out = task
-    stamp = hash_of(result["hash"], friction, hash_of_code(DRAWING))
+    stamp = hash_of(result.hash, friction, hash_of_code(DRAWING))
     with style():
         return [*draw_planes(result, friction, out, stamp), *draw_overlays(trial, result, out, stamp)]
 
@@ -106,7 +107,7 @@ def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], se
 
 
 def _points(axes: Axes, judged: Sequence[Judged], number: int, name: str, fitted: Sequence[Surface]) -> None:
-    keys = [(s.name, s.speed_deg_s) for s in fitted]
+    keys = [s.panel for s in fitted]
     for one_factor in (False, True):
         for place, key in enumerate(keys):
             chosen = [j for j in judged if j.one_factor == one_factor and (j.surface, j.speed_deg_s) == key]

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.base.drawing import is_drawn, save
-from bench.base.results import number
+from bench.records.trial import SeenWhisk, TrialResult
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.trial import Trial
@@ -18,34 +18,34 @@ _AROUND_PX = 34  # half width of the view that is enlarged
 _MARGIN_PX = 70
 
 
-def draw_overlays(trial: Trial, result: dict, out: Path, stamp: str) -> list[str]:
+def draw_overlays(trial: Trial, result: TrialResult, out: Path, stamp: str) -> list[str]:
     """overlays/<trial>_<whisk>.png of each whisk that was seen; names of the files."""
     names = []
-    for whisk in result["seen"]["whisks"]:
-        if whisk.get("overlay"):
-            names.append(f"overlays/{trial.name}_{whisk['whisk']}.png")
+    for whisk in result.seen.whisks:
+        if whisk.overlay:
+            names.append(f"overlays/{trial.name}_{whisk.whisk}.png")
             if not is_drawn(out / names[-1], stamp):
                 save(_figure(trial, whisk), out / names[-1], stamp, dpi=130)
     return names
 
 
-def _figure(trial: Trial, whisk: dict) -> Figure:
-    chosen = whisk["overlay"]
-    cameras = list(chosen["touch"]["cameras"])
-    pictures = _pictures(trial, cameras, {chosen[m]["frame"] for m in _MOMENTS})
+def _figure(trial: Trial, whisk: SeenWhisk) -> Figure:
+    chosen = whisk.overlay
+    cameras = list(chosen["touch"].cameras)
+    pictures = _pictures(trial, cameras, {chosen[m].frame for m in _MOMENTS})
     figure = Figure(figsize=(13.0, 3.9 * len(cameras)), layout="constrained")
     grid = figure.subplots(len(cameras), 2, squeeze=False)
     for row, camera in zip(grid, cameras):
         for axes, moment in zip(row, _MOMENTS):
-            frame = chosen[moment]["frame"]
-            _draw(axes, pictures[camera].get(frame), chosen[moment]["cameras"][camera])
+            frame = chosen[moment].frame
+            _draw(axes, pictures[camera].get(frame), chosen[moment].cameras[camera])
             axes.set_title(f"{camera}, frame {frame}, {_MOMENTS[moment]}: {_theta(whisk, frame)}", loc="left")
     return figure
 
 
-def _theta(whisk: dict, frame: int) -> str:
-    frames = whisk["frames"]
-    return f"{np.degrees(number(frames['theta_rad'][frames['index'].index(frame)])):+.2f}° past touch"
+def _theta(whisk: SeenWhisk, frame: int) -> str:
+    (theta_rad,) = whisk.frames.theta_rad.value[whisk.frames.index == frame]
+    return f"{np.degrees(theta_rad):+.2f}° past touch"
 
 
 def _pictures(trial: Trial, cameras, frames: set[int]) -> dict[str, dict[int, np.ndarray]]:
@@ -58,14 +58,13 @@ def _pictures(trial: Trial, cameras, frames: set[int]) -> dict[str, dict[int, np
     return found
 
 
-def _draw(axes: Axes, picture, lines: dict) -> None:
+def _draw(axes: Axes, picture, lines: dict[str, np.ndarray]) -> None:
     """The picture around the whisker with its lines, and the contact enlarged beside it."""
-    lines = {name: _as_points(line) for name, line in lines.items()}
     if picture is None:
         axes.text(0.5, 0.5, "no picture", transform=axes.transAxes, ha="center")
         axes.set_axis_off()
         return
-    contact = lines["contact"][0]
+    contact = lines["contact"]
     inset = axes.inset_axes((0.76, 0.02, 0.23, 0.41))
     for target in (axes, inset):
         target.imshow(picture, cmap="gray", vmax=np.percentile(picture, 99.8), interpolation="nearest")
@@ -79,11 +78,6 @@ def _draw(axes: Axes, picture, lines: dict) -> None:
     for edge in inset.spines.values():
         edge.set(visible=True, color="white", lw=1.2)
     axes.indicate_inset_zoom(inset, edgecolor="white", lw=0.8)
-
-
-def _as_points(line) -> np.ndarray:
-    """(n, 2) of a polyline or of one point, as read from a result."""
-    return np.array([[number(v) for v in point] for point in (line if isinstance(line[0], list) else [line])])
 
 
 def _look_at(axes: Axes, picture, wire) -> None:

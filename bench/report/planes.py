@@ -8,18 +8,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon, Wedge
 
 from bench.base.drawing import is_drawn, save
-from bench.base.results import number
+from bench.records.trial import SeenTrial, SeenWhisk, TrialResult
 
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
 _MARGIN_MM = 2.2
 
 
-def draw_planes(result: dict, friction: tuple[float, str], out: Path, stamp: str) -> list[str]:
+def draw_planes(result: TrialResult, friction: tuple[float, str], out: Path, stamp: str) -> list[str]:
     """planes/<trial>.png, a panel for each whisk that was seen to be pushed; nothing where there is none."""
-    whisks = [w for w in result["seen"]["whisks"] if w.get("d_x_mm") is not None and w["at"]["d_y_mm"] is not None]
+    whisks = [w for w in result.seen.whisks if w.has_truth and np.isfinite(w.at.d_y_mm.value)]
     if not whisks:
         return []
-    name = f"planes/{result['trial']['name']}.png"
+    name = f"planes/{result.trial.name}.png"
     if not is_drawn(out / name, stamp):
         columns = min(len(whisks), 3)
         rows = -(-len(whisks) // columns)
@@ -33,26 +33,26 @@ def draw_planes(result: dict, friction: tuple[float, str], out: Path, stamp: str
     return [name]
 
 
-def sensing_plane(axes: Axes, result: dict, whisk: dict, friction: tuple[float, str]) -> None:
+def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: tuple[float, str]) -> None:
     """One whisk: y to the right, z up, both in the contact frame from P0 on."""
     path = contact_path(whisk)
-    beta, theta = whisk["beta_rad"], whisk["at"]["theta_rad"]
+    beta, at = whisk.beta_rad.value, whisk.at
     along, normal = np.array([np.sin(beta), np.cos(beta)]), np.array([-np.cos(beta), np.sin(beta)])
-    contact = whisk["at"]["slip_mm"] * along
-    virtual = contact + np.array([whisk["at"]["d_y_mm"], -whisk["at"]["d_z_mm"]])
-    _draw_bar(axes, result["seen"], along, normal)
+    contact = at.slip_mm.value * along
+    virtual = contact + np.array([at.d_y_mm.value, -at.d_z_mm.value])
+    _draw_bar(axes, result.seen, along, normal)
     _draw_cone(axes, contact, normal, friction, float(np.linalg.norm(virtual - contact)))
-    _draw_whisker(axes, result["seen"], contact, virtual, path)
+    _draw_whisker(axes, result.seen, contact, virtual, path)
     _draw_angles(axes, whisk, contact, virtual)
     _draw_slip(axes, contact, normal)
     points = np.array([np.zeros(2), contact, virtual])
     low, high = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="y  [mm]", ylabel="z  [mm]")
-    axes.set_title(f"{result['trial']['name']}, whisk {whisk['whisk']}, θ = {np.degrees(theta):.2f}°", loc="left")
+    axes.set_title(f"{result.trial.name}, whisk {whisk.whisk}, θ = {np.degrees(at.theta_rad):.2f}°", loc="left")
     axes.text(
         0.98,
         0.02,
-        _values(whisk, friction),
+        _values(whisk),
         transform=axes.transAxes,
         ha="right",
         va="bottom",
@@ -62,20 +62,19 @@ def sensing_plane(axes: Axes, result: dict, whisk: dict, friction: tuple[float, 
     )
 
 
-def contact_path(whisk: dict) -> np.ndarray:
+def contact_path(whisk: SeenWhisk) -> np.ndarray:
     """Contact (n, 2) y, z of the touching frames in the contact frame, from P0."""
-    frames = whisk["frames"]
-    points = np.array([[number(v) for v in p] for p in frames["point_mm"]])[np.array(frames["touching"], dtype=bool)]
-    c, s = np.cos(whisk["touch_rad"]), np.sin(whisk["touch_rad"])
-    turned = (points - np.array(whisk["point_mm"])) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    points = whisk.frames.point_mm.value[whisk.frames.touching]
+    c, s = np.cos(whisk.touch_rad.value), np.sin(whisk.touch_rad.value)
+    turned = (points - whisk.point_mm.value) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     return turned[:, 1:]
 
 
-def _draw_bar(axes: Axes, seen: dict, along, normal) -> None:
+def _draw_bar(axes: Axes, seen: SeenTrial, along, normal) -> None:
     """The bar's outline: its near side one whisker radius from P0, which lies on the whisker's centreline."""
     far = 60.0 * along
-    near = -seen["wire_radius_mm"] * normal
-    width = -2.0 * seen["bar_radius_mm"] * normal
+    near = -seen.wire_radius_mm * normal
+    width = -2.0 * seen.bar_radius_mm * normal
     axes.add_patch(
         Polygon([near - far, near + far, near + far + width, near - far + width], fc=_BAR, ec="0.45", lw=0.8, zorder=0)
     )
@@ -103,8 +102,8 @@ def _draw_cone(axes: Axes, contact, normal, friction: tuple[float, str], size: f
     axes.plot(*zip(contact, contact + reach * normal), color="0.4", lw=0.8, ls="--", zorder=2)
 
 
-def _draw_whisker(axes: Axes, seen: dict, contact, virtual, path) -> None:
-    radius = seen["wire_radius_mm"]
+def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path) -> None:
+    radius = seen.wire_radius_mm
     for place, fill in ((np.zeros(2), "white"), (contact, _WIRE)):
         axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
     axes.add_patch(Circle(virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
@@ -141,9 +140,9 @@ def _draw_slip(axes: Axes, contact, normal) -> None:
     axes.annotate("σ", 0.5 * contact + 1.25 * normal, ha="center", va="center", color=_PATH, fontsize=10)
 
 
-def _draw_angles(axes: Axes, whisk: dict, contact, virtual) -> None:
+def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual) -> None:
     """β between z and the bar at P0, φ between −y and the deflection at V, and the two legs of the deflection."""
-    beta, phi = np.degrees(whisk["beta_rad"]), np.degrees(whisk["at"]["phi_rad"])
+    beta, phi = np.degrees(whisk.beta_rad.value), np.degrees(whisk.at.phi_rad.value)
     corner = np.array([contact[0], virtual[1]])
     axes.plot(*zip(virtual, corner, contact), color="0.35", lw=0.8, ls=":", zorder=2)
     axes.annotate("d$_y$", 0.5 * (virtual + corner) + [0, -0.32], ha="center", fontsize=9, color="0.25")
@@ -164,15 +163,16 @@ def _draw_angles(axes: Axes, whisk: dict, contact, virtual) -> None:
         axes.annotate("β", 1.95 * np.array([np.cos(middle), np.sin(middle)]), ha="center", va="center")
 
 
-def _values(whisk: dict, friction: tuple[float, str]) -> str:
-    at = whisk["at"]
+def _values(whisk: SeenWhisk) -> str:
+    at = whisk.at
     lines = [
-        ("d$_x$", whisk["d_x_mm"], whisk["d_x_sigma_mm"], "mm", 3),
-        ("σ", at["slip_mm"], at["slip_sigma_mm"], "mm", 3),
-        ("β", *np.degrees([whisk["beta_rad"], whisk["beta_sigma_rad"]]), "°", 2),
-        ("φ", *np.degrees([at["phi_rad"], at["phi_sigma_rad"]]), "°", 2),
-        ("α seen", *np.degrees([at["alpha_rad"], at["alpha_sigma_rad"]]), "°", 2),
+        ("d$_x$", whisk.d_x_mm, 1.0, "mm", 3),
+        ("σ", at.slip_mm, 1.0, "mm", 3),
+        ("β", whisk.beta_rad, np.degrees(1.0), "°", 2),
+        ("φ", at.phi_rad, np.degrees(1.0), "°", 2),
+        ("α seen", at.alpha_rad, np.degrees(1.0), "°", 2),
     ]
     return "\n".join(
-        f"{name} = {value:.{digits}f} ± {sigma:.{digits}f} {unit}" for name, value, sigma, unit, digits in lines
+        f"{name} = {scale * of.value:.{digits}f} ± {scale * of.sigma:.{digits}f} {unit}"
+        for name, of, scale, unit, digits in lines
     )

@@ -9,6 +9,8 @@ from bench.base.errors import BadInput
 from bench.base.results import read_result
 from bench.base.tables import write_table
 from bench.friction.surfaces import Surface, friction_lines, surfaces
+from bench.records.plain import from_plain
+from bench.records.trial import TrialResult, WhiskerFacts
 from bench.report.figure_8 import COLUMNS, figure_8, rows
 from estimator.beam import Beam
 
@@ -40,7 +42,7 @@ def pooled(outs: Sequence[Path]) -> list[Surface]:
     _check_given_once(runs)
     for out, results in others:
         _check_alike(out, results[0], first, reference[0])
-    beam = _beam(reference[0]["whisker"])
+    beam = _beam(reference[0].whisker)
     _check_distances([(out, surfaces(results, beam)) for out, results in runs])
     fitted = surfaces([result for _, results in runs for result in results], beam)
     if not fitted:
@@ -49,11 +51,12 @@ def pooled(outs: Sequence[Path]) -> list[Surface]:
     return fitted
 
 
-def _beam(whisker: dict) -> Beam:
-    return Beam.from_rigidity(whisker["EI_Nmm2"], whisker["length_mm"], whisker["shape"], whisker.get("tip_share"))
+def _beam(whisker: WhiskerFacts) -> Beam:
+    tip = None if whisker.tip_diameter_mm is None else whisker.tip_diameter_mm / whisker.diameter_mm
+    return Beam.from_rigidity(whisker.EI_Nmm2, whisker.length_mm, whisker.shape, tip)
 
 
-def read_run(out: Path) -> list[dict]:
+def read_run(out: Path) -> list[TrialResult]:
     """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run."""
     if not (out / TABLE).is_file():
         raise BadInput(f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out)
@@ -71,33 +74,35 @@ def _trials(table: Path) -> list[str | None]:
         raise BadInput(f"is damaged ({problem}); evaluate the session again into this folder", file=table) from None
 
 
-def _result(out: Path, trial: str | None) -> dict:
+def _result(out: Path, trial: str | None) -> TrialResult:
     path = out / "trials" / f"{trial}.json"
-    result = read_result(path)
-    if result is None or "whisker" not in result:
-        found = "is of an older version" if result else "is not there or damaged"
-        raise BadInput(f"{path.relative_to(out)} {found}; evaluate the session again into this folder", file=out)
-    return result
+    kept, again = read_result(path), "evaluate the session again into this folder"
+    if not kept:
+        raise BadInput(f"{path.relative_to(out)} is not there or damaged; {again}", file=out)
+    try:
+        return from_plain(TrialResult, kept)
+    except ValueError:
+        raise BadInput(f"{path.relative_to(out)} is of an older version; {again}", file=out) from None
 
 
-def _check_given_once(runs: Sequence[tuple[Path, list[dict]]]) -> None:
+def _check_given_once(runs: Sequence[tuple[Path, list[TrialResult]]]) -> None:
     """A recording that is counted twice would look like two that agree. Raises BadInput."""
     seen: dict[str, Path] = {}
     for out, results in runs:
         for result in results:
-            if result["hash"] in seen:
-                found = f"holds the same recording as {seen[result['hash']]} ({result['trial']['name']})"
+            if result.hash in seen:
+                found = f"holds the same recording as {seen[result.hash]} ({result.trial.name})"
                 raise BadInput(f"{found}; give each run once", file=out)
-        seen |= {result["hash"]: out for result in results}
+        seen |= {result.hash: out for result in results}
 
 
-def _check_alike(out: Path, result: dict, first: Path, reference: dict) -> None:
+def _check_alike(out: Path, result: TrialResult, first: Path, reference: TrialResult) -> None:
     """One whisker, one pushing angle. Raises BadInput."""
-    if result["theta_deg"] != reference["theta_deg"]:
-        found = f"was evaluated at θ = {result['theta_deg']:g}°, {first} at {reference['theta_deg']:g}°"
+    if result.theta_deg != reference.theta_deg:
+        found = f"was evaluated at θ = {result.theta_deg:g}°, {first} at {reference.theta_deg:g}°"
         raise BadInput(f"{found}; evaluate both at one --theta-deg", file=out)
-    for name, ours in result["whisker"].items():
-        theirs = reference["whisker"][name]
+    for name, ours in vars(result.whisker).items():
+        theirs = getattr(reference.whisker, name)
         exactly = isinstance(ours, str) or None in (ours, theirs)
         alike = ours == theirs if exactly else abs(ours / theirs - 1.0) <= _SAME_WHISKER
         if not alike:
@@ -108,11 +113,11 @@ def _check_alike(out: Path, result: dict, first: Path, reference: dict) -> None:
 
 def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
     """One distance a panel. Raises BadInput."""
-    known: dict[tuple[str, float], tuple[Path, float]] = {}
+    known: dict[tuple[str, float | None], tuple[Path, float]] = {}
     for out, fitted in runs:
         for surface in fitted:
             d_x = surface.common_d_x_mm
-            first, reference = known.setdefault((surface.name, surface.speed_deg_s), (out, d_x))
+            first, reference = known.setdefault(surface.panel, (out, d_x))
             if abs(d_x / reference - 1.0) > _SAME_DISTANCE:
                 found = f"{surface.title}: d_x is {d_x:.1f} mm, in {first} {reference:.1f} mm"
                 raise BadInput(f"{found}; whisks at distances {_SAME_DISTANCE:.0%} apart cannot be pooled", file=out)

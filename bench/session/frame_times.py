@@ -46,13 +46,6 @@ class FrameTimes:
         first, last = signals.time_s[stroke][[0, -1]]
         return slice(*np.searchsorted(self.time_s, [first - half_s, last + half_s]).tolist())
 
-    def dropped_in(self, frames: slice) -> np.ndarray:
-        """Indices k of a whisk's frames where frames are missing between k and k + 1, by the gaps in time."""
-        steps = np.diff(self.time_s[frames])
-        if len(steps) == 0:
-            return np.array([], dtype=int)
-        return frames.start + np.flatnonzero(steps > _DROPPED_STEPS * np.median(steps))
-
 
 def frame_times(trial: Trial) -> FrameTimes:
     """The frame times of a trial, from the first source that there is.

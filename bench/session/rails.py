@@ -1,6 +1,7 @@
 """Saturated samples: a channel that stands still at its own extreme, far from where it began."""
 
 import numpy as np
+from scipy.ndimage import label
 
 _LEAST_RUN = 3
 _FAR = 0.5  # of the channel's range, from its level at the start: noise without an ADC stands still at zero too
@@ -26,9 +27,5 @@ def _at_rail(column) -> np.ndarray:
 
 def _runs(marked) -> np.ndarray:
     """The marked samples that belong to runs of `_LEAST_RUN` or more."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
-    kept = np.zeros(len(marked), dtype=bool)
-    for first, last in edges.reshape(-1, 2):
-        if last - first >= _LEAST_RUN:
-            kept[first:last] = True
-    return kept
+    runs, _ = label(marked)
+    return marked & (np.bincount(runs)[runs] >= _LEAST_RUN)

@@ -1,11 +1,11 @@
 """Truth and estimate side by side: error = estimate − truth, always; per cent of the true d_x."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from bench.base.results import number
+from bench.records.trial import EstimateRow, SeenWhisk, TrialResult, whisks
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Judged:
     whisk: int
     purpose: str
     surface: str
-    speed_deg_s: float
+    speed_deg_s: float | None
     estimator: str
     beta_deg: float
     d_x_mm: float
@@ -43,43 +43,36 @@ class Judged:
         return 100.0 * float(np.hypot(self.d_x_est_sigma_mm, self.d_x_sigma_mm)) / self.d_x_mm
 
 
-def whisks(results: Iterable[dict]) -> Iterator[tuple[dict, dict, dict]]:
-    """(result, seen, felt) of every whisk."""
-    for result in results:
-        for seen, felt in zip(result["seen"]["whisks"], result["felt"]["whisks"]):
-            yield result, seen, felt
-
-
-def slope_deg(result: dict, seen: dict) -> float:
+def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
     """β as seen; the nominal one where the session has no pictures of it."""
-    beta = number(seen.get("beta_rad"))
-    return float(np.degrees(beta)) if np.isfinite(beta) else number(result["trial"]["beta_nominal_deg"])
+    beta_rad = seen.beta_rad.value
+    return float(np.degrees(beta_rad)) if np.isfinite(beta_rad) else result.trial.beta_nominal_deg
 
 
-def judge(results: Iterable[dict]) -> list[Judged]:
+def judge(results: Iterable[TrialResult]) -> list[Judged]:
     """Every estimate of every whisk."""
     return [
         _judged(result, seen, answer, one_factor)
         for result, seen, felt in whisks(results)
-        for one_factor, kind in ((False, "estimates"), (True, "one_factor"))
-        for answer in felt[kind]
+        for one_factor, answers in ((False, felt.estimates), (True, felt.one_factor))
+        for answer in answers
     ]
 
 
-def _judged(result: dict, seen: dict, answer: dict, one_factor: bool) -> Judged:
-    trial = result["trial"]
+def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool) -> Judged:
+    trial = result.trial
     return Judged(
-        trial["name"],
-        seen["whisk"],
-        trial["purpose"],
-        trial["surface"],
-        number(trial["speed_deg_s"]),
-        answer["estimator"],
+        trial.name,
+        seen.whisk,
+        trial.purpose,
+        trial.surface,
+        trial.speed_deg_s,
+        answer.estimator,
         slope_deg(result, seen),
-        number(seen.get("d_x_mm")),
-        number(seen.get("d_x_sigma_mm")),
-        number(answer["d_x_est_mm"]),
-        number(answer["d_x_est_sigma_mm"]),
+        float(seen.d_x_mm.value),
+        float(seen.d_x_mm.sigma),
+        float(answer.d_x_est_mm.value),
+        float(answer.d_x_est_mm.sigma),
         one_factor,
-        answer["status"],
+        answer.status,
     )

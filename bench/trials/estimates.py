@@ -12,6 +12,7 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import GAUGE_DELAY_S, Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.records.trial import EstimateRow, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
@@ -19,6 +20,7 @@ from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
+from vision.truth.value import Value
 
 # What a robot allows for in an object that it does not know: as thick as the paper's bar of 6 mm, with the whisker of
 # 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
@@ -108,64 +110,49 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
     )
 
 
-def as_felt(touch: Touch, whisk: Whisk | None, speed_rad_s: float) -> dict:
-    """Felt touch, moments and slip angle as plain values, rad and N·mm.
+def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float) -> FeltWhisk:
+    """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`.
 
     The gauges' own filter makes all that is felt late: that is in the touch's sigma, and not in θ's, since touch and
     moments are late alike.
     """
     late = math.hypot(touch.sigma_rad, GAUGE_DELAY_S * speed_rad_s)
-    felt = {"touch_felt_rad": touch.motor_rad, "touch_felt_sigma_rad": late, "theta_sigma_rad": touch.sigma_rad}
+    felt = FeltWhisk(number, Value(touch.motor_rad, late), theta_sigma_rad=touch.sigma_rad)
     if whisk is None:
         return felt
-    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at))
-    phi, phi_sigma = _slip_angle(whisk)
-    return felt | {
-        "m_y_Nmm": whisk.m_y_at_Nmm,
-        "m_y_sigma_Nmm": sigma_y,
-        "m_z_Nmm": whisk.m_z_at_Nmm,
-        "m_z_sigma_Nmm": sigma_z,
-        "phi_felt_rad": phi,
-        "phi_felt_sigma_rad": phi_sigma,
-        "covariance_at": whisk.covariance_at,
-        "theta_moment_covariance_at": whisk.theta_moment_covariance_at,
-    }
+    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
+    return replace(
+        felt,
+        m_y_Nmm=Value(whisk.m_y_at_Nmm, sigma_y),
+        m_z_Nmm=Value(whisk.m_z_at_Nmm, sigma_z),
+        phi_felt_rad=_slip_angle(whisk),
+        covariance_at=whisk.covariance_at,
+        theta_moment_covariance_at=whisk.theta_moment_covariance_at,
+    )
 
 
-def _slip_angle(whisk: Whisk) -> tuple[float, float]:
+def _slip_angle(whisk: Whisk) -> Value:
     """φ, equation (8), and its sigma."""
     m_y, m_z = whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
     gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
-    return felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0))
+    return Value(felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0)))
 
 
-def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> list[dict]:
+def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> tuple[EstimateRow, ...]:
     """What each estimator says, as rows of estimates.csv without truth."""
-    alpha = settings.alpha_est_rad, np.radians(settings.first_alpha_est_sigma_deg)
-    return [answer(name, estimator, whisk, *alpha) for name, estimator in asked.items()]
+    alpha = settings.alpha_est_rad, float(np.radians(settings.first_alpha_est_sigma_deg))
+    return tuple(answer(name, estimator, whisk, *alpha) for name, estimator in asked.items())
 
 
-def answer(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> dict:
+def answer(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> EstimateRow:
     """What one estimator says under a friction angle with its sigma; its own sigma as if that angle were right, too."""
-    known, doubted = (_asked(name, estimator, whisk, alpha_est_rad, sigma) for sigma in (0.0, float(sigma_rad)))
+    exact, doubted = (_asked(name, estimator, whisk, alpha_est_rad, sigma) for sigma in (0.0, float(sigma_rad)))
     ends = (doubted.low_mm, doubted.high_mm)
     if math.isnan(doubted.low_mm) and math.isnan(doubted.high_mm):
         ends = (doubted.d_x_mm - Z_95 * doubted.sigma_mm, doubted.d_x_mm + Z_95 * doubted.sigma_mm)
-    return {
-        "estimator": name,
-        "alpha_est_rad": _known(doubted.alpha_est_rad),
-        "d_x_est_mm": doubted.d_x_mm,
-        "d_x_est_sigma_mm": doubted.sigma_mm,
-        "d_x_est_sigma_alpha_exact_mm": known.sigma_mm,
-        "d_x_est_low_mm": ends[0],
-        "d_x_est_high_mm": ends[1],
-        "beta_est_rad": _known(doubted.beta_rad),
-        "status": doubted.status,
-    }
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
+    d_x = Value(doubted.d_x_mm, doubted.sigma_mm)
+    angles = doubted.alpha_est_rad, float(doubted.beta_rad)
+    return EstimateRow(name, d_x, *angles, doubted.status, exact.sigma_mm, *map(float, ends))
 
 
 def _asked(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> Estimate:

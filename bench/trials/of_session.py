@@ -1,13 +1,18 @@
-"""What all trials of a session tell together before one is judged: drift of the zero, and the gauges."""
+"""The steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges, each trial's
+result. `evaluate` and `calibrate gauges` share them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.results import hash_of_files, read_result
 from bench.base.settings import Settings
 from bench.base.workers import Workers
+from bench.cameras.calibration import SessionCalibration, calibrate_session
 from bench.gauges.checks import Undetermined, check_alive
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import strokes_of
@@ -15,10 +20,13 @@ from bench.gauges.fit import fit_gauges
 from bench.gauges.gauges_file import given_gauges
 from bench.gauges.matrix import Gauges
 from bench.gauges.readings import Pairs, pairs_of
+from bench.records.plain import from_plain
+from bench.records.trial import TrialResult
 from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
-from bench.trials.unit import Unit, see_unit
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit, evaluate_unit, see_unit
 
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 
@@ -29,6 +37,30 @@ def judged(session: Session) -> list[Trial]:
     if not trials:
         raise BadInput("there is no trial to evaluate", file="trials")
     return trials
+
+
+def placed_units(
+    session: Session, trials: Sequence[Trial], out: Path, settings: Settings, pool: Workers, doubts: Doubts
+) -> tuple[SessionCalibration, list[Unit]]:
+    """The session's cameras in the rig frame of board and free strokes, and a unit of work for each trial, so far
+    without gauges. Raises BadInput."""
+    calibration = calibrate_session(session, out)
+    units = [Unit(session, trial, hash_of_files([trial.folder]), calibration, settings, out) for trial in trials]
+    calibration = place_rig(session, calibration, units, pool, doubts)
+    return calibration, [replace(unit, calibration=calibration) for unit in units]
+
+
+def with_gauges(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> tuple[Gauges | None, list[Unit]]:
+    """The session's gauges, and the units with them and with the drift of the channels."""
+    rate = session_drift([unit.trial for unit in units], units[0].settings, pool)
+    gauges = session_gauges(units, rate, pool, doubts)
+    return gauges, [unit.with_gauges(rate, gauges) for unit in units]
+
+
+def evaluated(units: Sequence[Unit], pool: Workers) -> list[TrialResult]:
+    """Every unit's result, made where it does not stand in its file already."""
+    pool.run(evaluate_unit, units, "trials")
+    return [from_plain(TrialResult, read_result(unit.path)) for unit in units]
 
 
 def session_drift(trials: Sequence[Trial], settings: Settings, pool: Workers) -> np.ndarray:
@@ -64,6 +96,6 @@ def _pairs(unit: Unit, rate) -> list[Pairs]:
     check_alive(strokes)
     found = [
         pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
-        for seen, stroke in zip(see_unit(unit)["whisks"], strokes)
+        for seen, stroke in zip(see_unit(unit).whisks, strokes)
     ]
     return [pairs for pairs in found if pairs is not None]

@@ -6,15 +6,16 @@ the jump is the static angle. A jump ends where the force is back on the kinetic
 would show too large an angle, as nothing tells the two apart.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import find_objects, label
 
+from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
+from bench.records.trial import SeenWhisk
 from estimator.beam import Beam
+from vision.truth.records import FrameTruth
 
-STATIC, KINETIC = "static", "kinetic"
 _LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3
 _FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
 _REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it the contact rests
@@ -25,40 +26,7 @@ _WINDOW_RAD, _WINDOW_S, _FEWEST, _MOST = np.radians(0.12), 0.012, 4, 40
 _GUARD = 3  # samples at a jump that the gauges' own filter smears
 
 
-@dataclass(frozen=True)
-class Angle:
-    """One friction angle, rad: kind "static" or "kinetic", at which pushing angle, and its own sigma (not β's)."""
-
-    kind: str
-    theta_rad: float
-    alpha_rad: float
-    sigma_rad: float
-
-
-@dataclass(frozen=True)
-class Phases:
-    """Of one whisk: how many rests and jumps its record shows, and the angles at their ends."""
-
-    rests: int
-    jumps: int
-    angles: tuple[Angle, ...]
-
-    def mean(self, kind: str) -> tuple[float, float]:
-        """Weighted mean of the angles of one kind and its sigma from their scatter, rad; NaN without two of them."""
-        chosen = [a for a in self.angles if a.kind == kind]
-        if len(chosen) < 2:
-            return float("nan"), float("nan")
-        values, sigmas = np.array([(a.alpha_rad, a.sigma_rad) for a in chosen]).T
-        weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
-        mean = float(weights @ values)
-        scatter = np.sqrt(len(values) / (len(values) - 1) * np.sum(weights**2 * (values - mean) ** 2))
-        return mean, float(max(scatter, np.sum(sigmas**-2.0) ** -0.5))
-
-
-NO_PHASES = Phases(0, 0, ())
-
-
-def seen_phases(frames: dict, beta_rad: float, d_x_mm: float) -> Phases:
+def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
     """Phases from the slip of each touching frame, with its sigma.
 
     A jump lies anywhere between its two frames: its angles are carried half the way to it, as a contact at rest has
@@ -78,7 +46,7 @@ def seen_phases(frames: dict, beta_rad: float, d_x_mm: float) -> Phases:
         for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
             spread = float(np.hypot(alpha_sigma[k], turning[k] * way / np.sqrt(12.0)))
             angles.append(Angle(kind, float(middle), float(alpha[k] + half * way * turning[k]), spread))
-    return Phases(sum(1 for _ in _runs(rests & known)), len(jumps), tuple(angles)) if jumps else NO_PHASES
+    return Phases(len(_runs(rests & known)), len(jumps), tuple(angles)) if jumps else NO_PHASES
 
 
 def _is_jump(first: int, last: int, rests) -> bool:
@@ -86,17 +54,17 @@ def _is_jump(first: int, last: int, rests) -> bool:
     return first > 0 and last < len(rests) and last - first <= _LONGEST_JUMP and bool(rests[first - 1] and rests[last])
 
 
-def _touching(frames: dict) -> np.ndarray:
+def _touching(frames: FrameTruth) -> np.ndarray:
     """Rows (7, n): θ, slip, its sigma, d_y, d_z, α, its sigma, of the frames that touch and are known."""
-    names = ("theta_rad", "slip_mm", "slip_sigma_mm", "d_y_mm", "d_z_mm", "alpha_rad", "alpha_sigma_rad")
-    rows = np.array([frames[name] for name in names], dtype=float)
-    return rows[:, np.array(frames["touching"], dtype=bool) & np.isfinite(rows).all(axis=0) & (rows[0] > _FIRST_RAD)]
+    slip, alpha = frames.slip_mm, frames.alpha_rad
+    rows = np.array([frames.theta_rad.value, slip.value, slip.sigma, frames.d_y_mm.value, frames.d_z_mm.value,
+                     alpha.value, alpha.sigma])  # fmt: skip
+    return rows[:, frames.touching & np.isfinite(rows).all(axis=0) & (rows[0] > _FIRST_RAD)]
 
 
-def _runs(mask) -> Iterator[tuple[int, int]]:
+def _runs(mask) -> list[tuple[int, int]]:
     """(first, one past the last) of each unbroken stretch of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist())
+    return [(run.start, run.stop) for (run,) in find_objects(label(mask)[0])]
 
 
 def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, beam: Beam) -> Phases:
@@ -174,14 +142,7 @@ def _angle(kind: str, at: float, row, lines, shape, variances, slope: float) -> 
     return Angle(kind, at, slope - float(np.arctan2(m_y, m_z)), float(np.sqrt(share * gradient**2 @ variances)))
 
 
-def slips(seen: dict) -> bool:
+def slips(seen: SeenWhisk) -> bool:
     """Does the contact move along the bar? Else the force may lie anywhere within the friction cone."""
-    d = seen.get("deflection")
-    return bool(d) and len(d["theta_rad"]) >= _LEAST_FRAMES and np.ptp(d["slip_mm"]) >= _LEAST_SLIP_MM
-
-
-def from_plain(phases: dict | None) -> Phases:
-    """Phases read back from a result."""
-    if not phases:
-        return NO_PHASES
-    return Phases(phases["rests"], phases["jumps"], tuple(Angle(**angle) for angle in phases["angles"]))
+    d = seen.deflection
+    return d is not None and len(d.theta_rad) >= _LEAST_FRAMES and bool(np.ptp(d.slip_mm) >= _LEAST_SLIP_MM)

@@ -1,7 +1,7 @@
 """Where the rig is, learnt from the free strokes of the session's own trials and weighed against T_rig_board."""
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from bench.cameras.calibration import SessionCalibration
 from bench.cameras.first_look import by_first_look, first_look, spread
 from bench.session.session import Session
 from bench.trials.unit import Unit, see_unit
-from vision.calibration.place import Placement, by_board, by_strokes, check_swing_suffices, combine, placed
-from vision.geometry.base_lines import BaseLines
+from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
+from vision.calibration.swing import by_strokes
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform
 
@@ -119,5 +119,4 @@ def _before(session: Session) -> Placement:
 def _by_strokes(units: Sequence[Unit], pool: Workers) -> Placement:
     """What the free strokes of these trials say, of every whisk whose base is seen before touch."""
     pool.run(see_unit, units, "free strokes")
-    bases = [whisk["base"] for unit in units for whisk in see_unit(unit)["whisks"] if whisk.get("base")]
-    return by_strokes([BaseLines(*(np.array(base[field.name]) for field in fields(BaseLines))) for base in bases])
+    return by_strokes([w.base for unit in units for w in see_unit(unit).whisks if w.base is not None])

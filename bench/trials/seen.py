@@ -1,11 +1,13 @@
-"""The seen half of a trial's result: pictures in, truth out, as plain values. No gauge is read here."""
+"""The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
 
 import numpy as np
 
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration, moved_cameras
+from bench.records.trial import BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
@@ -19,13 +21,13 @@ from vision.truth.records import WhiskTruth
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12
 _MOST_NAMED = 5  # frames in a line
-_NOT_PLAIN = ("smooth", "frames", "overlay")
+_SAME = tuple({f.name for f in fields(SeenWhisk)} & {f.name for f in fields(WhiskTruth)} - {"status", "overlay"})
 
 
 def see_trial(
     session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration, settings: Settings
-) -> dict:
-    """Whisks of a trial as the cameras show them: {"whisks": [...], "notes": [...]}.
+) -> SeenTrial:
+    """Whisks of a trial as the cameras show them.
 
     What keeps a trial from being seen is the status of its whisks; the others go on.
     """
@@ -38,14 +40,13 @@ def see_trial(
         return _unseen(len(strokes), str(reason))
 
 
-def _unseen(count: int, status: str) -> dict:
-    nothing = {"status": status, "d_x_mm": None, "cameras": 0, "frames_used": 0}
-    return {"whisks": [{"whisk": number} | nothing for number in range(count)], "notes": []}
+def _unseen(count: int, status: str) -> SeenTrial:
+    return SeenTrial(tuple(SeenWhisk(number, status) for number in range(count)))
 
 
 def _see(
     session: Session, trial: Trial, signals: Signals, strokes, calibration: SessionCalibration, settings: Settings
-) -> dict:
+) -> SeenTrial:
     times = frame_times(trial)
     frames = read_trial(trial, times)
     moved = moved_cameras(session, calibration, frames)
@@ -62,15 +63,14 @@ def _see(
         calibration.background,
         VisionSettings(clock_sigma_s=clock_sigma_s),
     )
-    whisks = [whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks]
-    return {
-        "whisks": whisks,
-        "bar": {"point_mm": truth.bar_point_mm, "direction": truth.bar_direction},
-        "bar_radius_mm": 0.5 * trial.bar_diameter_mm,
-        "wire_radius_mm": 0.5 * wire.diameter_mm,
-        "notes": [*truth.notes, *_lost(frames, times)],
-        "clock": {"source": times.source, "sigma_s": clock_sigma_s, "recorded": times.clock_sigma_s == 0.0},
-    }
+    return SeenTrial(
+        tuple(whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks),
+        (*truth.notes, *_lost(frames, times)),
+        BarLine(truth.bar_point_mm, truth.bar_direction),
+        0.5 * trial.bar_diameter_mm,
+        0.5 * wire.diameter_mm,
+        Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
+    )
 
 
 def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
@@ -84,53 +84,46 @@ def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
             yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
 
 
-def whisk_record(truth: WhiskTruth, settings: Settings, doubts=()) -> dict:
-    """One whisk as plain values: at first touch, at the wanted angle, a row a frame, and lines to draw."""
+def whisk_record(truth: WhiskTruth, settings: Settings, doubts: Iterable[str] = ()) -> SeenWhisk:
+    """One whisk: at first touch, at the wanted angle, a row a frame, and lines to draw."""
     at = truth.at(settings.theta_rad)
-    record = {name: getattr(truth, name) for name in truth.__dataclass_fields__ if name not in _NOT_PLAIN}
     status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *doubts])))
-    return record | {
-        "status": status,
-        "at": at,
-        "frames": truth.frames,
-        "deflection": _deflection(truth),
-        "overlay": _overlay(truth, at.theta_rad),
-    }
+    drawn = _overlay(truth, at.theta_rad)
+    same = {name: getattr(truth, name) for name in _SAME}
+    return SeenWhisk(**same, status=status, at=at, deflection=_deflection(truth), overlay=drawn)
 
 
-def _deflection(truth: WhiskTruth) -> dict | None:
-    """Where the contact lies in the hub's axes while touching, seen from the unbent whisker, with joint covariance.
-
-    along_mm, across_y_mm, across_z_mm (f,); covariance (2f, 2f), of across z, y frame by frame.
-    """
+def _deflection(truth: WhiskTruth) -> Deflection | None:
+    """Of up to a dozen of the touching frames; None where none touches."""
     smooth = truth.smooth
     if smooth is None or len(smooth.theta_rad) == 0:
         return None
     chosen = np.unique(np.linspace(0, len(smooth.theta_rad) - 1, _MOST_DEFLECTIONS).round().astype(int))
     theta, d_y, d_z = smooth.theta_rad[chosen], smooth.values["d_y"][chosen], smooth.values["d_z"][chosen]
-    x, y, _ = truth.frames.point_mm[truth.frames.touching][chosen].T
-    towards = np.cos(truth.touch_rad) * x + np.sin(truth.touch_rad) * y - truth.d_x_mm
+    x, y, _ = truth.frames.point_mm.value[truth.frames.touching][chosen].T
+    touch, d_x = truth.touch_rad.value, truth.d_x_mm.value
+    towards = np.cos(touch) * x + np.sin(touch) * y - d_x
     by_y = np.cos(theta)[:, None] * smooth.jacobians["d_y"][chosen]
     jacobian = np.stack([smooth.jacobians["d_z"][chosen], by_y], axis=1).reshape(2 * len(chosen), -1)
-    return {
-        "theta_rad": theta,
-        "motor_rad": truth.touch_rad + theta,
-        "slip_mm": smooth.values["slip"][chosen],
-        "along_mm": truth.d_x_mm / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
-        "across_y_mm": d_y * np.cos(theta) + towards * np.sin(theta),
-        "across_z_mm": d_z,
-        "covariance": jacobian @ smooth.covariance @ jacobian.T,
-    }
+    return Deflection(
+        theta_rad=theta,
+        motor_rad=touch + theta,
+        slip_mm=smooth.values["slip"][chosen],
+        along_mm=d_x / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
+        across_y_mm=d_y * np.cos(theta) + towards * np.sin(theta),
+        across_z_mm=d_z,
+        covariance=jacobian @ smooth.covariance @ jacobian.T,
+    )
 
 
-def _overlay(truth: WhiskTruth, theta_rad: float) -> dict:
+def _overlay(truth: WhiskTruth, theta_rad: float) -> dict[str, Drawing]:
     """Lines in the frames nearest to touch and to the wanted angle."""
     if truth.frames is None or not truth.overlay:
         return {}
-    known = [k for k, index in enumerate(truth.frames.index) if int(index) in truth.overlay]
+    drawn = [k for k, index in enumerate(truth.frames.index) if int(index) in truth.overlay]
     chosen = {}
     for name, angle in (("touch", 0.0), ("theta", theta_rad)):
-        k = min(known, key=lambda k: abs(truth.frames.theta_rad[k] - angle))
+        k = min(drawn, key=lambda k: abs(truth.frames.theta_rad.value[k] - angle))
         frame = int(truth.frames.index[k])
-        chosen[name] = {"frame": frame, "cameras": truth.overlay[frame]}
+        chosen[name] = Drawing(frame, truth.overlay[frame])
     return chosen

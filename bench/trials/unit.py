@@ -5,28 +5,40 @@ redoing only what changed are this one mechanism. What is seen has a hash of its
 look at the pictures.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, plain, read_result, write_result
+from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_result, write_result
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of
 from bench.gauges.matrix import FROM_TRIALS, Gauges
 from bench.gauges.readings import pairs_of
+from bench.records.phases import NO_PHASES, Phases
+from bench.records.plain import from_plain, to_plain
+from bench.records.trial import (
+    EstimateRow,
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
 from bench.session.session import Session
 from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
 from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
-from bench.trials.phases import NO_PHASES, Phases, felt_phases, slips
+from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
 from estimator.signal import Touch
+from vision.truth.value import NAN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
 OWN_GAUGES = "not judged: without this trial the gauges are not known"
@@ -83,21 +95,25 @@ class Unit:
         return replace(self, drift_rate=drift_rate, gauges=gauges)
 
 
-def see_unit(unit: Unit) -> dict:
+def see_unit(unit: Unit) -> SeenTrial:
     """The seen half, kept beside the calibration."""
     seen = _kept_seen(unit)
     if seen is None:
-        seen = plain(see_trial(unit.session, unit.trial, read_signals(unit.trial), unit.calibration, unit.settings))
-        write_result(unit.seen_path, {"seen_hash": unit.seen_hash, "seen": seen})
+        seen = _see(unit, read_signals(unit.trial))
+        write_result(unit.seen_path, {"seen_hash": unit.seen_hash, "seen": to_plain(seen)})
     return seen
 
 
-def _kept_seen(unit: Unit) -> dict | None:
+def _see(unit: Unit, signals: Signals) -> SeenTrial:
+    return see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings)
+
+
+def _kept_seen(unit: Unit) -> SeenTrial | None:
     """The seen half of an earlier result, where all that it depends on is as it was."""
     for path in (unit.path, unit.seen_path):
         kept = read_result(path)
         if kept and kept.get("seen_hash") == unit.seen_hash:
-            return kept["seen"]
+            return from_plain(SeenTrial, kept["seen"])
     return None
 
 
@@ -105,54 +121,36 @@ def evaluate_unit(unit: Unit) -> None:
     """The trial's whole result in its file, unless it stands there already."""
     kept = read_result(unit.path)
     if not kept or kept.get("hash") != unit.hash:
-        write_result(unit.path, {"hash": unit.hash, "seen_hash": unit.seen_hash} | trial_result(unit))
+        write_result(unit.path, to_plain(trial_result(unit)))
 
 
-def trial_result(unit: Unit) -> dict:
-    """Truth and estimates of every whisk of the trial, as plain values."""
+def trial_result(unit: Unit) -> TrialResult:
+    """Truth and estimates of every whisk of the trial."""
     signals = read_signals(unit.trial)
-    seen = _kept_seen(unit)
-    if seen is None:
-        seen = plain(see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings))
-    return {
-        "trial": _described(unit.trial),
-        "whisker": _whisker(unit.session.whisker),
-        "theta_deg": unit.settings.theta_deg,
-        "seen": seen,
-        "felt": feel_trial(unit, signals, seen["whisks"]),
-    }
+    seen = _kept_seen(unit) or _see(unit, signals)
+    felt = feel_trial(unit, signals, seen)
+    described = _described(unit.trial), _whisker(unit.session.whisker)
+    return TrialResult(*described, unit.settings.theta_deg, seen, felt, unit.hash, unit.seen_hash)
 
 
-def _described(trial: Trial) -> dict:
-    return {
-        "name": trial.name,
-        "purpose": trial.purpose,
-        "surface": trial.surface,
-        "speed_deg_s": trial.speed_deg_s,
-        "d_x_nominal_mm": trial.d_x_mm,
-        "beta_nominal_deg": trial.beta_deg,
-    }
+def _described(trial: Trial) -> TrialFacts:
+    nominal = (NAN if value is None else float(value) for value in (trial.d_x_mm, trial.beta_deg))
+    return TrialFacts(trial.name, trial.purpose, trial.surface, trial.speed_deg_s, *nominal)
 
 
-def _whisker(whisker: Whisker) -> dict:
-    """What must be alike in results that are pooled."""
-    return {
-        "shape": whisker.shape,
-        "length_mm": whisker.length_mm,
-        "diameter_mm": whisker.diameter_mm,
-        "EI_Nmm2": whisker.EI_Nmm2,
-        "tip_share": whisker.beam.tip_share,
-    }
+def _whisker(whisker: Whisker) -> WhiskerFacts:
+    facts = whisker.shape, whisker.length_mm, whisker.diameter_mm, whisker.EI_Nmm2
+    return WhiskerFacts(*facts, whisker.tip_diameter_mm)
 
 
-def feel_trial(unit: Unit, signals: Signals, seen: Sequence[dict]) -> dict:
+def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     """Felt touch, moments and estimates of each whisk; and its phases of stick and slip, which take the slope as seen
     and are no estimate."""
     strokes = strokes_of(signals, unit.trial, unit.settings)
-    return {"whisks": [{"whisk": k} | _feel(unit, signals.kind, s, seen[k]) for k, s in enumerate(strokes)]}
+    return FeltTrial(tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes)))
 
 
-def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
+def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
     hand, missing = _hand(unit, kind)
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
@@ -160,34 +158,37 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: dict) -> dict:
     known = None if status else whisk
     if known is not None and hand.is_gauged:
         status = unit.gauges.beyond(hand.in_follicle(known))
-    felt = as_felt(touch, known, stroke.speed_rad_s)
-    felt |= {"status": status, "saturated": stroke.saturated, "estimates": [], "one_factor": []}
+    felt = as_felt(number, touch, known, stroke.speed_rad_s)
+    felt = replace(felt, status=status, saturated=stroke.saturated)
     if known is None:
         return felt
-    felt |= _against_pictures(unit, stroke, hand, seen, felt["status"])
-    felt["phases"] = _phases(unit.trial, stroke, touch, hand, seen, unit.session.whisker.beam)
-    asked = estimators(unit.settings.estimators)
-    return felt | {"estimates": answers(known, asked, unit.settings), "one_factor": _one_factor(unit, kind, stroke)}
+    felt = _against_pictures(felt, unit, stroke, hand, seen)
+    return replace(
+        felt,
+        phases=_phases(unit.trial, stroke, touch, hand, seen, beam),
+        estimates=answers(known, estimators(unit.settings.estimators), unit.settings),
+        one_factor=_one_factor(unit, kind, stroke),
+    )
 
 
-def _against_pictures(unit: Unit, stroke: Stroke, hand: Hand, seen: dict, status: str) -> dict:
-    """Whether the felt moments are those of the seen shape: χ², and the status with what is likely wrong."""
-    if not seen.get("deflection"):
-        return {}
+def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, hand: Hand, seen: SeenWhisk) -> FeltWhisk:
+    """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status."""
+    if seen.deflection is None:
+        return felt
     whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
-        return {}
+        return felt
     own_newtons = not hand.is_gauged or unit.gauges.source != FROM_TRIALS
     found = agreement(pairs, hand.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
-    status = "; ".join(filter(None, [status, found.status]))
-    return {"agreement": {"chi2": found.chi2, "chance": found.chance}, "apart": bool(found.status), "status": status}
+    status = "; ".join(filter(None, [felt.status, found.status]))
+    return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
 
 
-def _phases(trial: Trial, stroke: Stroke, touch: Touch, hand: Hand, seen: dict, beam: Beam) -> Phases:
+def _phases(trial: Trial, stroke: Stroke, touch: Touch, hand: Hand, seen: SeenWhisk, beam: Beam) -> Phases:
     """With the slope and distance as seen, or the nominal ones where no picture tells of them."""
-    if seen.get("deflection"):
-        beta_rad, d_x_mm = (seen["beta_rad"], seen["d_x_mm"]) if slips(seen) else (None, None)
+    if seen.deflection is not None:
+        beta_rad, d_x_mm = (seen.beta_rad.value, seen.d_x_mm.value) if slips(seen) else (None, None)
     else:
         beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
     if not beta_rad or not d_x_mm:
@@ -207,11 +208,11 @@ def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:
     return (Hand.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
 
 
-def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> list[dict]:
+def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:
     """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated."""
     plain_gauges = unit.gauges and unit.gauges.one_factor
     if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
-        return []
+        return ()
     _, whisk = felt_whisk(
         stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, unit.session.whisker.beam, unit.settings.theta_rad
     )

@@ -9,10 +9,13 @@ import pytest
 from bench.base.results import hash_of
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
+from bench.records.trial import SeenTrial, SeenWhisk
+from bench.session.session import load_session
 from bench.session.signals import forward_strokes
 from bench.trials.seen import whisk_record
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
+from vision.truth.value import FIELDS, Value
 
 SIGMA_MM, SIGMA_RAD = 0.005, np.radians(0.05)
 
@@ -47,16 +50,11 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
     return WhiskTruth(
         number,
         _frames(table, theta, touching, points, values),
-        touch,
-        SIGMA_RAD / 5,
-        first,
-        np.full(3, SIGMA_MM),
-        d_x,
-        2 * SIGMA_MM,
-        beta,
-        2 * SIGMA_RAD,
-        np.radians(at["psi_deg"]),
-        SIGMA_RAD,
+        Value(touch, SIGMA_RAD / 5),
+        Value(first, np.full(3, SIGMA_MM)),
+        Value(d_x, 2 * SIGMA_MM),
+        Value(beta, 2 * SIGMA_RAD),
+        Value(np.radians(at["psi_deg"]), SIGMA_RAD),
         2,
         len(theta),
         smooth=_smooth(theta, touching, values),
@@ -65,22 +63,18 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
 
 def _frames(table, theta, touching, points, values) -> FrameTruth:
     """Rows of truth.csv as vision's frames; values: by name, whose sigmas are empty where nothing touches."""
-    plain = {}
-    for name, column in values.items():
-        unit, sigma = ("rad", SIGMA_RAD) if name in ("phi", "alpha") else ("mm", SIGMA_MM)
-        plain |= {f"{name}_{unit}": column, f"{name}_sigma_{unit}": np.where(touching, sigma, np.nan)}
+    sigmas = {name: SIGMA_RAD if FIELDS[name].endswith("_rad") else SIGMA_MM for name in values}
+    columns = {FIELDS[k]: Value(column, np.where(touching, sigmas[k], np.nan)) for k, column in values.items()}
     return FrameTruth(
         index=table["frame"].astype(int),
         time_s=table["time_s"],
         motor_rad=np.radians(table["motor_deg"]),
-        theta_rad=theta,
-        theta_sigma_rad=np.full(len(theta), SIGMA_RAD),
+        theta_rad=Value(theta, np.full(len(theta), SIGMA_RAD)),
         touching=touching,
-        point_mm=points,
-        point_sigma_mm=np.full_like(points, SIGMA_MM),
+        point_mm=Value(points, np.full_like(points, SIGMA_MM)),
         arc_mm=table["arc_mm"],
         status=("",) * len(theta),
-        **plain,
+        **columns,
     )
 
 
@@ -98,7 +92,7 @@ def _smooth(theta, touching, values) -> Smooth:
     )
 
 
-def see_exactly(session, trial, signals, calibration, settings) -> dict:
+def see_exactly(session, trial, signals, calibration, settings) -> SeenTrial:
     """In place of `see_trial`: what perfect pictures would show, from the truth files."""
     strokes = forward_strokes(signals)
     time_s = read_csv(trial.folder / "truth.csv")["time_s"]
@@ -107,18 +101,24 @@ def see_exactly(session, trial, signals, calibration, settings) -> dict:
         first, last = signals.time_s[stroke][[0, -1]]
         rows = np.flatnonzero((time_s >= first) & (time_s <= last))
         whisks.append(whisk_record(exact_truth(trial.folder, number, rows), settings))
-    return {"whisks": whisks, "bar_radius_mm": 3.0, "wire_radius_mm": 0.5, "notes": []}
+    return SeenTrial(tuple(whisks), bar_radius_mm=3.0, wire_radius_mm=0.5)
 
 
 @pytest.fixture
 def exact_record():
     """A function (trial) that gives the record of its first whisk as perfect pictures would."""
 
-    def record(trial) -> dict:
+    def record(trial) -> SeenWhisk:
         rows = np.arange(len(read_csv(trial.folder / "truth.csv")["frame"]))
         return whisk_record(exact_truth(trial.folder, 0, rows), Settings())
 
     return record
+
+
+@pytest.fixture
+def steel_trial(steel_sample):
+    """The trial of the sample session at 30°."""
+    return load_session(steel_sample).trial("b30_3")
 
 
 @pytest.fixture
@@ -132,7 +132,7 @@ def exact_vision(monkeypatch):
 
     monkeypatch.setattr("bench.trials.unit.see_trial", see)
     nothing = SessionCalibration(None, {}, hash_of("exact"))
-    monkeypatch.setattr("bench.evaluate.calibrate_session", lambda session, out: nothing)
+    monkeypatch.setattr("bench.trials.of_session.calibrate_session", lambda session, out: nothing)
     return looks
 
 

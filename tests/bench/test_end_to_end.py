@@ -1,12 +1,16 @@
 """Pictures in, verdict out: the real thing on the small session, and in full (slow) on the sample session."""
 
 import csv
+import json
+import re
 
+import numpy as np
 import pytest
 
 from bench.base.settings import Settings
 from bench.cli import main
 from bench.evaluate import evaluate
+from tests.scenes.formats import documented, keys
 
 
 def read(path) -> list[dict]:
@@ -38,6 +42,16 @@ def _touching(session, out, trial):
             yield float(row["slip_mm"]), float(true[row["frame"]]["slip_mm"])
 
 
+def check_keys(out) -> None:
+    """docs/formats.md has every key of the JSON files and of cameras.npz, and no other."""
+    for heading, files in (("trials/<trial>.json", "trials/b*.json"), ("calibration/cameras.json",) * 2):
+        found = {key for file in out.glob(files) for key in keys(json.loads(file.read_text()))}
+        plain = {re.sub(r"\.cameras\.(high|low)\.", ".cameras.<camera>.", key) for key in found}
+        assert plain == set(documented(heading))
+    with np.load(out / "calibration" / "cameras.npz") as arrays:
+        assert sorted(arrays) == sorted(documented("cameras.npz"))
+
+
 def test_small_session(small_session, tmp_path, capsys):
     """Through the command line with two workers, then again: nothing is redone, the same verdict is printed."""
     command = ["evaluate", str(small_session), "--out", str(tmp_path), "--alpha-est-deg", "10.5", "--workers", "2"]
@@ -46,6 +60,7 @@ def test_small_session(small_session, tmp_path, capsys):
     check(small_session, tmp_path, [("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)])
     assert "camera high:" in first and "camera low:" in first
     assert (tmp_path / "overlays" / "b60_4_0.png").is_file()
+    check_keys(tmp_path)
     kept = [*tmp_path.glob("trials/*"), *tmp_path.glob("calibration/*"), *tmp_path.rglob("*.png")]
     written = {path: path.stat().st_mtime_ns for path in kept if path.is_file()}
     assert main(command) in (0, 1)

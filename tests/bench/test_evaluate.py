@@ -35,10 +35,10 @@ def evaluated(tmp_path_factory):
 
 
 @pytest.fixture
-def steel(steel_sample, exact_vision, evaluated):
+def steel(steel_signals, exact_vision, evaluated):
     """Folder of the finished results of the sample session."""
     if not (evaluated / "summary.txt").exists():
-        run(steel_sample, evaluated)
+        run(steel_signals, evaluated)
     return evaluated
 
 
@@ -61,8 +61,8 @@ def test_tables_have_the_columns_of_the_format_in_their_order(steel):
         assert (steel / f"{name}.csv").read_text().splitlines()[0] == ",".join(columns)
 
 
-def test_every_whisk_has_its_row(steel, steel_sample):
-    trials = sorted(path.name for path in (steel_sample / "trials").iterdir())
+def test_every_whisk_has_its_row(steel, steel_signals):
+    trials = sorted(path.name for path in (steel_signals / "trials").iterdir())
     assert [row["trial"] for row in table(steel / "whisks.csv")] == trials
     assert len(table(steel / "track" / "b60_4.csv")) == 13
 

@@ -23,17 +23,17 @@ from bench.rig.simulate import simulate
 def calibrate(monkeypatch, exact_vision):
     """The command with exact vision."""
     nothing = SessionCalibration(None, {}, hash_of("exact"))
-    monkeypatch.setattr("bench.calibrate_gauges.calibrate_session", lambda session, out: nothing)
+    monkeypatch.setattr("bench.trials.of_session.calibrate_session", lambda session, out: nothing)
     return lambda session, out, **options: calibrate_gauges_command(session, out, workers=0, **options)
 
 
 @pytest.mark.parametrize("every_trial", [False, True])
-def test_sample_session(calibrate, steel_sample, tmp_path, capsys, every_trial):
+def test_sample_session(calibrate, steel_signals, tmp_path, capsys, every_trial):
     """Diagonal within 1 %, cross-talk within 1 point of its column's diagonal, inside U95."""
     out = tmp_path / "gauges.toml"
-    assert calibrate(steel_sample, out, every_trial=every_trial) == 0
+    assert calibrate(steel_signals, out, every_trial=every_trial) == 0
     made = read_gauges(out, 8835.7293)
-    true = np.array(json.loads((steel_sample / "truth.json").read_text())["gauge_matrix_Nmm_per_V"])
+    true = np.array(json.loads((steel_signals / "truth.json").read_text())["gauge_matrix_Nmm_per_V"])
     assert np.diag(made.all.matrix) == pytest.approx(np.diag(true), rel=0.01)
     assert np.abs(made.all.matrix / np.diag(made.all.matrix) - true / np.diag(true)).max() < 0.01
     assert np.all(np.abs(made.all.matrix - true) < 1.96 * made.all.sigma)
@@ -44,9 +44,9 @@ def test_sample_session(calibrate, steel_sample, tmp_path, capsys, every_trial):
     assert (made.for_trial("gauge_roll0") is None) == (not every_trial)
 
 
-def test_another_modulus_scales_the_coefficients_so_that_c_cancels(calibrate, steel_sample, tmp_path):
+def test_another_modulus_scales_the_coefficients_so_that_c_cancels(calibrate, steel_signals, tmp_path):
     out = tmp_path / "gauges.toml"
-    calibrate(steel_sample, out)
+    calibrate(steel_signals, out)
     one, ten_per_cent_more = read_gauges(out, 8835.7293), read_gauges(out, 1.1 * 8835.7293)
     assert ten_per_cent_more.all.matrix == pytest.approx(1.1 * one.all.matrix, rel=1e-6)
     assert ten_per_cent_more.notes and not one.notes[1:]
@@ -81,31 +81,31 @@ def hung_volts(session, force_N: float, stiffer: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("with_zero", [True, False])
-def test_weights_fix_the_newtons_and_give_the_modulus(calibrate, steel_sample, tmp_path, capsys, with_zero):
+def test_weights_fix_the_newtons_and_give_the_modulus(calibrate, steel_signals, tmp_path, capsys, with_zero):
     """A rod 4 % stiffer than stated. Forces are known to 0.1 %, the lever to 0.2 mm in 60; the calibration itself is
     good to 0.6 %: E to 1.5 % in 95 of 100 cases."""
     session = tmp_path / "session"
-    shutil.copytree(steel_sample, session, ignore=shutil.ignore_patterns("high", "low"))
+    shutil.copytree(steel_signals, session, ignore=shutil.ignore_patterns("high", "low"))
     for force in (0.15, 0.1, *([0.0] if with_zero else [])):
         sigmas = {"force_sigma_N": 0.001 * force, "at_sigma_mm": 0.2}
-        hang(session, f"weight_{1000 * force:g}", force, hung_volts(steel_sample, force, 1.04), **sigmas)
+        hang(session, f"weight_{1000 * force:g}", force, hung_volts(steel_signals, force, 1.04), **sigmas)
     out = tmp_path / "gauges.toml"
     calibrate(session, out)
     said = capsys.readouterr().out
     E, u95 = map(float, re.search(r"E = ([\d.]+) ± ([\d.]+) GPa", said).groups())
     assert 0.2 < u95 < 1.5
     assert abs(E - 1.04 * 60.0) < u95
-    true = np.array(json.loads((steel_sample / "truth.json").read_text())["gauge_matrix_Nmm_per_V"])
+    true = np.array(json.loads((steel_signals / "truth.json").read_text())["gauge_matrix_Nmm_per_V"])
     made = tomllib.loads(out.read_text())
     assert np.diag(made["matrix_Nmm_per_V"]) == pytest.approx(1.04 * np.diag(true), rel=0.015)
     # the session's stated stiffness still rules evaluate: C cancels
     assert np.diag(read_gauges(out, 8835.7293).all.matrix) == pytest.approx(np.diag(true), rel=0.01)
 
 
-def test_a_weight_that_the_gauges_do_not_feel_is_refused(calibrate, steel_sample, tmp_path):
+def test_a_weight_that_the_gauges_do_not_feel_is_refused(calibrate, steel_signals, tmp_path):
     session = tmp_path / "session"
-    shutil.copytree(steel_sample, session, ignore=shutil.ignore_patterns("high", "low"))
-    hang(session, "weight", 0.15, hung_volts(steel_sample, -0.15, 1.0))
+    shutil.copytree(steel_signals, session, ignore=shutil.ignore_patterns("high", "low"))
+    hang(session, "weight", 0.15, hung_volts(steel_signals, -0.15, 1.0))
     with pytest.raises(BadInput, match="hang along rig −z"):
         calibrate(session, tmp_path / "gauges.toml")
 

@@ -208,10 +208,10 @@ def gauge_matrix(session):
 
 
 @pytest.mark.parametrize("name", ["b00_2", "b30_3", "b60_4"])
-def test_sample_session_within_three_sigma_at_the_right_friction(steel_sample, name):
+def test_sample_session_within_three_sigma_at_the_right_friction(steel_signals, name):
     """α = atan 0.185339 is the session's. Sigma holds noise, touch and gauges; seen values make the gauges here."""
-    matrix, relative = gauge_matrix(steel_sample)
-    motor, volts, time, truth = stroke_of(steel_sample / "trials" / name)
+    matrix, relative = gauge_matrix(steel_signals)
+    motor, volts, time, truth = stroke_of(steel_signals / "trials" / name)
     moments = volts @ matrix.T
     touch = felt_touch(motor, moments, time)
     at = moment_at(THETA, motor, moments, touch, time_s=time)

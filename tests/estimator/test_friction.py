@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimator import friction, slip
-from estimator.friction import AT_ZERO, NEVER_SLIPPED, alpha_from_tilts, confidence, curves, fit_alpha
+from estimator.friction import AT_ZERO, NEVER_SLIPPED, Pushes, alpha_from_tilts, confidence, curves, fit_alpha
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -31,7 +31,7 @@ def test_interval_holds_the_true_angle_in_95_percent(alpha_deg, noise):
     """One row of 16 slopes, its noise known: 93–97 % of 2000 is four times its own scatter of 0.5 %."""
     alpha = np.radians(alpha_deg)
     (m_y, m_z), (sigma_y, sigma_z) = noisy_moments(SLOPES, alpha, noise, np.random.default_rng(5))
-    fit = fit_alpha(SLOPES, m_y, m_z, D_X, THETA, C, sigma_y=sigma_y, sigma_z=sigma_z)
+    fit = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C, sigma_y=sigma_y, sigma_z=sigma_z))
     assert 0.93 <= coverage(fit, alpha) <= 0.97
     assert fit.alpha_rad.mean() == pytest.approx(alpha, abs=4 * fit.sigma_rad.mean() / np.sqrt(RUNS) + 1e-5)
     assert fit.alpha_rad.std() == pytest.approx(np.sqrt((fit.sigma_rad**2).mean()), rel=4 / np.sqrt(2 * RUNS))
@@ -44,7 +44,7 @@ def test_interval_holds_it_with_the_noise_found_from_the_residuals(noise, whisks
     alpha = np.radians(12.3)
     beta = np.repeat(SLOPES, whisks)
     (m_y, m_z), _ = noisy_moments(beta, alpha, noise, np.random.default_rng(6))
-    fit = fit_alpha(beta, m_y, m_z, D_X, THETA, C)
+    fit = fit_alpha(Pushes(beta, m_y, m_z, D_X, THETA, C))
     assert 0.93 <= coverage(fit, alpha) <= 0.97
 
 
@@ -57,8 +57,8 @@ def test_interval_holds_it_where_each_slope_is_set_up_once():
     d_x = D_X * (1 + 0.007 * rng.normal(size=runs))
     moments = slip.moments(d_x[:, recording], THETA, beta[:, recording], alpha, C)
     m_y, m_z = (m * (1 + 0.005 * rng.normal(size=m.shape)) for m in moments)
-    together = fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C, recording=recording)
-    apart = fit_alpha(SLOPES[recording], m_y, m_z, D_X, THETA, C)
+    together = fit_alpha(Pushes(SLOPES[recording], m_y, m_z, D_X, THETA, C, recording=recording))
+    apart = fit_alpha(Pushes(SLOPES[recording], m_y, m_z, D_X, THETA, C))
     assert 0.91 <= coverage(together, alpha) <= 0.98  # 400 runs are good to 1.1 %; few slopes weigh most
     assert coverage(apart, alpha) < 0.7
 
@@ -66,8 +66,8 @@ def test_interval_holds_it_where_each_slope_is_set_up_once():
 def test_a_recording_of_one_point_each_differs_by_the_pairing_of_its_moments():
     """m_y and m_z of a whisk share its slope's error; with independent noise the two sigmas agree on average."""
     (m_y, m_z), _ = noisy_moments(SLOPES, 0.2, "of the largest", np.random.default_rng(9))
-    plain = fit_alpha(SLOPES, m_y, m_z, D_X, THETA, C)
-    paired = fit_alpha(SLOPES, m_y, m_z, D_X, THETA, C, recording=np.arange(len(SLOPES)))
+    plain = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C))
+    paired = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C, recording=np.arange(len(SLOPES))))
     assert paired.alpha_rad == pytest.approx(plain.alpha_rad)
     assert np.sqrt((paired.sigma_rad**2).mean()) == pytest.approx(np.sqrt((plain.sigma_rad**2).mean()), rel=0.03)
 
@@ -77,7 +77,7 @@ def test_the_other_reading_is_as_honest_and_much_less_sure():
     alpha = np.radians(12.3)
     beta = np.repeat(SLOPES, 10)
     (m_y, m_z), _ = noisy_moments(beta, alpha, "of the largest", np.random.default_rng(7))
-    both, alone = (fit_alpha(beta, m_y, m_z, D_X, THETA, C, reading=r) for r in friction.READINGS)
+    both, alone = (fit_alpha(Pushes(beta, m_y, m_z, D_X, THETA, C), reading=r) for r in friction.READINGS)
     assert 0.93 <= coverage(alone, alpha) <= 0.97
     assert alone.sigma_rad.mean() > 4 * both.sigma_rad.mean()
 
@@ -87,7 +87,7 @@ def test_the_other_reading_is_as_honest_and_much_less_sure():
 def test_exact_moments_give_the_angle_back(reading, alpha_deg):
     """Golden sections end within √ε of the minimum, which |m|² at small α is flatter by tan α."""
     m_y, m_z = slip.moments(D_X, THETA, SLOPES, np.radians(alpha_deg), C)
-    fit = fit_alpha(SLOPES, m_y, m_z, D_X, THETA, C, reading=reading)
+    fit = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C), reading=reading)
     assert fit.alpha_rad == pytest.approx(np.radians(alpha_deg), abs=1e-6)
     assert fit.status == ""
     assert type(fit.alpha_rad) is float
@@ -97,7 +97,7 @@ def test_mirrored_slopes_and_own_distances_fit_alike():
     beta = np.concatenate([SLOPES, -SLOPES])
     d_x, theta = np.linspace(40, 60, beta.size), np.linspace(0.04, 0.06, beta.size)
     m_y, m_z = slip.moments(d_x, theta, beta, 0.2, C)
-    assert fit_alpha(beta, m_y, m_z, d_x, theta, C).alpha_rad == pytest.approx(0.2, abs=1e-6)
+    assert fit_alpha(Pushes(beta, m_y, m_z, d_x, theta, C)).alpha_rad == pytest.approx(0.2, abs=1e-6)
 
 
 def test_derivative_is_the_difference():
@@ -118,7 +118,7 @@ def test_curves_are_those_of_figure_8():
 def test_friction_beyond_every_slope_is_not_a_number():
     beta = np.radians([0.0, 5.0, 10.0])
     m_y, m_z = slip.moments(D_X, THETA, beta, 0.5, C)
-    fit = fit_alpha(beta, m_y, m_z, D_X, THETA, C)
+    fit = fit_alpha(Pushes(beta, m_y, m_z, D_X, THETA, C))
     assert np.isnan(fit.alpha_rad)
     assert fit.status == NEVER_SLIPPED
 
@@ -126,7 +126,7 @@ def test_friction_beyond_every_slope_is_not_a_number():
 def test_friction_at_zero_is_flagged():
     rng = np.random.default_rng(3)
     m_y, m_z = slip.moments(D_X, THETA, SLOPES, 0.0, C)
-    fit = fit_alpha(SLOPES, m_y + 0.02 + 0.01 * rng.normal(size=16), m_z, D_X, THETA, C)
+    fit = fit_alpha(Pushes(SLOPES, m_y + 0.02 + 0.01 * rng.normal(size=16), m_z, D_X, THETA, C))
     assert fit.status == AT_ZERO
     assert fit.low_rad == 0.0
 
@@ -142,8 +142,9 @@ def test_friction_at_zero_is_flagged():
 )
 def test_bad_data_are_refused(change, message):
     arguments = {"beta": [0.1, 0.5], "m_y": [0.0, 1.0], "m_z": [3.0, 2.0], "d_x": D_X, "theta": THETA, "C": C} | change
+    reading = arguments.pop("reading", "moments")
     with pytest.raises(ValueError, match=message):
-        fit_alpha(**arguments)
+        fit_alpha(Pushes(**arguments), reading=reading)
 
 
 # ---- section VII, way 1: tilting the array

@@ -172,13 +172,13 @@ def test_mismatched_arrays_are_refused():
         felt_touch(np.zeros(10), np.zeros((11, 2)))
 
 
-def test_touches_of_the_sample_session(steel_sample):
+def test_touches_of_the_sample_session(steel_signals):
     """Against the truth of a session that this package did not make: within 3 sigma in each of five trials, and these
     sigmas are below 0.01°."""
     import tomllib
 
     scores = []
-    for trial in sorted((steel_sample / "trials").iterdir()):
+    for trial in sorted((steel_signals / "trials").iterdir()):
         table = np.genfromtxt(trial / "signals.csv", delimiter=",", names=True)
         truth = tomllib.loads((trial / "truth.toml").read_text())["touch_deg"]
         touch = felt_touch(np.radians(table["motor_deg"]), np.c_[table["y_V"], table["z_V"]], table["time_s"])

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from estimator import distance, slip
 from estimator.curvature import deflection, deflection_printed, distance_error, slope_threshold
-from estimator.friction import fit_alpha
+from estimator.friction import Pushes, fit_alpha
 
 
 def angle(degrees):
@@ -139,5 +139,5 @@ def test_fig_8_angles_come_back_from_their_own_curves():
     beta = np.radians(np.arange(0, 80, 5))
     for printed_deg in (10.5, 12.3, 23.3, 18.7):
         m_y, m_z = slip.moments(50.0, angle(3), beta, angle(printed_deg), 8835.7)
-        fit = fit_alpha(beta, m_y, m_z, 50.0, angle(3), 8835.7)
+        fit = fit_alpha(Pushes(beta, m_y, m_z, 50.0, angle(3), 8835.7))
         assert np.degrees(fit.alpha_rad) == pytest.approx(printed_deg, abs=1e-5)

@@ -7,7 +7,6 @@ channels of each measured whisk are exchanged, reversed, weakened or turned, and
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,12 +16,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from bench.base.results import read_result
 from bench.base.settings import Settings
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.matrix import to_follicle
 from bench.gauges.readings import Pairs, pairs_of
+from bench.records.plain import from_plain
+from bench.records.trial import TrialResult
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.agreement import agreement
@@ -34,8 +36,8 @@ def pairs_in(session_path: Path, out: Path) -> Iterator[tuple[str, Pairs]]:
     strokes = {t.name: strokes_of(read_signals(t), t, settings) for t in session.trials}
     rate = drift_rate([s for many in strokes.values() for one in many if (s := free_slope(one)) is not None])
     for trial in session.trials:
-        seen = json.loads((out / "trials" / f"{trial.name}.json").read_text(encoding="utf-8"))["seen"]["whisks"]
-        for whisk, stroke in zip(seen, strokes[trial.name]):
+        result = from_plain(TrialResult, read_result(out / "trials" / f"{trial.name}.json"))
+        for whisk, stroke in zip(result.seen.whisks, strokes[trial.name]):
             pairs = pairs_of(trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
             if pairs is not None:
                 yield trial.purpose, pairs

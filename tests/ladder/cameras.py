@@ -26,6 +26,7 @@ from bench.session.session import load_session
 from vision.boards.corners import Corners, detect, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import held_out
+from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera
 from vision.pictures.files import Frames
@@ -52,7 +53,7 @@ def real_video(folder: Path, names: list[str], find, **how) -> str:
     is_held = np.arange(len(views[names[0]])) % 4 == 3
     kept = {n: [Corners.none() if out else v for v, out in zip(vs, is_held)] for n, vs in views.items()}
     sizes = {name: frames.size_px for name, frames in series.items()}
-    made = calibrate_cameras(kept, {}, WEBCAM_BOARD, sizes, None, **how)
+    made = calibrate_cameras(BoardViews(kept, sizes), WEBCAM_BOARD, None, **how)
     done = time.perf_counter()
     got = held_out(made, views, is_held, WEBCAM_BOARD)
     alone = np.sqrt(np.mean(np.square(list(got.alone_px.values()))))

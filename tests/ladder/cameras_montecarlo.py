@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, Recording, a_recording, measured_pose
 from tests.ladder.rows import HALF_WIDTH_95
 from vision.calibration.calibrate import calibrate_cameras
+from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.camera import Cameras
 from vision.geometry.triangulate import triangulate
 
@@ -57,8 +58,8 @@ def _one(recording: Recording, rng: np.random.Generator, rig_sigma_mm: float, ri
     boards, rig = recording.seen(SIGMA_PX, rng)
     sizes = dict.fromkeys(boards, SIZE_PX)
     T_measured = measured_pose(T_RIG_BOARD, rig_sigma_mm, rig_sigma_rad, rng)
-    made = calibrate_cameras(boards, rig, BOARD, sizes, T_measured,
-                             T_rig_board_sigma_mm=rig_sigma_mm, T_rig_board_sigma_rad=rig_sigma_rad)  # fmt: skip
+    on_rig = MeasuredPose(T_measured, rig_sigma_mm, rig_sigma_rad)
+    made = calibrate_cameras(BoardViews(boards, sizes, rig), BOARD, on_rig)
     return _projected(made.cameras, recording.cameras), _triangulated(made.cameras, recording.cameras, rng)
 
 

@@ -89,12 +89,11 @@ def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
     background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
     (whisk,) = observe_trial(frames, scene.recording.frames.time_s, scene.motor_rad,
                              [slice(0, len(scene.motor_rad))], cameras, wire, bar, background).whisks
-    if math.isnan(whisk.d_x_mm):
+    if math.isnan(whisk.d_x_mm.value):
         return Seen({}, {}, whisk.status)
-    rows = whisk.frames
-    return Seen({"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": rows.slip_mm},
-                {"touch": whisk.touch_sigma_rad, "d_x": whisk.d_x_sigma_mm, "beta": whisk.beta_sigma_rad,
-                 "slip": rows.slip_sigma_mm}, whisk.status)
+    found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
+    return Seen({name: one.value for name, one in found.items()}, {name: one.sigma for name, one in found.items()},
+                whisk.status)
 
 
 def see_alone(scene: Scene) -> Seen:

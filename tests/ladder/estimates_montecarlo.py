@@ -17,6 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from bench.records.trial import EstimateRow
 from bench.rig.bar import Bar, first_touch
 from bench.rig.contact import moments_Nmm
 from bench.rig.friction import Friction, March
@@ -90,24 +91,23 @@ def push(rod: Rod, beta: float, psi: float, d_x: float, radius: float, alpha: fl
 class Sample:
     """Rows of (10) and the truths (n,), with what each may say: "all" with α_est's sigma, "exact" without."""
 
-    rows: list[dict]
+    rows: list[EstimateRow]
     truths: np.ndarray
 
     @property
     def status(self) -> np.ndarray:
-        return np.array([bool(row["status"]) for row in self.rows])
+        return np.array([bool(row.status) for row in self.rows])
 
     @property
     def holds(self) -> np.ndarray:
         """Does the 95 % interval hold the truth, with α_est's sigma?"""
-        low, high = (np.array([row[f"d_x_est_{end}_mm"] for row in self.rows]) for end in ("low", "high"))
+        low, high = (np.array([getattr(row, f"d_x_est_{end}_mm") for row in self.rows]) for end in ("low", "high"))
         return (low <= self.truths) & (self.truths <= high)
 
-    def z(self, sigma: str = "d_x_est_sigma_mm") -> np.ndarray:
-        """Error over stated sigma, NaN where there is no distance."""
-        return np.array([row["d_x_est_mm"] - t for row, t in zip(self.rows, self.truths)]) / [
-            row[sigma] for row in self.rows
-        ]
+    def z(self, alpha_exact: bool = False) -> np.ndarray:
+        """Error over stated sigma, with α_est's or as if it were right; NaN where there is no distance."""
+        errors = np.array([row.d_x_est_mm.value for row in self.rows]) - self.truths
+        return errors / [row.d_x_est_sigma_alpha_exact_mm if alpha_exact else row.d_x_est_mm.sigma for row in self.rows]
 
 
 def sample(shape: str, count: int, seed: int) -> Sample:
@@ -129,7 +129,7 @@ def main() -> None:
     options = parser.parse_args()
     for shape in options.shape:
         s = sample(shape, options.count, options.seed)
-        z, exact = s.z(), s.z("d_x_est_sigma_alpha_exact_mm")
+        z, exact = s.z(), s.z(alpha_exact=True)
         told = s.status
         print(
             f"{shape}: {options.count} whisks, 95 % intervals hold in {100 * s.holds.mean():.1f} % "

@@ -64,11 +64,11 @@ def felt_rows(session_path: Path, thetas_deg: Sequence[float]) -> Iterator[dict]
             for theta_deg in thetas_deg:
                 row = {"speed": trial.speed_deg_s, "theta_deg": theta_deg}
                 touch, whisk = felt_whisk(stroke, hand, rate, session.whisker.beam, np.radians(theta_deg))
-                felt = as_felt(touch, whisk, stroke.speed_rad_s)
-                row["touch"] = np.degrees(felt["touch_felt_rad"]) - truth["touch_deg"]
-                row["touch_sigma"] = np.degrees(felt["touch_felt_sigma_rad"])
-                said = answer("with_friction", with_friction, whisk, alpha, 0.0)
-                yield row | {"d_x": said["d_x_est_mm"] - truth["d_x_mm"], "d_x_sigma": said["d_x_est_sigma_mm"]}
+                felt = as_felt(0, touch, whisk, stroke.speed_rad_s).touch_felt_rad
+                row["touch"] = np.degrees(felt.value) - truth["touch_deg"]
+                row["touch_sigma"] = np.degrees(felt.sigma)
+                said = answer("with_friction", with_friction, whisk, alpha, 0.0).d_x_est_mm
+                yield row | {"d_x": said.value - truth["d_x_mm"], "d_x_sigma": said.sigma}
 
 
 def scores(rows: Sequence[dict]) -> Iterator[Score]:

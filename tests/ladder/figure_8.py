@@ -28,9 +28,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench import cli
 from bench.friction.surfaces import Surface
+from bench.records.trial import TrialResult
 from bench.report.pooled import pooled, read_run
 from bench.rig.protocol import FOLDER as PROTOCOLS
-from estimator.friction import fit_alpha
+from estimator.friction import Pushes, fit_alpha
 
 STATIC_BY_KINETIC = {"one": 1.0, "stick-slip": 1.25}
 WIDTH_PX = 1400
@@ -73,8 +74,8 @@ class Panel:
         """α that fits with these fields of the whisks."""
         beta, d_x, m = (np.array([getattr(w, name) for w in self.whisks]) for name in (beta_deg, d_x_mm, moments))
         theta, beam = self.surface.theta_rad, self.surface.beam
-        fit = fit_alpha(np.radians(beta), *m.T, beam.as_cylinder_mm(d_x), theta, beam.C_Nmm2)
-        return float(np.degrees(fit.alpha_rad))
+        pushes = Pushes(np.radians(beta), *m.T, beam.as_cylinder_mm(d_x), theta, beam.C_Nmm2)
+        return float(np.degrees(fit_alpha(pushes).alpha_rad))
 
 
 HEAD = f"{'':<18}{'n':>5}{'kinetic':>8}{'static':>8}{'fitted':>15}" + "".join(
@@ -116,27 +117,26 @@ def panels(folder: Path) -> list[Panel]:
     """An evaluated session's panels, each with its whisks."""
     found: dict[tuple, list[Whisk]] = {}
     for result in read_run(folder / "out"):
-        trial = result["trial"]
-        if trial["purpose"] == "measure":
-            whisks = found.setdefault((trial["surface"], trial["speed_deg_s"]), [])
-            whisks += _whisks(result, folder / "session" / "trials" / trial["name"])
-    return [Panel(s, tuple(found[s.name, s.speed_deg_s])) for s in pooled([folder / "out"])]
+        trial = result.trial
+        if trial.purpose == "measure":
+            found.setdefault(trial.panel, []).extend(_whisks(result, folder / "session" / "trials" / trial.name))
+    return [Panel(s, tuple(found[s.panel])) for s in pooled([folder / "out"])]
 
 
-def _whisks(result: dict, folder: Path) -> Iterator[Whisk]:
+def _whisks(result: TrialResult, folder: Path) -> Iterator[Whisk]:
     """The whisks of a trial beside its truth files."""
     truth = {k: np.atleast_1d(v) for k, v in tomllib.loads((folder / "truth.toml").read_text(encoding="utf-8")).items()}
     track = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
-    felt, trial = result["felt"]["whisks"], result["trial"]
+    felt, trial = result.felt.whisks, result.trial
     for k, (whisk, frames) in enumerate(zip(felt, np.split(track, len(felt)))):
         theta_deg = frames["motor_deg"] - truth["touch_deg"][k]
         yield Whisk(
-            trial["beta_nominal_deg"],
-            trial["d_x_nominal_mm"],
-            np.array([whisk["m_y_Nmm"], whisk["m_z_Nmm"]]),
+            trial.beta_nominal_deg,
+            trial.d_x_nominal_mm,
+            np.array([whisk.m_y_Nmm.value, whisk.m_z_Nmm.value]),
             truth["beta_deg"][k],
             truth["d_x_mm"][k],
-            np.array([np.interp(result["theta_deg"], theta_deg, frames[m]) for m in ("m_y_Nmm", "m_z_Nmm")]),
+            np.array([np.interp(result.theta_deg, theta_deg, frames[m]) for m in ("m_y_Nmm", "m_z_Nmm")]),
             *np.degrees(np.arctan([truth["mu_kinetic"][k], truth["mu_static"][k]])),
         )
 

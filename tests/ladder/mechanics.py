@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.rig.elastica import Elastica
 from bench.rig.rod import Rod
-from tests.rig.test_contact_march import polar, slip_mm, small_angle, whisk
-from tests.rig.test_elastica import CYLINDER, elliptic_end
+from tests.scenes.elliptic import CYLINDER, elliptic_end
+from tests.scenes.marches import polar, slip_mm, small_angle, whisk
 
 THETAS_DEG = np.arange(0.25, 5.01, 0.25)
 

@@ -22,6 +22,7 @@ from bench.rig.recording import Recording
 from tests.ladder.board_scenes import BOARD, board_views, measured_pose, noisy, rig_view
 from vision.bar.edges import EDGE_PX
 from vision.calibration.calibrate import calibrate_cameras
+from vision.calibration.views import BoardViews, MeasuredPose
 from vision.fit import problem as model
 from vision.fit.problem import Problem, State
 from vision.geometry.camera import Camera, Cameras
@@ -219,9 +220,8 @@ def calibrated(scene: Scene, rng: np.random.Generator, views: int = 10) -> Camer
     held = {c.name: [noisy(view, corner, rng) for view in board_views(c, views, rng)] for c in scene.cameras}
     standing = {c.name: noisy(rig_view(c, T), corner, rng) for c in scene.cameras}
     stated = measured_pose(T, scene.sigmas.rig_mm, scene.sigmas.rig_rad, rng)
-    return calibrate_cameras(held, standing, BOARD, {c.name: c.size_px for c in scene.cameras}, stated,
-                             T_rig_board_sigma_mm=scene.sigmas.rig_mm,
-                             T_rig_board_sigma_rad=scene.sigmas.rig_rad).cameras
+    views = BoardViews(held, {c.name: c.size_px for c in scene.cameras}, standing)
+    return calibrate_cameras(views, BOARD, MeasuredPose(stated, scene.sigmas.rig_mm, scene.sigmas.rig_rad)).cameras
 
 
 def given(scene: Scene, rng: np.random.Generator) -> tuple[Wire, Bar]:

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from bench.rig.protocol import PicturesTable, WhiskerTable
 from tests.ladder import estimates_montecarlo
-from tests.ladder.coverage import COLUMNS, Seen, scene_row, see_points, summary
+from tests.ladder.coverage import COLUMNS, QUANTITIES, Seen, row_of, scene_row, see_points, summary
 from tests.ladder.exactness import model_errors, own_errors, scenes
 from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
 from tests.ladder.precision import repeat
@@ -47,12 +48,15 @@ def test_rung_3_predicted_deviations_are_those_of_repeated_trials(tmp_path):
         assert np.all(np.abs(sample.error) < 5 * sample.sigma), name
 
 
-def test_rung_4_intervals_hold():
-    rows = [scene_row(seed, see_points) for seed in range(3)]
-    for row in rows:
-        for name in ("d_x_mm", "touch_deg", "beta_deg", "slip_mm"):
-            assert abs(row[f"{name}_error"]) < 5 * row[f"{name}_sigma"]
-    assert next(iter(summary(rows))) == "3 scenes, 3 with a truth"
+def test_rung_4_sigmas_are_neither_too_small_nor_too_wide():
+    """z of four quantities in six scenes. Touch, slip and slope share errors, d_x does not: as two of the four, so
+    that the sum of z² over both is chi² of twelve, and its RMS lies outside these once in a thousand right sigmas."""
+    rows = [row_of(scene, see_points(scene)) for scene in (draw_scene(seed, pictures=FEW) for seed in range(6))]
+    assert next(iter(summary(rows))) == "6 scenes, 6 with a truth"
+    z = np.array([[row[f"{name}_error"] / row[f"{name}_sigma"] for name in QUANTITIES] for row in rows])
+    low, high = np.sqrt(chi2.ppf([0.0005, 0.9995], 12) / 12)
+    assert low < np.sqrt(np.mean(z**2)) < high
+    assert np.all(np.abs(z) < 5)
 
 
 def test_rung_4_one_camera_errs_within_what_it_states():
@@ -105,4 +109,4 @@ def test_intervals_of_10_hold_whatever_the_friction(shape):
     assert whisks.holds.mean() > 0.89
     z = whisks.z()[~whisks.status]
     assert np.nanmax(np.abs(z)) < 4
-    assert np.nanmean(np.abs(whisks.z("d_x_est_sigma_alpha_exact_mm")) < 1.96) < 0.5
+    assert np.nanmean(np.abs(whisks.z(alpha_exact=True)) < 1.96) < 0.5

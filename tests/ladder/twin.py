@@ -41,10 +41,10 @@ def errors_of(session_path: Path, out: Path) -> dict[str, list[float]]:
     calibration = calibrate_session(session, out)
     for trial in session.trials:
         truth = tomllib.loads((trial.folder / "truth.toml").read_text())
-        (seen,) = see_trial(session, trial, read_signals(trial), calibration, Settings())["whisks"]
-        errors["d_x"].append((seen["d_x_mm"] or math.nan) - truth["d_x_mm"])
-        errors["beta"].append(math.degrees(seen.get("beta_rad", math.nan)) - truth["beta_deg"])
-        errors["slip"].extend(_slip_errors(seen.get("frames"), trial.folder / "truth.csv"))
+        (seen,) = see_trial(session, trial, read_signals(trial), calibration, Settings()).whisks
+        errors["d_x"].append(seen.d_x_mm.value - truth["d_x_mm"])
+        errors["beta"].append(math.degrees(seen.beta_rad.value) - truth["beta_deg"])
+        errors["slip"].extend(_slip_errors(seen.frames, trial.folder / "truth.csv"))
     return {name: [float(e) for e in values] for name, values in errors.items()}
 
 
@@ -52,7 +52,7 @@ def _slip_errors(frames, path):
     with path.open(encoding="utf-8") as file:
         true = {int(row["frame"]): row for row in csv.DictReader(file)}
     if frames is not None:
-        for frame, touching, slip_mm in zip(frames.index, frames.touching, frames.slip_mm):
+        for frame, touching, slip_mm in zip(frames.index, frames.touching, frames.slip_mm.value):
             if touching and true[int(frame)]["contact"] == "1":
                 yield slip_mm - float(true[int(frame)]["slip_mm"])
 

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, board_views, looking_at, noisy, rig_view
 from vision.calibration.calibrate import calibrate_cameras
+from vision.calibration.views import BoardViews, MeasuredPose
 
 LENS = [2000, 2002, 642.0, 358.0, -0.10, 0.10, 3e-4, -3e-4, 0.0]
 PLACES = [(60, -180, 330), (30, -340, 130), (140, -300, 190), (-60, -280, 220)]
@@ -32,7 +33,7 @@ def seconds(cameras: int, views: int) -> float:
 
 def _timed(boards, rig, sizes) -> float:
     begin = time.process_time()
-    calibrate_cameras(boards, rig, BOARD, sizes, T_RIG_BOARD)
+    calibrate_cameras(BoardViews(boards, sizes, rig), BOARD, MeasuredPose(T_RIG_BOARD))
     return time.process_time() - begin
 
 

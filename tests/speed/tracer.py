@@ -20,7 +20,7 @@ from scipy.special import ndtr
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.vision.test_observe import BAR, WIRE, Recorded
+from tests.scenes.recorded import BAR, WIRE, Recorded
 from vision.lines.bands import cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots

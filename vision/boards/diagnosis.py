@@ -8,7 +8,6 @@ import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, detect, to_8_bit
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
 
 # A setting is believed where it finds at least this share of the board's corners, and far more than the one entered.
 _LEAST_SHARE = 0.3
@@ -33,13 +32,6 @@ def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
                 "if that is the board in the pictures, enter it"
             )
     return None if entered > 0 else _what_is_there(greys, board)
-
-
-def check_settings(greys: Sequence[np.ndarray], board: Board) -> None:
-    """Raises Refused with `why_not_found`, where there is something to say."""
-    reason = why_not_found(greys, board)
-    if reason:
-        raise Refused(reason)
 
 
 def corner_share(greys: Sequence[np.ndarray], board: Board) -> float:

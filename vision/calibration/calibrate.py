@@ -35,6 +35,7 @@ from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
 from vision.calibration.place import by_board
+from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
 from vision.geometry.errors import Refused
@@ -105,56 +106,47 @@ class Calibration:
 
 
 def calibrate_cameras(
-    board_views: Mapping[str, Sequence[Corners]],
-    rig_views: Mapping[str, Corners],
+    views: BoardViews,
     board: Board,
-    sizes_px: Mapping[str, tuple[int, int]],
-    T_rig_board: np.ndarray | None,
+    on_rig: MeasuredPose | None,
     *,
-    T_rig_board_sigma_mm: float = 0.0,
-    T_rig_board_sigma_rad: float = 0.0,
-    trial_views: Mapping[str, Sequence[Corners]] | None = None,
-    times_s: Mapping[str, Sequence[float]] | None = None,
     work_points_mm: np.ndarray | None = None,
     triggered: bool = False,
 ) -> Calibration:
     """Calibrates all cameras in one adjustment.
 
-    board_views: each camera's views of the board; that cameras looked at it at once is found out from the views (and
-    times_s, each picture's time, helps). rig_views: the board standing on the rig; empty, with T_rig_board None, for
-    one camera or cameras that looked at once: then the world is the first camera's frame. T_rig_board (3, 4), mm; its
-    sigmas are per axis, of the shift and of a turn about the board's origin, and are shared by all cameras.
-    trial_views: the rig board in the trials' frames, of cameras that did not move. work_points_mm (n, 3): where the
-    whisker will be, which each camera's views must cover. triggered: pictures of one view are known to be of one
-    instant, so that no other is looked for.
+    That cameras looked at the held board at once is found out from its views; their times help. on_rig: where the board
+    stands on the rig; None for one camera or cameras that looked at once: then the world is the first camera's frame.
+    work_points_mm (n, 3): where the whisker will be, which each camera's views must cover. triggered: pictures of one
+    view are known to be of one instant, so that no other is looked for.
 
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
-    with_rig = T_rig_board is not None
-    alone = {n: _alone(n, board_views[n], rig_views.get(n), board, sizes_px[n], with_rig) for n in board_views}
-    standing = {n: _standing(rig_views[n], (trial_views or {}).get(n, ()), board) for n in alone} if with_rig else None
-    together = looked_at_once(alone)
+    alone = {n: _alone(n, views, board, on_rig is not None) for n in views.boards}
+    standing = {n: _standing(views.rig[n], views.trials.get(n, ()), board) for n in alone} if on_rig else None
+    together, T_rig_board = looked_at_once(alone), on_rig.T_rig_board if on_rig else None
     poses = place_cameras(alone, standing, board, T_rig_board, together=together)
     layout = lay_out(
-        alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=times_s
+        alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=views.times_s
     )
-    known = _knowledge(layout.first, board, T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad)
-    settled, timing = _settle(layout, board, known, _errors(alone, triggered), times_s is None)
+    known = _knowledge(layout.first, board, on_rig)
+    settled, timing = _settle(layout, board, known, _errors(alone, triggered), views.times_s is None)
     settled, notes = _settle_with_warp(layout, settled, board)
     if timing is not None:
         notes.append(_timing_note(alone, timing))
-    calibration = _calibration(alone, sizes_px, settled, board, notes, timing, together)
-    if with_rig:
-        placement = by_board(T_rig_board, T_rig_board_sigma_mm, T_rig_board_sigma_rad).covariance
+    calibration = _calibration(alone, views.sizes_px, settled, board, notes, timing, together)
+    if on_rig is not None:
+        placement = by_board(T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad).covariance
         calibration = replace(calibration, cameras=replace(calibration.cameras, placement=placement))
     check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
     check_work(calibration.cameras, alone, standing, work_points_mm)
     return calibration
 
 
-def _alone(name, views, rig_view, board: Board, size_px, with_rig: bool) -> Alone:
+def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:
     """A camera by itself: the start of the joint adjustment, and the error that it has when nobody else is asked."""
-    seen = {k: without_strays(view, board) for k, view in enumerate(views)}
+    size_px, rig_view = views.sizes_px[name], views.rig.get(name)
+    seen = {k: without_strays(view, board) for k, view in enumerate(views.boards[name])}
     usable = {k: view for k, view in seen.items() if fixes_pose(view, board)}
     lens = first_lens(usable.values(), board.corners_mm, size_px)
     usable = {k: view for k, view in usable.items() if has_pose(view, board.corners_mm, lens)}
@@ -194,7 +186,7 @@ def lens_knowledge(n_cameras: int, n_views: int) -> Knowledge:
     return Knowledge(free, mean, sigma, np.ones(n_views, dtype=bool))
 
 
-def _knowledge(first: State, board: Board, T_rig_board, sigma_mm: float, sigma_rad: float) -> Knowledge:
+def _knowledge(first: State, board: Board, on_rig: MeasuredPose | None) -> Knowledge:
     """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the square.
 
     Without a rig board the first camera is the world's frame.
@@ -203,12 +195,12 @@ def _knowledge(first: State, board: Board, T_rig_board, sigma_mm: float, sigma_r
     if board.square_sigma_mm > 0:
         known.free[-N_BOARD] = True
         known.sigma[-N_BOARD] = board.square_sigma_mm / board.square_mm
-    if T_rig_board is None:
+    if on_rig is None:
         known.free[POSE] = False
         return known
-    known.view_free[0] = sigma_mm > 0 or sigma_rad > 0
-    pose_sigma = np.repeat([max(sigma_rad, 1e-9), max(sigma_mm, 1e-7)], 3)
-    return replace(known, pose_view=0, pose_T=T_rig_board, pose_sigma=pose_sigma)
+    known.view_free[0] = not on_rig.is_exact
+    pose_sigma = np.repeat([max(on_rig.sigma_rad, 1e-9), max(on_rig.sigma_mm, 1e-7)], 3)
+    return replace(known, pose_view=0, pose_T=on_rig.T_rig_board, pose_sigma=pose_sigma)
 
 
 def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Settled, list[str]]:

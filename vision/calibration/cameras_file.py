@@ -1,10 +1,6 @@
-"""cameras.toml and its covariance beside it in cameras.npz, as the session format has them; both written
-whole.
-"""
+"""cameras.toml and its covariance beside it in cameras.npz, as the session format has them."""
 
 import hashlib
-import os
-import tempfile
 import tomllib
 from io import BytesIO
 from pathlib import Path
@@ -19,22 +15,16 @@ from vision.geometry.errors import Refused
 _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
 
 
-def write_cameras(path: Path | str, cameras: Cameras) -> None:
-    """Writes `path` (TOML) and, beside it with the suffix .npz, the joint covariance with the parameters'
-    names, and the part of it that is the rig frame's, where that is told.
-
-    The covariance goes first, so that a run that dies between the two leaves no TOML pointing at nothing.
-    """
-    path = Path(path)
+def cameras_as_files(cameras: Cameras, companion: str) -> tuple[bytes, bytes]:
+    """Contents of cameras.toml and of the file `companion` beside it: the joint covariance with the parameters' names,
+    and the part of it that is the rig frame's, where that is known."""
     packed = _pack_covariance(cameras)
-    companion = path.with_suffix(".npz")
     document = {
-        "covariance": companion.name,
+        "covariance": companion,
         "covariance_sha256": hashlib.sha256(packed).hexdigest(),
         "cameras": {camera.name: _as_table(camera) for camera in cameras},
     }
-    _write_whole(companion, packed)
-    _write_whole(path, tomli_w.dumps(document).encode())
+    return tomli_w.dumps(document).encode(), packed
 
 
 def _as_table(camera: Camera) -> dict:
@@ -49,34 +39,15 @@ def _as_table(camera: Camera) -> dict:
 
 def _pack_covariance(cameras: Cameras) -> bytes:
     buffer = BytesIO()
-    told = {} if cameras.placement is None else {"placement": cameras.placement}
+    placement = {} if cameras.placement is None else {"placement": cameras.placement}
     np.savez(
         buffer,
         covariance=cameras.covariance,
         cameras=np.array(cameras.names),
         parameters=np.array(PARAMETERS),
-        **told,
+        **placement,
     )
     return buffer.getvalue()
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """The old file or the new one, never half of either."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def read_cameras(path: Path | str) -> Cameras:

@@ -4,30 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NAN = float("nan")
+from vision.truth.value import FIELDS, Value, WhileTouching
+
 _WINDOW_RAD = np.radians(1.6)
 _JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
 _BEYOND_RAD = np.radians(0.3)
-_NAMES = {"slip": "mm", "longitudinal_slip": "mm", "d_y": "mm", "d_z": "mm", "phi": "rad", "alpha": "rad"}
 
 
-@dataclass(frozen=True)
-class TruthAtAngle:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TruthAtAngle(WhileTouching):
     """Truth at one pushing angle; NaN with a status where the whisk does not hold it."""
 
     theta_rad: float
-    slip_mm: float = NAN
-    slip_sigma_mm: float = NAN
-    longitudinal_slip_mm: float = NAN
-    longitudinal_slip_sigma_mm: float = NAN
-    d_y_mm: float = NAN
-    d_y_sigma_mm: float = NAN
-    d_z_mm: float = NAN
-    d_z_sigma_mm: float = NAN
-    phi_rad: float = NAN
-    phi_sigma_rad: float = NAN
-    alpha_rad: float = NAN
-    alpha_sigma_rad: float = NAN
     status: str = ""
 
 
@@ -48,22 +36,27 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: str) -> TruthAtAn
     without: the status where there is nothing smooth.
     """
     if smooth is None or len(smooth.theta_rad) == 0:
-        return TruthAtAngle(theta_rad, status=without or "the whisker does not touch")
+        return TruthAtAngle(theta_rad=theta_rad, status=without or "the whisker does not touch")
     if theta_rad > np.max(smooth.theta_rad) + _BEYOND_RAD or theta_rad <= 0:
         reached = np.degrees(np.max(smooth.theta_rad))
-        return TruthAtAngle(theta_rad, status=f"pushed to {reached:.2f} deg only")
+        return TruthAtAngle(theta_rad=theta_rad, status=f"pushed to {reached:.2f} deg only")
     weights, slope, jumps = _weights(smooth, theta_rad)
-    values = {}
-    for name, unit in _NAMES.items():
-        value, sigma = _combine(smooth, name, weights, slope)
-        if not jumps:
-            sigma = max(sigma, _least_sigma(smooth, name, theta_rad))
-            sigma = float(np.hypot(sigma, _unfitted(smooth, name, theta_rad)))
-        values[f"{name}_{unit}"], values[f"{name}_sigma_{unit}"] = value, sigma
+    values = {field: _value(smooth, name, theta_rad, weights, slope, jumps) for name, field in FIELDS.items()}
     if jumps:
         nearest = float(smooth.theta_rad[int(np.argmax(weights))])
-        return TruthAtAngle(nearest, **values, status=f"slips in jumps: seen at {np.degrees(nearest):.2f} deg")
-    return TruthAtAngle(theta_rad, **values)
+        status = f"slips in jumps: seen at {np.degrees(nearest):.2f} deg"
+        return TruthAtAngle(theta_rad=nearest, **values, status=status)
+    return TruthAtAngle(theta_rad=theta_rad, **values)
+
+
+def _value(smooth: Smooth, name: str, theta_rad: float, weights, slope_weights, jumps: bool) -> Value:
+    """One quantity by these weights (f,). A smooth one is no surer than the surest frame nearby, and errs by what the
+    local fit leaves, too."""
+    value, sigma = _combine(smooth, name, weights, slope_weights)
+    if jumps:
+        return Value(value, sigma)
+    sigma = max(sigma, _least_sigma(smooth, name, theta_rad))
+    return Value(value, float(np.hypot(sigma, _unfitted(smooth, name, theta_rad))))
 
 
 def _weights(smooth: Smooth, theta_rad: float):

@@ -12,23 +12,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.bar.search import SeenBar, see_bar
+from vision.bar.search import see_bar
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import check_beam
-from vision.fit.quantities import jacobians
-from vision.fit.uncertainty import uncertainty
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
-from vision.lines.one_sided import Lit, one_sided_lines
+from vision.lines.one_sided import one_sided_lines
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.whisk import fit_whisk, free_stroke
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
-_FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
+_FEWEST_FRAMES = 4
 
 _USUAL = VisionSettings()
 
@@ -51,71 +50,66 @@ def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_
         bar_seen = see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
-    lights = [{} for _ in whisks]
-    rows = [_see_whisk(number, range(*where.indices(len(time_s))), views, used, rods, bar_seen, time_s, motor_rad,
-                       lights[number], settings) for number, where in enumerate(whisks)]
+    seen = [WhiskPictures(number, range(*where.indices(len(time_s))), time_s, motor_rad, views, used, rods, bar_seen,
+                          settings) for number, where in enumerate(whisks)]
+    rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis = bar_seen.axis
-    return TrialTruth(axis.point_mm, axis.direction, np.full((4, 4), np.nan), tuple(rows), one_sided_lines(lights))
+    return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines([whisk.light for whisk in seen]))
 
 
 def _nothing(whisks, reason: str) -> TrialTruth:
     rows = tuple(WhiskTruth(number, None, status=reason) for number in range(len(whisks)))
-    return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), np.full((4, 4), np.nan), rows)
+    return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), rows)
 
 
-def _views(frames, cameras: Cameras, background) -> list[View]:
+def _views(frames, cameras: Cameras, background) -> tuple[View, ...]:
     views = []
     for camera in cameras:
         pictures = frames.get(camera.name, {})
         if len(pictures) < 3:
             continue
         first, second = list(pictures.values())[:2]
-        known = background.get(camera.name)
-        known = np.zeros(first.shape) if known is None else np.asarray(known, dtype=float)
-        views.append(View(camera, pictures, known, measure_noise(first, second)))
+        empty = background.get(camera.name)
+        empty = np.zeros(first.shape) if empty is None else np.asarray(empty, dtype=float)
+        views.append(View(camera, pictures, empty, measure_noise(first, second)))
     if not views:
         raise Refused("no camera has three frames or more")
-    return views
+    return tuple(views)
 
 
-def _see_whisk(number: int, indices, views, cameras, rods: Rods, bar: SeenBar, time_s, motor_rad,
-               light: dict[str, Lit], settings: VisionSettings, misled: Sequence[str] = ()) -> WhiskTruth:
-    """Truth of one whisk; its status where there is none. misled: lines on cameras that were left out already."""
-    views, left_out = _with_frames(views, indices)
-    left_out = [*left_out, *misled]
-    seen = [f for f in indices if all(f in view.frames for view in views)]
-    if len(seen) < 4:
-        few = f"{len(seen)} frames seen by every camera, 4 are needed"
-        return WhiskTruth(number, None, status="; ".join([few, *left_out]))
-    cameras = cameras.subset([view.camera.name for view in views])
-    motor = {f: float(motor_rad[f]) for f in seen}
-    try:
-        problem, state, answer, near = fit_whisk(views, cameras, rods, bar, motor, light, settings)
-    except (Refused, np.linalg.LinAlgError) as reason:
-        status = str(reason) if isinstance(reason, Refused) else "the fit of wire and bar does not settle"
-        if isinstance(reason, Misled) and len(views) > 1:
-            others = [view for view in views if view.camera.name != reason.camera]
-            return _see_whisk(number, indices, others, cameras, rods, bar, time_s, motor_rad, light, settings,
-                              [*left_out, status])
-        return WhiskTruth(number, None, cameras=len(views), frames_used=len(seen),
-                          status="; ".join([status, *left_out]))
-    measured, by_parameter = jacobians(problem, state)
-    known = uncertainty(problem, state, answer)
-    far = set(motor) - set(near)
-    whisk = to_whisk(number, indices, near, time_s, motor_rad, problem, state, measured, by_parameter, known,
-                     views, rods.bar.radius_mm, settings, far)
-    beam = check_beam(problem, state, known.covariance, measured, by_parameter)
-    status = "; ".join(filter(None, [whisk.status, beam.alarm, *left_out]))
-    stroke = free_stroke(views, rods, problem, state, motor, near, light, settings) if far else (problem, state)
-    return replace(whisk, base=base_lines(*stroke, known.lens), beam=beam, status=status)
+def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
+    """Truth of one whisk; its status where there is none. A camera that shows something else than the others is left
+    out, and the others are asked again."""
+    while True:
+        whisk = whisk.without_gaps()
+        if len(whisk.frames) < _FEWEST_FRAMES:
+            few = f"{len(whisk.frames)} frames seen by every camera, {_FEWEST_FRAMES} are needed"
+            return WhiskTruth(whisk.number, None, status="; ".join([few, *whisk.left_out]))
+        try:
+            fit = fit_whisk(whisk.views, whisk.cameras, whisk.rods, whisk.bar, whisk.motor, whisk.light, whisk.settings)
+            break
+        except Misled as reason:
+            if len(whisk.views) == 1:
+                return _refused(whisk, str(reason))
+            whisk = whisk.without(reason.camera, str(reason))
+        except Refused as reason:
+            return _refused(whisk, str(reason))
+        except np.linalg.LinAlgError:
+            return _refused(whisk, "the fit of wire and bar does not settle")
+    return _truth(whisk, FittedWhisk.of(*fit))
 
 
-def _with_frames(views, indices) -> tuple[list[View], list[str]]:
-    """The views that have most of the frames, and lines on those left out: one camera's gaps are not all cameras'."""
-    counts = [sum(f in view.frames for f in indices) for view in views]
-    kept = [view for view, count in zip(views, counts) if count > _FEWEST_SHARE * max(counts)]
-    lost = [f"camera {view.camera.name} was left out: {count} frames of {len(indices)}"
-            for view, count in zip(views, counts) if count <= _FEWEST_SHARE * max(counts)]
-    return kept, lost
+def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
+    return WhiskTruth(whisk.number, None, cameras=len(whisk.views), frames_used=len(whisk.frames),
+                      status="; ".join([status, *whisk.left_out]))
 
 
+def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
+    """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
+    truth = to_whisk(whisk, fitted)
+    beam = check_beam(fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter)
+    stroke = fitted.problem, fitted.state
+    if len(fitted.frames) < len(whisk.frames):
+        stroke = free_stroke(whisk.views, whisk.rods, *stroke, whisk.motor, fitted.frames, whisk.light, whisk.settings)
+    status = "; ".join(filter(None, [truth.status, beam.alarm, *whisk.left_out]))
+    return replace(truth, base=base_lines(*stroke, fitted.uncertainty.lens), beam=beam, status=status)

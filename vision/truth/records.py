@@ -6,67 +6,50 @@ import numpy as np
 
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.base_lines import BaseLines
-from vision.truth.at_angle import NAN, Smooth, TruthAtAngle, at_angle
+from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
+from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
 
 
-@dataclass(frozen=True)
-class FrameTruth:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrameTruth(WhileTouching):
     """A row a frame (n,), mm and rad; NaN where there is nothing to tell, with the reason in `status`.
 
-    Values that exist only while touching are NaN before. *_sigma: one standard deviation.
+    Values that exist only while touching are NaN before. point_mm: value and sigma (n, 3). arc_mm: of the contact along
+    the whisker.
     """
 
     index: np.ndarray
     time_s: np.ndarray
     motor_rad: np.ndarray
-    theta_rad: np.ndarray
-    theta_sigma_rad: np.ndarray
+    theta_rad: Value
     touching: np.ndarray
-    point_mm: np.ndarray
-    point_sigma_mm: np.ndarray
-    slip_mm: np.ndarray
-    slip_sigma_mm: np.ndarray
-    longitudinal_slip_mm: np.ndarray
-    longitudinal_slip_sigma_mm: np.ndarray
-    d_y_mm: np.ndarray
-    d_y_sigma_mm: np.ndarray
-    d_z_mm: np.ndarray
-    d_z_sigma_mm: np.ndarray
-    phi_rad: np.ndarray
-    phi_sigma_rad: np.ndarray
-    alpha_rad: np.ndarray
-    alpha_sigma_rad: np.ndarray
+    point_mm: Value
     arc_mm: np.ndarray
     status: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
     d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
-    budget: shares of d_x's variance by cause. base: the whisker's base in the frames before touch. beam: the same by a
-    curve that is no beam.
+    overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
+    the frames before touch. beam: the same by a curve that is no beam.
     """
 
     whisk: int
     frames: FrameTruth | None
-    touch_rad: float = NAN
-    touch_sigma_rad: float = NAN
-    point_mm: np.ndarray = field(default_factory=lambda: np.full(3, NAN))
-    point_sigma_mm: np.ndarray = field(default_factory=lambda: np.full(3, NAN))
-    d_x_mm: float = NAN
-    d_x_sigma_mm: float = NAN
-    beta_rad: float = NAN
-    beta_sigma_rad: float = NAN
-    psi_rad: float = NAN
-    psi_sigma_rad: float = NAN
+    touch_rad: Value = UNKNOWN
+    point_mm: Value = UNKNOWN_POINT
+    d_x_mm: Value = UNKNOWN
+    beta_rad: Value = UNKNOWN
+    psi_rad: Value = UNKNOWN
     cameras: int = 0
     frames_used: int = 0
     status: str = ""
-    overlay: dict = field(default_factory=dict)
+    overlay: dict[int, dict[str, dict[str, np.ndarray]]] = field(default_factory=dict)
     smooth: Smooth | None = None
-    budget: dict = field(default_factory=dict)
+    budget: dict[str, float] = field(default_factory=dict)
     base: BaseLines | None = None
     beam: BeamCheck | None = None
 
@@ -77,11 +60,9 @@ class WhiskTruth:
 
 @dataclass(frozen=True)
 class TrialTruth:
-    """All whisks of a trial and the bar they shared: point (3,), direction (3,), covariance (4, 4) of two shifts
-    (mm) and two tilts across it."""
+    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, and its direction (3,)."""
 
     bar_point_mm: np.ndarray
     bar_direction: np.ndarray
-    bar_covariance: np.ndarray
     whisks: tuple[WhiskTruth, ...]
     notes: tuple[str, ...] = ()

@@ -1,55 +1,53 @@
 """From the fit to rows: values with sigmas, statuses, and lines to draw on the pictures."""
 
-from collections.abc import Collection, Sequence
-
 import numpy as np
 
-from vision.fit.problem import Problem, State, bar_axis, curves_of
-from vision.fit.quantities import Jacobians, Measured
-from vision.fit.uncertainty import Uncertainty, variance_by_cause
+from vision.fit.problem import bar_axis, curves_of
+from vision.fit.uncertainty import variance_by_cause
+from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
-from vision.geometry.settings import VisionSettings
+from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import normals, outline
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
+from vision.truth.value import FIELDS, Value
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _MOST_GAP = 1.5  # of the median frame interval, beyond which a frame was lost
 # Beyond this sigma of the slope two scenes of 380 were off by 9 and 49 degrees, the latter at a stated 10.
-_TOLD_RAD = np.radians(3.0)
+_DOUBTED_SLOPE_SIGMA_RAD = np.radians(3.0)
 # Beyond this one nothing that is propagated linearly holds: in one scene touch was 18 of its sigmas off.
-_MOST_UNTOLD_RAD = np.radians(20.0)
+_MOST_SLOPE_SIGMA_RAD = np.radians(20.0)
 # Nor beyond this one of slip: in one view, with slip known to 5 mm, slope was 24 degrees off at a stated 0.04.
-_MOST_UNTOLD_MM = 1.0
+_MOST_SLIP_SIGMA_MM = 1.0
 _VECTORS = ("x", "y", "z")
-_PLAIN = ("slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha")
 
 
-def to_whisk(number: int, indices: Sequence[int], seen: Sequence[int], time_s, motor_rad, problem: Problem,
-             state: State, measured: Measured, by_parameter: Jacobians, known: Uncertainty, views,
-             bar_radius_mm: float, settings: VisionSettings, far: Collection[int] = ()) -> WhiskTruth:
-    """The row of a whisk and its frames. seen: the frames in the fit; far: those left out of it, long before touch."""
-    covariance = known.covariance
-    sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by_parameter.whisk.items()}
-    value = {name: float(v) for name, v in measured.whisk.items()}
-    clock = settings.clock_sigma_s * _speed(time_s[list(seen)], problem.motor_rad, value["touch"])
-    sigma["touch"] = float(np.hypot(sigma["touch"], clock))
-    frames = _frames(indices, seen, far, time_s, motor_rad, problem, measured, by_parameter, covariance,
-                     value["touch"], sigma["touch"])
-    lost = _lost_at_touch(indices, [*far, *seen], motor_rad, value["touch"])
-    outside = _outside(problem, value)
-    slip_untold = _slip_untold(frames)
-    status = "; ".join(filter(None, [lost, outside, _slope_untold(sigma["beta"]), slip_untold]))
-    untold = bool(lost or outside or slip_untold) or sigma["beta"] > _MOST_UNTOLD_RAD
-    truth = {} if untold else {
-        "d_x_mm": value["d_x"], "d_x_sigma_mm": sigma["d_x"], "touch_rad": value["touch"],
-        "touch_sigma_rad": sigma["touch"], "beta_rad": value["beta"], "beta_sigma_rad": sigma["beta"],
-        "psi_rad": value["psi"], "psi_sigma_rad": sigma["psi"],
-        "point_mm": np.array([value[k] for k in _VECTORS]),
-        "point_sigma_mm": np.array([sigma[k] for k in _VECTORS])}
-    return WhiskTruth(number, frames, cameras=len(views), frames_used=len(seen), status=status,
-                      overlay=_overlay(problem, state, measured, seen, views, bar_radius_mm),
-                      smooth=None if untold else _smooth(problem, measured, by_parameter, covariance),
-                      budget=_budget(problem, state, known, by_parameter.whisk["d_x"]), **truth)
+def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
+    """The row of a whisk and its frames; its d_x is NaN and its status says why where the fit does not tell it."""
+    touch, beta = _touch(whisk, fitted), fitted.of_whisk("beta")
+    frames = _frames(whisk, fitted, touch)
+    reasons = [_lost_at_touch(whisk, touch.value), _outside(fitted, touch.value), _slope_unresolved(beta.sigma),
+               _slip_unresolved(frames)]
+    lost, outside, _, slip = reasons
+    is_known = not (lost or outside or slip) and not beta.sigma > _MOST_SLOPE_SIGMA_RAD
+    truth = _at_touch(fitted, touch, beta) | {"smooth": _smooth(fitted)} if is_known else {}
+    return WhiskTruth(whisk.number, frames, cameras=len(whisk.views), frames_used=len(fitted.frames),
+                      status="; ".join(filter(None, reasons)), overlay=_overlay(whisk, fitted),
+                      budget=_budget(fitted), **truth)
+
+
+def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:
+    """Motor angle of first touch, rad; a clock that is off moves it."""
+    touch = fitted.of_whisk("touch")
+    speed_rad_s = _speed(whisk.time_s[fitted.frames], fitted.problem.motor_rad, touch.value)
+    return Value(touch.value, float(np.hypot(touch.sigma, whisk.settings.clock_sigma_s * speed_rad_s)))
+
+
+def _at_touch(fitted: FittedWhisk, touch: Value, beta: Value) -> dict[str, Value]:
+    point = [fitted.of_whisk(name) for name in _VECTORS]
+    return {"touch_rad": touch, "d_x_mm": fitted.of_whisk("d_x"), "beta_rad": beta, "psi_rad": fitted.of_whisk("psi"),
+            "point_mm": Value(np.array([p.value for p in point]), np.array([p.sigma for p in point]))}
 
 
 def _speed(time_s, motor_rad, at_rad: float) -> float:
@@ -58,102 +56,101 @@ def _speed(time_s, motor_rad, at_rad: float) -> float:
     return abs(motor_rad[nearest] - motor_rad[nearest - 1]) / max(time_s[nearest] - time_s[nearest - 1], 1e-9)
 
 
-def _outside(problem: Problem, value) -> str:
+def _outside(fitted: FittedWhisk, touch_rad: float) -> str:
     """A touch that no frame brackets is a guess."""
-    if not problem.motor_rad.min() <= value["touch"] <= problem.motor_rad.max():
-        return "touch lies outside the frames"
-    return ""
+    motor_rad = fitted.problem.motor_rad
+    return "" if motor_rad.min() <= touch_rad <= motor_rad.max() else "touch lies outside the frames"
 
 
-def _slope_untold(beta_sigma_rad: float) -> str:
+def _slope_unresolved(beta_sigma_rad: float) -> str:
     """A slope that only the priors of whole lines hold may be off by far more: nothing is linear there."""
-    if beta_sigma_rad > _TOLD_RAD:
+    if beta_sigma_rad > _DOUBTED_SLOPE_SIGMA_RAD:
         return (f"the bar's slope is known to {np.degrees(beta_sigma_rad):.0f} deg only: no two cameras see it from "
                 "different sides")
     return ""
 
 
-def _slip_untold(frames: FrameTruth) -> str:
+def _slip_unresolved(frames: FrameTruth) -> str:
     """Slip that is known to a millimetre or worse is not known, nor is where the whisker touches."""
-    sigma_mm = float(np.max(frames.slip_sigma_mm[frames.touching], initial=0.0))
-    if sigma_mm > _MOST_UNTOLD_MM:
-        return f"slip is known to {sigma_mm:.1f} mm only, {_MOST_UNTOLD_MM:g} is allowed"
+    sigma_mm = float(np.max(frames.slip_mm.sigma[frames.touching], initial=0.0))
+    if sigma_mm > _MOST_SLIP_SIGMA_MM:
+        return f"slip is known to {sigma_mm:.1f} mm only, {_MOST_SLIP_SIGMA_MM:g} is allowed"
     return ""
 
 
-def _lost_at_touch(indices, seen, motor_rad, touch_rad: float) -> str:
+def _lost_at_touch(whisk: WhiskPictures, touch_rad: float) -> str:
     """Reason where a frame next to touch was lost."""
-    lost = sorted(set(indices) - set(seen))
+    lost = sorted(set(whisk.indices) - set(whisk.frames))
     if not lost:
         return ""
-    step = np.median(np.abs(np.diff(motor_rad[list(indices)])))
-    near = [f for f in lost if abs(motor_rad[f] - touch_rad) < _MOST_GAP * step]
+    step = np.median(np.abs(np.diff(whisk.motor_rad[list(whisk.indices)])))
+    near = [f for f in lost if abs(whisk.motor_rad[f] - touch_rad) < _MOST_GAP * step]
     return f"frame {near[0]} at touch was lost" if near else ""
 
 
-def _smooth(problem: Problem, measured: Measured, by_parameter: Jacobians, covariance) -> Smooth:
+def _smooth(fitted: FittedWhisk) -> Smooth:
+    """What `WhiskTruth.at` needs of the touching frames."""
+    problem, measured, by = fitted.problem, fitted.measured, fitted.by_parameter
     keep = problem.touching
-    touch = by_parameter.whisk["touch"]
-    return Smooth(problem.motor_rad[keep] - measured.whisk["touch"], touch,
-                  {name: measured.frame[name][keep] for name in _PLAIN},
-                  {name: by_parameter.frame[name][keep] for name in _PLAIN}, covariance)
+    return Smooth(problem.motor_rad[keep] - measured.whisk["touch"], by.whisk["touch"],
+                  {name: measured.frame[name][keep] for name in FIELDS},
+                  {name: by.frame[name][keep] for name in FIELDS}, fitted.covariance)
 
 
-def _frames(indices, seen, far, time_s, motor_rad, problem: Problem, measured: Measured, by_parameter: Jacobians,
-            covariance, touch_rad: float, touch_sigma_rad: float) -> FrameTruth:
+def _frames(whisk: WhiskPictures, fitted: FittedWhisk, touch: Value) -> FrameTruth:
     """A row for every frame of the whisk, NaN for those not seen or not touching."""
-    indices = np.array(list(indices))
-    position = {f: k for k, f in enumerate(seen)}
-    rows = np.array([position.get(f, -1) for f in indices])
-    touching = np.array([r >= 0 and bool(problem.touching[r]) for r in rows])
-    bent = np.array([r >= 0 and bool(problem.bent[r]) for r in rows])
-
-    def column(values):
-        out = np.full(len(indices), np.nan)
-        out[touching] = values[rows[touching]]
-        return out
-
-    sigmas = {name: np.sqrt(np.maximum(np.einsum("fi,ij,fj->f", j, covariance, j), 0.0))
-              for name, j in by_parameter.frame.items()}
-    status = tuple("long before touch" if f in far else "no picture" if r < 0 else "" if t or not b else "at touch"
-                   for f, r, t, b in zip(indices, rows, touching, bent))
-    plain = {}
-    for name in _PLAIN:
-        unit = "rad" if name in ("phi", "alpha") else "mm"
-        plain[f"{name}_{unit}"] = column(measured.frame[name])
-        plain[f"{name}_sigma_{unit}"] = column(sigmas[name])
-    motor = np.asarray(motor_rad)[indices]
+    indices = np.array(whisk.indices)
+    position = {f: k for k, f in enumerate(fitted.frames)}
+    rows = np.array([position.get(f, -1) for f in whisk.indices])
+    touching = (rows >= 0) & fitted.problem.touching[rows]
+    columns = {name: Value(_column(of.value, rows, touching), _column(of.sigma, rows, touching))
+               for name in (*_VECTORS, *FIELDS) for of in [fitted.of_frames(name)]}
+    point = [columns[name] for name in _VECTORS]
+    motor = whisk.motor_rad[indices]
     return FrameTruth(
-        index=indices, time_s=np.asarray(time_s)[indices], motor_rad=motor, theta_rad=motor - touch_rad,
-        theta_sigma_rad=np.full(len(indices), touch_sigma_rad), touching=touching,
-        point_mm=np.stack([column(measured.frame[k]) for k in _VECTORS], axis=1),
-        point_sigma_mm=np.stack([column(sigmas[k]) for k in _VECTORS], axis=1),
-        arc_mm=column(measured.frame["arc"]), status=status, **plain)
+        index=indices, time_s=whisk.time_s[indices], motor_rad=motor, touching=touching,
+        theta_rad=Value(motor - touch.value, np.full(len(indices), touch.sigma)),
+        point_mm=Value(np.stack([p.value for p in point], axis=1), np.stack([p.sigma for p in point], axis=1)),
+        arc_mm=_column(fitted.measured.frame["arc"], rows, touching), status=_statuses(whisk, fitted, rows),
+        **{field: columns[name] for name, field in FIELDS.items()})
 
 
-def _budget(problem: Problem, state: State, known: Uncertainty, gradient) -> dict[str, float]:
-    """Shares of the variance by cause; those that are told add up to 1."""
-    parts = variance_by_cause(problem, state, known, gradient)
+def _column(values, rows, touching) -> np.ndarray:
+    """Of the fit's frames (f,) those in these rows (n,), NaN where not touching."""
+    return np.where(touching, values[rows], np.nan)
+
+
+def _statuses(whisk: WhiskPictures, fitted: FittedWhisk, rows) -> tuple[str, ...]:
+    """Why a frame has no values; empty where it touches, or surely does not."""
+    at_touch = fitted.problem.bent & ~fitted.problem.touching
+    return tuple(("at touch" if at_touch[row] else "") if row >= 0 else
+                 "long before touch" if f in whisk.motor else "no picture" for f, row in zip(whisk.indices, rows))
+
+
+def _budget(fitted: FittedWhisk) -> dict[str, float]:
+    """Shares of d_x's variance by cause; those that are known add up to 1."""
+    parts = variance_by_cause(fitted.problem, fitted.state, fitted.uncertainty, fitted.by_parameter.whisk["d_x"])
     whole = np.nansum(list(parts.values()))
     return {name: part / whole for name, part in parts.items()}
 
 
-def _overlay(problem: Problem, state: State, measured: Measured, seen, views, bar_radius_mm: float) -> dict:
+def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, dict[str, np.ndarray]]]:
     """Per frame and camera: wire, the bar's two edges (m, 2) and the contact (2,) in pixels."""
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
-    axis = bar_axis(problem, state.vector)
+    curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
+    axis = bar_axis(fitted.problem, fitted.state.vector)
     place = np.linspace(-40.0, 40.0, 81)
     along = axis.point_mm + place[:, None] * axis.direction
     drawn: dict = {}
-    for k, f in enumerate(seen):
+    for k, f in enumerate(fitted.frames):
         one = Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k])
-        contact = np.array([[measured.frame[name][k] for name in _VECTORS]])
-        drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, bar_radius_mm)
-                         for view in views}
+        contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
+        drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm)
+                         for view in whisk.views}
     return drawn
 
 
-def _drawn(camera, curve: Curves, along, axis, contact, bar_radius_mm: float) -> dict[str, np.ndarray]:
+def _drawn(camera: Camera, curve: Curves, along, axis: BarAxis, contact,
+           bar_radius_mm: float) -> dict[str, np.ndarray]:
     middle, half = outline(camera, along, np.broadcast_to(axis.direction, along.shape), bar_radius_mm)
     aside = half[:, None] * normals(middle)
     return {"wire": camera.project(curve.points_mm), "bar_left": middle - aside, "bar_right": middle + aside,

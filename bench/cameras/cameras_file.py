@@ -1,0 +1,18 @@
+"""cameras.toml and cameras.npz are written whole."""
+
+from pathlib import Path
+
+from bench.base.atomic import write_whole
+from vision.calibration.cameras_file import cameras_as_files
+from vision.geometry.camera import Cameras
+
+
+def write_cameras(path: Path, cameras: Cameras) -> None:
+    """Writes `path` (TOML) and, beside it with the suffix .npz, the joint covariance.
+
+    The covariance goes first, so that a run that dies between the two leaves no TOML pointing at nothing.
+    """
+    companion = path.with_suffix(".npz")
+    document, packed = cameras_as_files(cameras, companion.name)
+    write_whole(companion, packed)
+    write_whole(path, document)

@@ -1,0 +1,82 @@
+"""Records as JSON has them, and back: a `Value` is two keys there, its own and that of its sigma, and NaN is null."""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import lru_cache
+from types import NoneType, UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from bench.base.results import plain
+from bench.base.tables import sigma_name
+from vision.truth.value import NAN, Value
+
+Record = TypeVar("Record")
+
+
+def to_plain(value: object) -> Any:
+    """A record, or a list or mapping of records, as plain values."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {key: part for f in fields(value) for key, part in _keys(f.name, getattr(value, f.name))}
+    if isinstance(value, Mapping):
+        return {str(key): to_plain(item) for key, item in value.items()}
+    return [to_plain(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
+
+
+def _keys(name: str, value: object) -> list[tuple[str, Any]]:
+    if isinstance(value, Value):
+        return [(name, plain(value.value)), (sigma_name(name), plain(value.sigma))]
+    return [(name, to_plain(value))]
+
+
+def from_plain(kind: type[Record], value: Any) -> Record:
+    """A record of this kind. Raises ValueError where it is not one: of an older version, or damaged."""
+    try:
+        return _read(kind, value)
+    except (TypeError, AttributeError) as problem:
+        raise ValueError(f"is no {kind.__name__}: {problem}") from problem
+
+
+def _read(kind: Any, value: Any) -> Any:
+    """A plain value as its annotation has it; fields of other types stay as they are."""
+    if isinstance(kind, UnionType):
+        return None if value is None else _read(next(k for k in get_args(kind) if k is not NoneType), value)
+    if kind is float:
+        return NAN if value is None else float(value)
+    if kind is np.ndarray:
+        return _array(value)
+    if is_dataclass(kind):
+        hints = _hints(kind)
+        return kind(**{f.name: part for f in fields(kind) for part in _field(kind, f, hints[f.name], value)})
+    if get_origin(kind) is tuple:
+        return tuple(_read(get_args(kind)[0], item) for item in value)
+    if get_origin(kind) is dict:
+        return {key: _read(get_args(kind)[1], item) for key, item in value.items()}
+    return value
+
+
+def _field(kind: type, field: Field, hint: Any, table: Mapping) -> list:
+    """The value of a field, or nothing where its default is to stand. Raises ValueError where there is neither."""
+    if table.get(field.name) is None and (field.default is not MISSING or field.default_factory is not MISSING):
+        return []
+    if field.name not in table:
+        raise ValueError(f"{kind.__name__}: {field.name} is missing")
+    if hint is Value:
+        return [Value(_number(table[field.name]), _number(table.get(sigma_name(field.name))))]
+    return [_read(hint, table[field.name])]
+
+
+def _number(value: Any) -> float | np.ndarray:
+    return _array(value) if isinstance(value, list) else _read(float, value)
+
+
+def _array(value: Any) -> np.ndarray:
+    """Of numbers, null as NaN; truth values and whole numbers stay such."""
+    found = np.array(value)
+    return found.astype(float) if found.dtype == object else found
+
+
+@lru_cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)

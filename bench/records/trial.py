@@ -1,0 +1,201 @@
+"""The result of one trial: what is seen, felt and estimated in each whisk. Missing is NaN, or None with a status."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bench.records.phases import NO_PHASES, Phases
+from vision.fit.beam_check import BeamCheck
+from vision.geometry.base_lines import BaseLines
+from vision.truth.at_angle import TruthAtAngle
+from vision.truth.records import FrameTruth
+from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
+
+
+@dataclass(frozen=True)
+class TrialFacts:
+    """What the manifest says of the trial."""
+
+    name: str
+    purpose: str
+    surface: str
+    speed_deg_s: float | None
+    d_x_nominal_mm: float = NAN
+    beta_nominal_deg: float = NAN
+
+    @property
+    def panel(self) -> tuple[str, float | None]:
+        """Surface and speed: whisks that are alike in both belong together."""
+        return self.surface, self.speed_deg_s
+
+
+@dataclass(frozen=True)
+class WhiskerFacts:
+    """What must be alike in results that are pooled."""
+
+    shape: str
+    length_mm: float
+    diameter_mm: float
+    EI_Nmm2: float
+    tip_diameter_mm: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Deflection:
+    """Where the contact lies in the hub's axes while touching, seen from the unbent whisker: (f,) each, and the joint
+    covariance (2f, 2f) of across z, y frame by frame."""
+
+    theta_rad: np.ndarray
+    motor_rad: np.ndarray
+    slip_mm: np.ndarray
+    along_mm: np.ndarray
+    across_y_mm: np.ndarray
+    across_z_mm: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Lines (n, 2) by name, px, to draw on one frame of each camera; the contact is one point (2,)."""
+
+    frame: int
+    cameras: dict[str, dict[str, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
+class SeenWhisk:
+    """One whisk as the cameras show it; d_x_mm is NaN exactly where there is no truth, and `status` says why.
+
+    The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
+    moment, "touch" and "theta".
+    """
+
+    whisk: int
+    status: str = ""
+    cameras: int = 0
+    frames_used: int = 0
+    touch_rad: Value = UNKNOWN
+    point_mm: Value = UNKNOWN_POINT
+    d_x_mm: Value = UNKNOWN
+    beta_rad: Value = UNKNOWN
+    psi_rad: Value = UNKNOWN
+    budget: dict[str, float] = field(default_factory=dict)
+    base: BaseLines | None = None
+    beam: BeamCheck | None = None
+    frames: FrameTruth | None = None
+    at: TruthAtAngle | None = None
+    deflection: Deflection | None = None
+    overlay: dict[str, Drawing] = field(default_factory=dict)
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether the whisk's distance is known."""
+        return bool(np.isfinite(self.d_x_mm.value))
+
+
+@dataclass(frozen=True)
+class Clock:
+    """What ties the frames to the signals: source, how well (one sigma), and whether by a recorded edge."""
+
+    source: str
+    sigma_s: float
+    recorded: bool
+
+
+@dataclass(frozen=True, eq=False)
+class BarLine:
+    """The bar's axis in the rig frame: point (3,) and direction (3,)."""
+
+    point_mm: np.ndarray
+    direction: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SeenTrial:
+    """The seen half of a trial; bar, radii and clock are missing where there are no pictures."""
+
+    whisks: tuple[SeenWhisk, ...]
+    notes: tuple[str, ...] = ()
+    bar: BarLine | None = None
+    bar_radius_mm: float = NAN
+    wire_radius_mm: float = NAN
+    clock: Clock | None = None
+
+
+@dataclass(frozen=True)
+class EstimateRow:
+    """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
+
+    d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm, d_x_est_high_mm: the 95 %
+    interval.
+    """
+
+    estimator: str
+    d_x_est_mm: Value
+    alpha_est_rad: float = NAN
+    beta_est_rad: float = NAN
+    status: str = ""
+    d_x_est_sigma_alpha_exact_mm: float = NAN
+    d_x_est_low_mm: float = NAN
+    d_x_est_high_mm: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class FeltWhisk:
+    """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle, phases, estimates.
+
+    theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
+    (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
+    those of the seen shape, 2 degrees of freedom; apart: they are not those. one_factor: estimates with one factor a
+    channel.
+    """
+
+    whisk: int = 0
+    touch_felt_rad: Value = UNKNOWN
+    m_y_Nmm: Value = UNKNOWN
+    m_z_Nmm: Value = UNKNOWN
+    phi_felt_rad: Value = UNKNOWN
+    theta_sigma_rad: float = NAN
+    covariance_at: np.ndarray | None = None
+    theta_moment_covariance_at: np.ndarray | None = None
+    status: str = ""
+    saturated: int = 0
+    agreement_chi2: float = NAN
+    apart: bool = False
+    phases: Phases = NO_PHASES
+    estimates: tuple[EstimateRow, ...] = ()
+    one_factor: tuple[EstimateRow, ...] = ()
+
+    @property
+    def has_moments(self) -> bool:
+        """Whether the moments are known."""
+        return bool(np.isfinite(self.m_y_Nmm.value))
+
+
+@dataclass(frozen=True, eq=False)
+class FeltTrial:
+    """The felt half of a trial."""
+
+    whisks: tuple[FeltWhisk, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class TrialResult:
+    """All of one trial. theta_deg: the wanted pushing angle. hash, seen_hash: of what the result, and its seen half,
+    were made from."""
+
+    trial: TrialFacts
+    whisker: WhiskerFacts
+    theta_deg: float
+    seen: SeenTrial
+    felt: FeltTrial
+    hash: str = ""
+    seen_hash: str = ""
+
+
+def whisks(results: Iterable[TrialResult]) -> Iterator[tuple[TrialResult, SeenWhisk, FeltWhisk]]:
+    """(result, seen, felt) of every whisk."""
+    for result in results:
+        for seen, felt in zip(result.seen.whisks, result.felt.whisks):
+            yield result, seen, felt

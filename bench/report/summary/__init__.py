@@ -1,0 +1,1 @@
+"""summary.txt, a module a section; `page` puts them together."""

@@ -1,0 +1,28 @@
+"""The error of each estimator, a line a whisk."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from bench.base.drawing import label_of
+from bench.trials.compare import Judged
+
+
+def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
+    """A column an estimator, estimate less truth in per cent."""
+    judged = [j for j in judged if np.isfinite(j.error_percent)]
+    if not judged:
+        return
+    columns = list(dict.fromkeys((j.estimator, j.one_factor) for j in sorted(judged, key=lambda j: j.one_factor)))
+    columns = [c for c in columns if not c[1] or c[0] == "with_friction"]
+    names = [label_of(name) + (", one factor" if one else "") for name, one in columns]
+    widths = [max(17, len(name)) for name in names]
+    yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   " + "  ".join(f"{n:>{width}}" for n, width in zip(names, widths))
+    for key in dict.fromkeys((j.trial, j.whisk) for j in judged):
+        mine = {(j.estimator, j.one_factor): j for j in judged if (j.trial, j.whisk) == key}
+        cells = [f"{_error(mine.get(c)):>{width}}" for c, width in zip(columns, widths)]
+        yield f"{key[0]:<18}{key[1]:>5}  {next(iter(mine.values())).beta_deg:>5.1f}°   " + "  ".join(cells)
+
+
+def _error(j: Judged | None) -> str:
+    return "-" if j is None else f"{j.error_percent:+.2f} ± {j.error_sigma_percent:.2f}"

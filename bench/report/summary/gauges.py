@@ -1,0 +1,31 @@
+"""The gauges' coefficients."""
+
+from collections.abc import Iterator
+
+from bench.gauges.matrix import GaugeMatrix, Gauges
+
+_U95 = 1.96
+
+
+def gauge_lines(gauges: Gauges | None) -> Iterator[str]:
+    """The matrices with 95 % limits, and what is not known; nothing without gauges."""
+    if gauges is None:
+        return
+    yield f"from {gauges.source}; [m_y, m_z] = matrix · [y, z] above each free stroke"
+    yield from _matrix_lines("", gauges.all)
+    yield from _matrix_lines("the paper's way, one factor a channel, no cross-talk", gauges.one_factor)
+    yield from _matrix_lines("four coefficients at one angle, (2)", gauges.at_angle)
+    missing = [name for name, matrix in gauges.without.items() if matrix is None]
+    if missing:
+        yield f"not known without one of these trials, so they are not judged: {', '.join(missing)}"
+    yield from gauges.notes
+
+
+def _matrix_lines(title: str, gauges: GaugeMatrix | None) -> Iterator[str]:
+    if gauges is None:
+        return
+    if title:
+        yield f"{title}:"
+    for row, sigmas in zip(gauges.matrix, gauges.sigma):
+        cells = [f"{value:9.4f}" + (f" ± {_U95 * sigma:.4f}" if sigma > 0 else "") for value, sigma in zip(row, sigmas)]
+        yield "  " + "   ".join(cells)

@@ -1,0 +1,69 @@
+"""Lines of the summary that rest on a whisk's record alone."""
+
+import numpy as np
+import pytest
+
+from bench.gauges.felt import GAUGE_DELAY_S, lateness
+from bench.records.trial import (
+    Clock,
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
+from bench.report.assembly import beam_rows, budget_rows
+from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
+from bench.trials.estimates import as_felt
+from estimator.signal import Touch
+from vision.fit.beam_check import BeamCheck, Compared
+from vision.fit.uncertainty import CAUSES
+from vision.truth.value import Value
+
+
+def result(clock=None, **seen) -> TrialResult:
+    whisk = SeenWhisk(0, d_x_mm=Value(60.0, 0.01), **seen)
+    facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 2945.2)
+    return TrialResult(*facts, 3.0, SeenTrial((whisk,), clock=clock), FeltTrial((FeltWhisk(),)))
+
+
+def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
+    recorded, stated = Clock("frames.csv", 0.0, True), Clock("frame_rate_Hz", 0.025, False)
+    own, other, _ = clock_lines([result(recorded), result(stated), result(stated)])
+    assert own.endswith("(frames.csv), 1 of 3 trials; their clock is taken as that of the signals")
+    assert "by frame_rate_Hz, 2 of 3 trials: no recorded edge" in other
+    assert "do not tell the clock from the encoder's zero; taken as known to 25 ms" in other
+
+
+def test_felt_touch_is_late_within_the_filters_delay():
+    """At 90 deg/s 0.52 ms are 0.047 deg: what a filter of 800 Hz delays is one sigma."""
+    felt = as_felt(0, Touch(0.0508, 1e-5), None, np.radians(90.0))
+    late = lateness(SeenWhisk(0, touch_rad=Value(0.05, 1e-5)), felt)
+    assert late.value == pytest.approx(8e-4)
+    assert np.degrees(late.sigma) == pytest.approx(0.0468, abs=1e-4)
+    assert felt.touch_felt_rad.sigma == pytest.approx(late.sigma, rel=1e-3)
+    assert felt.theta_sigma_rad == 1e-5  # touch and moments are late alike
+    assert pytest.approx(0.52e-3, rel=0.01) == GAUGE_DELAY_S
+
+
+def test_a_rig_board_that_is_not_told_apart_is_an_empty_cell_and_a_line():
+    shares = dict.fromkeys(CAUSES, 0.0) | {"light": 0.8, "cameras": 0.2}
+    told, untold = result(budget=shares), result(budget=shares | {"placement": np.nan})
+    assert np.isnan(next(budget_rows([untold]))["placement_percent"])
+    assert len(list(budget_lines([told]))) == 1
+    assert "`cameras` is both" in list(budget_lines([told, untold]))[1]
+
+
+def test_beam_and_spline_stand_side_by_side():
+    def both(beam, spline, sigma):
+        return Compared(beam, spline, sigma, 0.01)
+
+    compared = both(60.0, 60.004, 0.001), both(0.04, 0.041, 1e-4), both(2.0, 1.9, 0.02)
+    made = result(beam=BeamCheck(*compared, theta_rad=0.07, chance=0.3))
+    (row,) = beam_rows([made])
+    assert row["touch_spline_deg"] == pytest.approx(np.degrees(0.041)) and row["slip_beam_mm"] == 2.0
+    (line,) = beam_lines([made])
+    assert "d_x +0.0040 ± 0.0010 mm (t)" in line and "slip -0.1000 ± 0.0200 mm (t)" in line
+    assert list(beam_lines([result()])) == []

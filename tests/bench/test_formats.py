@@ -1,0 +1,67 @@
+"""docs/formats.md names every key and column that there is, and none that there is not."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from bench.base.settings import Settings
+from bench.evaluate import evaluate
+from bench.friction import error_map, explained, tables
+from bench.gauges.gauges_file import FileKeys
+from bench.report import assembly
+from bench.session import manifest
+from tests.scenes.formats import DOCUMENT, documented, keys
+
+ROOT = Path(__file__).resolve().parents[2]
+TOML = {
+    "[session.toml] top": manifest.SessionKeys,
+    "[whisker]": manifest.WhiskerKeys,
+    "[bar]": manifest.BarKeys,
+    "[board]": manifest.BoardKeys,
+    "[rig]": manifest.RigKeys,
+    "[[cameras]]": manifest.CameraKeys,
+    "[gauges]": manifest.GaugeKeys,
+    "[trial]": manifest.TrialKeys,
+    "gauges.toml": FileKeys,
+}
+CSV = {
+    "whisks.csv": assembly.WHISK_COLUMNS,
+    "estimates.csv": assembly.ESTIMATE_COLUMNS,
+    "track/<trial>.csv": assembly.TRACK_COLUMNS,
+    "budget.csv": assembly.BUDGET_COLUMNS,
+    "beam.csv": assembly.BEAM_COLUMNS,
+    "friction.csv": tables.WHISK_COLUMNS,
+    "phases.csv": tables.PHASE_COLUMNS,
+    "surfaces.csv": tables.SURFACE_COLUMNS,
+    "explained.csv": explained.COLUMNS,
+    "error_map.csv": error_map.COLUMNS,
+}
+
+
+@pytest.mark.parametrize("heading", TOML)
+def test_keys_of_toml(heading):
+    assert sorted(documented(heading)) == sorted(TOML[heading].__struct_fields__)
+
+
+@pytest.mark.parametrize("heading", CSV)
+def test_columns_of_tables(heading):
+    assert sorted(documented(heading)) == sorted(CSV[heading])
+
+
+def test_keys_of_results(steel_signals, exact_vision, tmp_path):
+    """Without a picture; what pictures add is looked at where the small session is evaluated (test_end_to_end.py)."""
+    evaluate(steel_signals, tmp_path, Settings(), workers=0)
+    written = keys(json.loads((tmp_path / "trials" / "b60_4.json").read_text()))
+    named = set(documented("trials/<trial>.json"))
+    assert {path for path in named if not path.startswith("seen.")} == {p for p in written if not p.startswith("seen.")}
+
+
+def test_every_file_is_named():
+    """Names of files that a run writes stand as such in the code, or are made of a stem that does."""
+    whole = "\n".join(path.read_text() for path in [*(ROOT / "bench").rglob("*.py"), *(ROOT / "vision").rglob("*.py")])
+    section = DOCUMENT.split("## OUT\n")[1].split("###")[0]
+    for name in re.findall(r"`([^`]+)`", section):
+        stem = re.sub(r"\.(csv|png|json|toml|npz|txt)$", "", name)
+        assert all(part in whole for part in re.split(r"/|<\w+>_?", stem)), name

@@ -1,0 +1,146 @@
+"""Channels to moments: turned follicles, covariances, and the answers' columns."""
+
+import numpy as np
+import pytest
+
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.gauges.drift import allow_drift
+from bench.gauges.felt import Stroke
+from bench.gauges.matrix import GaugeMatrix
+from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
+from estimator import slip
+from estimator.beam import Beam
+from estimator.whisk import Estimate
+
+MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
+BEAM = Beam(8835.7, 100.0)
+THETA, BETA, ALPHA = np.radians([3.0, 60.0, 10.0])
+
+
+def stroke(rng, d_x=60.0, noise=1e-3, roll=0.0) -> Stroke:
+    """A stroke of the small-angle theory (13), (14) at 10°/s, in volts of a turned follicle."""
+    time = np.arange(1240) / 2000.0
+    motor = np.radians(10.0) * time + 0.02
+    theta = np.maximum(0.0, motor - 0.02 - np.radians(1.6))
+    m_y, m_z = slip.moments(d_x, 1.0, BETA, ALPHA, BEAM.C_Nmm2)
+    c, s = np.cos(roll), np.sin(roll)
+    follicle = np.outer(theta, np.array([[c, s], [-s, c]]) @ [m_y, m_z])
+    volts = np.linalg.solve(MATRIX, follicle.T).T + 0.2 + noise * rng.normal(size=follicle.shape)
+    return Stroke(time, motor, volts, volts)
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 90.0, -30.0])
+def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
+    """Noise of 1 mV is 0.01 N·mm a sample, some 200 of them: 1e-3 N·mm."""
+    hand = Hand(GaugeMatrix(MATRIX), np.radians(roll_deg))
+    _, whisk = felt_whisk(stroke(rng, roll=np.radians(roll_deg)), hand, np.zeros(2), BEAM, THETA)
+    expected = slip.moments(60.0, THETA, BETA, ALPHA, BEAM.C_Nmm2)
+    assert (whisk.m_y_at_Nmm, whisk.m_z_at_Nmm) == pytest.approx(expected, abs=0.01)
+
+
+def test_answers_carry_what_they_assumed(rng):
+    touch, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    rows = {row.estimator: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))}
+    assert np.isnan([rows["no_slip"].alpha_est_rad, rows["no_slip"].beta_est_rad]).all()
+    assert rows["frictionless"].alpha_est_rad == 0.0
+    assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
+    assert np.degrees(rows["with_friction"].beta_est_rad) == pytest.approx(60.0, abs=0.2)
+    assert np.degrees(as_felt(0, touch, whisk, 0.17).phi_felt_rad.value) == pytest.approx(50.0, abs=0.2)
+
+
+def test_sigma_of_10_is_its_scatter(rng):
+    """Over 200 strokes the sampled standard deviation scatters by 5 %; the stated one averages over them."""
+    stated, found = [], []
+    for _ in range(200):
+        _, whisk = felt_whisk(stroke(rng, noise=0.01), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+        row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
+        stated.append(row.d_x_est_sigma_alpha_exact_mm)
+        found.append(row.d_x_est_mm.value)
+    assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
+
+
+def test_gauges_and_turn_add_to_the_moments_covariance():
+    volts = np.array([0.3, 0.7])
+    hand = Hand(GaugeMatrix(MATRIX, 1e-2 * np.eye(4)), 0.0, np.radians(1.0))
+    added = hand.covariance(volts, np.zeros((2, 2)))
+    m_y, m_z = MATRIX @ volts
+    turn = np.radians(1.0) * np.array([-m_z, m_y])
+    assert added == pytest.approx(1e-2 * (volts @ volts) * np.eye(2) + np.outer(turn, turn))
+
+
+def test_no_touch_is_a_reason(rng):
+    free = stroke(rng)
+    silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
+    touch, reason = felt_whisk(silent, Hand.bare(), np.zeros(2), BEAM, THETA)
+    assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
+    assert np.isnan(as_felt(0, touch, None, 0.17).touch_felt_rad.value)
+
+
+@pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])
+def test_estimators_that_cannot_be_had(name):
+    with pytest.raises(BadInput, match=name):
+        estimators((name,))
+
+
+def test_an_answer_must_be_an_estimate(rng):
+    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    with pytest.raises(BadInput, match="must return an Estimate"):
+        answers(whisk, {"mine:f": lambda *_: 60.0}, Settings())
+
+
+def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
+    def fails(*_):
+        raise ZeroDivisionError("no slope")
+
+    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f")
+    assert np.isnan(row.d_x_est_mm.value) and row.status == "mine:f raised ZeroDivisionError: no slope"
+
+
+def asked(rng, function) -> dict:
+    """The row of one's own estimator on a whisk at 60 mm."""
+    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    return answers(whisk, {"mine:f": function}, Settings())[0]
+
+
+@pytest.mark.parametrize(
+    "d_x, sigma, said",
+    [
+        (np.inf, 1.0, "gave inf mm, which is no distance"),
+        (-5.0, 1.0, "gave -5 mm, which is no distance"),
+        (np.nan, 1.0, "gave no distance and no reason"),
+        ("far", 1.0, "gave no distance and no reason"),
+    ],
+)
+def test_what_is_no_distance_is_a_missing_one_with_a_status(rng, d_x, sigma, said):
+    row = asked(rng, lambda *_: Estimate(d_x, sigma))
+    assert np.isnan([row.d_x_est_mm.value, row.d_x_est_mm.sigma]).all() and row.status == said
+
+
+@pytest.mark.parametrize("sigma", [0.0, -1.0, np.nan, np.inf])
+def test_a_distance_without_a_sigma_is_told(rng, sigma):
+    row = asked(rng, lambda *_: Estimate(60.0, sigma))
+    assert row.d_x_est_mm.value == 60.0 and np.isnan(row.d_x_est_mm.sigma)
+    assert "which is none" in row.status
+
+
+def test_past_the_length_is_told_and_left(rng):
+    row = asked(rng, lambda *_: Estimate(130.0, 1.0))
+    assert row.d_x_est_mm.value == 130.0 and "past the whisker's length of 100 mm" in row.status
+
+
+def test_what_an_estimator_never_used_does_not_stand_beside_it(rng):
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0))
+    assert np.isnan(row.alpha_est_rad) and np.isnan(row.beta_est_rad) and row.status == ""
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0, beta_rad=0.5))
+    assert row.beta_est_rad == 0.5
+
+
+def test_an_estimator_cannot_spoil_the_whisk_of_the_next(rng):
+    def vandal(whisk, _):
+        whisk.m_z_Nmm[:] = 0.0
+        return Estimate(60.0, 1.0)
+
+    row = asked(rng, vandal)
+    assert "read-only" in row.status and np.isnan(row.d_x_est_mm.value)

@@ -1,0 +1,104 @@
+"""Where the rig is: free strokes against T_rig_board, and what becomes of the cameras."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.cameras.calibration import SessionCalibration
+from bench.records.trial import SeenTrial, SeenWhisk
+from bench.session.session import load_session
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit
+from tests.scenes.base_lines import some_lines
+from tests.scenes.model_scenes import CAMERAS
+
+SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
+T_RIG_BOARD = load_session(SMALL).T_rig_board
+OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.8, 0.0])  # the centre 0.8 mm across the whisker from where the board has it
+
+
+@pytest.fixture
+def place(small_copy, monkeypatch):
+    """A function (step of the true rig, T_rig_board's sigma in mm) that gives the placed calibration, the doubts and
+    the stages at which trials were looked at."""
+
+    def placed(step, sigma_mm=0.0, frames=30, width_deg=8.0, board=True):
+        rng, stages, lines = np.random.default_rng(5), [], {}
+
+        def see(unit):
+            stages.append(unit.stage)
+            now = unit.calibration.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
+            left = step - np.append(np.zeros(3), CAMERAS["one"].T_camera_rig[:, :3].T @ now)
+            made = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
+            base = lines.setdefault((unit.stage, unit.trial.name), made)
+            return SeenTrial((SeenWhisk(0, base=base), SeenWhisk(1), SeenWhisk(2, "no pictures")))
+
+        monkeypatch.setattr("bench.trials.placing.see_unit", see)
+        session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)
+        session = session if board else replace(session, T_rig_board=None)
+        before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",), session.T_rig_board)
+        units = [Unit(session, t, "", before, Settings(), small_copy) for t in session.trials]
+        doubts = Doubts()
+        return place_rig(session, before, units, Workers(0), doubts), doubts.notes, set(stages)
+
+    return placed
+
+
+def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
+    made, doubts, stages = place(0 * OFF)
+    assert made.cameras is CAMERAS and made.hash == "before" and not doubts
+    assert stages == {"seen"}  # what was looked at is the trial's own result and is not looked at again
+    assert any("free strokes of 8.0 degrees give: centre of rotation ± " in note for note in made.notes)
+
+
+def test_a_disagreement_is_an_alarm(place):
+    made, doubts, _ = place(OFF)
+    assert made.cameras is CAMERAS
+    assert len(doubts) == 1 and "board and free stroke disagree" in doubts[0]
+    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubts[0])[1]) == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_board_with_a_sigma_gives_way(place):
+    made, doubts, stages = place(OFF, sigma_mm=0.5)
+    assert not doubts and made.hash != "before" and stages == {"swing0", "swing1"}
+    moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
+    np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ OFF[3:], atol=0.05)
+    # The board on the rig has not moved in the pictures: it stands elsewhere in the rig's frame.
+    before, after = (c.project(T[:, 3][None]) for c, T in ((CAMERAS["one"], T_RIG_BOARD),
+                                                           (made.cameras["one"], made.T_rig_board)))  # fmt: skip
+    np.testing.assert_allclose(after, before, atol=1e-6)
+
+
+def test_strokes_too_short_to_tell_are_no_doubt(place):
+    made, doubts, _ = place(OFF, frames=3)
+    assert not doubts and "needs 4 frames" in made.notes[-1]
+
+
+def test_a_board_by_ruler_needs_strokes_wide_enough(place):
+    with pytest.raises(BadInput, match=r"trials: the free strokes are what places the rig, and 1\.5 degrees fix"):
+        place(0 * OFF, sigma_mm=2.0, width_deg=1.5)
+
+
+def test_without_a_board_the_strokes_place_the_rig(place):
+    """A first look may be off by millimetres; no alarm compares it with the strokes, and no board is weighed in."""
+    made, doubts, _ = place(10 * OFF, board=False, width_deg=20.0)
+    assert not doubts and not any("board" in note for note in made.notes[1:])
+    moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
+    np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ (10 * OFF[3:]), atol=0.05)
+
+
+def test_without_a_board_narrow_strokes_are_refused(place):
+    with pytest.raises(BadInput, match=r"trials: the free strokes are what places the rig, and 1\.5 degrees fix"):
+        place(0 * OFF, board=False, width_deg=1.5)
+
+
+def test_without_a_board_strokes_that_say_nothing_are_refused(place):
+    with pytest.raises(BadInput, match=r"trials: T_rig_board is missing, and 3 frames of free stroke"):
+        place(0 * OFF, board=False, frames=3)

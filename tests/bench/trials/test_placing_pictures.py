@@ -1,0 +1,134 @@
+"""Where the rig is, from pictures: the free strokes against a T_rig_board that is right, wrong, or not there."""
+
+import csv
+import re
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.cameras.calibration import SessionCalibration, on_the_rig
+from bench.rig.simulate import simulate
+from bench.session.session import load_session
+from bench.trials.placing import place_rig
+from bench.trials.unit import Unit, see_unit
+from tests.scenes.recorded import exact_cameras
+from vision.geometry.camera import Cameras
+from vision.geometry.rotation import compose, invert_transform
+from vision.pictures.files import read_picture
+
+PROTOCOL = """
+name = "wide"
+[[cameras]]
+name = "high"
+position_mm = [38.0, -175.0, 335.0]
+focal_px = 1400.0
+size_px = [900, 500]
+distortion = [0.0, 0.0, 0.0, 0.0, 0.0]
+[[cameras]]
+name = "low"
+position_mm = [98.0, -325.0, 120.0]
+focal_px = 1400.0
+size_px = [900, 500]
+distortion = [0.0, 0.0, 0.0, 0.0, 0.0]
+[board]
+views = 1
+[light]
+wire_matt = 0.5
+[motor]
+before_deg = {before:g}
+[pictures]
+format = "png"
+before_deg = {before:g}
+after_deg = 4.2
+step_deg = {step:g}
+[[trials]]
+beta_deg = 20
+d_x_mm = 60.0
+"""
+
+
+def recorded(folder, before, step):
+    """A session of one trial whose free stroke is so many degrees wide."""
+    (folder / "one.toml").write_text(PROTOCOL.format(before=before, step=step))
+    simulate(folder / "session", protocol=folder / "one.toml", seed=5)
+    return load_session(folder / "session")
+
+
+@pytest.fixture(scope="module")
+def wide(tmp_path_factory):
+    """A free stroke of 24 degrees."""
+    return recorded(tmp_path_factory.mktemp("wide"), 24.0, 1.2)
+
+
+def moved(session, T_world_rig):
+    """The exact cameras in another frame."""
+    T_rig_world = invert_transform(T_world_rig)
+    return Cameras(tuple(replace(c, T_camera_rig=compose(c.T_camera_rig, T_rig_world))
+                         for c in exact_cameras(session.path)))  # fmt: skip
+
+
+def place(session, cameras, T_rig_board, out):
+    """place_rig's calibration, the doubts, and the trial as a unit under that calibration."""
+    background = {name: read_picture(path) for name, path in session.rig_pictures.items()}
+    before = SessionCalibration(cameras, background, "given", (), T_rig_board)
+    unit = Unit(session, session.trials[0], "", before, Settings(), out)
+    doubts = Doubts()
+    made = place_rig(session, before, [unit], Workers(0), doubts)
+    return made, doubts.notes, replace(unit, calibration=made)
+
+
+def test_a_right_board_is_agreed_with(wide, tmp_path):
+    made, doubts, _ = place(wide, exact_cameras(wide.path), wide.T_rig_board, tmp_path)
+    assert not doubts
+    (note,) = (note for note in made.notes if note.startswith("A free stroke of 2"))
+    # A whole line may be off by 0.25 px, 0.07 mm in these small pictures, and two cameras on one side triple it.
+    assert float(re.search(r"± ([0-9.]+) mm across", note)[1]) < 0.3
+
+
+def test_a_board_1_mm_across_is_an_alarm(wide, tmp_path):
+    # The board is said to stand 1 mm nearer along rig y than it does, and takes the cameras with it.
+    shift = np.column_stack([np.eye(3), [0.0, -1.0, 0.0]])
+    _, (doubt,), _ = place(wide, moved(wide, shift), compose(shift, wide.T_rig_board), tmp_path)
+    # Three of the 0.13 mm that the stroke tells the centre to across the whisker.
+    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubt)[1]) == pytest.approx(-1.0, abs=0.4)
+
+
+def test_the_swing_alone_places_the_rig(wide, tmp_path):
+    session = replace(wide, T_rig_board=None)
+    cameras, T_rig_board, note = on_the_rig(session, moved(wide, invert_transform(wide.T_rig_board)), np.eye(3, 4))
+    assert "a first look at 1 strokes" in note
+    _, doubts, unit = place(session, cameras, T_rig_board, tmp_path)
+    assert not doubts
+    truth = tomllib.loads((unit.trial.folder / "truth.toml").read_text())
+    (seen,) = see_unit(unit).whisks
+    for found, true in ((seen.d_x_mm, truth["d_x_mm"]), (seen.beta_rad, np.radians(truth["beta_deg"]))):
+        assert abs(found.value - true) < 3 * found.sigma
+    # What suffices is 0.05 mm along the whisker, and the bar's own place comes on top of it.
+    assert seen.d_x_mm.sigma < 0.08
+    rows = list(csv.DictReader((unit.trial.folder / "truth.csv").open()))
+    for k in np.flatnonzero(seen.frames.touching):
+        error = seen.frames.slip_mm.value[k] - float(rows[seen.frames.index[k]]["slip_mm"])
+        assert abs(error) < max(3 * seen.frames.slip_mm.sigma[k], 0.02)
+
+
+def test_a_narrow_swing_alone_is_refused_with_the_width_that_would_do(tmp_path):
+    narrow = recorded(tmp_path, 1.6, 0.8)
+    alone, in_board = replace(narrow, T_rig_board=None), moved(narrow, invert_transform(narrow.T_rig_board))
+    with pytest.raises(BadInput, match=r"record free strokes of (about|some) [0-9]+ degrees"):
+        place(alone, *on_the_rig(alone, in_board, np.eye(3, 4))[:2], tmp_path)
+
+
+@pytest.mark.slow
+def test_squares_a_sixth_too_large_are_what_a_stroke_that_cannot_be_read_leads_to(wide, tmp_path):
+    """The cameras then stand a sixth too far from the board, and the whisker is nowhere near where they look."""
+    far = [replace(c, T_camera_rig=np.column_stack([c.T_camera_rig[:, :3], 1.16 * c.T_camera_rig[:, 3]]))
+           for c in moved(wide, invert_transform(wide.T_rig_board))]  # fmt: skip
+    on_rig = [replace(c, T_camera_rig=compose(c.T_camera_rig, invert_transform(wide.T_rig_board))) for c in far]
+    _, (doubt,), _ = place(wide, Cameras(tuple(on_rig)), wide.T_rig_board, tmp_path)
+    assert "square_mm" in doubt

@@ -1,0 +1,49 @@
+"""Whisks of the rig's mechanics along pushing angles, and what the paper's small angles say of them."""
+
+import math
+
+import numpy as np
+
+from bench.rig.bar import Bar, first_touch
+from bench.rig.contact import moments_Nmm
+from bench.rig.friction import Friction, March
+from bench.rig.rod import Rod
+
+WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
+C = 3 * WIRE.rigidity_Nmm2
+MU_10 = math.tan(math.radians(10))
+
+
+def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, static=None, radius=3.0, touch_deg=0.0,
+          rests=(1.0,)):  # fmt: skip
+    """(march, touch, states) along pushing angles."""
+    touch_rad = math.radians(touch_deg)
+    bar = Bar.placed(
+        d_x_mm=d_x,
+        beta_rad=math.radians(beta),
+        psi_rad=math.radians(psi),
+        touch_rad=touch_rad,
+        radius_mm=radius,
+        whisker_radius_mm=float(rod.radius_mm(d_x)),
+    )
+    touch = first_touch(rod, bar, touch_rad, d_x)
+    march = March(rod, bar, Friction(mu if static is None else static, mu, rests=rests), touch)
+    _, states = march.along(touch.motor_rad + np.radians(thetas_deg))
+    return march, touch, states
+
+
+def polar(state):
+    """(|m|, φ in degrees)."""
+    m_y, m_z = moments_Nmm(state)
+    return math.hypot(m_y, m_z), math.degrees(math.atan2(m_y, m_z))
+
+
+def small_angle(theta_deg, d_x, beta_deg, alpha_deg):
+    """|m| and φ of equations (13), (14): (Cθ/d_x)·cos β/cos(β − φ), φ = max(0, β − α)."""
+    phi = max(0.0, beta_deg - alpha_deg)
+    share = math.cos(math.radians(beta_deg)) / math.cos(math.radians(beta_deg - phi))
+    return C * math.radians(theta_deg) / d_x * share, phi
+
+
+def slip_mm(march, touch, state):
+    return (state.point_mm - touch.point_mm) @ march.contact.bar.axis

@@ -1,0 +1,89 @@
+"""A whisk drawn from the fit's own model before two cameras, its line points with noise or without."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vision.fit.problem import Problem, State, bar_axis, curves_of
+from vision.fit.solve import bar_middle
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.centreline import Curves, rotation_z
+from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.rods import Wire
+from vision.geometry.silhouette import normals
+from vision.lines.points import LinePoints, Observed
+
+WIRE = Wire("cylinder", 100.0, 1.0)
+REACH = 3.5
+
+
+def camera(name, centre, target=(55.0, 5.0, 0.0), focal=2000.0):
+    """A camera at `centre` that looks at `target`, its picture upright."""
+    centre, target = np.array(centre, dtype=float), np.array(target)
+    z = (target - centre) / np.linalg.norm(target - centre)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(z, x), z])
+    matrix = np.array([[focal, 0, 640.0], [0, focal, 360.0], [0, 0, 1]])
+    return Camera(name, (1280, 720), matrix, np.array([-0.1, 0.1, 0, 0, 0]), np.column_stack([R, -R @ centre]))
+
+
+CAMERAS = Cameras((camera("one", (38, -175, 335)), camera("two", (130, -325, 120))))
+
+
+def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7):
+    """A problem without line points and the state that is its truth: a whisk whose contact keeps the reach."""
+    motor = np.radians(0.7 + 0.9 * np.arange(frames))
+    touch, beta = np.radians(touch_deg), np.radians(beta_deg)
+    turn = rotation_z(touch)
+    axis = BarAxis(turn @ (np.array([d_x, 0, 0]) + REACH * np.array([0, np.cos(beta), -np.sin(beta)])),
+                   turn @ np.array([0.0, np.sin(beta), np.cos(beta)]))
+    touching = motor > touch
+    problem = Problem(CAMERAS, WIRE, REACH, 0.0, axis, motor, touching, touching, [])
+    vector = np.zeros(problem.size)
+    vector[4:12] = [0.05, 0.1, -0.2, 0.0, -0.05, 0.1, -0.3, 0.0]
+    state = State(vector, np.full(frames, d_x))
+    return problem, _bent_until_touching(problem, state)
+
+
+def _bent_until_touching(problem, state, slope=0.35):
+    """Bends whose contact is on the bar: their y component by secant, z a fixed share of it."""
+    count = int(problem.bent.sum())
+    low, high = np.zeros(count), np.full(count, -0.2)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        vector = state.vector.copy()
+        vector[problem.first_bend:] = np.stack([middle, -slope * middle], axis=1).ravel()
+        curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=6)
+        axis = bar_axis(problem, vector)
+        gap = clearance(curves, BarAxis(axis.point_mm[None], axis.direction[None]))[0][problem.bent] - REACH
+        low, high = np.where(gap < 0, middle, low), np.where(gap < 0, high, middle)
+    return State(vector, arcs)
+
+
+def with_points(problem, state, rng=None, sigma=0.05):
+    """The problem with line points of wire and bar drawn from the state, with noise where a generator is given."""
+    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
+    seen = []
+    for number, view in enumerate(problem.cameras):
+        for frame in range(len(problem.motor_rad)):
+            place = np.linspace(8.0, 95.0, 30)
+            one = Curves(curves.arc_mm, curves.points_mm[frame], curves.tangents[frame])
+            seen.append(Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng)))
+        place = np.linspace(-25.0, 25.0, 20)
+        seen.append(Observed(-1, number, _points(bar_middle(problem, view, state.vector, place), place, sigma, rng)))
+    return replace(problem, seen=seen)
+
+
+def _points(px, place, sigma, rng):
+    normal = normals(px)
+    noise = 0.0 if rng is None else sigma * rng.standard_normal(len(px))[:, None]
+    return LinePoints(px + noise * normal, normal, np.full(len(px), sigma), place)
+
+
+def begun(problem, state):
+    """A start that knows the bends to a fifth and nothing of bar and rest shape but the expected axis."""
+    vector = state.vector.copy()
+    vector[:problem.first_bend] = 0.0
+    vector[problem.first_bend:] *= 0.8
+    return State(vector, state.arcs_mm)

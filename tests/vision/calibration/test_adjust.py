@@ -1,0 +1,138 @@
+"""The adjustment: its gradients are finite differences, without noise it is exact, its cost is linear in views."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_recording, moving_board, noisy_view_at
+from vision.calibration.adjust import solve
+from vision.calibration.board_motion import Trajectory
+from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
+from vision.calibration.calibrate import calibrate_alone, calibrate_cameras, lens_knowledge
+from vision.calibration.views import BoardViews, MeasuredPose
+from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
+
+VIEWS, CAMERAS = 4, 2
+CORNERS = np.array([[x, y, 0.0] for y in (0, 15, 30) for x in (0, 15, 30, 45)])
+TIMES_S = np.array([0.0, 0.2, 0.5, 0.7])
+
+
+def a_state(moving):
+    rng = np.random.default_rng(0)
+    turns = [exp_rotation(np.array([0.15, 0.05, 0.1]) * (k + 1)) for k in range(VIEWS)]
+    boards = np.array([np.column_stack([R, [5 * k, 3 * k, 300 + 4 * k]]) for k, R in enumerate(turns)])
+    cameras = np.array([np.eye(3, 4), np.column_stack([exp_rotation([0.1, 0.3, 0]), [10, 20, 30]])])
+    one = [1000, 1010, 640, 360, -0.2, 0.1, 1e-3, -1e-3, 0.05]
+    other = [900, 910, 600, 350, 0.1, 0.1, 1e-3, 2e-3, 0.05]
+    return State(
+        np.array([one, other]),
+        cameras,
+        boards,
+        board=np.array([0.01, 0.3, -0.4]),
+        clock=np.array([0, 0.05]),
+        instants=rng.normal(0, 0.05, (VIEWS, CAMERAS)),
+        trajectory=Trajectory(TIMES_S, np.arange(CAMERAS)) if moving else None,
+    )
+
+
+def all_sightings():
+    view, camera, corner = np.array(list(np.ndindex(VIEWS, CAMERAS, len(CORNERS)))).T
+    n = len(view)
+    return Sightings(camera, view, corner, np.zeros((n, 2)), np.ones(n), 0.1 * camera)
+
+
+def differences(state, seen, globals_step, view_step):
+    none = np.zeros((VIEWS, CAMERAS))
+    up = predict(state.stepped(globals_step, view_step, none), seen, CORNERS)[0]
+    return up - predict(state.stepped(-globals_step, -view_step, none), seen, CORNERS)[0]
+
+
+# Step of each parameter: central differences err by step² f‴/6, and by rounding of 1e-13 · 1e3 px / step.
+STEPS = [1e-2] * 4 + [1e-4] * 5 + [1e-5] * 3 + [1e-3] * 3 + [1e-5]
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_gradients_by_cameras_and_board_are_finite_differences(moving):
+    state, seen = a_state(moving), all_sightings()
+    J = predict(state, seen, CORNERS)[1]
+    for column in range(N_CAMERA * CAMERAS + N_BOARD):
+        own = column < N_CAMERA * CAMERAS
+        local = column % N_CAMERA if own else N_CAMERA + column - N_CAMERA * CAMERAS
+        step = np.zeros(N_CAMERA * CAMERAS + N_BOARD)
+        step[column] = STEPS[local] if own else 1e-4
+        numeric = differences(state, seen, step, np.zeros((VIEWS, 6))) / (2 * step[column])
+        of = seen.camera == column // N_CAMERA if own else np.ones(len(seen), dtype=bool)
+        analytic = J[:, :, local] * of[:, None]
+        np.testing.assert_allclose(analytic, numeric, atol=1e-6 * max(np.abs(numeric).max(), 1e-3))
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_gradients_by_board_poses_are_finite_differences(moving):
+    state, seen = a_state(moving), all_sightings()
+    J = predict(state, seen, CORNERS)[1][:, :, N_CAMERA + N_BOARD :]
+    touched = [seen.view]
+    if moving:
+        touched += list(state.trajectory.neighbours[seen.view].T)
+    for view, k in np.ndindex(VIEWS, N_VIEW):
+        step = np.zeros((VIEWS, 6))
+        step[view, k] = 1e-5 if k < 3 else 1e-3
+        numeric = differences(state, seen, np.zeros(N_CAMERA * CAMERAS + N_BOARD), step) / (2 * step[view, k])
+        analytic = sum(J[:, :, N_VIEW * b + k] * (who == view)[:, None] for b, who in enumerate(touched))
+        np.testing.assert_allclose(analytic, numeric, atol=1e-6 * np.abs(numeric).max())
+
+
+def test_left_jacobian_is_that_of_the_exponential():
+    w, d = np.array([0.4, -0.3, 0.7]), 1e-6 * np.array([0.3, 0.9, -0.2])
+    moved = log_rotation(exp_rotation(w + d) @ exp_rotation(w).T)
+    np.testing.assert_allclose(moved, left_jacobian(w) @ d, atol=1e-11)
+
+
+def test_without_noise_cameras_come_out_exact():
+    recording = a_recording(views=8)
+    boards, rig = recording.seen(0.0, np.random.default_rng(0))
+    made = calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX), rig), BOARD, MeasuredPose(T_RIG_BOARD))
+    for camera in made.cameras:
+        # Corners carry 1e-9 px as sigma, the lens priors weigh against that by (1e-9)²; what is left is where the
+        # adjustment stops: relative changes of the cost below 1e-8.
+        np.testing.assert_allclose(camera.project(WORK_MM), recording.cameras[camera.name].project(WORK_MM), atol=1e-4)
+
+
+def test_a_moving_board_seen_late_is_followed():
+    """Two cameras look at a board in motion; the second is late by 40 ms and by 20 ms more or less."""
+    rng, recording = np.random.default_rng(5), a_recording(views=2)
+    times = np.arange(24) * 0.15
+    late = np.column_stack([np.zeros(24), 0.04 + 0.02 * rng.standard_normal(24)])
+    boards = {name: [] for name in recording.cameras.names}
+    for k, t in enumerate(times):
+        for c, camera in enumerate(recording.cameras):
+            boards[camera.name].append(noisy_view_at(camera, moving_board(t + late[k, c]), 0.02, rng))
+    rig = recording.seen(0.02, rng)[1]
+    sizes = dict.fromkeys(boards, SIZE_PX)
+    views = BoardViews(boards, sizes, rig, times_s=dict.fromkeys(boards, times))
+    made = calibrate_cameras(views, BOARD, MeasuredPose(T_RIG_BOARD))
+    assert made.together and made.timing is not None
+    # The mean of 24 latenesses that scatter by 20 ms is known to 4 ms; four of these.
+    assert abs(made.timing.offset_s[1] - made.timing.offset_s[0] - 0.04) < 0.016
+    for camera in made.cameras:
+        assert np.abs(camera.project(WORK_MM) - recording.cameras[camera.name].project(WORK_MM)).max() < 0.25
+
+
+def test_more_iterations_change_nothing_at_rest():
+    recording = a_recording(views=6)
+    boards, _ = recording.seen(0.05, np.random.default_rng(1))
+    settled = calibrate_alone(boards["high"], BOARD, SIZE_PX)
+    known = lens_knowledge(1, 6)
+    known.free[9:15] = False
+    seen = settled.seen.chosen(settled.kept)
+    again = solve(settled.solution.state, seen, BOARD.corners_mm, replace(known), tolerance=1e-14)
+    sigma = np.sqrt(np.diag(again.covariance)[:9])
+    assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
+
+
+def test_cost_is_linear_in_views():
+    from tests.speed.cameras import seconds
+
+    few, many = seconds(2, 15), seconds(2, 60)
+    # Four times the views cost four times as much; a dense solve would cost up to 64 times. Twice for a busy machine.
+    assert many < 8 * few

@@ -1,0 +1,99 @@
+"""Centre, axis and encoder's zero by the swing: exact without noise, as sure as it says, alarmed where due."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.scenes.base_lines import STEP, some_lines
+from vision.calibration.known_lengths import check_known_lengths
+from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
+from vision.calibration.swing import by_swing
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.errors import Refused
+from vision.geometry.rotation import exp_rotation
+
+
+def test_noiseless_is_exact():
+    # Differences by forward steps leave 1e-8 relative; the fan of 10 degrees multiplies by 1/sin(10°) = 6.
+    np.testing.assert_allclose(by_swing(some_lines(10.0)).step, STEP, atol=1e-6)
+
+
+def test_stated_sigmas_are_the_sampled_ones_and_intervals_hold():
+    rng = np.random.default_rng(4)
+    made = [by_swing(some_lines(8.0, across_mm=0.01, turn_rad=5e-4, rng=rng)) for _ in range(300)]
+    error = np.array([m.step for m in made]) - STEP
+    sigma = np.sqrt([np.diag(m.covariance) for m in made])
+    # 300 draws: a standard deviation scatters by 1/√600 = 4.1 %, so 15 % is 3.7 of these; six components.
+    np.testing.assert_allclose(error.std(axis=0) / sigma.mean(axis=0), 1.0, atol=0.15)
+    # 1800 intervals, not independent; as if 600 were: ± 0.9 %, three of them.
+    assert abs(np.mean(np.abs(error) < 1.96 * sigma) - 0.95) < 0.027
+
+
+def test_a_narrow_swing_fixes_the_centre_across_but_not_along():
+    made = by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4))
+    along, across, _ = np.sqrt(np.diag(made.covariance)[3:])
+    assert along > 20 * across
+    assert f"± {along:.4f} mm along" in made.notes[0]
+
+
+def test_combined_is_never_less_sure_than_either():
+    T = np.column_stack([np.eye(3), [10.0, 40.0, -45.0]])
+    board, swing = by_board(T, 0.1, 0.002), by_swing(some_lines(3.0, across_mm=0.01, turn_rad=5e-4))
+    both = combine(board, swing)
+    for one in (board, swing):
+        assert np.linalg.eigvalsh(one.covariance - both.covariance).min() > -1e-12
+    assert both.alarm is None
+
+
+def test_an_exact_board_stays_but_the_alarm_speaks():
+    lines = some_lines(8.0, np.array([0, 0, 0, 0.0, 0.5, 0.0]), across_mm=0.01, turn_rad=5e-4)
+    both = combine(by_board(np.eye(3, 4), 0.0, 0.0), by_swing(lines))
+    np.testing.assert_array_equal(both.step, np.zeros(6))
+    assert "across the whisker by +0.5" in both.alarm
+
+
+def test_alarm_names_the_encoder():
+    lines = some_lines(8.0, np.array([0, 0, np.radians(0.5), 0, 0, 0]), across_mm=0.01, turn_rad=2e-4)
+    alarm = combine(by_board(np.eye(3, 4), 0.05, 1e-4), by_swing(lines)).alarm
+    # The zero is known to 0.003 degrees here; four of those.
+    found = float(re.search(r"encoder's zero is off by ([+-][0-9.]+)", alarm)[1])
+    assert abs(found - 0.5) < 0.012
+
+
+def test_a_narrow_swing_with_a_board_by_ruler_is_refused_with_the_width_that_would_do():
+    ruler = by_board(np.eye(3, 4), 3.0, 0.05)
+    narrow = combine(ruler, by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4)))
+    with pytest.raises(Refused, match=r"along the whisker; 0\.05 mm is needed") as refusal:
+        check_swing_suffices(narrow)
+    needed = float(re.search(r"free strokes of about (\d+) degrees", str(refusal.value))[1])
+    # A stroke that wide, with frames as close, does.
+    wide = some_lines(needed, across_mm=0.01, turn_rad=5e-4, frames=round(30 * needed / 1.5))
+    check_swing_suffices(combine(ruler, by_swing(wide)))
+
+
+def test_too_few_frames_are_refused():
+    with pytest.raises(Refused, match="needs 4 frames"):
+        by_swing(some_lines(5.0, frames=3))
+
+
+def test_cameras_follow_the_frame_and_trade_the_shared_error():
+    T = np.column_stack([exp_rotation([2.0, 0.2, 0.1]), [-50.0, 4.0, 370.0]])
+    camera = Camera("a", (1280, 720), [[2000, 0, 640], [0, 2000, 360], [0, 0, 1]], np.zeros(5), T)
+    before = by_board(np.column_stack([np.eye(3), [10.0, 40.0, -45.0]]), 0.1, 0.002)
+    after = Placement(STEP, before.covariance / 4)
+    shared = np.zeros((15, 15))
+    R = np.kron(np.eye(2), T[:, :3])
+    shared[9:, 9:] = R @ before.covariance @ R.T
+    moved = placed(Cameras((camera,), shared), before, after)
+    rig = np.array([[20.0, 3.0, -5.0]])
+    old = rig @ exp_rotation(STEP[:3]).T + STEP[3:]
+    np.testing.assert_allclose(moved["a"].project(rig), camera.project(old), atol=1e-9)
+    np.testing.assert_allclose(moved.covariance, shared / 4, atol=1e-12)
+    np.testing.assert_allclose(moved.by_placement @ moved.placement @ moved.by_placement.T, shared / 4, atol=1e-12)
+
+
+def test_a_board_at_the_wrong_scale_is_refused_with_the_factor():
+    with pytest.raises(Refused, match=r"seem to be 1\.0[34]\d+ ± 0\.00\d+ times"):
+        check_known_lengths({"bar": (5.8, 0.02, 6.0, 0.01), "whisker": (96.6, 0.5, 100.0, 0.1)})
+    check_known_lengths({"bar": (6.02, 0.02, 6.0, 0.01)})

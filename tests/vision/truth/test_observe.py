@@ -1,0 +1,101 @@
+"""A trial of the sample session as the cameras show it, against its truth; and the ways in which it has none."""
+
+
+import numpy as np
+import pytest
+
+from tests.scenes.recorded import BAR, WIRE, Recorded
+from vision.truth.observe import observe_trial
+
+
+@pytest.fixture(scope="module")
+def steep(small_session):
+    return Recorded(small_session, "b60_4")
+
+
+def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
+    """The requirement: d_x to 0.03 mm, slip to 0.03 mm RMS, beta to 0.3 degrees, each within three stated sigma."""
+    seen, truth = steep.see(), steep.truth
+    assert seen.status == ""
+    beta, touch = (np.degrees([angle.value, angle.sigma]) for angle in (seen.beta_rad, seen.touch_rad))
+    for error, sigma, most in ((seen.d_x_mm.value - truth["d_x_mm"], seen.d_x_mm.sigma, 0.03),
+                               (beta[0] - truth["beta_deg"], beta[1], 0.3),
+                               (touch[0] - truth["touch_deg"], touch[1], 0.05)):
+        assert abs(error) < most and abs(error) < 3 * sigma
+    assert seen.d_x_mm.sigma < 0.02
+    touching = seen.frames.touching
+    error = (seen.frames.slip_mm.value - steep.rows["slip_mm"])[touching]
+    assert np.sqrt(np.mean(error**2)) < 0.03
+    assert np.all(np.abs(error) < 3 * seen.frames.slip_mm.sigma[touching])
+    assert sum(seen.budget.values()) == pytest.approx(1.0)
+    assert all(share >= 0 for share in seen.budget.values())
+    at = seen.at(np.radians(3.0))
+    near = touching & (np.abs(seen.frames.theta_rad.value - np.radians(3.0)) < np.radians(1.6))
+    assert at.slip_mm.sigma >= np.min(seen.frames.slip_mm.sigma[near])  # frames nearby err alike
+    assert at.slip_mm.value == pytest.approx(truth["slip_at_3deg_mm"], abs=3 * at.slip_mm.sigma)
+    # friction of the scene: atan(0.185339)
+    assert np.degrees(at.alpha_rad.value) == pytest.approx(10.5, abs=3 * np.degrees(at.alpha_rad.sigma))
+
+
+def test_a_stroke_that_ends_before_the_bar_never_touches(steep):
+    seen = steep.see(slice(0, 4))
+    assert np.isnan(seen.d_x_mm.value) and seen.status == "the whisker never touches"
+
+
+def test_a_stroke_that_begins_on_the_bar_has_no_truth(steep):
+    seen = steep.see(slice(5, None))
+    assert np.isnan(seen.d_x_mm.value) and "touches from the start" in seen.status
+
+
+def test_three_frames_are_too_few(steep):
+    seen = steep.see(slice(0, 3))
+    assert np.isnan(seen.d_x_mm.value) and "4 are needed" in seen.status
+
+
+def test_without_a_bar_in_view_the_trial_says_so(steep):
+    background = {name: pictures[0].astype(float) for name, pictures in steep.frames.items()}
+    motor = np.radians(steep.rows["motor_deg"][:4])
+    frames = {name: dict.fromkeys(range(4), pictures[0]) for name, pictures in steep.frames.items()}
+    (whisk,) = observe_trial(frames, steep.rows["time_s"][:4], motor, [slice(0, 4)], steep.cameras, WIRE, BAR,
+                             background).whisks
+    assert np.isnan(whisk.d_x_mm.value) and "no bar of diameter 6 mm is seen" in whisk.status
+
+
+def _whisk(recorded, frames):
+    motor, time = np.radians(recorded.rows["motor_deg"]), recorded.rows["time_s"]
+    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], recorded.cameras, WIRE, BAR,
+                             recorded.background).whisks
+    return whisk
+
+
+def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
+    """The bar's width tells d_x to half a millimetre, its taper the slope to some degrees, each within three sigma."""
+    whisk, truth = _whisk(steep, {"high": steep.frames["high"]}), steep.truth
+    assert whisk.cameras == 1 and "no two cameras see it" in whisk.status
+    for found, sigma, true, most in ((whisk.d_x_mm.value, whisk.d_x_mm.sigma, truth["d_x_mm"], 0.5),
+                                     (np.degrees(whisk.beta_rad.value), np.degrees(whisk.beta_rad.sigma),
+                                      truth["beta_deg"], 10.0),
+                                     (np.degrees(whisk.touch_rad.value), np.degrees(whisk.touch_rad.sigma),
+                                      truth["touch_deg"], 0.5)):
+        assert abs(found - true) < 3 * sigma
+        assert sigma < most
+    touching = whisk.frames.touching
+    error = (whisk.frames.slip_mm.value - steep.rows["slip_mm"])[touching]
+    assert np.all(np.abs(error) < 3 * whisk.frames.slip_mm.sigma[touching])
+    assert sum(whisk.budget.values()) == pytest.approx(1.0)
+
+
+def test_a_camera_with_gaps_is_left_out_by_name(steep):
+    whisk = _whisk(steep, steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}})
+    assert "camera low was left out: 3 frames" in whisk.status
+    assert whisk.cameras == 1 and abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
+
+
+def test_a_camera_that_shows_another_wire_is_left_out(steep):
+    """Its pictures jump from frame to frame, as from a camera that shakes: what is left is one camera's truth."""
+    shaken = {k: np.roll(picture, 4 * (-1) ** k, axis=0) for k, picture in steep.frames["low"].items()}
+    motor = np.radians(steep.rows["motor_deg"])
+    (whisk,) = observe_trial({"high": steep.frames["high"], "low": shaken}, steep.rows["time_s"], motor,
+                             [slice(0, len(motor))], steep.cameras, WIRE, BAR, steep.background).whisks
+    assert whisk.cameras == 1 and "camera low was left out: its lines of the wire scatter by" in whisk.status
+    assert abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma

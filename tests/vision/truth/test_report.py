@@ -1,0 +1,54 @@
+"""What the row of a whisk says of itself."""
+
+import numpy as np
+import pytest
+
+from bench.rig.protocol import PicturesTable
+from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
+from vision.fit.problem import BAR
+from vision.fit.quantities import jacobians
+from vision.fit.solve import solve
+from vision.fit.uncertainty import Uncertainty
+from vision.geometry.rods import Rods
+from vision.geometry.settings import VisionSettings
+from vision.truth.rows import to_whisk
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+
+
+def row_of(noise_of):
+    """The row of a scene whose parameters have this noise, and the scene."""
+    scene = draw_scene(0, pictures=PicturesTable(step_deg=1.5))
+    problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
+    state, answer = solve(problem, begin(problem), scales=(1e9,) * 6)
+    frames, known = range(len(scene.motor_rad)), Uncertainty(answer, noise_of(answer), 0.0 * answer)
+    fitted = FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state))
+    rods, no_bar = Rods(scene.wire, scene.bar), None
+    return scene, to_whisk(WhiskPictures(0, frames, scene.recording.frames.time_s, scene.motor_rad, (), scene.cameras,
+                                         rods, no_bar, VisionSettings()), fitted)
+
+
+def tilted(by_deg: float):
+    """The noise of a bar whose two tilts are known to so much, and all else as it is."""
+    tilts = np.arange(BAR)[2:]
+
+    def noise(answer):
+        more = answer.copy()
+        more[tilts, tilts] += np.radians(by_deg) ** 2
+        return more
+
+    return noise
+
+
+@pytest.mark.parametrize(("by_deg", "doubted"), [(0.0, False), (5.0, True)])
+def test_a_slope_that_the_cameras_do_not_tell_is_doubted(by_deg, doubted):
+    scene, whisk = row_of(tilted(by_deg))
+    assert (np.degrees(whisk.beta_rad.sigma) > 3.0) == doubted
+    assert ("slope is known to" in whisk.status) == doubted
+    assert whisk.d_x_mm.value == pytest.approx(scene.truth.d_x, abs=2e-3)
+
+
+@pytest.mark.parametrize(("noise_of", "reason"), [(tilted(30.0), "slope is known to 3"),
+                                                  (lambda answer: 1e5 * answer, "slip is known to")])  # fmt: skip
+def test_where_nothing_is_linear_there_is_no_truth(noise_of, reason):
+    _, whisk = row_of(noise_of)
+    assert np.isnan(whisk.d_x_mm.value) and reason in whisk.status

@@ -1,0 +1,36 @@
+"""A number with its sigma, and the six that exist only while the whisker touches."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Value:
+    """A measured quantity and its one sigma, in one unit and of one shape; NaN where there is none."""
+
+    value: float | np.ndarray = NAN
+    sigma: float | np.ndarray = NAN
+
+
+UNKNOWN = Value()
+UNKNOWN_POINT = Value(np.full(3, NAN), np.full(3, NAN))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WhileTouching:
+    """Slip along the bar and along the whisker, deflection, its direction, and the force's angle from the contact's
+    normal: floats at one pushing angle, or (n,) over frames."""
+
+    slip_mm: Value = UNKNOWN
+    longitudinal_slip_mm: Value = UNKNOWN
+    d_y_mm: Value = UNKNOWN
+    d_z_mm: Value = UNKNOWN
+    phi_rad: Value = UNKNOWN
+    alpha_rad: Value = UNKNOWN
+
+
+# Fields of WhileTouching by the names that the fit has for them (`vision.fit.quantities`).
+FIELDS = {field.rpartition("_")[0]: field for field in WhileTouching.__dataclass_fields__}

@@ -1,0 +1,100 @@
+"""A whisk being seen: its pictures and what is known beforehand, and the fit to them."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from vision.bar.search import SeenBar
+from vision.fit.problem import Problem, State
+from vision.fit.quantities import Jacobians, Measured, jacobians
+from vision.fit.uncertainty import Uncertainty, uncertainty
+from vision.geometry.camera import Cameras
+from vision.geometry.rods import Rods
+from vision.geometry.settings import VisionSettings
+from vision.lines.one_sided import Lit
+from vision.pictures.view import View
+from vision.truth.value import Value
+
+_FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
+
+
+@dataclass(frozen=True, eq=False)
+class WhiskPictures:
+    """One whisk in the pictures of a trial.
+
+    indices: the frames of the stroke; time_s, motor_rad (n,) at every frame of the trial; light: filled with how each
+    camera sees the wire; left_out: a line on each camera that is not asked.
+    """
+
+    number: int
+    indices: range
+    time_s: np.ndarray
+    motor_rad: np.ndarray
+    views: tuple[View, ...]
+    cameras: Cameras
+    rods: Rods
+    bar: SeenBar
+    settings: VisionSettings
+    light: dict[str, Lit] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+    @cached_property
+    def frames(self) -> list[int]:
+        """The frames that every camera has."""
+        return [f for f in self.indices if all(f in view.frames for view in self.views)]
+
+    @cached_property
+    def motor(self) -> dict[int, float]:
+        """Motor angle by frame, of the frames that every camera has."""
+        return {f: float(self.motor_rad[f]) for f in self.frames}
+
+    def without_gaps(self) -> "WhiskPictures":
+        """The whisk by the cameras that have most of its frames: one camera's gaps are not all cameras'."""
+        counts = {view.camera.name: sum(f in view.frames for f in self.indices) for view in self.views}
+        few = [name for name, count in counts.items() if count <= _FEWEST_SHARE * max(counts.values())]
+        lines = (f"camera {name} was left out: {counts[name]} frames of {len(self.indices)}" for name in few)
+        return replace(self._by([name for name in counts if name not in few]), left_out=(*lines, *self.left_out))
+
+    def without(self, camera: str, line: str) -> "WhiskPictures":
+        """The whisk by the other cameras, and a line on why."""
+        others = [view.camera.name for view in self.views if view.camera.name != camera]
+        return replace(self._by(others), left_out=(*self.left_out, line))
+
+    def _by(self, names: list[str]) -> "WhiskPictures":
+        views = tuple(view for view in self.views if view.camera.name in names)
+        return replace(self, views=views, cameras=self.cameras.subset(names))
+
+
+@dataclass(frozen=True, eq=False)
+class FittedWhisk:
+    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for."""
+
+    problem: Problem
+    state: State
+    frames: list[int]
+    uncertainty: Uncertainty
+    measured: Measured
+    by_parameter: Jacobians
+
+    @classmethod
+    def of(cls, problem: Problem, state: State, answer: np.ndarray, frames: list[int]) -> "FittedWhisk":
+        """answer (size, size): how the parameters answer the observations (see `Uncertainty`)."""
+        measured, by_parameter = jacobians(problem, state)
+        return cls(problem, state, frames, uncertainty(problem, state, answer), measured, by_parameter)
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(size, size), of the parameters."""
+        return self.uncertainty.covariance
+
+    def of_whisk(self, name: str) -> Value:
+        """A quantity of the whole whisk by its name."""
+        gradient = self.by_parameter.whisk[name]
+        return Value(float(self.measured.whisk[name]), float(np.sqrt(gradient @ self.covariance @ gradient)))
+
+    def of_frames(self, name: str) -> Value:
+        """A quantity of each frame (f,) by its name."""
+        rows = self.by_parameter.frame[name]
+        variances = np.einsum("fi,ij,fj->f", rows, self.covariance, rows)
+        return Value(self.measured.frame[name], np.sqrt(np.maximum(variances, 0.0)))
