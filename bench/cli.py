@@ -108,7 +108,15 @@ def _add_evaluate(verbs) -> None:
     _add_out(verb, "OUT", "folder for tables, figures and the summary")
     verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
     verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
-    verb.add_argument("--cutoff-Hz", type=float, metavar="X", help="of the low-pass (default: 0.5 for each deg/s)")
+    verb.add_argument(
+        "--alpha-est-sigma-deg",
+        type=float,
+        metavar="X",
+        help="how far that may be off, one sigma (default: by the spread of the session's surfaces, 5 without any)",
+    )
+    verb.add_argument(
+        "--cutoff-Hz", type=float, metavar="X", help="of the low-pass ahead of one's own estimators (0.5 a deg/s)"
+    )
     verb.add_argument(
         "--clock-sigma-s",
         type=float,
@@ -133,7 +141,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    names = ("theta_deg", "alpha_est_deg", "cutoff_Hz", "clock_sigma_s", "estimators")
+    names = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "estimators")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])

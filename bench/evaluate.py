@@ -26,7 +26,7 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
     with lock_output(out), Workers(workers, progress) as pool:
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
-        results = tuple(with_runs(evaluated(units, pool), session.whisker))
+        results = tuple(with_runs(evaluated(units, pool), session.whisker, settings))
         friction = tuple(friction_of(results, session.whisker, settings.alpha_est_rad))
         write_tables(out, results)
         write_friction(out, results, friction, settings.alpha_est_rad)

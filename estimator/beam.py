@@ -6,10 +6,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.domain import require_positive
+from estimator.domain import elementwise, require_positive
 
 NMM2_PER_GPA_MM4 = 1000.0
-SHAPES = ("cylinder", "cone")
+SHAPES = ("cylinder", "cone", "tapered")
 
 
 def second_moment_of_area(diameter_mm: ArrayLike):
@@ -52,40 +52,87 @@ def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike):
     return 1000.0 * moment_Nmm / rigidity_Nmm2
 
 
+def taper_of(shape, tip_share=None):
+    """Share of the base's diameter that is lost up to the tip: 0 of a cylinder, 1 of a cone, between them if tapered.
+
+    tip_share: the tip's diameter over the base's, given for "tapered" alone. Raises ValueError for another shape, and
+    where a tip_share is missing, not asked for, or outside (0, 1).
+    """
+    if shape not in SHAPES:
+        raise ValueError(f"shape = {shape!r}: must be one of {', '.join(SHAPES)}")
+    if (shape == "tapered") != (tip_share is not None):
+        raise ValueError(f"a tapered whisker, and no other, has a tip diameter: shape is {shape!r}")
+    if shape == "tapered":
+        if not 0 < tip_share < 1:
+            raise ValueError(f"tip diameter over base diameter = {tip_share}: must lie between 0 and 1")
+        return 1.0 - tip_share
+    return float(shape == "cone")
+
+
 @dataclass(frozen=True)
 class Beam:
-    """A straight whisker, clamped at its base.
+    """A straight whisker, clamped at its base: cylinder, cone, or a cone cut off ("tapered").
 
-    C_Nmm2 is 3EI at the base (the C of equation (1)); shape is "cylinder", or "cone" for one that tapers
-    to a point at length_mm. Raises ValueError for anything but a positive C and length and one of these
-    shapes.
+    C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's diameter over the
+    base's. Raises ValueError for anything but a positive C and length, and as `taper_of` does.
+
+    The one compliance of all of them: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the diameter that is lost
+    up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every equation for a cylinder holds for the base's
+    cylinder touched at d (`as_cylinder_mm`), and the way back is `distance_mm`.
     """
 
     C_Nmm2: float
     length_mm: float
     shape: str = "cylinder"
+    tip_share: float | None = None
 
     def __post_init__(self):
         require_positive("C_Nmm2", self.C_Nmm2, "N·mm²")
         require_positive("length_mm", self.length_mm, "mm")
-        if self.shape not in SHAPES:
-            raise ValueError(f"shape = {self.shape!r}: must be one of {', '.join(SHAPES)}")
+        taper_of(self.shape, self.tip_share)
 
     @classmethod
-    def from_modulus(
-        cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, shape: str = "cylinder"
-    ) -> Self:
+    def from_modulus(cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, *shape: str | float) -> Self:
         """Beam of a round wire from Young's modulus and the diameter at the base."""
         require_positive("youngs_modulus_GPa", youngs_modulus_GPa, "GPa")
         require_positive("diameter_mm", diameter_mm, "mm")
-        return cls.from_rigidity(flexural_rigidity(youngs_modulus_GPa, diameter_mm), length_mm, shape)
+        return cls.from_rigidity(flexural_rigidity(youngs_modulus_GPa, diameter_mm), length_mm, *shape)
 
     @classmethod
-    def from_rigidity(cls, rigidity_Nmm2: float, length_mm: float, shape: str = "cylinder") -> Self:
+    def from_rigidity(cls, rigidity_Nmm2: float, length_mm: float, *shape: str | float) -> Self:
         """Beam from its flexural rigidity EI at the base."""
-        return cls(3 * rigidity_Nmm2, length_mm, shape)
+        return cls(3 * rigidity_Nmm2, length_mm, *shape)
 
     @property
     def rigidity_Nmm2(self) -> float:
         """EI at the base."""
         return self.C_Nmm2 / 3
+
+    @property
+    def taper(self) -> float:
+        """Share of the base's diameter that is lost up to the tip."""
+        return taper_of(self.shape, self.tip_share)
+
+    def as_cylinder_mm(self, d_x_mm):
+        """Distance at which the base's cylinder is as stiff as this whisker at d_x; infinite at a cone's point."""
+        return _inverse_sum(d_x_mm, -self.taper / self.length_mm)
+
+    def moment_Nmm(self, theta_rad, d_x_mm):
+        """m_z of (2): of a push by θ against a contact at d_x, without slip."""
+        return self.C_Nmm2 * theta_rad / self.as_cylinder_mm(d_x_mm)
+
+    def distance_mm(self, as_cylinder_mm):
+        """d_x from the distance that the base's cylinder would give; NaN unless that is positive."""
+        return _inverse_sum(as_cylinder_mm, self.taper / self.length_mm)
+
+    def error_share(self, d_x_mm, of_cylinder):
+        """Relative error of d_x from that of the distance that its base's cylinder would give; −1: there is none."""
+        wrong = self.distance_mm(self.as_cylinder_mm(d_x_mm) * (1.0 + np.asarray(of_cylinder)))
+        return np.where(np.asarray(of_cylinder) > -1, wrong / d_x_mm, 0.0)[()] - 1.0
+
+
+@elementwise
+def _inverse_sum(d, per_mm):
+    """1 / (1/d + per_mm) for d > 0, infinite where the sum is zero or below, NaN elsewhere."""
+    below = 1 + d * per_mm
+    return np.where(d > 0, np.where(below > 0, d / np.maximum(below, 0.0), np.inf), np.nan)

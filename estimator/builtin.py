@@ -1,37 +1,60 @@
 """The paper's estimators, written as anyone would write one: a function of a whisk and the settings.
 
-For a cone the equations run on the base's cylinder, and 1/d_x gains 1/L (`distance.cone`). An estimate of (10) or
-(12) beyond the whisker's length is set to the length and said to be a tip contact (section VII). (2) overestimates
-by as much as slip it ignores, so that beyond the length it tells of slip, not of the tip: it is flagged and left.
+For a tapered whisker they run on the base's cylinder, and 1/d_x gains the taper (`Beam.distance_mm`). An estimate of
+(10) or (12) beyond the whisker's length is set to the length and said to be a tip contact (section VII). (2)
+overestimates by as much as slip it ignores, so that beyond the length it tells of slip, not of the tip: it is flagged
+and left.
 """
 
-from math import nan
+from dataclasses import replace
+from math import hypot, nan
 
 from estimator import distance, uncertainty
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
 BEYOND = "longer than the whisker: (2) ignores slip"
-TIP = "tip contact: the distance came out as {:.1f} mm, longer than the whisker, and was set to its length"
+TIP = (
+    "tip contact: the distance came out as {:.1f} mm, longer than the whisker, and was set to its length; "
+    "farther than {:.1f} mm (95 %)"
+)
+NEARER = "known only to be nearer than {:.1f} mm (95 %)"
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (2): as if the whisker did not slip sideways."""
     felt = (whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
     d_x, gradient = distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt)
-    return _estimate(whisk, settings, d_x, gradient, alpha_est=0.0, clamp=False)
+    return _estimate(whisk, _without_friction(settings), d_x, gradient, m_y=0.0, clamp=False)
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Equation (10): slip accounted for, with the assumed friction cone angle."""
+    """Equation (10): slip accounted for, with the assumed friction cone angle.
+
+    Its interval holds α_est's sigma and stays where (10) loses its root: then only one side of it is known.
+    """
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad, whisk.beam.C_Nmm2)
-    return _estimate(whisk, settings, distance.with_friction(*felt), uncertainty.gradient_with_friction(*felt))
+    d_x, gradient = distance.with_friction(*felt), uncertainty.gradient_with_friction(*felt)
+    return _assuming(whisk, settings, d_x, gradient)
 
 
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (12): slip accounted for, as if there were no friction."""
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
     d_x, gradient = distance.frictionless(*felt), uncertainty.gradient_frictionless(*felt)
-    return _estimate(whisk, settings, d_x, gradient, alpha_est=0.0)
+    return _assuming(whisk, _without_friction(settings), d_x, gradient)
+
+
+def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
+    """Equations (16), (17) as printed, ν(θ, |m|) cos φ with the whisker's own ν: far off where a tapered whisker slips,
+    for the slip takes its share of the angle and not of the distance. Not among ESTIMATORS; to be asked for by name."""
+    felt, beam = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm), whisk.beam
+    d_x = distance.general_printed(*felt, lambda theta, m: beam.distance_mm(beam.C_Nmm2 * theta / m))
+    if d_x != d_x:
+        return Estimate(nan, nan, distance.why_not(*felt))
+    noise = {"theta_sigma": whisk.theta_sigma_rad, "covariance": whisk.covariance_at}
+    gradient = uncertainty.gradient_printed(*felt, beam.C_Nmm2, beam.taper / beam.length_mm)
+    mixed = whisk.theta_moment_covariance_at
+    return Estimate(d_x, uncertainty.sigma(gradient, **noise, theta_moment_covariance=mixed))
 
 
 ESTIMATORS = {
@@ -41,27 +64,57 @@ ESTIMATORS = {
 }
 
 
-def _estimate(whisk, settings, d_x, gradient, alpha_est=None, clamp=True):
-    """Estimate from a cylinder's distance and gradient: sigma, taper, clamp at the tip, reason for a NaN."""
-    if d_x != d_x:
-        alpha_est = settings.alpha_est_rad if alpha_est is None else alpha_est
-        return Estimate(nan, nan, _reason(whisk, alpha_est))
-    sigma = uncertainty.sigma(
-        gradient,
-        theta_sigma=whisk.theta_sigma_rad,
-        covariance=whisk.covariance_at,
-        alpha_est_sigma=settings.alpha_est_sigma_rad,
-        theta_moment_covariance=whisk.theta_moment_covariance_at,
+def _without_friction(settings: EstimatorSettings) -> EstimatorSettings:
+    return replace(settings, alpha_est_rad=0.0, alpha_est_sigma_rad=0.0)
+
+
+def _assuming(whisk, settings, d_x, gradient):
+    """An estimate that takes both moments, with the friction angle assumed and the slope (9) that follows."""
+    slope = distance.estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
+    estimate = _estimate(whisk, settings, d_x, gradient, m_y=whisk.m_y_at_Nmm)
+    return replace(estimate, alpha_est_rad=settings.alpha_est_rad, beta_rad=slope)
+
+
+def _estimate(whisk, settings, d_x, gradient, *, m_y, clamp=True):
+    """Estimate from a cylinder's distance and gradient: sigma, interval, taper, clamp at the tip, reason for a NaN.
+
+    m_y: the moment along the surface that the equation takes; (2) takes none.
+    """
+    theta, m_z, beam = whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam
+    knows = {
+        "theta_sigma": whisk.theta_sigma_rad,
+        "covariance": whisk.covariance_at,
+        "alpha_est_sigma": settings.alpha_est_sigma_rad,
+        "theta_moment_covariance": whisk.theta_moment_covariance_at,
+    }
+    tapered = beam.distance_mm(d_x)
+    left = tapered / d_x  # of the base's diameter at the contact; of a relative error on the base's cylinder, too
+    model = _model_share(whisk, settings, tapered, left)
+    ends = uncertainty.interval_with_friction(
+        theta, m_y, m_z, settings.alpha_est_rad, beam.C_Nmm2, model_sigma=model / left if model else 0.0, **knows
     )
-    length = whisk.beam.length_mm
-    if whisk.beam.shape == "cone":
-        tapered = distance.taper(d_x, length)
-        d_x, sigma = tapered, sigma * (tapered / d_x) ** 2
-    clamped, at_tip = distance.clamp_to_length(d_x, length)
+    low, high = (min(beam.distance_mm(end), beam.length_mm) if end > 0 else end for end in ends)
+    if d_x != d_x:
+        return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
+    sigma = hypot(uncertainty.sigma(gradient, **knows) * left**2, model * tapered)
+    clamped, at_tip = distance.clamp_to_length(tapered, beam.length_mm)
     if at_tip and not clamp:
-        return Estimate(d_x, sigma, BEYOND)
-    return Estimate(clamped, sigma, TIP.format(d_x) if at_tip else "")
+        return Estimate(tapered, sigma, BEYOND)
+    if at_tip:
+        return Estimate(clamped, sigma, TIP.format(tapered, low), low, high)
+    return Estimate(clamped, sigma, NEARER.format(high) if low == 0 else "", low, high)
 
 
-def _reason(whisk, alpha_est):
-    return distance.why_not(whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_est=alpha_est)
+def _model_share(whisk, settings, d_x, left):
+    """What (10) may be off by itself, as a share of d_x; 0 where nothing is said of the object, or without distance."""
+    if d_x != d_x or settings.object_reach_mm == 0:
+        return 0.0
+    phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    known = {"reach": settings.object_reach_mm, "tilt_sigma": settings.tilt_sigma_rad, "left": left}
+    return uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, **known)
+
+
+def _reason(whisk, alpha_est, high):
+    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    reason = distance.why_not(*felt, alpha_est=alpha_est)
+    return f"{reason}; {NEARER.format(high)}" if high > 0 else reason

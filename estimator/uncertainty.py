@@ -1,4 +1,4 @@
-"""Standard deviation of d_x from those of the pushing angle, the moments and α_est, by analytic derivatives.
+"""Standard deviation and interval of d_x from those of the pushing angle, the moments and α_est, and the model's own.
 
 Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4. Angles in rad, moments in
 N·mm, C in N·mm², lengths in mm. Where the distance is NaN, so is its sigma.
@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import distance
-from estimator.domain import elementwise, require_sigma
+from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive, require_sigma
+
+Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
+_STEEPEST_RAD = RIGHT_ANGLE - 1e-9  # of a friction angle: at 90° its tangent has no number
 
 
 def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike):
@@ -49,6 +52,16 @@ def gradient_cone(
     cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
     shrink = (distance.cone(theta, m_y, m_z, alpha_est, C, length) / cylinder) ** 2
     return np.asarray(shrink)[..., None] * gradient_with_friction(theta, m_y, m_z, alpha_est, C)
+
+
+@elementwise
+def gradient_printed(theta, m_y, m_z, C, taper_per_mm):
+    """∂d_x/∂(θ, m_y, m_z, α_est) of (16) as printed, cos φ / (|m|/(Cθ) + τ/L); the last one is 0."""
+    m = np.hypot(m_y, m_z)
+    d_x = (m_z / m) / (m / (C * theta) + taper_per_mm)
+    shrink = 1 / (1 + taper_per_mm * C * theta / m)  # of a relative error of Cθ/|m|
+    by_m = -(1 + shrink) / m**2
+    return _stack(d_x, shrink / theta, by_m * m_y, by_m * m_z + 1 / m_z, 0.0)
 
 
 def sigma(
@@ -110,6 +123,50 @@ def sigma_cone(
 ):
     """Standard deviation of the cone's distance, in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_cone(theta, m_y, m_z, alpha_est, C, length), **sigmas)
+
+
+def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0, model_sigma=0.0, **sigmas):
+    """(low, high), mm: the 95 % interval of (10), beyond a φ + α_est of 90° too; NaN where m_z or θ is no push.
+
+    (10) falls with α_est, and by more than a line where its sigma is large. So each side is its own: the change that
+    the end of α_est's interval makes and 1.96 sigma of the rest (`sigmas` as of `sigma`), added in squares (MOVER:
+    Zou & Donner, Statistics in Medicine 27, 2008). model_sigma: of the equation itself, a share of it. A low end at
+    zero or below says that no distance is too short: it is 0.
+    """
+    require_sigma("alpha_est_sigma", alpha_est_sigma)
+    require_friction_angle("alpha_est", alpha_est)
+    require_positive("C", C, "N·mm²")
+    middle, gradient = _through_zero(theta, m_y, m_z, alpha_est, C)
+    rest = Z_95 * np.hypot(sigma(gradient, **sigmas), model_sigma * middle)
+    ends = (alpha_est + side * Z_95 * alpha_est_sigma for side in (1.0, -1.0))
+    least, most = (_through_zero(theta, m_y, m_z, np.clip(a, 0.0, _STEEPEST_RAD), C)[0] for a in ends)
+    low, high = middle - np.hypot(middle - least, rest), middle + np.hypot(most - middle, rest)
+    push = (np.asarray(theta) > 0) & (np.asarray(m_z) > 0) & np.isfinite(middle)
+    return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(push, np.maximum(high, 0.0), np.nan)[()]
+
+
+def model_share(theta, phi, alpha, d_x, *, reach=0.0, tilt_sigma=0.0, left=1.0):
+    """How far (10) may be off by itself, as a share of d_x: leading terms in θ, derived in docs/maps.md.
+
+    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left: share of the base's
+    diameter that is left at d_x. A held contact drags along the whisker by up to tan α; where it slips, that is far
+    less than what α_est does.
+    """
+    leaning = 0.5 * theta * np.tan(tilt_sigma) * np.sin(np.abs(phi)) / np.cos(alpha)
+    slope = np.cos(np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE))
+    rolling = theta * reach / np.asarray(d_x) * slope * (0.5 / left - 0.125)
+    return np.sqrt(leaning**2 + rolling**2 + (0.2 * theta * np.tan(alpha)) ** 2 + (theta**2 / (6 * left)) ** 2)
+
+
+@elementwise
+def _through_zero(theta, m_y, m_z, alpha_est, C):
+    """(10) and its gradient (..., 4), which go on through zero where φ + α_est passes 90°."""
+    mu, square = np.copysign(np.tan(alpha_est), m_y), m_z * m_z + m_y * m_y
+    scale = C * theta / square
+    d_x = scale * (m_z - mu * m_y)
+    by_y, by_z = -scale * mu - 2 * m_y * d_x / square, scale - 2 * m_z * d_x / square
+    by_alpha = -scale * np.abs(m_y) / np.cos(alpha_est) ** 2
+    return d_x, np.stack(np.broadcast_arrays(d_x / theta, by_y, by_z, by_alpha), axis=-1)
 
 
 @elementwise

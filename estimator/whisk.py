@@ -1,11 +1,14 @@
 """All that an estimator may know of one whisk, what it is told, and what it answers."""
 
 from dataclasses import dataclass, field
+from math import nan
 
 import numpy as np
 
 from estimator.beam import Beam
 from estimator.domain import require_friction_angle, require_sigma
+
+_ARRAYS = ("time_s", "theta_rad", "m_y_Nmm", "m_z_Nmm", "covariance_at", "theta_moment_covariance_at")
 
 
 @dataclass(frozen=True)
@@ -17,7 +20,8 @@ class Whisk:
     the pushing angle wanted; m_y_at_Nmm, m_z_at_Nmm: moments there; covariance_at (2, 2): theirs, in the
     order y, z, in (N·mm)²; theta_sigma_rad: of the pushing angle, felt touch included;
     theta_moment_covariance_at (2,): of the pushing angle with m_y and m_z, in rad·N·mm. Raises ValueError
-    where shapes disagree or a sigma is negative.
+    where shapes disagree or a sigma is negative. The arrays are copies that cannot be written to: what one estimator
+    does with them is no other's concern.
     """
 
     time_s: np.ndarray
@@ -41,24 +45,44 @@ class Whisk:
         if np.shape(self.theta_moment_covariance_at) != (2,):
             raise ValueError("theta_moment_covariance_at must have shape (2,)")
         require_sigma("theta_sigma_rad", self.theta_sigma_rad)
+        for name in _ARRAYS:
+            kept = np.array(getattr(self, name), dtype=float)
+            kept.setflags(write=False)
+            object.__setattr__(self, name, kept)
 
 
 @dataclass(frozen=True)
 class EstimatorSettings:
-    """What an estimator is told beforehand: the assumed friction cone angle, and how far it is trusted."""
+    """What an estimator is told beforehand: the assumed friction cone angle, and how far it is trusted.
+
+    Nobody knows the object: object_reach_mm is how thick it may be (radii of object and whisker together), and
+    tilt_sigma_rad how far it may lean along the whisker. Both enter the sigma alone.
+    """
 
     alpha_est_rad: float
     alpha_est_sigma_rad: float = 0.0
+    object_reach_mm: float = 0.0
+    tilt_sigma_rad: float = 0.0
 
     def __post_init__(self):
         require_friction_angle("alpha_est_rad", self.alpha_est_rad)
-        require_sigma("alpha_est_sigma_rad", self.alpha_est_sigma_rad)
+        for name in ("alpha_est_sigma_rad", "object_reach_mm", "tilt_sigma_rad"):
+            require_sigma(name, getattr(self, name))
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A distance with its standard deviation, both in mm; NaN where there is none, and status says why."""
+    """A distance with its standard deviation, both in mm; NaN where there is none, and status says why.
+
+    low_mm, high_mm: its 95 % interval, NaN where that is 1.96 sigma to either side; a low end of 0 and a high one at
+    the whisker's length are open. alpha_est_rad, beta_rad: the friction angle that was assumed and the slope that came
+    of it, NaN where the estimator knows of none.
+    """
 
     d_x_mm: float
     sigma_mm: float
     status: str = ""
+    low_mm: float = nan
+    high_mm: float = nan
+    alpha_est_rad: float = nan
+    beta_rad: float = nan

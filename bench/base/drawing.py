@@ -24,6 +24,7 @@ LABELS = {
     "frictionless": "(12) frictionless",
     "with_friction_fitted": "(10), α fitted",
     "with_friction_seen": "(10), α seen",
+    "estimator.builtin:printed_17": "(17) as printed",
 }
 _STYLE = {
     "font.size": 9,

@@ -9,12 +9,15 @@ from bench.base.errors import BadInput
 
 # The paper's 5 Hz at 10 deg/s and 45 Hz at 90 deg/s: half a hertz for each deg/s.
 CUTOFF_HZ_PER_DEG_S = 0.5
+# How far α_est may be off where nothing tells: steel's 10.5° to sandpaper's 23.3° (Fig. 8) about an assumed 10° or 15°.
+ALPHA_EST_SIGMA_DEG = 5.0
 
 
 @dataclass(frozen=True)
 class Settings:
     """theta_deg: pushing angle of truth and estimates. alpha_est_deg: friction angle that (10) assumes.
 
+    alpha_est_sigma_deg: how far that may be off, one sigma; None goes by the session's surfaces (`alpha_est_sigma`).
     cutoff_Hz: of the zero-phase low-pass; None goes by speed. estimators: "module:function" of one's own.
     clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
     (`FrameTimes.clock_sigma_s`). Raises BadInput out of range.
@@ -25,10 +28,13 @@ class Settings:
     cutoff_Hz: float | None = None
     estimators: tuple[str, ...] = ()
     clock_sigma_s: float | None = None
+    alpha_est_sigma_deg: float | None = None
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)
         _require("--alpha-est-deg", self.alpha_est_deg, 0.0, 89.0)
+        if self.alpha_est_sigma_deg is not None:
+            _require("--alpha-est-sigma-deg", self.alpha_est_sigma_deg, 0.0, 45.0)
         if self.cutoff_Hz is not None:
             _require("--cutoff-Hz", self.cutoff_Hz, 0.0, 1e5, above=True)
         if self.clock_sigma_s is not None:
@@ -43,6 +49,11 @@ class Settings:
     def alpha_est_rad(self) -> float:
         """The friction angle that (10) assumes, rad."""
         return math.radians(self.alpha_est_deg)
+
+    @property
+    def first_alpha_est_sigma_deg(self) -> float:
+        """What α_est may be off by as long as no surface is known."""
+        return ALPHA_EST_SIGMA_DEG if self.alpha_est_sigma_deg is None else self.alpha_est_sigma_deg
 
     def cutoff_for(self, speed_deg_s: float) -> float:
         """Cut-off in Hz for a whisk at this speed."""

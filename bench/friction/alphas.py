@@ -8,8 +8,10 @@ import numpy as np
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial import FeltWhisk, SeenWhisk, TrialFacts, TrialResult, whisks
 from bench.trials.phases import seen_phases, slips
+from vision.truth.value import Value
 
 UNKNOWN = (float("nan"), float("nan"))
+BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture tells it
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class WhiskAlphas:
     phases_felt: Phases
     shared_seen_rad: float  # sigma that all angles of this whisk share: of β, and felt also of the moments
     shared_felt_rad: float
+    nominal: bool = False  # β is that of the manifest: no picture shows it
 
     def apart(self, kind: str, record: str) -> tuple[float, float]:
         """Static or kinetic α from the record "seen" or "felt"; NaN where it shows no stick–slip."""
@@ -54,7 +57,9 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
 
 
 def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk) -> WhiskAlphas:
-    beta = seen.beta_rad
+    beta, nominal = seen.beta_rad, not np.isfinite(seen.beta_rad.value)
+    if nominal:
+        beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
     of_seen = seen_phases(seen.frames, beta.value, seen.d_x_mm.value) if slips(seen) else NO_PHASES
     shared = beta.sigma, float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma))
     return WhiskAlphas(
@@ -68,6 +73,7 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk) -> WhiskAlphas:
         of_seen,
         felt.phases,
         *shared,
+        nominal,
     )
 
 
@@ -90,9 +96,10 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, float]:
-    """α = |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip."""
+    """α = |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip; unknown
+    where the moments are not those of the seen shape."""
     beta, phi = seen.beta_rad, felt.phi_felt_rad
-    if not (slips(seen) and np.isfinite(phi.value)):
+    if not (slips(seen) and np.isfinite(phi.value)) or felt.apart:
         return UNKNOWN
     return abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma))
 

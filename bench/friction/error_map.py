@@ -4,8 +4,9 @@ A whisk's friction is its surface's: α as seen, where pictures show it, else as
 nothing was measured stay empty.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ def write_error_map(
     path, stamp = out / f"{NAME}.png", hash_of([vars(cell) for cell in cells], alpha_est_rad, COLUMNS)
     if not is_drawn(path, stamp):
         with style():
-            save(draw_error_map(cells, alpha_est_rad), path, stamp)
+            save(draw_error_map(cells, alpha_est_rad, _typical_taper(friction)), path, stamp)
     return [path.name]
 
 
@@ -59,10 +60,10 @@ def measured_cells(
 ) -> list[Cell]:
     """The cells that hold a whisk, by slope and friction."""
     cells: dict[tuple, list[tuple[float, float]]] = {}
-    for beta_deg, alpha_rad, error in _whisks(results, friction):
+    for beta_deg, alpha_rad, error, share in _whisks(results, friction):
         half = 0.5 * _BETA_DEG
         edges = _edge(abs(beta_deg) + half, _BETA_DEG) - half, _edge(np.degrees(alpha_rad), _ALPHA_DEG)
-        predicted = 100.0 * float(distance_error(np.radians(abs(beta_deg)), alpha_rad, alpha_est_rad))
+        predicted = 100.0 * float(share(distance_error(np.radians(abs(beta_deg)), alpha_rad, alpha_est_rad)))
         cells.setdefault(edges, []).append((error, predicted))
     return [Cell(*edges, *np.array(values).T) for edges, values in sorted(cells.items())]
 
@@ -71,17 +72,17 @@ def _edge(value: float, size: float) -> float:
     return float(np.floor(value / size) * size)
 
 
-def _whisks(
-    results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
-) -> Iterator[tuple[float, float, float]]:
-    """(β in degrees, α in rad, error in per cent) of every whisk for which all three are known."""
+def _whisks(results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> Iterator[tuple]:
+    """(β in degrees, α in rad, error in per cent) of every whisk for which all three are known, and how its whisker's
+    taper changes a relative error."""
     errors = {(j.trial, j.whisk): j for j in judge(results) if j.estimator == "with_friction" and not j.one_factor}
     for surface in friction:
         seen, fitted = surface.alpha("seen")[0], surface.alpha("least_squares")[0]
         alpha = seen if np.isfinite(seen) else fitted
         mine = (errors[whisk.key] for whisk in surface.whisks if whisk.key in errors)
         known = (j for j in mine if np.isfinite([alpha, j.beta_deg, j.error_percent]).all() and alpha >= 0)
-        yield from ((j.beta_deg, alpha, j.error_percent) for j in known)
+        of_taper = surface.surface.beam.error_share
+        yield from ((j.beta_deg, alpha, j.error_percent, partial(of_taper, j.d_x_mm)) for j in known)
 
 
 def _row(cell: Cell) -> dict:
@@ -98,8 +99,17 @@ def _row(cell: Cell) -> dict:
     }
 
 
-def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float) -> Figure:
-    """Measured on the left, predicted for the whole field on the right, in one scale of colours."""
+def _typical_taper(found: Sequence[SurfaceFriction]) -> Callable:
+    """How the whisker's taper changes a relative error at the session's median distance."""
+    surfaces = [s.surface for s in found]
+    return partial(surfaces[0].beam.error_share, float(np.median([s.common_d_x_mm for s in surfaces])))
+
+
+def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float, of_taper: Callable = np.asarray) -> Figure:
+    """Measured on the left, predicted for the whole field on the right, in one scale of colours.
+
+    of_taper: makes of a relative error on a cylinder that on the whisker.
+    """
     figure = Figure(figsize=(9.6, 3.9), layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     most = max(10.0, *(abs(c.errors.mean()) for c in cells))
@@ -109,7 +119,7 @@ def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float) -> Figure:
     mesh = left.pcolormesh(beta, alpha, measured, **look)
     _tell(left, cells, most)
     slopes, angles = np.meshgrid(np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121))
-    predicted = 100.0 * distance_error(np.radians(slopes), np.radians(angles), alpha_est_rad)
+    predicted = 100.0 * of_taper(distance_error(np.radians(slopes), np.radians(angles), alpha_est_rad))
     right.pcolormesh(slopes, angles, np.clip(predicted, -most, most), shading="nearest", **look)
     for axes, title in ((left, "measured"), (right, "predicted by (13), (14)")):
         axes.set(xlabel="slope β  [°]", title=title, xlim=(-2.5, _STEEPEST_DEG), ylim=(0.0, top))

@@ -18,7 +18,7 @@ from bench.friction.alphas import seen_friction
 from bench.gauges.readings import reference_from_pictures
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
-from estimator.distance import taper, with_friction
+from estimator.distance import with_friction
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
 COLUMNS = ("trial", "whisk", "d_x_mm", "alpha_seen_deg", "alpha_seen_sigma_deg", "error_mm", *SHARES)
@@ -85,9 +85,9 @@ def by_10(
     alpha_rad: float | np.ndarray,
     whisker: Whisker,
 ) -> float | np.ndarray:
-    """d_x of (10), mm, of a cylinder or a cone; arrays or floats."""
-    d_x = with_friction(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker.C_Nmm2)
-    return taper(d_x, whisker.length_mm) if whisker.shape == "cone" else d_x
+    """d_x of (10), mm; arrays or floats."""
+    beam = whisker.beam
+    return beam.distance_mm(with_friction(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, beam.C_Nmm2))
 
 
 def _moments_seen(seen: SeenWhisk, theta: float, whisker: Whisker) -> tuple[float, float]:

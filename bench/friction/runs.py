@@ -10,57 +10,73 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.base.settings import Settings
 from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
+from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
-from estimator.distance import estimated_slope
-from estimator.whisk import EstimatorSettings, Whisk
-from vision.truth.value import Value
+from estimator.whisk import Whisk
 
-FITTED, SEEN = "with_friction_fitted", "with_friction_seen"
+GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
 RUNS = (FITTED, SEEN)
 
 
-def with_runs(results: Iterable[TrialResult], whisker: Whisker) -> list[TrialResult]:
-    """The results, each whisk's estimates followed by those of (10) with α fitted and with α seen, where known."""
+def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
+    """How far α_est may be off in this session, rad, one sigma: as given, else by its surfaces.
+
+    Root mean square of fitted less assumed α over the surfaces, among which the 5° that hold without any count as one
+    (the scale of a scaled inverse χ² posterior): a single surface does not tell how much others differ.
+    """
+    first = np.radians(settings.first_alpha_est_sigma_deg)
+    fits = [s.fit for s in found if s.fit is not None]
+    if settings.alpha_est_sigma_deg is not None or not fits:
+        return float(first)
+    squares = [first**2, *((fit.alpha_rad - settings.alpha_est_rad) ** 2 + fit.sigma_rad**2 for fit in fits)]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def with_runs(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> list[TrialResult]:
+    """The results, (10) with the session's sigma of α_est, and each whisk's estimates followed by those of (10) with α
+    fitted and with α seen, where known."""
     results = list(results)
-    by_panel = {s.panel: s for s in surfaces(results, whisker.C_Nmm2)}
-    return [_with_runs(result, by_panel, whisker) for result in results]
+    found = surfaces(results, whisker.beam)
+    by_panel, sigma_rad = {s.panel: s for s in found}, alpha_est_sigma(found, settings)
+    return [_with_runs(result, by_panel, whisker.beam, sigma_rad) for result in results]
 
 
-def _with_runs(result: TrialResult, by_panel: Mapping, whisker: Whisker) -> TrialResult:
-    beam, surface = Beam(whisker.C_Nmm2, whisker.length_mm, whisker.shape), by_panel.get(result.trial.panel)
+def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, sigma_rad: float) -> TrialResult:
+    surface = by_panel.get(result.trial.panel)
     felt = tuple(
-        replace(felt, estimates=(*felt.estimates, *_answers(result, seen, felt, surface, beam)))
+        replace(felt, estimates=_answers(result, seen, felt, surface, beam, sigma_rad))
         for _, seen, felt in whisks([result])
     )
     return replace(result, felt=replace(result.felt, whisks=felt))
 
 
 def _answers(
-    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, surface: Surface | None, beam: Beam
-) -> list[EstimateRow]:
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, surface: Surface | None, beam: Beam, sigma_rad: float
+) -> tuple[EstimateRow, ...]:
+    """The whisk's estimates with the new ones."""
     if not felt.estimates:
-        return []
+        return ()
     fit = surface and surface.fit_without(result.trial.name, seen.whisk)
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
     whisk = _whisk(felt, np.radians(result.theta_deg), beam)
     angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
-    return [_answer(name, whisk, max(alpha, 0.0), sigma) for name, (alpha, sigma) in angles if np.isfinite(alpha)]
+    runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma) for name, (a, sigma) in angles if np.isfinite(a)]
+    given = [
+        answer(a.estimator, with_friction, whisk, a.alpha_est_rad, sigma_rad) if a.estimator == GIVEN else a
+        for a in felt.estimates
+    ]
+    return (*given, *runs)
 
 
 def _whisk(felt: FeltWhisk, theta_rad: float, beam: Beam) -> Whisk:
     """The whisk at the wanted angle: all that (10) looks at."""
     no_samples = (np.zeros(0),) * 4
     moments = felt.m_y_Nmm.value, felt.m_z_Nmm.value
-    covariances = felt.covariance_at, felt.touch_felt_rad.sigma, beam, felt.theta_moment_covariance_at
+    covariances = felt.covariance_at, felt.theta_sigma_rad, beam, felt.theta_moment_covariance_at
     return Whisk(*no_samples, theta_rad, *moments, *covariances)
-
-
-def _answer(name: str, whisk: Whisk, alpha_rad: float, sigma_rad: float) -> EstimateRow:
-    estimate = with_friction(whisk, EstimatorSettings(alpha_rad, sigma_rad))
-    slope = float(estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad))
-    return EstimateRow(name, Value(estimate.d_x_mm, estimate.sigma_mm), alpha_rad, slope, estimate.status)

@@ -7,19 +7,23 @@
 Ways 1 and 2 see no picture: the slopes are the nominal ones, set by hand.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import stdtrit
 
+from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.friction.explained import by_10
 from bench.records.trial import TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.friction import alpha_from_tilts, confidence
+from estimator.uncertainty import Z_95
 
-_ALPHA_EST_SIGMA_RAD = np.radians(5.0)  # steel's 10.5° to sandpaper's 23.3° (Fig. 8) about an assumed 10° or 15°
+_ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
 _FEWEST = 3
-_GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.05))
+_GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
 
 
@@ -44,6 +48,13 @@ class Contact:
     m_z_Nmm: float
     phi_rad: float
     phi_sigma_rad: float
+    trial: str = ""
+
+    def steeper(self) -> "Contact":
+        """The same with a slip angle that is larger by its sigma, and as large a moment."""
+        steep, m = abs(self.phi_rad) + self.phi_sigma_rad, np.hypot(self.m_y_Nmm, self.m_z_Nmm)
+        phi = float(np.copysign(steep, self.phi_rad))
+        return replace(self, phi_rad=phi, m_y_Nmm=float(m * np.sin(phi)), m_z_Nmm=float(m * np.cos(phi)))
 
 
 def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[Contact]:
@@ -57,9 +68,13 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
             felt.m_z_Nmm.value,
             felt.phi_felt_rad.value,
             felt.phi_felt_rad.sigma,
+            result.trial.name,
         )
         for result, _, felt in whisks(results)
-        if result.trial.purpose == "measure" and result.trial.panel == panel and felt.has_moments
+        if result.trial.purpose == "measure"
+        and result.trial.panel == panel
+        and felt.has_moments
+        and not felt.apart
     ]
 
 
@@ -69,31 +84,67 @@ def by_tilting(of_surface: Sequence[Contact]) -> Way:
     if not (any(c.beta_rad < 0 for c in known) and any(c.beta_rad > 0 for c in known)):
         return Way("tilting", np.nan, np.nan, "needs nominal slopes (beta_deg) of both signs")
     sigma = float(np.median([c.phi_sigma_rad for c in known]))
-    fit = alpha_from_tilts([c.beta_rad for c in known], [c.phi_rad for c in known], phi_sigma=sigma)
-    return Way("tilting", fit.alpha_rad, fit.sigma_rad, fit.status)
+
+    def found(some: Sequence[Contact]) -> tuple[float, str]:
+        fit = alpha_from_tilts([c.beta_rad for c in some], [c.phi_rad for c in some], phi_sigma=sigma)
+        return fit.alpha_rad, fit.status
+
+    return _by_recordings("tilting", found, known)
 
 
 def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
-    """Way 2: the α under which distances scatter least as shares of their mean; sigma by leaving out each contact."""
+    """Way 2: the α under which distances scatter least as shares of their mean."""
     nominal = {c.d_x_nominal_mm for c in of_surface}
     spread = np.ptp([abs(np.tan(c.phi_rad)) for c in of_surface]) if of_surface else 0.0
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
         return Way("consistency", np.nan, np.nan, f"needs {_FEWEST} whisks or more at one nominal distance (d_x_mm)")
     if spread < _LEAST_SPREAD:
         return Way("consistency", np.nan, np.nan, "the whisks do not span two slip angles")
-    distances = np.array([by_10(c.theta_rad, c.m_y_Nmm, c.m_z_Nmm, _GRID_RAD, whisker) for c in of_surface])
-    if not np.isfinite(distances[:, 0]).all():
+    if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return Way("consistency", np.nan, np.nan, "a whisk is no push against an object")
-    best = _least_scatter(distances)
-    without = [_least_scatter(np.delete(distances, k, axis=0)) for k in range(len(distances))]
-    sigma = float(np.sqrt((len(without) - 1) * np.var(without)))
-    return Way("consistency", best, sigma, "at the bound of the search" if best in _GRID_RAD[[0, -1]] else "")
+    return _by_recordings("consistency", lambda some: _least_scatter(some, whisker), of_surface)
 
 
-def _least_scatter(distances) -> float:
-    """α, rad, at which the distances (contacts, α) scatter least; where one of them ends, the search ends."""
-    scatter = distances.std(axis=0) / distances.mean(axis=0)
-    return float(_GRID_RAD[int(np.nanargmin(np.where(np.isfinite(scatter), scatter, np.inf)))])
+def _by_recordings(name: str, found: Callable[[Sequence[Contact]], tuple[float, str]], known: Sequence[Contact]) -> Way:
+    """α that `found` makes of contacts (α or NaN, a status), with its sigma; NaN where that has a status.
+
+    Whisks of one recording share a bar that was set up once, and are no independent repeats: each recording is left out
+    in turn (delete-group jackknife), Student's t for so few of them. What all share, the gauges' part of φ, comes on
+    top: all slip angles steeper by their sigma.
+    """
+    alpha, status = found(known)
+    trials = list(dict.fromkeys(c.trial for c in known))
+    if status or len(trials) < _FEWEST:
+        return Way(name, np.nan, np.nan, status or f"needs {_FEWEST} recordings or more to say how well it is known")
+    without = [found([c for c in known if c.trial != trial]) for trial in trials]
+    if any(why for _, why in without):
+        return Way(name, np.nan, np.nan, f"rests on one recording: without it, {next(w for _, w in without if w)}")
+    freedom = len(trials) - 1
+    own = np.sqrt(freedom * np.var([a for a, _ in without])) * stdtrit(freedom, 0.975) / Z_95
+    shared = found([c.steeper() for c in known])[0] - alpha
+    return Way(name, alpha, float(np.hypot(own, shared if np.isfinite(shared) else 0.0)))
+
+
+def _distances(some: Sequence[Contact], alphas_rad, whisker: Whisker) -> np.ndarray:
+    """By (10), mm, (contacts, α); NaN where there is none."""
+    return np.array([by_10(c.theta_rad, c.m_y_Nmm, c.m_z_Nmm, alphas_rad, whisker) for c in some])
+
+
+def _least_scatter(some: Sequence[Contact], whisker: Whisker) -> tuple[float, str]:
+    """(α, rad, '') at which the distances scatter least; where one of them ends, the search ends, and says so."""
+
+    def scatter(alphas_rad) -> np.ndarray:
+        distances = _distances(some, np.atleast_1d(alphas_rad), whisker)
+        return distances.std(axis=0) / distances.mean(axis=0)
+
+    on_grid = scatter(_GRID_RAD)
+    last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
+    best = int(np.nanargmin(on_grid))
+    if best in (0, last):
+        return float("nan"), f"at the bound of the search, {np.degrees(_GRID_RAD[best]):.1f}°: no angle between fits"
+    bracket = _GRID_RAD[best - 1], _GRID_RAD[best + 1]
+    found = minimize_scalar(lambda a: float(scatter(a)[0]), bounds=bracket, method="bounded", options={"xatol": 1e-7})
+    return float(found.x), ""
 
 
 def weights(phi_rad: Sequence[float], alpha_est_rad: float) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import slope_deg
+from estimator.beam import Beam
 from estimator.friction import FrictionFit, Pushes, fit_alpha
 
 # From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
@@ -65,7 +66,7 @@ class Surface:
     speed_deg_s: float | None
     felt: tuple[Felt, ...]
     fit: FrictionFit | None
-    C_Nmm2: float
+    beam: Beam
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -85,7 +86,7 @@ class Surface:
 
     @property
     def common_d_x_mm(self) -> float:
-        """The distance to which moments are scaled for the figure, by (13), (14): |m| goes as 1/d_x."""
+        """The distance to which moments are scaled for the figure, by (13), (14)."""
         return float(np.median([f.d_x_mm for f in self.felt]))
 
     @property
@@ -95,7 +96,7 @@ class Surface:
 
     def fit_without(self, trial: str, whisk: int) -> FrictionFit | None:
         """The fit without one whisk; None where the others do not hold α."""
-        return _fit([f for f in self.felt if (f.trial, f.whisk) != (trial, whisk)], self.C_Nmm2)
+        return _fit([f for f in self.felt if (f.trial, f.whisk) != (trial, whisk)], self.beam)
 
     def points(self) -> list[Point]:
         """Means and standard deviations over whisks of alike slope, moments scaled to the common distance."""
@@ -105,15 +106,15 @@ class Surface:
                 groups[-1].append(felt)
             else:
                 groups.append([felt])
-        return [_point(group, self.common_d_x_mm) for group in groups]
+        return [_point(group, self.common_d_x_mm, self.beam) for group in groups]
 
 
-def surfaces(results: Iterable[TrialResult], C_Nmm2: float) -> list[Surface]:
+def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[Surface]:
     """A Surface for each surface and speed among the measure trials, in the order in which they come."""
     groups: dict[tuple[str, float | None], list[Felt]] = {}
     for key, felt in _felt(results):
         groups.setdefault(key, []).append(felt)
-    return [Surface(*key, tuple(felt), _fit(felt, C_Nmm2), C_Nmm2) for key, felt in groups.items()]
+    return [Surface(*key, tuple(felt), _fit(felt, beam), beam) for key, felt in groups.items()]
 
 
 def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
@@ -133,7 +134,8 @@ def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | N
         trial, nominal = result.trial, not seen.has_truth
         d_x = trial.d_x_nominal_mm if nominal else seen.d_x_mm.value
         beta = slope_deg(result, seen)
-        if trial.purpose == "measure" and felt.has_moments and np.isfinite([d_x, beta]).all():
+        sound = felt.has_moments and not felt.apart
+        if trial.purpose == "measure" and sound and np.isfinite([d_x, beta]).all():
             m_y, m_z, phi = felt.m_y_Nmm, felt.m_z_Nmm, felt.phi_felt_rad
             moments = m_y.value, m_z.value, m_y.sigma, m_z.sigma
             angle = float(np.degrees(phi.value)), float(np.degrees(phi.sigma))
@@ -141,11 +143,12 @@ def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | N
             yield trial.panel, Felt(beta, d_x, theta, *moments, *angle, nominal, recording, trial.name, seen.whisk)
 
 
-def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
+def _fit(felt: list[Felt], beam: Beam) -> FrictionFit | None:
     if len(felt) < 2:
         return None
     columns = {name: np.array([getattr(f, field) for f in felt]) for name, field in _FITTED.items()}
-    pushes = Pushes(np.radians([f.beta_deg for f in felt]), **columns, C=C_Nmm2)
+    columns["d_x"] = beam.as_cylinder_mm(columns["d_x"])
+    pushes = Pushes(np.radians([f.beta_deg for f in felt]), **columns, C=beam.C_Nmm2)
     recording = np.array([f.recording for f in felt])
     if len(set(recording)) >= _MANY:
         pushes = replace(pushes, recording=recording)
@@ -156,9 +159,10 @@ def _fit(felt: list[Felt], C_Nmm2: float) -> FrictionFit | None:
     return fit if np.isfinite(fit.alpha_rad) else None
 
 
-def _point(group: list[Felt], d_x_mm: float) -> Point:
-    m = np.array([f.m_Nmm * f.d_x_mm / d_x_mm for f in group])
+def _point(group: list[Felt], d_x_mm: float, beam: Beam) -> Point:
+    to_common = beam.as_cylinder_mm([f.d_x_mm for f in group]) / beam.as_cylinder_mm(d_x_mm)
+    m = np.array([f.m_Nmm for f in group]) * to_common
     phi, beta = np.array([f.phi_deg for f in group]), float(np.mean([f.beta_deg for f in group]))
     if len(group) == 1:
-        return Point(beta, 1, m[0], group[0].m_sigma_Nmm, phi[0], group[0].phi_sigma_deg)
+        return Point(beta, 1, m[0], group[0].m_sigma_Nmm * to_common[0], phi[0], group[0].phi_sigma_deg)
     return Point(beta, len(group), m.mean(), m.std(ddof=1), phi.mean(), phi.std(ddof=1))

@@ -25,7 +25,7 @@ def _angle_columns(names: Sequence[str]) -> tuple[str, ...]:
 
 _OF_WHISK = (*RECORDS, *(f"{kind}_{record}" for kind, record in _APART))
 WHISK_COLUMNS = (
-    *("trial", "whisk", "surface", "speed_deg_s", "beta_deg"),
+    *("trial", "whisk", "surface", "speed_deg_s", "beta_deg", "beta_from"),
     *_angle_columns(_OF_WHISK),
     *("rests_seen", "jumps_seen", "rests_felt", "jumps_felt", "confidence"),
 )
@@ -67,7 +67,7 @@ class SurfaceFriction:
 def friction_of(results: Sequence[TrialResult], whisker: Whisker, alpha_est_rad: float) -> list[SurfaceFriction]:
     """Every surface and speed among the measure trials."""
     alphas = alphas_of(results)
-    return [_friction(s, results, alphas, whisker, alpha_est_rad) for s in surfaces(results, whisker.C_Nmm2)]
+    return [_friction(s, results, alphas, whisker, alpha_est_rad) for s in surfaces(results, whisker.beam)]
 
 
 def _friction(
@@ -109,7 +109,8 @@ def write_friction(
 
 def _whisk_row(a: WhiskAlphas, phi_rad: float | None, alpha_est_rad: float) -> dict:
     row = {"trial": a.trial, "whisk": a.whisk, "surface": a.surface, "speed_deg_s": a.speed_deg_s}
-    row |= {"beta_deg": float(np.degrees(a.beta_rad))} | _cells("seen", a.seen) | _cells("felt", a.felt)
+    row |= {"beta_deg": float(np.degrees(a.beta_rad)), "beta_from": "manifest" if a.nominal else "pictures"}
+    row |= _cells("seen", a.seen) | _cells("felt", a.felt)
     for kind, record in _APART:
         row |= _cells(f"{kind}_{record}", a.apart(kind, record))
     for record, phases in (("seen", a.phases_seen), ("felt", a.phases_felt)):
@@ -158,7 +159,8 @@ def _stick_slip(s: SurfaceFriction) -> Iterator[str]:
         if jumps:
             angles = " and ".join(f"{kind} α = {_shown(s.alpha(f'{kind}_{record}'))}" for kind in (STATIC, KINETIC))
             sticking = sum(p.jumps > 0 for p in phases)
-            yield f"stick–slip {record} in {sticking} whisks, {rests} rests and {jumps} jumps; {angles}"
+            by_hand = ", slopes as the manifest has them" if any(w.nominal for w in s.whisks) else ""
+            yield f"stick–slip {record}{by_hand} in {sticking} whisks, {rests} rests and {jumps} jumps; {angles}"
 
 
 def _section_vii(s: SurfaceFriction) -> Iterator[str]:

@@ -15,6 +15,7 @@ from estimator import noise
 from estimator.signal import Touch
 
 _GUARD_RAD = np.radians(0.1)
+_ROUNDS = 10  # of weights and excess; after five nothing changes that matters
 
 
 @dataclass(frozen=True)
@@ -40,18 +41,27 @@ def free_slope(stroke: Stroke) -> FreeSlope | None:
 
 def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
     """RMS rate (2,) of the channels' drift, per second: the slopes' mean square beyond their noise, and one standard
-    deviation of that, which is what the strokes cannot rule out. Zeros where there are no slopes."""
+    deviation of that, which is what the strokes cannot rule out. Zeros where there are no slopes.
+
+    A square scatters by √2 of its own mean: each stroke counts by one over the square of that, for a fast one is short
+    and tells hardly anything.
+    """
     if not slopes:
         return np.zeros(2)
     squares, variances = np.array([s.slope**2 for s in slopes]), np.array([s.variance for s in slopes])
-    excess = np.maximum(0.0, squares.mean(axis=0) - variances.mean(axis=0))
-    undecided = np.sqrt(2.0 * np.mean((excess + variances) ** 2, axis=0) / len(slopes))
-    return np.sqrt(excess + undecided)
+    excess = np.zeros(2)
+    for _ in range(_ROUNDS):
+        information = 0.5 / np.maximum(excess + variances, noise.TINY) ** 2
+        excess = np.maximum(0.0, np.sum(information * (squares - variances), axis=0) / information.sum(axis=0))
+    return np.sqrt(excess + information.sum(axis=0) ** -0.5)
 
 
 def allow_drift(touch: Touch, rate: np.ndarray, speed_rad_s: float) -> Touch:
     """The same touch, with a zero that may drift at `rate` (k,) per second: the session's, and not the stroke's own,
-    which is mostly noise."""
+    which is mostly noise. The touch's sigma takes the one for the other too, so that it agrees with its covariances."""
     if touch.status or speed_rad_s <= 0:
         return touch
-    return replace(touch, level=replace(touch.level, drift=np.asarray(rate) / speed_rad_s))
+    level, at = replace(touch.level, drift=np.asarray(rate) / speed_rad_s), touch.motor_rad
+    added = level.covariance_between(at, at) - touch.level.covariance_between(at, at)
+    variance = touch.sigma_rad**2 + touch.rise.gain @ added @ touch.rise.gain
+    return replace(touch, level=level, sigma_rad=float(np.sqrt(variance)))

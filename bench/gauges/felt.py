@@ -23,11 +23,9 @@ GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
 
 
 def lateness(seen: SeenWhisk, felt: FeltWhisk) -> Value:
-    """Felt less seen touch of a whisk, rad: its sigma is that of both touches and of the filter's delay, by which what
-    is felt comes late. (No error of θ: touch and moments are late alike.)"""
-    speed = np.median(np.diff(seen.frames.motor_rad) / np.diff(seen.frames.time_s))
-    sigmas = seen.touch_rad.sigma, felt.touch_felt_rad.sigma, GAUGE_DELAY_S * speed
-    return Value(felt.touch_felt_rad.value - seen.touch_rad.value, float(np.linalg.norm(sigmas)))
+    """Felt less seen touch of a whisk, rad."""
+    sigma = float(np.hypot(seen.touch_rad.sigma, felt.touch_felt_rad.sigma))
+    return Value(felt.touch_felt_rad.value - seen.touch_rad.value, sigma)
 
 
 @dataclass(frozen=True)
@@ -54,11 +52,8 @@ class Stroke:
         return felt_touch(self.motor_rad, self.channels, self.time_s)
 
     def at(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
-        """Filtered channels above the free stroke's level, at a pushing angle past `touch`."""
-        return moment_at(theta_rad, self.motor_rad, self.filtered, touch, time_s=self.time_s, **window)
-
-    def at_as_recorded(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
-        """The same from unfiltered samples: soon after touch a low-pass of 5 Hz smears the onset, 5 % of it at 0.5°."""
+        """Channels above the free stroke's level, at a pushing angle past `touch`: a line through the samples as
+        recorded, which averages as section V's low-pass does. That smears the onset, by 5 % of it at 0.5°."""
         return moment_at(theta_rad, self.motor_rad, self.channels, touch, time_s=self.time_s, **window)
 
 

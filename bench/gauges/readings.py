@@ -80,7 +80,7 @@ def pairs_of(
     reference = reference_from_pictures(seen, whisker) if is_seen else reference_from_nominal(trial, touch, whisker)
     if reference is None:
         return None
-    rigid_Nmm = whisker.C_Nmm2 * theta_rad / reference.d_x_mm
+    rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
     return _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
 
 
@@ -117,7 +117,7 @@ def _with_friction(along, across, share, whisker: Whisker) -> tuple[np.ndarray, 
     size = np.linalg.norm(across, axis=1)
 
     def rigidity(arc):
-        return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, 1.0 if whisker.shape == "cone" else 0.0)
+        return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
 
     def moment(friction: float):
         return np.concatenate([moment_at_clamp(x, w, rigidity, -friction * s) for x, w, s in zip(along, size, share)])
@@ -144,7 +144,7 @@ def reference_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Refe
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
     theta = _NOMINAL_THETA_RAD
-    radii_mm = 0.5 * (trial.bar_diameter_mm + whisker.diameter_mm)
+    radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
     x, y = trial.d_x_mm - radii_mm * np.sin(theta / 2), radii_mm * (1.0 - np.cos(theta / 2))
     along, across = x * np.cos(theta) + y * np.sin(theta), x * np.sin(theta) - y * np.cos(theta)
     deflection = np.stack([np.zeros_like(across), across], axis=1)
@@ -169,7 +169,7 @@ def _paired(
     theta = reference.motor_rad - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(reference.motor_rad), initial=np.inf))
     after = theta > 0.5 * _LEAST_THETA_RAD
-    read = [stroke.at_as_recorded(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
+    read = [stroke.at(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
     kept = np.array([r is not None and not r.status for r in read], dtype=bool)
     if not kept.any():
         return None

@@ -38,6 +38,7 @@ class WhiskerFacts:
     length_mm: float
     diameter_mm: float
     EI_Nmm2: float
+    tip_diameter_mm: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,21 +125,30 @@ class SeenTrial:
 
 @dataclass(frozen=True)
 class EstimateRow:
-    """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none."""
+    """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
+
+    d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm, d_x_est_high_mm: the 95 %
+    interval.
+    """
 
     estimator: str
     d_x_est_mm: Value
     alpha_est_rad: float = NAN
     beta_est_rad: float = NAN
     status: str = ""
+    d_x_est_sigma_alpha_exact_mm: float = NAN
+    d_x_est_low_mm: float = NAN
+    d_x_est_high_mm: float = NAN
 
 
 @dataclass(frozen=True, eq=False)
 class FeltWhisk:
     """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle, phases, estimates.
 
-    covariance_at (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. one_factor: estimates
-    with one factor a channel.
+    theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
+    (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
+    those of the seen shape, 2 degrees of freedom; apart: they are not those. one_factor: estimates with one factor a
+    channel.
     """
 
     whisk: int = 0
@@ -146,10 +156,13 @@ class FeltWhisk:
     m_y_Nmm: Value = UNKNOWN
     m_z_Nmm: Value = UNKNOWN
     phi_felt_rad: Value = UNKNOWN
+    theta_sigma_rad: float = NAN
     covariance_at: np.ndarray | None = None
     theta_moment_covariance_at: np.ndarray | None = None
     status: str = ""
     saturated: int = 0
+    agreement_chi2: float = NAN
+    apart: bool = False
     phases: Phases = NO_PHASES
     estimates: tuple[EstimateRow, ...] = ()
     one_factor: tuple[EstimateRow, ...] = ()

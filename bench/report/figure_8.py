@@ -47,7 +47,7 @@ def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
     With one whisk a point, m_sd and phi_sd are its stated sigmas.
     """
     for number, surface in enumerate(fitted):
-        points, EI = surface.points(), surface.C_Nmm2 / 3.0
+        points, EI = surface.points(), surface.beam.rigidity_Nmm2
         panel = {
             "panel": _letter(number),
             "surface": surface.name,
@@ -78,15 +78,15 @@ def _fitted(surface: Surface, beta_deg) -> tuple[np.ndarray, np.ndarray]:
     """|m| [EI/m] and φ [°] of (13), (14) at the fitted α over slopes (n,); NaN where there is no fit."""
     if surface.fit is None:
         return np.full(len(beta_deg), np.nan), np.full(len(beta_deg), np.nan)
-    m, phi = curves(
-        surface.alpha_rad, np.radians(beta_deg), surface.common_d_x_mm, surface.theta_rad, surface.C_Nmm2
-    )
-    return moment_in_EI_per_metre(m, surface.C_Nmm2 / 3.0), np.degrees(phi)
+    beam = surface.beam
+    as_cylinder = beam.as_cylinder_mm(surface.common_d_x_mm)
+    m, phi = curves(surface.alpha_rad, np.radians(beta_deg), as_cylinder, surface.theta_rad, beam.C_Nmm2)
+    return moment_in_EI_per_metre(m, beam.rigidity_Nmm2), np.degrees(phi)
 
 
 def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
     """|m| above, φ below; negative slopes are drawn at their mirror image's place."""
-    points, EI = surface.points(), surface.C_Nmm2 / 3.0
+    points, EI = surface.points(), surface.beam.rigidity_Nmm2
     beta = [abs(p.beta_deg) for p in points]
     look = {"fmt": "o", "ms": 4, "color": "black", "capsize": 2.5, "elinewidth": 1.0, "lw": 0, "zorder": 3}
     top.errorbar(

@@ -94,6 +94,7 @@ def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], se
     for surface in fitted if assumed is not None else ():
         if surface.fit is not None:
             error = distance_error(np.radians(SLOPES_DEG), surface.alpha_rad, assumed, equation=equation)
+            error = surface.beam.error_share(surface.common_d_x_mm, error)
             axes.plot(
                 SLOPES_DEG,
                 100.0 * error,

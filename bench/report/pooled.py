@@ -10,8 +10,9 @@ from bench.base.results import read_result
 from bench.base.tables import write_table
 from bench.friction.surfaces import Surface, friction_lines, surfaces
 from bench.records.plain import from_plain
-from bench.records.trial import TrialResult
+from bench.records.trial import TrialResult, WhiskerFacts
 from bench.report.figure_8 import COLUMNS, figure_8, rows
+from estimator.beam import Beam
 
 TABLE = "whisks.csv"
 # A whisker's length, diameter and stiffness are written down alike on all days; this allows for rounding.
@@ -41,13 +42,18 @@ def pooled(outs: Sequence[Path]) -> list[Surface]:
     _check_given_once(runs)
     for out, results in others:
         _check_alike(out, results[0], first, reference[0])
-    C_Nmm2 = 3.0 * reference[0].whisker.EI_Nmm2
-    _check_distances([(out, surfaces(results, C_Nmm2)) for out, results in runs])
-    fitted = surfaces([result for _, results in runs for result in results], C_Nmm2)
+    beam = _beam(reference[0].whisker)
+    _check_distances([(out, surfaces(results, beam)) for out, results in runs])
+    fitted = surfaces([result for _, results in runs for result in results], beam)
     if not fitted:
         found = "no whisk has moments with a slope and a distance, seen or nominal (beta_deg, d_x_mm in trial.toml)"
         raise BadInput(found, file=first)
     return fitted
+
+
+def _beam(whisker: WhiskerFacts) -> Beam:
+    tip = None if whisker.tip_diameter_mm is None else whisker.tip_diameter_mm / whisker.diameter_mm
+    return Beam.from_rigidity(whisker.EI_Nmm2, whisker.length_mm, whisker.shape, tip)
 
 
 def read_run(out: Path) -> list[TrialResult]:
@@ -97,9 +103,10 @@ def _check_alike(out: Path, result: TrialResult, first: Path, reference: TrialRe
         raise BadInput(f"{found}; evaluate both at one --theta-deg", file=out)
     for name, ours in vars(result.whisker).items():
         theirs = getattr(reference.whisker, name)
-        alike = ours == theirs if isinstance(ours, str) else abs(ours / theirs - 1.0) <= _SAME_WHISKER
+        exactly = isinstance(ours, str) or None in (ours, theirs)
+        alike = ours == theirs if exactly else abs(ours / theirs - 1.0) <= _SAME_WHISKER
         if not alike:
-            ours, theirs = (v if isinstance(v, str) else f"{v:.6g}" for v in (ours, theirs))
+            ours, theirs = (f"{v:.6g}" if isinstance(v, float) else v for v in (ours, theirs))
             found = f"is of another whisker: {name} is {ours}, in {first} {theirs}"
             raise BadInput(f"{found}; whisks of different whiskers cannot be pooled", file=out)
 

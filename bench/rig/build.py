@@ -19,7 +19,7 @@ def rod(protocol: Protocol) -> Rod:
     """The whisker of a protocol."""
     w = protocol.whisker
     rest = Rest(w.length_mm, w.sag_mm, w.set_y_mm, w.set_z_mm)
-    return Rod(w.shape, w.length_mm, w.diameter_mm, w.youngs_modulus_GPa, w.density_kg_m3, rest)
+    return Rod(w.shape, w.length_mm, w.diameter_mm, w.youngs_modulus_GPa, w.density_kg_m3, rest, w.tip_diameter_mm)
 
 
 def gauges(protocol: Protocol) -> Gauges:

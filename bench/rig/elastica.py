@@ -87,10 +87,11 @@ class Elastica:
         if self.rod.shape == "cylinder":
             return self._uniform, None
         at, base, load = self.nodes.at, self.nodes.from_base, self.nodes.to_load
-        width = 1 - at * arc_mm / self.rod.length_mm
+        per_mm = self.rod.lost / self.rod.length_mm
+        width = 1 - at * arc_mm * per_mm
         width[-1] = max(width[-1], 1e-3)  # at the very tip both moment and rigidity vanish; the curvature is finite
         softness = width**-4.0
-        by_arc = 4 * softness / width * at / self.rod.length_mm
+        by_arc = 4 * softness / width * at * per_mm
         return (base * softness) @ load, (base * by_arc) @ load
 
     def _bent(self, angle, matrix, twice, twice_by_arc, scale, force, arc_mm):

@@ -17,15 +17,24 @@ _NO_PUSH_RAD = 1e-7  # below this (5 nm at 50 mm) there is no force to speak of
 @dataclass(frozen=True)
 class Friction:
     """Coefficients at rest and in motion. `finest_rad`: teeth of stick–slip shorter than this are not resolved; the
-    whisker is then taken as sliding. Raises ValueError where the one at rest is the smaller."""
+    whisker is then taken as sliding. `rests`: how much of the excess at rest each rest reaches, in parts, one after the
+    other and round again. Raises ValueError where the one at rest is the smaller, or a rest reaches less than nothing.
+    """
 
     static: float
     kinetic: float
     finest_rad: float = math.radians(0.05)
+    rests: tuple[float, ...] = (1.0,)
 
     def __post_init__(self):
         if not self.static >= self.kinetic >= 0:
             raise ValueError(f"friction: static ({self.static}) ≥ kinetic ({self.kinetic}) ≥ 0 is needed")
+        if not self.rests or min(self.rests) < 0:
+            raise ValueError(f"friction: rests reach from nothing on, and there is one at least, not {self.rests}")
+
+    def at_rest(self, number: int) -> float:
+        """The static coefficient of one rest, counted from 0."""
+        return self.kinetic + (self.static - self.kinetic) * self.rests[number % len(self.rests)]
 
 
 class March:
@@ -38,7 +47,12 @@ class March:
     def __init__(self, rod: Rod, bar: Bar, friction: Friction, touch: Touch):
         self.contact, self.friction, self.touch = Contact(rod, bar), friction, touch
         self.state, self.before, self.jump_rad = self.contact.touching(touch), None, -math.inf
-        self.passed = False
+        self.passed, self.rest = False, 0
+
+    @property
+    def static(self) -> float:
+        """The coefficient that the present rest reaches."""
+        return self.friction.at_rest(self.rest)
 
     def along(self, path_rad: Iterable[float]) -> tuple[np.ndarray, list[State | None]]:
         """Motor angles and states met on the way through the angles of `path_rad`; a jump yields two states at one
@@ -88,7 +102,7 @@ class March:
         if self.friction.static == self.friction.kinetic:
             return [self._slide_on(motor_rad, tip)]
         held = self._hold(motor_rad, tip)
-        if held.share < self.friction.static:
+        if held.share < self.static:
             return [held]
         if not self.state.force_hub_N.any():
             return [self._slide(motor_rad, self.state, held, tip)]
@@ -114,6 +128,7 @@ class March:
             return [self._slide(motor_rad, self.state, held, tip)]
         self.jump_rad = edge.motor_rad
         landed = self._slide(edge.motor_rad, edge, edge, tip)
+        self.rest += 1
         self.before, self.state = None, landed
         return [edge, landed, *self._friction_step(motor_rad, tip)]
 
@@ -123,15 +138,15 @@ class March:
         On a strongly tilted bar the held branch may fold before it meets the cone: then the nearest that was found.
         """
         low, high = self.state.motor_rad, held.motor_rad
-        f_low, f_high = self.state.share - self.friction.static, held.share - self.friction.static
+        f_low, f_high = self.state.share - self.static, held.share - self.static
         nearest, f_nearest = held, f_high
-        while abs(f_nearest) > _ON_THE_CONE * self.friction.static and abs(high - low) > _CLOSE_RAD:
+        while abs(f_nearest) > _ON_THE_CONE * self.static and abs(high - low) > _CLOSE_RAD:
             at = high - f_high * (high - low) / (f_high - f_low)
             try:
-                edge = self.contact.hold(at, self.state, self._between(held, at), self.friction.static, tip)
+                edge = self.contact.hold(at, self.state, self._between(held, at), self.static, tip)
             except (ArithmeticError, np.linalg.LinAlgError):
                 break
-            f = edge.share - self.friction.static
+            f = edge.share - self.static
             if f * f_high < 0:
                 low, f_low = high, f_high
             else:
@@ -146,7 +161,7 @@ class March:
         return self.state.unknowns + ahead * (held.unknowns - self.state.unknowns)
 
     def _hold(self, motor_rad, tip):
-        return self.contact.hold(motor_rad, self.state, self._guess(motor_rad), self.friction.static, tip)
+        return self.contact.hold(motor_rad, self.state, self._guess(motor_rad), self.static, tip)
 
     def _slide(self, motor_rad, old, held, tip):
         """Slide from `old`, looking first where the contact would be if it were held."""

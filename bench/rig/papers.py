@@ -25,6 +25,7 @@ def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
     session = {
         "format": 1, "name": protocol.name,
         "whisker": {"shape": w.shape, "length_mm": w.length_mm, "diameter_mm": w.diameter_mm,
+                    **({"tip_diameter_mm": w.tip_diameter_mm} if w.tip_diameter_mm else {}),
                     "youngs_modulus_GPa": w.youngs_modulus_GPa},
         "bar": {"diameter_mm": protocol.bar_diameter_mm},
         "board": {"squares": list(b.squares), "square_mm": b.square_mm, "marker_mm": b.marker_mm,

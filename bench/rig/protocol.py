@@ -29,9 +29,10 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class WhiskerTable(Table):
     """[whisker] of a protocol."""
 
-    shape: Literal["cylinder", "cone"] = "cylinder"
+    shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     length_mm: Positive = 100.0
     diameter_mm: Positive = 1.0
+    tip_diameter_mm: Positive | None = None  # of "tapered"
     youngs_modulus_GPa: Positive = 60.0
     density_kg_m3: Positive = 6450.0
     sag_mm: float = 0.0  # the tip's drop under its own weight
@@ -146,6 +147,7 @@ class FrictionTable(Table):
     """[friction] of a protocol."""
 
     scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
+    irregular: Zero = 0.0  # sigma (of a log-normal) of how much of its excess over motion each single rest reaches
     finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
 
 

@@ -15,6 +15,7 @@ from bench.rig.stroke import Stroke
 from bench.rig.whisk import Whisk
 
 _STEP_RAD = math.radians(0.1)
+_RESTS = 500  # more than a stroke of 25° has teeth of 0.05°
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,19 +93,27 @@ def _frames(protocol, run, touch, stroke):
 
 
 def _whisks(protocol, run, rod, bar, touch, stroke, frames, rng):
-    """The whisks of a recording; without scatter of the friction each is like the first."""
+    """The whisks of a recording; without scatter of the friction, and with regular rests, each is like the first."""
     table, friction = run.table, protocol.friction
     static = table.friction if table.static_friction is None else table.static_friction
     end, back = float(stroke.angles_rad.max()), bool(stroke.back)
     stops = frames.motor_rad[(frames.whisk == 0) & ~frames.back]
     factors = np.exp(friction.scatter * rng.standard_normal(len(stroke.forward)))
+    rests = [_rests(friction.irregular, rng) for _ in factors]
     found = {}
-    for factor in factors:
-        if factor not in found:
-            coefficients = Friction(static * factor, table.friction * factor, math.radians(friction.finest_deg))
-            found[factor] = Whisk.run(rod, bar, coefficients, touch, end, step_rad=_STEP_RAD, stops_rad=stops,
-                                      back=back)
-    return tuple(found[factor] for factor in factors)
+    for kind in zip(factors, rests):
+        if kind not in found:
+            factor, reached = kind
+            finest = math.radians(friction.finest_deg)
+            coefficients = Friction(static * factor, table.friction * factor, finest, reached)
+            found[kind] = Whisk.run(rod, bar, coefficients, touch, end, step_rad=_STEP_RAD, stops_rad=stops,
+                                    back=back)
+    return tuple(found[kind] for kind in zip(factors, rests))
+
+
+def _rests(irregular: float, rng) -> tuple[float, ...]:
+    """How much of its excess each rest of a whisk reaches; nothing is drawn for regular ones."""
+    return tuple(np.exp(irregular * rng.standard_normal(_RESTS)).tolist()) if irregular else (1.0,)
 
 
 def _signals(protocol, run, stroke, whisks, rng):

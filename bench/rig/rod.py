@@ -1,4 +1,4 @@
-"""The whisker as a rod: round section, uniform or tapering to a point, with a rest shape of its own."""
+"""The whisker as a rod: round section, uniform or tapering, with a rest shape of its own."""
 
 import math
 from dataclasses import dataclass, field
@@ -42,9 +42,10 @@ class Rest:
 
 @dataclass(frozen=True)
 class Rod:
-    """A whisker of one material. `shape` is "cylinder", or "cone": base diameter to a point at `length_mm`.
+    """A whisker of one material. `shape` is "cylinder", "cone": base diameter to a point at `length_mm`, or "tapered":
+    to `tip_diameter_mm` there.
 
-    Raises ValueError for another shape or a size that is not positive.
+    Raises ValueError for another shape, a size that is not positive, or a tip that is not thinner than the base.
     """
 
     shape: str
@@ -53,10 +54,15 @@ class Rod:
     youngs_modulus_GPa: float
     density_kg_m3: float = 6450.0  # Nitinol
     rest: Rest | None = field(default=None)
+    tip_diameter_mm: float | None = None
 
     def __post_init__(self):
-        if self.shape not in ("cylinder", "cone"):
-            raise ValueError(f"a whisker's shape is 'cylinder' or 'cone', not {self.shape!r}")
+        if self.shape not in ("cylinder", "cone", "tapered"):
+            raise ValueError(f"a whisker's shape is 'cylinder', 'cone' or 'tapered', not {self.shape!r}")
+        if (self.shape == "tapered") != (self.tip_diameter_mm is not None):
+            raise ValueError(f"a tapered whisker, and no other, has a tip_diameter_mm; the shape is {self.shape!r}")
+        if self.tip_diameter_mm is not None and not 0 < self.tip_diameter_mm < self.diameter_mm:
+            raise ValueError(f"a whisker's tip_diameter_mm is between 0 and its diameter, not {self.tip_diameter_mm}")
         for name in ("length_mm", "diameter_mm", "youngs_modulus_GPa", "density_kg_m3"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"a whisker's {name} is positive, not {getattr(self, name)}")
@@ -73,10 +79,16 @@ class Rod:
         """Mass per length at the base."""
         return self.density_kg_m3 * math.pi * (self.diameter_mm * 1e-3) ** 2 / 4
 
+    @property
+    def lost(self) -> float:
+        """Share of the base's diameter that is lost up to the tip: 0 of a cylinder, 1 of a cone."""
+        if self.tip_diameter_mm is not None:
+            return 1 - self.tip_diameter_mm / self.diameter_mm
+        return 1.0 if self.shape == "cone" else 0.0
+
     def width(self, arc_mm: float | np.ndarray):
         """Diameter relative to the base's at arc length."""
-        arc = np.asarray(arc_mm, float)
-        return np.ones_like(arc) if self.shape == "cylinder" else np.maximum(1 - arc / self.length_mm, 0.0)
+        return np.maximum(1 - self.lost * np.asarray(arc_mm, float) / self.length_mm, 0.0)
 
     def radius_mm(self, arc_mm: float | np.ndarray):
         """Radius at arc length."""
@@ -84,5 +96,5 @@ class Rod:
 
     @property
     def taper(self) -> float:
-        """Change of the radius per arc length: zero, or negative for a cone."""
-        return 0.0 if self.shape == "cylinder" else -0.5 * self.diameter_mm / self.length_mm
+        """Change of the radius per arc length: zero, or negative where the whisker tapers."""
+        return -0.5 * self.lost * self.diameter_mm / self.length_mm

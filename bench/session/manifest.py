@@ -14,11 +14,12 @@ Pair = Annotated[list[float], msgspec.Meta(min_length=2, max_length=2)]
 class WhiskerKeys(Keys, kw_only=True):
     """[whisker] of session.toml."""
 
-    shape: Literal["cylinder", "cone"] = "cylinder"
+    shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     length_mm: float
     length_sigma_mm: float = 0.0
     diameter_mm: float
     diameter_sigma_mm: float = 0.0
+    tip_diameter_mm: float | None = None
     youngs_modulus_GPa: float | None = None
     youngs_modulus_sigma_GPa: float = 0.0
     flexural_rigidity_Nmm2: float | None = None
@@ -27,6 +28,7 @@ class WhiskerKeys(Keys, kw_only=True):
     windows: ClassVar = {
         "length_mm": plausible.LENGTH,
         "diameter_mm": plausible.THICKNESS,
+        "tip_diameter_mm": plausible.THICKNESS,
         "youngs_modulus_GPa": plausible.YOUNGS_MODULUS,
         "flexural_rigidity_Nmm2": plausible.RIGIDITY,
     }

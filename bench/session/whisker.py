@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from estimator.beam import flexural_rigidity
+from estimator.beam import Beam, flexural_rigidity
 from vision.geometry.rods import Wire
 
 
@@ -11,7 +11,8 @@ from vision.geometry.rods import Wire
 class Whisker:
     """Shape, size and stiffness, each with one standard deviation (0: taken as exact).
 
-    Exactly one of `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given.
+    diameter_mm is the base's; a "tapered" whisker, and no other, has a tip_diameter_mm below it. Exactly one of
+    `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given. Raises ValueError for anything else.
     """
 
     shape: str
@@ -23,15 +24,21 @@ class Whisker:
     diameter_sigma_mm: float = 0.0
     youngs_modulus_sigma_GPa: float = 0.0
     flexural_rigidity_sigma_Nmm2: float = 0.0
+    tip_diameter_mm: float | None = None
 
     def __post_init__(self):
         if (self.youngs_modulus_GPa is None) == (self.flexural_rigidity_Nmm2 is None):
             raise ValueError("give either youngs_modulus_GPa or flexural_rigidity_Nmm2")
+        if (self.shape == "tapered") != (self.tip_diameter_mm is not None):
+            raise ValueError('tip_diameter_mm belongs to shape = "tapered", and to no other shape')
+        if self.tip_diameter_mm is not None and not 0 < self.tip_diameter_mm < self.diameter_mm:
+            raise ValueError(f"tip_diameter_mm = {self.tip_diameter_mm:g}: must be below diameter_mm, and above 0")
 
     @property
     def wire(self) -> Wire:
         """What the cameras look for."""
-        return Wire(self.shape, self.length_mm, self.diameter_mm, self.length_sigma_mm, self.diameter_sigma_mm)
+        sigmas = self.length_sigma_mm, self.diameter_sigma_mm
+        return Wire(self.shape, self.length_mm, self.diameter_mm, *sigmas, self.tip_diameter_mm)
 
     @property
     def EI_Nmm2(self) -> float:
@@ -49,6 +56,12 @@ class Whisker:
     def C_Nmm2(self) -> float:
         """C = 3 E I of the paper, N·mm²."""
         return 3.0 * self.EI_Nmm2
+
+    @property
+    def beam(self) -> Beam:
+        """What an estimator may know of it."""
+        tip_share = None if self.tip_diameter_mm is None else self.tip_diameter_mm / self.diameter_mm
+        return Beam(self.C_Nmm2, self.length_mm, self.shape, tip_share)
 
     @property
     def C_sigma_Nmm2(self) -> float:

@@ -12,7 +12,7 @@ from bench.records.trial import EstimateRow, SeenWhisk, TrialResult, whisks
 class Judged:
     """One estimate beside the truth. Truth is NaN where there is none; slope is the seen one, else the nominal one.
 
-    one_factor: made with one gauge factor a channel.
+    one_factor: made with one gauge factor a channel. status: what the estimator or the bench says of the estimate.
     """
 
     trial: str
@@ -27,6 +27,7 @@ class Judged:
     d_x_est_mm: float
     d_x_est_sigma_mm: float
     one_factor: bool = False
+    status: str = ""
 
     @property
     def error_mm(self) -> float:
@@ -75,4 +76,5 @@ def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_facto
         float(answer.d_x_est_mm.value),
         float(answer.d_x_est_mm.sigma),
         one_factor,
+        answer.status,
     )

@@ -10,16 +10,22 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import GAUGE_DELAY_S, Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.records.trial import EstimateRow, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
-from estimator.distance import estimated_slope, felt_slip_angle
+from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
+from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 from vision.truth.value import Value
+
+# What a robot allows for in an object that it does not know: as thick as the paper's bar of 6 mm, with the whisker of
+# 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
+OBJECT_REACH_MM = 3.5
+TILT_SIGMA_RAD = np.radians(5.0)
 
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
@@ -106,9 +112,14 @@ def felt_whisk(
     )
 
 
-def as_felt(number: int, touch: Touch, whisk: Whisk | None) -> FeltWhisk:
-    """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`."""
-    felt = FeltWhisk(number, Value(touch.motor_rad, touch.sigma_rad))
+def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float) -> FeltWhisk:
+    """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`.
+
+    The gauges' own filter makes all that is felt late: that is in the touch's sigma, and not in θ's, since touch and
+    moments are late alike.
+    """
+    late = math.hypot(touch.sigma_rad, GAUGE_DELAY_S * speed_rad_s)
+    felt = FeltWhisk(number, Value(touch.motor_rad, late), theta_sigma_rad=touch.sigma_rad)
     if whisk is None:
         return felt
     sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
@@ -131,17 +142,49 @@ def _slip_angle(whisk: Whisk) -> Value:
 
 def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> tuple[EstimateRow, ...]:
     """What each estimator says, as rows of estimates.csv without truth."""
-    return tuple(_answer(name, estimator, whisk, settings) for name, estimator in asked.items())
+    alpha = settings.alpha_est_rad, float(np.radians(settings.first_alpha_est_sigma_deg))
+    return tuple(answer(name, estimator, whisk, *alpha) for name, estimator in asked.items())
 
 
-def _answer(name: str, estimator: Estimator, whisk: Whisk, settings: Settings) -> EstimateRow:
+def answer(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> EstimateRow:
+    """What one estimator says under a friction angle with its sigma; its own sigma as if that angle were right, too."""
+    exact, doubted = (_asked(name, estimator, whisk, alpha_est_rad, sigma) for sigma in (0.0, float(sigma_rad)))
+    ends = (doubted.low_mm, doubted.high_mm)
+    if math.isnan(doubted.low_mm) and math.isnan(doubted.high_mm):
+        ends = (doubted.d_x_mm - Z_95 * doubted.sigma_mm, doubted.d_x_mm + Z_95 * doubted.sigma_mm)
+    d_x = Value(doubted.d_x_mm, doubted.sigma_mm)
+    angles = doubted.alpha_est_rad, float(doubted.beta_rad)
+    return EstimateRow(name, d_x, *angles, doubted.status, exact.sigma_mm, *map(float, ends))
+
+
+def _asked(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> Estimate:
+    told = EstimatorSettings(alpha_est_rad, sigma_rad, OBJECT_REACH_MM, TILT_SIGMA_RAD)
     try:
-        estimate = estimator(whisk, EstimatorSettings(settings.alpha_est_rad))
+        estimate = estimator(whisk, told)
     except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
-        estimate = Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
+        return Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
     if not isinstance(estimate, Estimate):
         raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
-    alpha_rad = {"no_slip": math.nan, "frictionless": 0.0}.get(name, settings.alpha_est_rad)
-    has_slope = math.isfinite(alpha_rad)
-    slope = float(estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, alpha_rad)) if has_slope else math.nan
-    return EstimateRow(name, Value(estimate.d_x_mm, estimate.sigma_mm), alpha_rad, slope, estimate.status)
+    return held_to_its_word(estimate, whisk.beam.length_mm)
+
+
+def held_to_its_word(estimate: Estimate, length_mm: float) -> Estimate:
+    """The estimate, its status telling what no distance or no sigma can be. What is none becomes NaN."""
+    d_x, sigma = _float(estimate.d_x_mm), _float(estimate.sigma_mm)
+    estimate = replace(estimate, d_x_mm=d_x, sigma_mm=sigma, status=str(estimate.status))
+    if not (np.isfinite(d_x) and d_x > 0):
+        said = "gave no distance and no reason" if math.isnan(d_x) else f"gave {d_x:g} mm, which is no distance"
+        return replace(estimate, d_x_mm=math.nan, sigma_mm=math.nan, status=estimate.status or said)
+    doubts = [] if np.isfinite(sigma) and sigma > 0 else [f"gave a sigma of {sigma:g} mm, which is none"]
+    if d_x > length_mm and not estimate.status:
+        doubts.append(f"gave {d_x:.1f} mm, past the whisker's length of {length_mm:g} mm")
+    sigma = math.nan if doubts and "sigma" in doubts[0] else sigma
+    return replace(estimate, sigma_mm=sigma, status="; ".join(filter(None, [estimate.status, *doubts])))
+
+
+def _float(value) -> float:
+    """A number as it was given, however it was wrapped; NaN for anything else."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan

@@ -13,6 +13,7 @@ from scipy.ndimage import find_objects, label
 
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial import SeenWhisk
+from estimator.beam import Beam
 from vision.truth.records import FrameTruth
 
 _LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3
@@ -67,7 +68,7 @@ def _runs(mask) -> list[tuple[int, int]]:
 
 
 def felt_phases(
-    time_s: np.ndarray, theta_rad: np.ndarray, moments_Nmm: np.ndarray, beta_rad: float, d_x_mm: float, C_Nmm2: float
+    time_s: np.ndarray, theta_rad: np.ndarray, moments_Nmm: np.ndarray, beta_rad: float, d_x_mm: float, beam: Beam
 ) -> Phases:
     """Phases from the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left out.
 
@@ -76,7 +77,8 @@ def felt_phases(
     good = np.isfinite(moments_Nmm).all(axis=1)
     time, theta, moments = time_s[good], theta_rad[good], moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slope = abs(beta_rad)
-    slip = d_x_mm**2 / C_Nmm2 * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
+    mm_per_Nmm = d_x_mm / beam.moment_Nmm(1.0, d_x_mm)
+    slip = mm_per_Nmm * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
     jumps = _jumps(time, theta, slip)
     if not len(jumps):
         return NO_PHASES

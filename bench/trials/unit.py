@@ -14,7 +14,8 @@ from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_r
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of
-from bench.gauges.matrix import Gauges
+from bench.gauges.matrix import FROM_TRIALS, Gauges
+from bench.gauges.readings import pairs_of
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial import (
@@ -31,6 +32,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
+from bench.trials.agreement import agreement
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
@@ -137,7 +139,8 @@ def _described(trial: Trial) -> TrialFacts:
 
 
 def _whisker(whisker: Whisker) -> WhiskerFacts:
-    return WhiskerFacts(whisker.shape, whisker.length_mm, whisker.diameter_mm, whisker.EI_Nmm2)
+    facts = whisker.shape, whisker.length_mm, whisker.diameter_mm, whisker.EI_Nmm2
+    return WhiskerFacts(*facts, whisker.tip_diameter_mm)
 
 
 def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
@@ -149,29 +152,50 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
     readout, missing = _readout(unit, kind)
-    beam, theta_rad = _beam(unit.session), unit.settings.theta_rad
+    beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
     usable = None if status else whisk
     if usable is not None and readout.is_gauged:
         status = unit.gauges.beyond(readout.in_follicle(usable))
-    felt = replace(as_felt(number, touch, usable), status=status, saturated=stroke.saturated)
+    felt = as_felt(number, touch, usable, stroke.speed_rad_s)
+    felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
+    felt = _against_pictures(felt, unit, stroke, readout, seen)
     return replace(
         felt,
-        phases=_phases(stroke, touch, readout, seen, unit.session.whisker.C_Nmm2),
+        phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
         estimates=answers(usable, estimators(unit.settings.estimators), unit.settings),
         one_factor=_one_factor(unit, kind, stroke),
     )
 
 
-def _phases(stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, C_Nmm2: float) -> Phases:
-    if not slips(seen):
+def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:
+    """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status."""
+    if seen.deflection is None:
+        return felt
+    whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
+    pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
+    if pairs is None:
+        return felt
+    own_newtons = not readout.is_gauged or unit.gauges.source != FROM_TRIALS
+    found = agreement(pairs, readout.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
+    status = "; ".join(filter(None, [felt.status, found.status]))
+    return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
+
+
+def _phases(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, beam: Beam) -> Phases:
+    """With the slope and distance as seen, or the nominal ones where no picture tells of them."""
+    if seen.deflection is not None:
+        beta_rad, d_x_mm = (seen.beta_rad.value, seen.d_x_mm.value) if slips(seen) else (None, None)
+    else:
+        beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
+    if not beta_rad or not d_x_mm:
         return NO_PHASES
     moments = (stroke.channels - touch.offset) @ readout.matrix.T
     theta = stroke.motor_rad - touch.motor_rad
-    return felt_phases(stroke.time_s, theta, moments, seen.beta_rad.value, seen.d_x_mm.value, C_Nmm2)
+    return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
 
 
 def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
@@ -189,11 +213,7 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...
     plain_gauges = unit.gauges and unit.gauges.one_factor
     if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
         return ()
-    _, whisk = felt_whisk(
-        stroke, Readout.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad
-    )
+    readout, beam = Readout.of(unit.trial, plain_gauges), unit.session.whisker.beam
+    _, whisk = felt_whisk(stroke, readout, unit.drift_rate, beam, unit.settings.theta_rad)
     return answers(whisk, estimators(()), unit.settings)
 
-
-def _beam(session: Session) -> Beam:
-    return Beam(session.whisker.C_Nmm2, session.whisker.length_mm, session.whisker.shape)

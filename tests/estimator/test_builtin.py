@@ -132,6 +132,53 @@ def test_estimators_on_a_felt_stroke(stroke):
     assert 0.5 < np.std(scores) < 1.3
 
 
+@pytest.mark.parametrize("shape", [("cylinder",), ("cone",), ("tapered", 0.4)])
+def test_17_as_printed_has_its_own_name_and_sigma(shape):
+    """Of a cylinder it is (12), of others it falls short under slip; its sigma is that of numeric derivatives."""
+    beam = Beam.from_modulus(60.0, 1.0, 100.0, *shape)
+    beta, d_x = np.radians(50.0), 60.0
+    moments = np.array(slip.moments(beam.as_cylinder_mm(d_x), THETA, beta, 0.0, beam.C_Nmm2))
+    told, right = (f(whisk_of(*moments, beam=beam), SETTINGS) for f in (builtin.printed_17, builtin.frictionless))
+    assert right.d_x_mm == pytest.approx(d_x) and (told.d_x_mm < 0.95 * d_x) == (shape[0] != "cylinder")
+
+    def d(theta, m_y, m_z):
+        return builtin.printed_17(whisk_of(m_y, m_z, beam=beam, theta=theta), SETTINGS).d_x_mm
+
+    at = np.array([THETA, *moments])
+    numeric = [(d(*(at + h)) - d(*(at - h))) / 2e-6 for h in 1e-6 * np.eye(3)]
+    assert told.sigma_mm == pytest.approx(np.linalg.norm(numeric * np.array([1e-4, 0.01, 0.01])), rel=1e-5)
+
+
+# ---- where (10) loses its root
+
+
+DOUBT = EstimatorSettings(np.radians(10.0), np.radians(5.0))
+
+
+@pytest.mark.parametrize("alpha_deg", [0.5, 10.0, 19.5])
+def test_steep_surfaces_give_an_interval_that_holds_whatever_alpha_est_may_be(alpha_deg):
+    """β = 79°, the true α within two sigma of the assumed 10 ± 5°: an estimate off by up to 90 % says so itself."""
+    whisk = whisk_at(60.0, np.radians(79.0), np.radians(alpha_deg), sigma=1e-3)
+    estimate = ESTIMATORS["with_friction"](whisk, DOUBT)
+    assert estimate.low_mm <= 60.0 <= estimate.high_mm <= 100.0
+    assert estimate.status or abs(estimate.d_x_mm - 60.0) < 2 * estimate.sigma_mm
+
+
+def test_without_a_root_there_is_still_a_farthest_distance():
+    """φ = 84° and α_est = 10 ± 5°: no distance, and none beyond that of α = 0.2°."""
+    moments = slip.moments(60.0, THETA, np.radians(84.0), 0.0, BEAM.C_Nmm2)
+    estimate = ESTIMATORS["with_friction"](whisk_of(*moments, sigma=1e-4), DOUBT)
+    assert np.isnan(estimate.d_x_mm) and estimate.low_mm == 0.0
+    assert estimate.high_mm == pytest.approx(60.0, rel=0.05)
+    assert "nearer than" in estimate.status
+
+
+def test_without_doubt_the_interval_is_that_of_the_sigma():
+    estimate = ESTIMATORS["with_friction"](whisk_at(60.0, np.radians(40)), SETTINGS)
+    half = (estimate.high_mm - estimate.low_mm) / 2
+    assert half == pytest.approx(1.959964 * estimate.sigma_mm, rel=1e-6)
+
+
 # ---- the session that this package did not make, with gauges found as in section V
 
 

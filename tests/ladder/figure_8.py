@@ -73,8 +73,9 @@ class Panel:
     def fitted_deg(self, beta_deg="beta_deg", d_x_mm="d_x_mm", moments="felt_Nmm") -> float:
         """α that fits with these fields of the whisks."""
         beta, d_x, m = (np.array([getattr(w, name) for w in self.whisks]) for name in (beta_deg, d_x_mm, moments))
-        theta, C = self.surface.theta_rad, self.surface.C_Nmm2
-        return float(np.degrees(fit_alpha(Pushes(np.radians(beta), *m.T, d_x, theta, C)).alpha_rad))
+        theta, beam = self.surface.theta_rad, self.surface.beam
+        pushes = Pushes(np.radians(beta), *m.T, beam.as_cylinder_mm(d_x), theta, beam.C_Nmm2)
+        return float(np.degrees(fit_alpha(pushes).alpha_rad))
 
 
 HEAD = f"{'':<18}{'n':>5}{'kinetic':>8}{'static':>8}{'fitted':>15}" + "".join(

@@ -80,7 +80,8 @@ class Scene:
     def wire(self) -> Wire:
         """The whisker as it is."""
         whisker = self.protocol.whisker
-        return Wire(whisker.shape, whisker.length_mm, whisker.diameter_mm, 0.0, self.sigmas.wire_diameter_mm)
+        sigma = self.sigmas.wire_diameter_mm
+        return Wire(whisker.shape, whisker.length_mm, whisker.diameter_mm, 0.0, sigma, whisker.tip_diameter_mm)
 
     @property
     def bar(self) -> Bar:

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from bench.rig.protocol import PicturesTable, WhiskerTable
+from tests.ladder import estimates_montecarlo
 from tests.ladder.coverage import COLUMNS, QUANTITIES, Seen, row_of, scene_row, see_points, summary
 from tests.ladder.exactness import model_errors, own_errors, scenes
 from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
@@ -99,3 +100,13 @@ def test_lumps_make_a_mean_as_uncertain_as_so_many_fewer_points(rng):
     """2000 means of 400 points tell their variance to 3 %; three of these."""
     means = [np.mean(lumpy_noise(400, rng)) for _ in range(2000)]
     assert 400 * np.var(means) == pytest.approx(LUMP, rel=0.1)
+
+
+@pytest.mark.parametrize("shape", ["cylinder"])
+def test_intervals_of_10_hold_whatever_the_friction(shape):
+    """Of 120 whisks 95 % hold, but for 3 sigma of a binomial (6 %); without α_est's sigma it is under a half."""
+    whisks = estimates_montecarlo.sample(shape, 120, seed=1)
+    assert whisks.holds.mean() > 0.89
+    z = whisks.z()[~whisks.status]
+    assert np.nanmax(np.abs(z)) < 4
+    assert np.nanmean(np.abs(whisks.z(alpha_exact=True)) < 1.96) < 0.5

@@ -36,7 +36,7 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(d_x, THETA, beta, alpha, C)
     felt = {"m_y_Nmm": m_y, "m_z_Nmm": m_z, "m_y_sigma_Nmm": 0.02, "m_z_sigma_Nmm": 0.02, "touch_felt_rad": 0.0}
-    felt |= {"touch_felt_sigma_rad": 1e-4}
+    felt |= {"touch_felt_sigma_rad": 1e-4, "theta_sigma_rad": 1e-4}
     felt |= {"phi_felt_rad": np.arctan2(m_y, m_z), "phi_felt_sigma_rad": PHI_SIGMA, "one_factor": [], "status": ""}
     felt |= {"covariance_at": 4e-4 * np.eye(2), "theta_moment_covariance_at": np.zeros(2)}
     given = {"estimator": "with_friction", "alpha_est_rad": np.radians(10.0), "d_x_est_sigma_mm": 0.1, "status": ""}

@@ -14,7 +14,8 @@ C = 3 * WIRE.rigidity_Nmm2
 MU_10 = math.tan(math.radians(10))
 
 
-def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, static=None, radius=3.0, touch_deg=0.0):
+def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, static=None, radius=3.0, touch_deg=0.0,
+          rests=(1.0,)):  # fmt: skip
     """(march, touch, states) along pushing angles."""
     touch_rad = math.radians(touch_deg)
     bar = Bar.placed(
@@ -26,7 +27,7 @@ def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, stati
         whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
     touch = first_touch(rod, bar, touch_rad, d_x)
-    march = March(rod, bar, Friction(mu if static is None else static, mu), touch)
+    march = March(rod, bar, Friction(mu if static is None else static, mu, rests=rests), touch)
     _, states = march.along(touch.motor_rad + np.radians(thetas_deg))
     return march, touch, states
 

@@ -21,18 +21,17 @@ _NODES = 41
 
 def tangent_growth(arc_mm: float | np.ndarray, contact_mm: float | np.ndarray, wire: Wire) -> np.ndarray:
     """Share (…) of the final tangent angle reached at an arc length, 0 at the base, 1 from the contact on."""
-    s = np.minimum(arc_mm, contact_mm)
-    if wire.shape == "cylinder":
-        u = s / contact_mm
-        return u * (2.0 - u)
-    length = wire.length_mm
-    return _cone_turn(s, contact_mm, length) / _cone_turn(contact_mm, contact_mm, length)
+    turn, whole = (_turn(s, contact_mm, wire.taper_per_mm) for s in (np.minimum(arc_mm, contact_mm), contact_mm))
+    return turn / whole
 
 
-def _cone_turn(s, contact, length):
-    """Integral of (contact - s)/(1 - s/length)⁴ from 0 to s: the tangent angle of a cone under a point force."""
-    w = np.maximum(1.0 - s / length, 1e-3)
-    return length * (contact - length) * (w**-3 - 1.0) / 3.0 + length**2 * (w**-2 - 1.0) / 2.0
+def _turn(s, contact, taper_per_mm):
+    """Tangent angle of a tapering rod under a point force: the integral of (contact - t)/(1 - t taper)⁴ from 0 to s.
+
+    In this form nothing cancels, whatever the taper; without any it is s (contact - s/2).
+    """
+    w = np.maximum(1.0 - taper_per_mm * s, 1e-3)
+    return s / w**3 * (contact * (1.0 + w + w * w) / 3.0 - s * (w + 2.0) / 6.0)
 
 
 @dataclass(frozen=True)

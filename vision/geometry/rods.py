@@ -6,29 +6,42 @@ import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
 
-SHAPES = ("cylinder", "cone")
+SHAPES = ("cylinder", "cone", "tapered")
 
 
 @dataclass(frozen=True)
 class Wire:
-    """The whisker: a cylinder, or a cone that ends in a point at its length. Refused where a length is not > 0."""
+    """The whisker: a cylinder, a cone that ends in a point at its length, or a cone cut off there ("tapered").
+
+    Refused where a length is not > 0, and where a tapered wire has no tip thinner than its base or another one has.
+    """
 
     shape: str
     length_mm: float
     diameter_mm: float
     length_sigma_mm: float = 0.0
     diameter_sigma_mm: float = 0.0
+    tip_diameter_mm: float | None = None
 
     def __post_init__(self):
         require(self.shape in SHAPES, f"wire shape {self.shape!r}: must be one of {', '.join(SHAPES)}")
         require_length("wire", length_mm=self.length_mm, diameter_mm=self.diameter_mm)
+        tip = self.tip_diameter_mm
+        tips = (tip is not None and 0 < tip < self.diameter_mm) if self.shape == "tapered" else tip is None
+        require(tips, f"wire tip_diameter_mm {tip}: a tapered wire, and no other, has one between 0 and its diameter")
         require_sigma("wire", length_sigma_mm=self.length_sigma_mm, diameter_sigma_mm=self.diameter_sigma_mm)
 
     def radius_mm(self, arc_mm: np.ndarray | float) -> np.ndarray:
         """Radius at arc length `arc_mm` from the base, mm; the shape of `arc_mm`; 0 beyond a cone's point."""
         arc_mm = np.asarray(arc_mm, dtype=float)
-        taper = 1.0 - arc_mm / self.length_mm if self.shape == "cone" else np.ones_like(arc_mm)
-        return 0.5 * self.diameter_mm * np.clip(taper, 0.0, None)
+        return 0.5 * self.diameter_mm * np.clip(1.0 - self.taper_per_mm * arc_mm, 0.0, None)
+
+    @property
+    def taper_per_mm(self) -> float:
+        """Share of the base's diameter that is lost for each mm of arc: one over where it would come to a point."""
+        if self.shape == "tapered":
+            return (1.0 - self.tip_diameter_mm / self.diameter_mm) / self.length_mm
+        return 1.0 / self.length_mm if self.shape == "cone" else 0.0
 
 
 @dataclass(frozen=True)

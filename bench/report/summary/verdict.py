@@ -19,8 +19,11 @@ def verdict(
     measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     known = sum(s.has_truth for s in seen)
-    for name in dict.fromkeys(j.estimator for j in measured if j.estimator not in RUNS):
-        yield _verdict_on(name, [j for j in measured if j.estimator == name], settings)
+    asked = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
+    for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
+        mine = [j for j in measured if j.estimator == name]
+        told = _told([j for j in asked if j.estimator == name])
+        yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + told
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
@@ -29,6 +32,15 @@ def verdict(
         if pictures
         else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
     ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
+
+
+def _told(asked: Sequence[Judged]) -> str:
+    """How many of an estimator's answers are none, and how many more come with a status."""
+    none = [j for j in asked if not np.isfinite(j.error_percent)]
+    doubted = [j for j in asked if j.status and np.isfinite(j.error_percent)]
+    parts = [f"{len(none)} of {len(asked)} without a distance ({none[0].status})"] if none else []
+    parts += [f"{len(doubted)} with a status ({doubted[0].status})"] if doubted else []
+    return f" {'; '.join(parts)}." if parts else ""
 
 
 def _measured(judged: Sequence[Judged]) -> list[Judged]:

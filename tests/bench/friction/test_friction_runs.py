@@ -1,10 +1,12 @@
 """(10) with α fitted by the other whisks and with α seen; and what a session tells of α, by every way."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from bench.base.settings import Settings
 from bench.friction.alphas import mean_alpha
 from bench.friction.runs import FITTED, SEEN, with_runs
 from bench.friction.section_vii import Contact, by_consistency, by_tilting, weights
@@ -21,36 +23,55 @@ def errors(results, name) -> dict[str, float]:
 
 
 def test_with_the_right_friction_nothing_is_left_of_the_error():
-    results = with_runs([result(b) for b in SLOPES], WHISKER)
+    results = with_runs([result(b) for b in SLOPES], WHISKER, Settings())
     assert abs(errors(results, "with_friction")["b70"]) > 5.0
     for name in (FITTED, SEEN):
         assert list(errors(results, name)) == [f"b{b}" for b in SLOPES]
         assert np.allclose(list(errors(results, name).values()), 0.0, atol=1e-3)
 
 
+def test_sigma_holds_what_alpha_est_may_be_off_by():
+    """One surface at 14° and 10° assumed: √(½(5² + 4²)) = 4.53°; as given where it is given. At β = 70° that is
+    what the error of (10) is made of, and without it the sigma is far too small."""
+    results = [result(b) for b in SLOPES]
+    rows = {r["trial"]: r for r in estimate_rows(with_runs(results, WHISKER, Settings())) if _is_10(r)}
+    steep = rows["b70"]
+    by_alpha = np.sqrt(steep["d_x_est_sigma_mm"] ** 2 - steep["d_x_est_sigma_alpha_exact_mm"] ** 2)
+    sensitivity = np.tan(np.radians(66.0)) - np.tan(np.radians(10.0))  # φ = 56°
+    assert by_alpha == pytest.approx(steep["d_x_est_mm"] * sensitivity * np.radians(np.sqrt((25 + 16) / 2)), rel=1e-3)
+    assert abs(steep["error_mm"]) > 2 * steep["d_x_est_sigma_alpha_exact_mm"]
+    assert steep["d_x_est_low_mm"] < 60.0 < steep["d_x_est_high_mm"]
+    given = [r for r in estimate_rows(with_runs(results, WHISKER, Settings(alpha_est_sigma_deg=1.0))) if _is_10(r)]
+    assert all(g["d_x_est_sigma_mm"] < rows[g["trial"]]["d_x_est_sigma_mm"] for g in given)
+
+
+def _is_10(row) -> bool:
+    return row["estimator"] == "with_friction"
+
+
 def test_the_fit_leaves_out_the_whisk_that_it_judges():
     """One whisk whose friction is its own: its own run has the others' α, theirs are spoilt by it."""
     odd = result(60, alpha=np.radians(25.0), name="odd")
-    results = with_runs([*(result(b) for b in SLOPES), odd], WHISKER)
+    results = with_runs([*(result(b) for b in SLOPES), odd], WHISKER, Settings())
     alphas = {r["trial"]: r["alpha_est_deg"] for r in estimate_rows(results) if r["estimator"] == FITTED}
     assert alphas["odd"] == pytest.approx(14.0, abs=1e-4)
     assert alphas["b30"] > 15.0
 
 
 def test_a_whisk_alone_on_its_surface_has_no_fitted_run_but_a_seen_one():
-    results = with_runs([result(60)], WHISKER)
+    results = with_runs([result(60)], WHISKER, Settings())
     assert errors(results, FITTED) == {}
     assert list(errors(results, SEEN)) == ["b60"]
 
 
 def test_doubt_about_friction_is_in_the_sigma():
-    row = next(r for r in estimate_rows(with_runs([result(70)], WHISKER)) if r["estimator"] == SEEN)
+    row = next(r for r in estimate_rows(with_runs([result(70)], WHISKER, Settings())) if r["estimator"] == SEEN)
     by_alpha = (np.tan(np.radians(70.0)) - np.tan(ALPHA)) * np.radians(0.1)  # ∂ln d_x/∂α_est times β's sigma, at least
     assert row["d_x_est_sigma_mm"] > 60.0 * by_alpha
 
 
 def test_every_way_finds_the_friction_angle(tmp_path):
-    results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER)
+    results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER, Settings())
     found = friction_of(results, WHISKER, np.radians(10.0))
     (surface,) = found
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
@@ -66,7 +87,8 @@ def test_every_way_finds_the_friction_angle(tmp_path):
 
 def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
-    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, np.arctan2(m_y, m_z), PHI_SIGMA)
+    phi = np.arctan2(m_y, m_z), PHI_SIGMA
+    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, *phi, f"b{beta_deg}")
 
 
 def test_ways_say_what_they_lack():
@@ -85,3 +107,25 @@ def test_mean_does_not_shrink_a_shared_sigma():
     assert mean_alpha([(0.2, 0.01)] * 16) == pytest.approx((0.2, 0.01))
     assert np.isnan(mean_alpha([(np.nan, np.nan)])).all()
     assert mean_alpha([(0.1, 0.001), (0.3, 0.001)])[1] == pytest.approx(0.1 / np.sqrt(2))
+
+
+def test_repeats_of_one_recording_are_no_independent_ones():
+    """Bars a little off: ten whisks a recording say no more of α than one, and its sigma holds the error."""
+    bars = [replace(contact(b + off), beta_rad=np.radians(b), trial=f"b{b}") for b, off in OFF.items()]
+    sizes = 1.004, 0.996, 1.003, 0.998
+    bars = [replace(c, m_y_Nmm=c.m_y_Nmm * k, m_z_Nmm=c.m_z_Nmm * k) for c, k in zip(bars, sizes)]
+    one, ten = by_consistency(bars, WHISKER), by_consistency(bars * 10, WHISKER)
+    assert ten.alpha_rad == pytest.approx(one.alpha_rad, abs=1e-5)
+    assert ten.sigma_rad == pytest.approx(one.sigma_rad, rel=1e-2)
+    assert abs(one.alpha_rad - ALPHA) < 2 * one.sigma_rad < np.radians(6.0)
+
+
+OFF = {20: 0.3, 40: -0.4, 55: 0.2, 65: -0.2}
+
+
+def test_at_the_bound_of_the_search_there_is_no_angle():
+    """Distances that shrink with the slope, as no friction angle makes them: the bound is told, and is no result."""
+    bars = [replace(c, m_y_Nmm=c.m_y_Nmm * k, m_z_Nmm=c.m_z_Nmm * k)
+            for c, k in ((contact(20), 1.0), (contact(40), 2.0), (contact(60), 4.0))]  # fmt: skip
+    way = by_consistency(bars, WHISKER)
+    assert np.isnan([way.alpha_rad, way.sigma_rad]).all() and "at the bound of the search" in way.status

@@ -1,14 +1,20 @@
 """Fig. 8 from the results: groups, means, and the friction angle that the moments hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.friction.surfaces import surfaces
 from bench.records.plain import from_plain
 from bench.records.trial import TrialResult
+from bench.report.figure_8 import rows
 from estimator import slip
+from estimator.beam import Beam
+from vision.truth.value import Value
 
-C = 8835.7
+BEAM = Beam(8835.7, 100.0)
+C = BEAM.C_Nmm2
 THETA = np.radians(3.0)
 
 
@@ -41,13 +47,13 @@ def result(
 
 
 def test_fit_gives_the_friction_angle_back_with_distances_that_differ():
-    found = surfaces([result(b, 12.0, d) for b, d in ((0, 60), (30, 50), (60, 70), (-45, 55))], C)
+    found = surfaces([result(b, 12.0, d) for b, d in ((0, 60), (30, 50), (60, 70), (-45, 55))], BEAM)
     assert len(found) == 1
     assert np.degrees(found[0].alpha_rad) == pytest.approx(12.0, abs=1e-6)
 
 
 def test_without_pictures_the_nominal_slope_is_taken():
-    found = surfaces([result(b, 20.0, seen=False) for b in (0, 30, 60)], C)[0]
+    found = surfaces([result(b, 20.0, seen=False) for b in (0, 30, 60)], BEAM)[0]
     assert np.degrees(found.alpha_rad) == pytest.approx(20.0, abs=1e-6)
     assert all(f.nominal for f in found.felt)
 
@@ -60,7 +66,7 @@ def test_a_panel_for_each_surface_and_speed_and_none_for_gauge_trials():
             result(30, 23, surface="sandpaper"),
             result(0, 10, purpose="gauge"),
         ],
-        C,
+        BEAM,
     )
     assert [(s.name, s.speed_deg_s) for s in found] == [("steel", 10.0), ("steel", 90.0), ("sandpaper", 10.0)]
     assert all(s.fit is None for s in found)  # one whisk each holds no α
@@ -68,7 +74,7 @@ def test_a_panel_for_each_surface_and_speed_and_none_for_gauge_trials():
 
 def test_points_are_means_over_whisks_of_one_slope(rng):
     whisks = [result(b, 10.5, noise=rng.normal(0, 0.05, 2)) for b in (0, 45) for _ in range(10)]
-    first, second = surfaces(whisks, C)[0].points()
+    first, second = surfaces(whisks, BEAM)[0].points()
     assert (first.whisks, second.whisks) == (10, 10)
     assert second.beta_deg == pytest.approx(45)
     assert second.m_sd_Nmm == pytest.approx(0.05, rel=0.6)  # 10 samples: 24 % a sigma
@@ -77,9 +83,24 @@ def test_points_are_means_over_whisks_of_one_slope(rng):
 
 def test_moments_are_scaled_to_one_distance():
     """|m| goes as 1/d_x, so whisks of one slope and friction at two distances are one point without scatter."""
-    (point,) = surfaces([result(45, 10.5, d) for d in (50.0, 60.0, 70.0)], C)[0].points()
+    (point,) = surfaces([result(45, 10.5, d) for d in (50.0, 60.0, 70.0)], BEAM)[0].points()
     assert point.m_sd_Nmm == pytest.approx(0.0, abs=1e-9)
 
 
 def test_no_slope_above_the_friction_angle_holds_none():
-    assert surfaces([result(b, 25.0) for b in (0, 5, 10)], C)[0].fit is None
+    assert surfaces([result(b, 25.0) for b in (0, 5, 10)], BEAM)[0].fit is None
+
+
+@pytest.mark.parametrize("beam", [Beam(C, 100.0, "cone"), Beam(C, 100.0, "tapered", 0.4)])
+def test_a_whisker_that_tapers_is_fitted_as_one(beam):
+    """Its moments are those of the base's cylinder touched farther out; points lie on the fitted curve, at one d_x."""
+    whisks = []
+    for beta, d_x in ((0, 60), (30, 50), (60, 70), (-45, 55)):
+        whisk = result(beta, 12.0, float(beam.as_cylinder_mm(d_x)))
+        (seen,) = whisk.seen.whisks
+        seen = replace(seen, d_x_mm=Value(float(d_x), 0.01))
+        whisks.append(replace(whisk, seen=replace(whisk.seen, whisks=(seen,))))
+    (found,) = surfaces(whisks, beam)
+    assert np.degrees(found.alpha_rad) == pytest.approx(12.0, abs=1e-6)
+    for row in rows([found]):
+        assert row["m_EI_per_metre"] == pytest.approx(row["m_fit_EI_per_metre"], rel=1e-6)

@@ -57,3 +57,29 @@ def test_no_touch_stays_none(rng):
     silent = stroke(rng, noise=5.0)
     assert free_slope(silent) is None
     assert allow_drift(silent.touch(), [1.0, 1.0], SPEED).status
+
+
+def test_a_zero_that_may_drift_is_in_the_touch_too(rng):
+    """As far from the free stroke as touch is: drift times that, through the rise's slope."""
+    one = stroke(rng)
+    steady, wandering = (allow_drift(one.touch(), rate, SPEED) for rate in ([0.0, 0.0], [0.05, 0.05]))
+    seconds = (steady.motor_rad - steady.level.centre_rad) / SPEED
+    added = np.linalg.norm(steady.rise.gain) * 0.05 * seconds
+    assert wandering.sigma_rad == pytest.approx(np.hypot(steady.sigma_rad, added), rel=1e-6)
+
+
+def test_touch_and_moments_may_be_one_whisks(rng):
+    """θ's sigma, its covariance with the moments and theirs make a covariance, at small angles and large drifts too."""
+    one = stroke(rng)
+    touch = allow_drift(one.touch(), [0.3, 0.3], SPEED)
+    at = one.at(np.radians(0.3), touch)
+    whole = np.block([[touch.sigma_rad**2, at.theta_covariance], [at.theta_covariance[:, None], at.covariance]])
+    scale = np.sqrt(np.diag(whole))
+    assert np.linalg.eigvalsh(whole / np.outer(scale, scale)).min() > -1e-9
+
+
+def test_fast_strokes_tell_little_of_the_drift(rng):
+    """Strokes nine times as fast have 27 times the slope's sigma; the slow ones alone tell as much."""
+    slow = [FreeSlope(rng.normal(0.0, 0.01, 2), np.full(2, 0.01**2)) for _ in range(100)]
+    fast = [FreeSlope(rng.normal(0.0, 0.27, 2), np.full(2, 0.27**2)) for _ in range(100)]
+    assert drift_rate([*slow, *fast]) == pytest.approx(drift_rate(slow), rel=0.05)

@@ -26,6 +26,7 @@ from bench.report.planes import contact_path, sensing_plane
 from bench.session.session import load_session
 from bench.trials.compare import Judged
 from estimator import slip
+from estimator.beam import Beam
 from estimator.friction import Pushes, fit_alpha
 from vision.truth.value import Value
 
@@ -39,7 +40,7 @@ def surface(name="steel", alpha_deg=10.5, slopes=(0, 20, 40, -60)) -> Surface:
         Felt(b, 60.0, THETA, y, z, 0.02, 0.02, np.degrees(np.arctan2(y, z)), 0.2, False)
         for b, y, z in zip(slopes, m_y, m_z)
     )
-    return Surface(name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), C)
+    return Surface(name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), Beam(C, 100.0))
 
 
 def judged(estimator, beta, error_percent, one_factor=False) -> Judged:

@@ -16,9 +16,10 @@ from bench.records.trial import (
 )
 from bench.report.assembly import beam_rows, budget_rows
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
+from bench.trials.estimates import as_felt
+from estimator.signal import Touch
 from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.uncertainty import CAUSES
-from vision.truth.records import FrameTruth
 from vision.truth.value import Value
 
 
@@ -38,21 +39,12 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
 
 def test_felt_touch_is_late_within_the_filters_delay():
     """At 90 deg/s 0.52 ms are 0.047 deg: what a filter of 800 Hz delays is one sigma."""
-    time_s, nothing = np.arange(5) * 0.01, np.full(5, np.nan)
-    frames = FrameTruth(
-        index=np.arange(5),
-        time_s=time_s,
-        motor_rad=np.radians(90.0) * time_s,
-        theta_rad=Value(nothing),
-        touching=np.zeros(5, dtype=bool),
-        point_mm=Value(np.full((5, 3), np.nan)),
-        arc_mm=nothing,
-        status=("",) * 5,
-    )
-    seen = SeenWhisk(0, touch_rad=Value(0.05, 1e-5), frames=frames)
-    late = lateness(seen, FeltWhisk(touch_felt_rad=Value(0.0508, 1e-5)))
+    felt = as_felt(0, Touch(0.0508, 1e-5), None, np.radians(90.0))
+    late = lateness(SeenWhisk(0, touch_rad=Value(0.05, 1e-5)), felt)
     assert late.value == pytest.approx(8e-4)
     assert np.degrees(late.sigma) == pytest.approx(0.0468, abs=1e-4)
+    assert felt.touch_felt_rad.sigma == pytest.approx(late.sigma, rel=1e-3)
+    assert felt.theta_sigma_rad == 1e-5  # touch and moments are late alike
     assert pytest.approx(0.52e-3, rel=0.01) == GAUGE_DELAY_S
 
 

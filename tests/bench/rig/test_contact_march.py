@@ -138,6 +138,16 @@ def test_stick_slip_is_a_saw_tooth_between_the_two_cones():
     assert 60 - math.degrees(math.atan(0.25)) - 0.3 < phi.min() and phi.max() < 60 - math.degrees(math.atan(0.18)) + 0.3
 
 
+def test_each_rest_reaches_its_own_coefficient():
+    """Rests that reach all of the excess and half of it in turn, round and round."""
+    _, _, states = whisk(np.arange(0.1, 6.01, 0.1), mu=0.18, static=0.26, rests=(1.0, 0.5))
+    angles = np.array([s.motor_rad for s in states])
+    shares = [states[i].share for i in np.nonzero(np.diff(angles) == 0)[0]]
+    assert len(shares) > 20
+    expected = np.where(np.arange(len(shares)) % 2, 0.22, 0.26)
+    assert shares == pytest.approx(expected, rel=1e-3)
+
+
 def test_below_the_static_cone_the_whisker_never_slips_along_the_bar():
     march, touch, states = whisk(np.arange(0.1, 4.01, 0.1), beta=15.0, mu=0.25, static=0.4)
     assert {s.status for s in states} == {"held"}

@@ -11,6 +11,7 @@ from bench.gauges.matrix import GaugeMatrix
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
+from estimator.whisk import Estimate
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
 BEAM = Beam(8835.7, 100.0)
@@ -45,7 +46,7 @@ def test_answers_carry_what_they_assumed(rng):
     assert rows["frictionless"].alpha_est_rad == 0.0
     assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
     assert np.degrees(rows["with_friction"].beta_est_rad) == pytest.approx(60.0, abs=0.2)
-    assert np.degrees(as_felt(0, touch, whisk).phi_felt_rad.value) == pytest.approx(50.0, abs=0.2)
+    assert np.degrees(as_felt(0, touch, whisk, 0.17).phi_felt_rad.value) == pytest.approx(50.0, abs=0.2)
 
 
 def test_sigma_of_10_is_its_scatter(rng):
@@ -54,7 +55,7 @@ def test_sigma_of_10_is_its_scatter(rng):
     for _ in range(200):
         _, whisk = felt_whisk(stroke(rng, noise=0.01), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
         row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
-        stated.append(row.d_x_est_mm.sigma)
+        stated.append(row.d_x_est_sigma_alpha_exact_mm)
         found.append(row.d_x_est_mm.value)
     assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
 
@@ -73,7 +74,7 @@ def test_no_touch_is_a_reason(rng):
     silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
     touch, reason = felt_whisk(silent, Readout.bare(), np.zeros(2), BEAM, THETA)
     assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
-    assert np.isnan(as_felt(0, touch, None).touch_felt_rad.value)
+    assert np.isnan(as_felt(0, touch, None, 0.17).touch_felt_rad.value)
 
 
 @pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])
@@ -95,3 +96,51 @@ def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
     _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f")
     assert np.isnan(row.d_x_est_mm.value) and row.status == "mine:f raised ZeroDivisionError: no slope"
+
+
+def asked(rng, function) -> dict:
+    """The row of one's own estimator on a whisk at 60 mm."""
+    _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    return answers(whisk, {"mine:f": function}, Settings())[0]
+
+
+@pytest.mark.parametrize(
+    "d_x, sigma, said",
+    [
+        (np.inf, 1.0, "gave inf mm, which is no distance"),
+        (-5.0, 1.0, "gave -5 mm, which is no distance"),
+        (np.nan, 1.0, "gave no distance and no reason"),
+        ("far", 1.0, "gave no distance and no reason"),
+    ],
+)
+def test_what_is_no_distance_is_a_missing_one_with_a_status(rng, d_x, sigma, said):
+    row = asked(rng, lambda *_: Estimate(d_x, sigma))
+    assert np.isnan([row.d_x_est_mm.value, row.d_x_est_mm.sigma]).all() and row.status == said
+
+
+@pytest.mark.parametrize("sigma", [0.0, -1.0, np.nan, np.inf])
+def test_a_distance_without_a_sigma_is_told(rng, sigma):
+    row = asked(rng, lambda *_: Estimate(60.0, sigma))
+    assert row.d_x_est_mm.value == 60.0 and np.isnan(row.d_x_est_mm.sigma)
+    assert "which is none" in row.status
+
+
+def test_past_the_length_is_told_and_left(rng):
+    row = asked(rng, lambda *_: Estimate(130.0, 1.0))
+    assert row.d_x_est_mm.value == 130.0 and "past the whisker's length of 100 mm" in row.status
+
+
+def test_what_an_estimator_never_used_does_not_stand_beside_it(rng):
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0))
+    assert np.isnan(row.alpha_est_rad) and np.isnan(row.beta_est_rad) and row.status == ""
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0, beta_rad=0.5))
+    assert row.beta_est_rad == 0.5
+
+
+def test_an_estimator_cannot_spoil_the_whisk_of_the_next(rng):
+    def vandal(whisk, _):
+        whisk.m_z_Nmm[:] = 0.0
+        return Estimate(60.0, 1.0)
+
+    row = asked(rng, vandal)
+    assert "read-only" in row.status and np.isnan(row.d_x_est_mm.value)

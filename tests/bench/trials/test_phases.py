@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
+from bench.evaluate import evaluate
 from bench.gauges.felt import strokes_of
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Phases
 from bench.records.plain import from_plain, to_plain
@@ -15,6 +16,7 @@ from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.phases import felt_phases, seen_phases
+from estimator.beam import Beam
 from vision.truth.records import FrameTruth
 from vision.truth.value import Value
 
@@ -81,7 +83,7 @@ def test_moments_tell_static_from_kinetic(seed, mirror):
     time, theta = samples()
     slip = saw_tooth(theta)
     felt = moments(theta, slip, np.random.default_rng(seed)) * [mirror, 1.0]
-    found = felt_phases(time, theta, felt, mirror * BETA, D_X, C)
+    found = felt_phases(time, theta, felt, mirror * BETA, D_X, Beam(C, 100.0))
     teeth = np.count_nonzero(np.diff(slip[theta > np.radians(2.3)]) > 0.02)
     assert teeth <= found.jumps <= teeth + 6  # earlier, smaller ones may drown in the noise
     for kind, true in ((STATIC, ALPHA_STATIC), (KINETIC, ALPHA_KINETIC)):
@@ -99,7 +101,7 @@ def test_ringing_after_a_jump_is_no_jump():
         since = np.maximum(time - time[k], 0.0) * 2 * np.pi * 165
         ringing += np.where(since > 0, 0.5 * (slip[k + 1] - slip[k]) * np.exp(-0.02 * since) * np.cos(since), 0.0)
     felt = moments(theta, slip - ringing, np.random.default_rng(1))
-    found = felt_phases(time, theta, felt, BETA, D_X, C)
+    found = felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0))
     assert found.jumps <= len(rung)
     assert np.degrees(found.mean(STATIC)[0]) == pytest.approx(23.0, abs=1.0)
     assert np.degrees(found.mean(KINETIC)[0]) == pytest.approx(18.5, abs=1.0)
@@ -111,7 +113,7 @@ def test_a_whisker_that_slides_neither_rests_nor_jumps(seed):
     tangent = np.tan(BETA - ALPHA_KINETIC)
     slip = D_X * np.maximum(theta, 0.0) * tangent / (np.cos(BETA) + np.sin(BETA) * tangent)
     felt = moments(theta, slip, np.random.default_rng(seed))
-    assert felt_phases(time, theta, felt, BETA, D_X, C) == NO_PHASES
+    assert felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0)) == NO_PHASES
     touching = theta > 0
     assert seen_phases(frames(theta[touching][::40], slip[touching][::40]), BETA, D_X) == NO_PHASES
 
@@ -147,7 +149,22 @@ def test_the_rig_s_sandpaper(tmp_path):
         touch = stroke.touch()
         felt = (stroke.channels - touch.offset) @ np.array(true["gauge_matrix_Nmm_per_V"]).T
         theta, beta = stroke.motor_rad - touch.motor_rad, np.radians(told["beta_deg"])
-        found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.C_Nmm2)
+        found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.beam)
         assert found.jumps >= 7
         for kind, mu in ((STATIC, told["mu_static"]), (KINETIC, told["mu_kinetic"])):
             assert np.degrees(found.mean(kind)[0] - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)
+
+
+def test_without_pictures_the_nominal_slope_serves(tmp_path):
+    """Slopes as set by hand: phases.csv has both angles, and friction.csv says where the slope is from."""
+    text = (Path(__file__).parents[2] / "ladder" / "protocols" / "sandpaper.toml").read_text()
+    text = text.replace("vibration = true", "vibration = true\nknown = true")
+    text = text.replace("beta_deg = [45, 60]", "beta_deg = 60")
+    (tmp_path / "p.toml").write_text(text)
+    session = simulate(tmp_path / "session", protocol=tmp_path / "p.toml", signals_only=True, seed=5)
+    evaluate(session, tmp_path / "out", Settings())
+    kinds = (tmp_path / "out" / "phases.csv").read_text()
+    assert kinds.count("felt,static") >= 5 and kinds.count("felt,kinetic") >= 5
+    assert "sandpaper,10,60,manifest" in (tmp_path / "out" / "friction.csv").read_text()
+    summary = (tmp_path / "out" / "summary.txt").read_text()
+    assert "stick–slip felt, slopes as the manifest has them" in summary

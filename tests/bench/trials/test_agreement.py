@@ -1,0 +1,109 @@
+"""Felt moments against those of the seen shape: what stands out, with its likeliest cause, spoils no other whisk."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from bench.base.settings import Settings
+from bench.evaluate import evaluate
+from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.gauges.readings import Pairs
+from bench.rig.simulate import simulate
+from bench.trials.agreement import LEAST_CHANCE, agreement
+
+MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
+GAUGES = GaugeMatrix(MATRIX, (0.003 * 11) ** 2 * np.eye(4))
+THETA = np.radians([0.5, 1.5, 2.5, 3.5, 4.5])
+PER_RAD = np.array([90.0, 120.0])  # N·mm/rad, at φ = 37°
+
+
+def pairs(rng, spoil=None) -> Pairs:
+    """A whisk whose channels are what `spoil` (2, 2) makes of sound ones, with noise as stated."""
+    exact = np.outer(THETA, PER_RAD)
+    n = 2 * len(THETA)
+    of_moments, of_volts = (0.01**2 + 0.003**2) * np.eye(n), 0.001**2 * np.eye(n)
+    volts = np.linalg.solve(MATRIX, exact.T).T + 0.001 * rng.normal(size=exact.shape)
+    volts = volts if spoil is None else volts @ np.asarray(spoil).T
+    moments = exact + 0.01 * rng.normal(size=exact.shape)
+    nothing = np.full(2, np.nan)
+    return Pairs("t", 0, 0.0, THETA, moments, of_moments, volts, of_volts, nothing, nothing, 0.001)
+
+
+def turned(degrees):
+    """What a follicle that is turned further makes of the volts."""
+    return np.linalg.inv(MATRIX) @ to_follicle(np.radians(degrees)) @ MATRIX
+
+
+@pytest.mark.parametrize(
+    "spoil, said, value, within",
+    [
+        (np.eye(2)[::-1], "y_V and z_V look exchanged", None, 0),
+        (np.diag([-1, 1]), "y_V looks reversed", None, 0),
+        (np.diag([1, -1]), "z_V looks reversed", None, 0),
+        (-np.eye(2), "y_V and z_V look reversed", None, 0),
+        (np.diag([0.8, 1]), "gauge y_V looks slipped, it gives ", 80.0, 1.0),
+        (np.diag([1, 0.9]), "gauge z_V looks slipped, it gives ", 90.0, 1.0),
+        (turned(8.0), "the follicle looks turned by ", 8.0, 0.3),
+        (np.eye(2) / 1.1, "the whisker looks ", 110.0, 1.0),
+    ],
+)
+def test_what_stands_out_is_named(rng, spoil, said, value, within):
+    found = agreement(pairs(rng, spoil), GAUGES)
+    assert found.chance < LEAST_CHANCE
+    assert found.cause.startswith(said) and found.cause in found.status
+    if value is not None:
+        assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(value, abs=within)
+
+
+def test_sound_whisks_agree_as_often_as_chance_allows(rng):
+    """χ² of 2 degrees of freedom over 400 whisks whose errors are as stated, gauges' and distance's included."""
+    root = np.linalg.cholesky(GAUGES.covariance)
+    found = []
+    for _ in range(400):
+        one = pairs(rng)
+        felt = GaugeMatrix(MATRIX + (root @ rng.normal(size=4)).reshape(2, 2), GAUGES.covariance)
+        one.moments[:] *= 1.0 + one.scale_sigma * rng.normal()
+        found.append(agreement(one, felt).chance)
+    assert np.mean(np.array(found) < 0.05) == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / 400))
+    assert agreement(pairs(rng), GAUGES).status == ""
+
+
+PROTOCOL = """
+[whisker]
+shape = "{shape}"
+[[trials]]
+purpose = "gauge"
+d_x_mm = 50.0
+[[trials]]
+purpose = "gauge"
+d_x_mm = 50.0
+follicle_roll_deg = 90.0
+[[trials]]
+beta_deg = [30, 45, 60]
+d_x_mm = 55.0
+"""
+
+
+def read(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cone"])
+def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(tmp_path, exact_vision, shape):
+    (tmp_path / "p.toml").write_text(PROTOCOL.format(shape=shape))
+    session = simulate(tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4)
+    evaluate(session, tmp_path / "sound", Settings(), workers=0)
+    assert {r["status"] for r in read(tmp_path / "sound" / "whisks.csv") if r["trial"].startswith("steel")} == {""}
+    (trial,) = (session / "trials").glob("steel_b45*")
+    signals = trial / "signals.csv"
+    signals.write_text(signals.read_text().replace("y_V,z_V", "z_V,y_V", 1))
+    evaluate(session, tmp_path / "out", Settings(), workers=0)
+    status = {r["trial"]: r["status"] for r in read(tmp_path / "out" / "whisks.csv")}
+    assert "y_V and z_V look exchanged" in status.pop(trial.name)
+    assert all("seen shape" not in s for s in status.values())
+    (sound,), (spoilt,) = (read(tmp_path / out / "surfaces.csv") for out in ("sound", "out"))
+    alphas = [float(s["alpha_least_squares_deg"]) for s in (sound, spoilt)]
+    assert alphas[1] == pytest.approx(alphas[0], abs=0.5)
+    assert float(spoilt["alpha_felt_deg"]) == pytest.approx(float(sound["alpha_felt_deg"]), abs=0.5)
