@@ -72,7 +72,8 @@ def test_a_bar_that_passes_behind_the_camera_hides_no_more_than_what_is_before_i
     view, curves, wire = still
     sight = view.camera.centre_mm - np.array([70.0, 0.0, 0.0])
     sight /= np.linalg.norm(sight)
-    middle, radius = outline_of_bar(view.camera, BarAxis(view.camera.centre_mm - 30.0 * sight + [0.0, 8.0, 0.0], sight), 3.0)
+    beside = view.camera.centre_mm - 30.0 * sight + [0.0, 8.0, 0.0]
+    middle, radius = outline_of_bar(view.camera, BarAxis(beside, sight), 3.0)
     assert np.isnan(radius).any() and np.isfinite(radius).any()
     pieces = wire_pieces(view, curves, wire, 16, 7)
     clear = clear_of_bar(pieces, middle, radius, 4.0)

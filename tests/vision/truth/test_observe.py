@@ -33,7 +33,7 @@ def test_a_camera_before_which_the_bar_hides_the_wire_leaves_what_is_known(steep
     at, _ = low.project(truth["d_x_mm"] * np.array([[np.cos(turn), np.sin(turn), 0.0]]))[0].astype(int)
     seen = narrowed(steep, "low", at - 10, at + 10).see()
     assert seen.status.startswith("the bar's slope is known to")
-    assert seen.d_x_mm - truth["d_x_mm"] == pytest.approx(0.0, abs=3 * seen.d_x_sigma_mm)
+    assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=3 * seen.d_x_mm.sigma)
 
 
 def test_a_camera_with_the_whisker_behind_it_is_left_out(steep):
@@ -51,7 +51,7 @@ def test_a_camera_that_shows_one_grey_alone_tells_nothing(steep):
     white = copy(steep)
     white.frames = steep.frames | {"low": {k: np.full_like(grey, 255) for k, grey in steep.frames["low"].items()}}
     seen = white.see()
-    assert abs(seen.d_x_mm - steep.truth["d_x_mm"]) < 3 * seen.d_x_sigma_mm
+    assert abs(seen.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
 
 
 def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
