@@ -13,7 +13,7 @@ import numpy as np
 from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_result, write_result
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
-from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.felt import Stroke, strokes_of, touch_on_the_way_back
 from bench.gauges.matrix import Gauges
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
@@ -36,7 +36,7 @@ from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
 from estimator.signal import Touch
-from vision.truth.value import NAN
+from vision.truth.value import NAN, UNKNOWN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
 OWN_GAUGES = "not judged: without this trial the gauges are not known"
@@ -144,7 +144,8 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     """Felt touch, moments and estimates of each whisk; and its phases of stick and slip, which take the slope as seen
     and are no estimate."""
     strokes = strokes_of(signals, unit.trial, unit.settings)
-    return FeltTrial(tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes)))
+    whisks = tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes))
+    return FeltTrial(whisks, touch_on_the_way_back(signals) if seen.back else UNKNOWN)
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
