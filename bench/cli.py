@@ -117,6 +117,12 @@ def _add_evaluate(verbs) -> None:
         "else to half a frame)",
     )
     verb.add_argument(
+        "--gauges-from-all",
+        action="store_true",
+        help="calibrate the gauges by every trial with volts and a truth, not by gauge trials alone; each trial is "
+        "judged by gauges fitted without it",
+    )
+    verb.add_argument(
         "--estimator",
         action="append",
         dest="estimators",
@@ -133,7 +139,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    names = ("theta_deg", "alpha_est_deg", "cutoff_Hz", "clock_sigma_s", "estimators")
+    names = ("theta_deg", "alpha_est_deg", "cutoff_Hz", "clock_sigma_s", "estimators", "gauges_from_all")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])

@@ -186,9 +186,12 @@ def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:
 
 
 def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:
-    """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated."""
+    """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated, and by
+    other trials: these factors are those of all."""
     plain_gauges = unit.gauges and unit.gauges.one_factor
-    if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
+    if kind == "Nmm" or plain_gauges is None or unit.trial.name in unit.gauges.without:
+        return ()
+    if not np.isfinite(plain_gauges.matrix).all():
         return ()
     _, whisk = felt_whisk(
         stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, _beam(unit.session), unit.settings.theta_rad

@@ -9,7 +9,7 @@ from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubt
 from bench.report.summary.errors import error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import run_lines, verdict
+from bench.report.summary.verdict import gauges_of_all, run_lines, verdict
 from bench.trials.compare import judge
 
 DONE, DOUBTFUL = 0, 1
@@ -34,6 +34,7 @@ def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str
     truth = [*truth_lines(results), *budget_lines(results), *beam_lines(results)]
     return [
         *verdict(evaluation.session, results, judged, settings, len(doubtful)),
+        *gauges_of_all(evaluation.gauges),
         "",
         *_titled("Truth, from the pictures (± one sigma)", truth),
         *_titled("Clocks", clock_lines(results)),
