@@ -133,6 +133,9 @@ def _add_evaluate(verbs) -> None:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
+    from bench.base.workers import single_thread
+
+    single_thread()
     from bench.base.environment import check_environment
     from bench.base.settings import Settings
     from bench.evaluate import evaluate
