@@ -64,7 +64,8 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         return
     yield (
         f"of d_x's sigma ± {found.shared_mm:.4f} mm is one error that all {found.n} whisks share "
-        f"({', '.join(SHARED)}), ± {found.own_mm:.4f} mm each whisk's own: their mean is known to ± {found.mean_sigma_mm:.4f} mm"
+        f"({', '.join(SHARED)}), ± {found.own_mm:.4f} mm each whisk's own: their mean is known to ± "
+        f"{found.mean_sigma_mm:.4f} mm"
     )
     if found.freedom:
         beside = (f"{name} {np.degrees(_scatter(results, key)[0]):.4f}°" for name, key in _BESIDE)
