@@ -30,7 +30,7 @@ _MOST_ASPECT = 0.03
 _MOST_DECENTRING = 0.05
 _MOST_STRETCH = 2.0
 # What corners may be off by beside their own sigma, px an axis. Boards waved before webcams that nobody triggered leave
-# 0.18 once their instants are fitted, cameras by themselves 0.0 to 0.06 (tests/vision/test_held_out.py).
+# 0.18 once their instants are fitted, cameras by themselves 0.0 to 0.06 (tests/vision/calibration/test_held_out.py).
 MOST_ERROR_PX = 0.4
 # A lens may fold in the very corners, where no board is ever seen, but not before this share of the way there.
 _LEAST_REACH = 0.7
