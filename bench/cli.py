@@ -125,6 +125,12 @@ def _add_evaluate(verbs) -> None:
         "else to half a frame)",
     )
     verb.add_argument(
+        "--gauges-from-all",
+        action="store_true",
+        help="calibrate the gauges by every trial with volts and a truth, not by gauge trials alone; each trial is "
+        "judged by gauges fitted without it",
+    )
+    verb.add_argument(
         "--estimator",
         action="append",
         dest="estimators",
@@ -135,6 +141,9 @@ def _add_evaluate(verbs) -> None:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
+    from bench.base.workers import single_thread
+
+    single_thread()
     from bench.base.environment import check_environment
     from bench.base.settings import Settings
     from bench.evaluate import evaluate
@@ -142,6 +151,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     names = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "estimators")
+    names = (*names, "gauges_from_all")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])

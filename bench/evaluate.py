@@ -13,6 +13,7 @@ from bench.friction.tables import friction_of, write_friction
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation
 from bench.session.check import checked_session
+from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
 from bench.trials.estimates import estimators
 from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
 
@@ -27,6 +28,9 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
         results = tuple(with_runs(evaluated(units, pool), session.whisker, settings))
+        shared = shared_touch(results)
+        doubts.notes += filter(None, [shared_doubt(results, shared)])
+        results = with_shared_touch(results, shared)
         friction = tuple(friction_of(results, session.whisker, settings.alpha_est_rad))
         write_tables(out, results)
         write_friction(out, results, friction, settings.alpha_est_rad)

@@ -7,6 +7,7 @@ ideal broken line (level, then rise) through the same filter.
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import solve_banded
 
 from estimator.onset import Touch, columns, felt_touch, usable
 
@@ -21,16 +22,39 @@ def zero_phase_lowpass(x: ArrayLike, rate_Hz: float, cutoff_Hz: float) -> np.nda
     Second-order Butterworth each way. Missing samples (NaN) are bridged by lines for the filter, and stay NaN. Raises
     ValueError for a cut-off outside (0, rate/2).
     """
-    from scipy.signal import butter, sosfiltfilt
-
     x = np.asarray(x, dtype=float)
     if not 0 < cutoff_Hz < rate_Hz / 2:
         raise ValueError(f"cutoff_Hz = {cutoff_Hz}: must lie between 0 and half the rate of {rate_Hz} Hz")
     each_way = cutoff_Hz / (np.sqrt(2) - 1) ** (1 / (2 * FILTER_ORDER))
-    sections = butter(FILTER_ORDER, min(each_way, 0.499 * rate_Hz), fs=rate_Hz, output="sos")
     padding = min(len(x) - 1, int(3 * rate_Hz / cutoff_Hz))
-    filtered = sosfiltfilt(sections, np.apply_along_axis(_bridged, 0, x), axis=0, padlen=padding)
+    filtered = _there_and_back(np.apply_along_axis(_bridged, 0, x), min(each_way / rate_Hz, 0.499), padding)
     return np.where(np.isfinite(x), filtered, np.nan)
+
+
+def _there_and_back(x, cutoff, padding: int):
+    """The filter over x (n, …) and then from its end, beyond which x goes on mirrored at its ends; cutoff in rates."""
+    first, last = x[:1], x[-1:]
+    before, after = 2 * first - x[padding:0:-1], 2 * last - x[-2 : -padding - 2 : -1]
+    longer = np.concatenate([before, x, after])
+    for _ in range(2):
+        longer = _butterworth(longer, cutoff)[::-1]
+    return longer[padding : padding + len(x)]
+
+
+def _butterworth(x, cutoff):
+    """Second-order Butterworth low-pass by the bilinear transform, along the first axis, at rest at its first sample:
+
+    y_k + a1 y_{k-1} + a2 y_{k-2} = b (x_k + 2 x_{k-1} + x_{k-2}), one banded system for all k.
+    """
+    k = np.tan(np.pi * cutoff)
+    whole = 1.0 + np.sqrt(2.0) * k + k * k
+    a1, a2, b = 2.0 * (k * k - 1.0) / whole, (1.0 - np.sqrt(2.0) * k + k * k) / whole, k * k / whole
+    above = x - x[:1]
+    driven = b * above
+    driven[1:] += 2.0 * b * above[:-1]
+    driven[2:] += b * above[:-2]
+    bands = np.tile([[1.0], [a1], [a2]], len(x))
+    return x[:1] + solve_banded((2, 0), bands, driven.reshape(len(x), -1)).reshape(x.shape)
 
 
 def _bridged(x):

@@ -20,7 +20,8 @@ class Settings:
     alpha_est_sigma_deg: how far that may be off, one sigma; None goes by the session's surfaces (`alpha_est_sigma`).
     cutoff_Hz: of the zero-phase low-pass; None goes by speed. estimators: "module:function" of one's own.
     clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
-    (`FrameTimes.clock_sigma_s`). Raises BadInput out of range.
+    (`FrameTimes.clock_sigma_s`). gauges_from_all: every trial that can, calibrates the gauges. Raises BadInput out of
+    range.
     """
 
     theta_deg: float = 3.0
@@ -29,6 +30,7 @@ class Settings:
     estimators: tuple[str, ...] = ()
     clock_sigma_s: float | None = None
     alpha_est_sigma_deg: float | None = None
+    gauges_from_all: bool = False
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)

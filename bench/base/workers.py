@@ -1,7 +1,8 @@
 """Processes that work side by side, with the same results for any number of them.
 
-Every job runs in a fresh process with one thread, however many there are, because libraries sum in another order with
-other numbers of threads. Tests pass 0 workers: then jobs run here.
+Every job runs with one thread, however many processes there are, because libraries sum in another order with other
+numbers of threads: in fresh processes, or here where one is asked for and this one has a single thread itself
+(`single_thread`), which spares it from loading every library twice. Tests pass 0 workers: then jobs run here.
 """
 
 import multiprocessing
@@ -11,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from tqdm import tqdm
 
@@ -45,8 +46,11 @@ class Workers:
         return results
 
     def _finished(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
-        if self.count == 0:
-            yield from ((place, job(task)) for place, task in enumerate(tasks))
+        if self.count == 0 or (self.count == 1 and _has_one_thread()):
+            for place, task in enumerate(tasks):
+                with _pictures_by_one_thread() if self.count else nullcontext():
+                    result = job(task)
+                yield place, result
         elif tasks:
             pool = self._started()
             places = {pool.submit(job, task): place for place, task in enumerate(tasks)}
@@ -60,6 +64,29 @@ class Workers:
                 for _ in range(self.count):
                     self._pool.submit(_nothing)
         return self._pool
+
+
+def single_thread() -> None:
+    """One thread for linear algebra in this process, unless another number was asked for. Before numpy is loaded."""
+    for name in _THREADS:
+        os.environ.setdefault(name, "1")
+
+
+def _has_one_thread() -> bool:
+    return all(os.environ.get(name) == "1" for name in _THREADS)
+
+
+@contextmanager
+def _pictures_by_one_thread() -> Iterator[None]:
+    """OpenCV keeps to one thread in here, as in a worker."""
+    import cv2
+
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 @contextmanager

@@ -10,10 +10,11 @@ import numpy as np
 from bench.base.settings import Settings
 from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.rails import off_the_rails
-from bench.session.signals import Signals, forward_strokes
+from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
 from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
-from vision.truth.value import Value
+from vision.truth.records import FrameTruth
+from vision.truth.value import UNKNOWN, Value
 
 _GUARD_RAD = np.radians(0.2)
 _LEAST_FREE = 50  # samples
@@ -23,9 +24,27 @@ GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
 
 
 def lateness(seen: SeenWhisk, felt: FeltWhisk) -> Value:
-    """Felt less seen touch of a whisk, rad."""
+    """Felt less seen touch of a whisk, rad; the felt one's sigma holds the filter's delay. (No error of θ: touch and
+    moments are late alike.)"""
     sigma = float(np.hypot(seen.touch_rad.sigma, felt.touch_felt_rad.sigma))
     return Value(felt.touch_felt_rad.value - seen.touch_rad.value, sigma)
+
+
+def motor_speed(frames: FrameTruth) -> float:
+    """Of the motor over the frames of a whisk, rad/s."""
+    return float(np.median(np.diff(frames.motor_rad) / np.diff(frames.time_s)))
+
+
+def touch_on_the_way_back(signals: Signals) -> Value:
+    """Where the first back stroke lets go of the bar, rad: felt touch of that stroke run backwards."""
+    where = back_stroke(signals)
+    if where is None:
+        return UNKNOWN
+    channels = np.stack([signals.y, signals.z], axis=1)[where]
+    channels = off_the_rails(channels) if signals.kind == "V" else channels
+    time_s = signals.time_s[where]
+    touch = felt_touch(signals.motor_rad[where][::-1], channels[::-1], time_s[-1] - time_s[::-1])
+    return UNKNOWN if touch.status else Value(touch.motor_rad, touch.sigma_rad)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 _BEYOND = 1.05  # of the largest calibrated moment; up to there a line is still the same line
 
 FROM_FILE, FROM_MANIFEST, FROM_TRIALS = "gauges.toml", "session.toml [gauges]", "the session's gauge trials"
+FROM_ALL = "all trials that can serve (--gauges-from-all)"
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,8 @@ class SeenWhisk:
     """One whisk as the cameras show it; d_x_mm is NaN exactly where there is no truth, and `status` says why.
 
     The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
-    moment, "touch" and "theta".
+    moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
+    (`bench.trials.clocks`).
     """
 
     whisk: int
@@ -87,6 +88,7 @@ class SeenWhisk:
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
     overlay: dict[str, Drawing] = field(default_factory=dict)
+    touch_shared_rad: float = 0.0
 
     @property
     def has_truth(self) -> bool:
@@ -112,8 +114,17 @@ class BarLine:
 
 
 @dataclass(frozen=True, eq=False)
+class BackStroke:
+    """Touch as seen where the motor goes back, and the motor's speed, which is negative."""
+
+    touch_rad: Value
+    speed_rad_s: float
+
+
+@dataclass(frozen=True, eq=False)
 class SeenTrial:
-    """The seen half of a trial; bar, radii and clock are missing where there are no pictures."""
+    """The seen half of a trial; bar, radii and clock are missing where there are no pictures. back: the first back
+    stroke, where it was recorded and has a truth."""
 
     whisks: tuple[SeenWhisk, ...]
     notes: tuple[str, ...] = ()
@@ -121,6 +132,7 @@ class SeenTrial:
     bar_radius_mm: float = NAN
     wire_radius_mm: float = NAN
     clock: Clock | None = None
+    back: BackStroke | None = None
 
 
 @dataclass(frozen=True)
@@ -175,9 +187,10 @@ class FeltWhisk:
 
 @dataclass(frozen=True, eq=False)
 class FeltTrial:
-    """The felt half of a trial."""
+    """The felt half of a trial. back_touch_rad: felt touch of the first back stroke."""
 
     whisks: tuple[FeltWhisk, ...]
+    back_touch_rad: Value = UNKNOWN
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,6 +55,13 @@ def forward_strokes(signals: Signals) -> tuple[slice, ...]:
     return strokes.forward_strokes(signals.motor_rad)
 
 
+def back_stroke(signals: Signals) -> slice | None:
+    """Samples of the first back stroke that follows a forward one; None where none was recorded."""
+    forward = forward_strokes(signals)
+    back = strokes.forward_strokes(-signals.motor_rad)
+    return next((where for where in back if forward and where.start >= forward[0].stop - 1), None)
+
+
 def read_signals(trial: Trial) -> Signals:
     """Read and check a trial's signals.csv.
 

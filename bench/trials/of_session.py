@@ -1,7 +1,7 @@
 """The steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges, each trial's
 result. `evaluate` and `calibrate gauges` share them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauges_file import given_gauges
-from bench.gauges.matrix import Gauges
+from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.gauges.readings import Pairs, pairs_of
 from bench.records.plain import from_plain
 from bench.records.trial import TrialResult
@@ -28,6 +28,7 @@ from bench.session.trial import Trial
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, evaluate_unit, see_unit
 
+_MORE = "or let the other trials serve: --gauges-from-all"
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 
 
@@ -77,17 +78,28 @@ def _free_slopes(task: tuple[Trial, Settings]) -> list:
 
 
 def session_gauges(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Gauges | None:
-    """Gauges as brought along, else from the gauge trials; None, and a note, where these cannot fix them."""
-    given = given_gauges(units[0].session)
-    trials = [unit for unit in units if unit.trial.purpose == "gauge" and read_signals(unit.trial).kind == "V"]
+    """Gauges as brought along, else from the gauge trials, or from all where the settings say so; None, and a note on
+    what is lacking, where these cannot fix them."""
+    given, from_all = given_gauges(units[0].session), units[0].settings.gauges_from_all
+    volts = [unit for unit in units if read_signals(unit.trial).kind == "V"]
+    trials = [unit for unit in volts if from_all or unit.trial.purpose == "gauge"]
     if given is not None or not trials:
         return given
     pool.run(see_unit, trials, "gauge trials")
     try:
-        return fit_gauges([pairs for unit in trials for pairs in _pairs(unit, rate)])
+        fitted = fit_gauges([pairs for unit in trials for pairs in _pairs(unit, rate)])
     except Undetermined as reason:
-        doubts.note(str(reason))
+        doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * (len(trials) < len(volts))]))
         return None
+    return replace(fitted, source=FROM_ALL) if from_all else fitted
+
+
+def _lacking(units: Sequence[Unit]) -> Iterator[str]:
+    """What the truth of these trials lacks."""
+    for unit in units:
+        lacks = dict.fromkeys(whisk.status for whisk in see_unit(unit).whisks if not whisk.has_truth and whisk.status)
+        if lacks:
+            yield f"{unit.trial.name} has no truth: {', '.join(lacks)}"
 
 
 def _pairs(unit: Unit, rate) -> list[Pairs]:

@@ -7,10 +7,11 @@ import numpy as np
 
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration, moved_cameras
-from bench.records.trial import BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
+from bench.gauges.felt import motor_speed
+from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
-from bench.session.signals import Signals, forward_strokes
+from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
@@ -20,6 +21,7 @@ from vision.truth.records import WhiskTruth
 
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12
+_FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
 _MOST_NAMED = 5  # frames in a line
 _SAME = tuple({f.name for f in fields(SeenWhisk)} & {f.name for f in fields(WhiskTruth)} - {"status", "overlay"})
 
@@ -52,11 +54,13 @@ def _see(
     moved = moved_cameras(session, calibration, frames)
     wire = session.whisker.wire
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
+    places = [times.frames_in(signals, stroke) for stroke in strokes]
+    back = _backwards(signals, times)
     truth = observe_trial(
         {name: pictures for name, pictures in frames.items() if name not in moved},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
-        [times.frames_in(signals, stroke) for stroke in strokes],
+        [*places, *back],
         calibration.cameras,
         wire,
         Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
@@ -64,13 +68,32 @@ def _see(
         VisionSettings(clock_sigma_s=clock_sigma_s),
     )
     return SeenTrial(
-        tuple(whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks),
+        tuple(whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks[: len(places)]),
         (*truth.notes, *_lost(frames, times)),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
         0.5 * wire.diameter_mm,
         Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
+        _touch_alone(truth.whisks[-1]) if back else None,
     )
+
+
+def _backwards(signals: Signals, times: FrameTimes) -> list[slice]:
+    """Frames of the first back stroke, last to first, so that the whisker comes to the bar; none where few were taken.
+
+    A clock that is late has the whisker touch late on the way there and early on the way back.
+    """
+    where = back_stroke(signals)
+    frames = None if where is None else times.frames_in(signals, where)
+    if frames is None or frames.stop - frames.start < _FEWEST_BACK:
+        return []
+    return [slice(frames.stop - 1, frames.start - 1 if frames.start else None, -1)]
+
+
+def _touch_alone(truth: WhiskTruth) -> BackStroke | None:
+    """Of a back stroke what tells the clock; None where it has no truth."""
+    known = np.isfinite(truth.touch_rad.value)
+    return BackStroke(truth.touch_rad, motor_speed(truth.frames)) if known else None
 
 
 def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:

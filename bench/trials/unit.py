@@ -13,7 +13,7 @@ import numpy as np
 from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_result, write_result
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
-from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.felt import Stroke, strokes_of, touch_on_the_way_back
 from bench.gauges.matrix import FROM_TRIALS, Gauges
 from bench.gauges.readings import pairs_of
 from bench.records.phases import NO_PHASES, Phases
@@ -38,7 +38,7 @@ from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
 from estimator.signal import Touch
-from vision.truth.value import NAN
+from vision.truth.value import NAN, UNKNOWN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
 OWN_GAUGES = "not judged: without this trial the gauges are not known"
@@ -147,7 +147,8 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     """Felt touch, moments and estimates of each whisk; and its phases of stick and slip, which take the slope as seen
     and are no estimate."""
     strokes = strokes_of(signals, unit.trial, unit.settings)
-    return FeltTrial(tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes)))
+    whisks = tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes))
+    return FeltTrial(whisks, touch_on_the_way_back(signals) if seen.back else UNKNOWN)
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
@@ -209,9 +210,12 @@ def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
 
 
 def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:
-    """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated."""
+    """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated, and by
+    other trials: these factors are those of all."""
     plain_gauges = unit.gauges and unit.gauges.one_factor
-    if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
+    if kind == "Nmm" or plain_gauges is None or unit.trial.name in unit.gauges.without:
+        return ()
+    if not np.isfinite(plain_gauges.matrix).all():
         return ()
     readout, beam = Readout.of(unit.trial, plain_gauges), unit.session.whisker.beam
     _, whisk = felt_whisk(stroke, readout, unit.drift_rate, beam, unit.settings.theta_rad)

@@ -96,3 +96,15 @@ def test_no_number_where_there_is_no_touch(stroke, settings, status):
 def test_a_threshold_out_of_reach_is_told(stroke):
     s = stroke(np.random.default_rng(4))
     assert "does not cross" in threshold_touch(*s.arrays, s.time_s, 5.0, threshold=99.0).status
+
+
+@pytest.mark.parametrize("cutoff_Hz, n", [(5.0, 4000), (45.0, 700), (900.0, 300), (5.0, 40)])
+def test_the_low_pass_is_scipy_s(rng, cutoff_Hz, n):
+    """Loading scipy.signal takes longer than all else that one whisk needs of this package."""
+    from scipy.signal import butter, sosfiltfilt
+
+    x = np.cumsum(rng.standard_normal((n, 2)), axis=0)
+    each_way = min(cutoff_Hz / (np.sqrt(2) - 1) ** 0.25, 0.499 * 2000.0)
+    sections = butter(2, each_way, fs=2000.0, output="sos")
+    theirs = sosfiltfilt(sections, x, axis=0, padlen=min(n - 1, int(3 * 2000.0 / cutoff_Hz)))
+    np.testing.assert_allclose(zero_phase_lowpass(x, 2000.0, cutoff_Hz), theirs, atol=1e-9 * np.ptp(x))

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from vision.geometry.contact import BarAxis
+from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import outline
 from vision.lines.bands import Pieces, cut_pieces, read_band
@@ -24,10 +25,14 @@ NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
 
 def bar_pieces(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                settings: VisionSettings) -> Pieces:
-    """Pieces of the bar's band in the picture `grey`, to either side of the axis's point, that show no wire."""
+    """Pieces of the bar's band in the picture `grey`, to either side of the axis's point, that show no wire.
+
+    Raises Refused where no part of the bar lies before the camera."""
     place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
     points = axis.point_mm + place[:, None] * axis.direction
     middle, radius = outline(view.camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)
+    if not np.any(np.isfinite(radius)):
+        raise Refused(f"camera {view.camera.name} would have the bar behind it: check T_camera_rig")
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
     band = read_band(grey, view.background, middle, place, radius, half)
     pieces = cut_pieces([band], settings.bar_piece_px, view.noise)

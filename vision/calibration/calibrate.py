@@ -18,6 +18,7 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.boards.static_board import camera_moved, mean_view
 from vision.boards.sufficiency import (
+    check_errors,
     check_lenses,
     check_rig_view,
     check_views,
@@ -29,12 +30,12 @@ from vision.boards.sufficiency import (
     without_strays,
 )
 from vision.calibration.adjust import solve
-from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Priors, State
+from vision.calibration.bundle import N_CAMERA, POSE, Priors, State
 from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
-from vision.calibration.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
+from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
+from vision.calibration.tied import Tied, Timing, lens_priors, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
@@ -42,19 +43,9 @@ from vision.geometry.errors import Refused
 
 __all__ = ["Calibration", "CameraReport", "calibrate_cameras", "camera_moved"]
 
-# One sigma about zero of the distortion terms, for lenses of 3 to 100 mm; wider than any that is not a
-# fisheye.
-LENS_PRIOR = {"k1": 0.5, "k2": 0.5, "p1": 0.005, "p2": 0.005, "k3": 0.3}
 # The board's warp enters where it lowers the cost by more than chance does once in 10 000 (two parameters).
 _WARP_GAIN = 18.4
 _WARP_SIGMA_MM = 2.0
-# Cameras that share views were not triggered together where they agree this many times worse than each with itself.
-_DISAGREE = 1.5
-# Clock offsets and scatter of instants to begin with, in frame intervals.
-_CLOCK_SIGMA = 0.6
-_FIRST_LATENESS = 0.2
-# What cameras may disagree by, px, before instants have been found.
-_FIRST_EXCESS_PX = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +68,6 @@ class CameraReport:
     depth_ratio: float
     tilt_deg: float
     intrinsics_sigma: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Timing:
-    """Cameras that are not triggered together: offset_s and scatter_s (C,), how late pictures are on average and how
-    much that varies; s, or frame intervals where the pictures' times were not given (in_frames)."""
-
-    offset_s: np.ndarray
-    scatter_s: np.ndarray
-    in_frames: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,19 +105,17 @@ def calibrate_cameras(
     """
     alone = {n: _alone(n, views, board, on_rig is not None) for n in views.boards}
     standing = {n: _standing(views.rig[n], views.trials.get(n, ()), board) for n in alone} if on_rig else None
-    together, T_rig_board = looked_at_once(alone), on_rig.T_rig_board if on_rig else None
-    poses = place_cameras(alone, standing, board, T_rig_board, together=together)
-    layout = lay_out(
-        alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=views.times_s
-    )
-    priors = _priors(layout.first, board, on_rig)
-    settled, timing = _settle(layout, board, priors, _errors(alone, triggered), views.times_s is None)
-    settled, notes = _settle_with_warp(layout, settled, board)
+    layout, settled, timing, notes = Tied(alone, standing, board, on_rig, views.times_s, triggered).adjusted()
+    together = layout.trajectory is not None
+    settled, warp = _settle_with_warp(layout, settled, board)
+    notes = [*notes, *warp]
+    if not triggered:
+        check_errors(alone, settled.error_px)
     if timing is not None:
-        notes.append(_timing_note(alone, timing))
+        notes.append(timing_note(alone, timing))
     calibration = _calibration(alone, views.sizes_px, settled, board, notes, timing, together)
     if on_rig is not None:
-        placement = by_board(T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad).covariance
+        placement = by_board(on_rig.T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad).covariance
         calibration = replace(calibration, cameras=replace(calibration.cameras, placement=placement))
     check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
     check_work(calibration.cameras, alone, standing, work_points_mm)
@@ -176,35 +155,6 @@ def calibrate_alone(
     return settle(state, seen, board.corners_mm, priors, rough=rough)
 
 
-def lens_priors(n_cameras: int, n_views: int) -> Priors:
-    """Lenses and poses free, the lenses' prior; board exact, cameras triggered together."""
-    size = N_CAMERA * n_cameras + N_BOARD
-    free, mean, sigma = np.ones(size, dtype=bool), np.zeros(size), np.full(size, np.inf)
-    for column, name in enumerate(CAMERA_COLUMNS):
-        rows = column + N_CAMERA * np.arange(n_cameras)
-        sigma[rows] = LENS_PRIOR.get(name, np.inf)
-        free[rows] = not name.endswith("_s")
-    free[-N_BOARD:] = False
-    return Priors(free, mean, sigma, np.ones(n_views, dtype=bool))
-
-
-def _priors(first: State, board: Board, on_rig: MeasuredPose | None) -> Priors:
-    """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the square.
-
-    Without a rig board the first camera is the world's frame.
-    """
-    priors = lens_priors(len(first.lens), len(first.T_world_board))
-    if board.square_sigma_mm > 0:
-        priors.free[-N_BOARD] = True
-        priors.sigma[-N_BOARD] = board.square_sigma_mm / board.square_mm
-    if on_rig is None:
-        priors.free[POSE] = False
-        return priors
-    priors.view_free[0] = not on_rig.is_exact
-    pose_sigma = np.repeat([max(on_rig.sigma_rad, 1e-9), max(on_rig.sigma_mm, 1e-7)], 3)
-    return replace(priors, pose_view=0, pose_T=on_rig.T_rig_board, pose_sigma=pose_sigma)
-
-
 def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Settled, list[str]]:
     """With a warped board where that lowers the cost, at the flat board's noise, by more than chance would."""
     priors = allow_warp(flat.priors)
@@ -214,44 +164,6 @@ def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Sett
     settled = settle(warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1)
     x, y = settled.solution.state.board[1:]
     return settled, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
-
-
-def _errors(alone: Mapping[str, Alone], triggered: bool) -> np.ndarray | None:
-    """Each camera's error by itself, against which to judge how they agree; None where there is no need to."""
-    return None if triggered or len(alone) < 2 else np.array([a.error_px for a in alone.values()])
-
-
-def _settle(layout: Layout, board: Board, priors: Priors, error_alone: np.ndarray | None, in_frames: bool):
-    """With pictures of one view at one instant, unless cameras agree far worse with each other than with themselves."""
-    if layout.trajectory is None or error_alone is None:
-        return settle(layout.first, layout.seen, board.corners_mm, priors), None
-    rough = settle(layout.first, layout.seen, board.corners_mm, priors, rough=True)
-    if np.median(rough.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:
-        return settle(rough.solution.state, layout.seen, board.corners_mm, priors), None
-    state = replace(rough.solution.state, trajectory=layout.trajectory)
-    priors = allow_lateness(priors, layout.trajectory)
-    settled = settle(state, layout.seen, board.corners_mm, priors, error_px=error_alone + _FIRST_EXCESS_PX)
-    return settled, Timing(settled.solution.state.clock, settled.priors.late_sigma_s, in_frames)
-
-
-def _timing_note(names, timing: Timing) -> str:
-    scale, unit = (1.0, "frames") if timing.in_frames else (1e3, "ms")
-    late = (
-        f"{name} {scale * offset:+.3g} ± {scale * scatter:.2g} {unit}"
-        for name, offset, scatter in zip(names, timing.offset_s, timing.scatter_s)
-    )
-    said = f"later than the view by {', '.join(late)} (below 0: earlier)"
-    return f"Pictures of one view were not taken at one instant: {said}; taken into account."
-
-
-def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
-    """The same with clocks and pictures' instants free. The clock of the camera that ranks first is the clock."""
-    free, sigma = priors.free.copy(), priors.sigma.copy()
-    clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
-    free[clocks[trajectory.camera_rank > 0]] = True
-    sigma[clocks] = _CLOCK_SIGMA * trajectory.interval_s
-    late = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
-    return replace(priors, free=free, sigma=sigma, late_sigma_s=late)
 
 
 def allow_warp(priors: Priors) -> Priors:

@@ -15,10 +15,11 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import check_lens, check_rig_view
 from vision.calibration.bundle import N_CAMERA, State
-from vision.calibration.calibrate import as_cameras, lens_priors
+from vision.calibration.calibrate import as_cameras
 from vision.calibration.corner_noise import settle
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
+from vision.calibration.tied import lens_priors
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.errors import Refused

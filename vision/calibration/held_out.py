@@ -18,9 +18,10 @@ from vision.boards.corners import Corners
 from vision.boards.sufficiency import fixes_pose, without_strays
 from vision.calibration.adjust import Solution, solve
 from vision.calibration.bundle import predict
-from vision.calibration.calibrate import Calibration, lens_priors
+from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, has_pose
 from vision.calibration.layout import Alone, Layout, lay_out
+from vision.calibration.tied import lens_priors
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.triangulate import triangulate

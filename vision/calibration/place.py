@@ -11,7 +11,7 @@ Covariances say how well each knows it, and weigh the two.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
@@ -86,7 +86,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
     covariance = board.covariance - gain @ board.covariance
     apart = swing.step - board.step
     square = float(apart @ np.linalg.solve(both, apart))
-    alarm = _alarm(apart, np.sqrt(np.diag(both))) if square > chi2.isf(FALSE_ALARM, 6) else None
+    alarm = _alarm(apart, np.sqrt(np.diag(both))) if square > chdtri(6, FALSE_ALARM) else None
     made = replace(swing, step=step, covariance=0.5 * (covariance + covariance.T), alarm=alarm)
     return replace(made, notes=(*swing.notes, f"With the board: {made.spread}."))
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from vision.calibration.place import FALSE_ALARM, Placement
 from vision.geometry.base_lines import BaseLines
@@ -57,7 +57,7 @@ def by_swing(lines: BaseLines) -> Placement:
 def _excess(fitted: OptimizeResult) -> float:
     """By how much frames scatter more than they say (a motor angle's own noise), as variances; 1 where chance may."""
     square, left = 2 * fitted.cost, len(fitted.fun) - len(fitted.x)
-    return square / left if square > chi2.isf(FALSE_ALARM, left) else 1.0
+    return square / left if square > chdtri(left, FALSE_ALARM) else 1.0
 
 
 def _first(lines: BaseLines) -> np.ndarray:

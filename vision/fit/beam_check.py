@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from vision.fit.problem import CONTACT_SIGMA_MM, WANDER_PX, Problem, State, bar_axis, bends, curves_of, wandering
 from vision.fit.quantities import Jacobians, Measured
@@ -102,7 +102,7 @@ def _chance(departure, spread) -> float:
     if not np.all(np.isfinite(spread)):
         return float("nan")
     square = departure @ np.linalg.pinv(spread, hermitian=True) @ departure
-    return float(chi2.sf(square, len(departure)))
+    return float(chdtrc(len(departure), square))
 
 
 def _departure(problem: Problem, state: State, frame: int):

@@ -151,6 +151,8 @@ def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarr
     with the largest sum wins. The background's gain and offset are those that fit the whole piece. Its picture is as
     noisy as a frame's: a dim rod must not drown in a noise that is no difference.
     """
+    if len(pieces) == 0:  # hidden, or outside the picture
+        return np.zeros(0), np.zeros(0)
     columns = np.stack([pieces.background, np.ones_like(pieces.background)], -1) * pieces.weight[..., None]
     seen = pieces.grey * pieces.weight
     turned = columns.transpose(0, 2, 1)

@@ -51,9 +51,10 @@ def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.
 
 
 def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.ndarray:
-    """Which pieces (s,) lie outside the bar's outline, given by its middle (m, 2) and half-width (m,)."""
+    """Which pieces (s,) lie outside the bar's outline, given by its middle (m, 2) and half-width (m,); NaN where it
+    passes behind the camera and hides nothing."""
     away = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
-    return np.min(away - radius_px[None], axis=1) > margin_px
+    return np.fmin.reduce(away - radius_px[None], axis=1, initial=np.inf) > margin_px
 
 
 def _best_blur(pieces: Pieces, knots: Knots) -> float:

@@ -32,7 +32,7 @@ def noise_by_level(level: np.ndarray, deviation: np.ndarray) -> Noise:
     edges = np.unique(np.quantile(level, np.linspace(0, 1, 13)))
     classes = np.digitize(level, edges[1:-1])
     rows = [(np.median(level[classes == k]), (np.median(deviation[classes == k]) / 0.6745) ** 2, np.sum(classes == k))
-            for k in range(len(edges) - 1) if np.any(classes == k)]
+            for k in range(max(len(edges) - 1, 1)) if np.any(classes == k)]
     middle, variance, count = np.array(rows).T
     if len(middle) > 1 and np.ptp(middle) >= 1.0:
         gain, floor = np.polyfit(middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, 0.1))

@@ -16,6 +16,7 @@ from vision.bar.search import see_bar
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import check_beam
 from vision.geometry.camera import Cameras
+from vision.geometry.centreline import resting_lines
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
@@ -53,13 +54,14 @@ def observe_trial(
     time_s, motor_rad = np.asarray(time_s, dtype=float), np.asarray(motor_rad, dtype=float)
     rods = Rods(wire, bar)
     try:
+        cameras, behind = _that_face_it(cameras, wire, motor_rad)
         views = _views(frames, cameras, background)
         used = cameras.subset([view.camera.name for view in views])
         bar_seen = see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
     seen = [WhiskPictures(number, range(*where.indices(len(time_s))), time_s, motor_rad, views, used, rods, bar_seen,
-                          settings) for number, where in enumerate(whisks)]
+                          settings, left_out=tuple(behind)) for number, where in enumerate(whisks)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis = bar_seen.axis
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines([whisk.light for whisk in seen]))
@@ -68,6 +70,17 @@ def observe_trial(
 def _nothing(whisks, reason: str) -> TrialTruth:
     rows = tuple(WhiskTruth(number, None, status=reason) for number in range(len(whisks)))
     return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), rows)
+
+
+def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, list[str]]:
+    """The cameras that have the whisker before them, and lines on the others. Raises Refused where none has."""
+    span = [np.min(motor_rad), np.max(motor_rad)]
+    faces = {camera.name: bool(np.all(np.isfinite(resting_lines(camera, wire, span)))) for camera in cameras}
+    lines = [f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig"
+             for name, faced in faces.items() if not faced]
+    if not any(faces.values()):
+        raise Refused("; ".join(lines))
+    return cameras.subset([name for name, faced in faces.items() if faced]), lines
 
 
 def _views(frames, cameras: Cameras, background) -> tuple[View, ...]:

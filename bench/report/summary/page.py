@@ -8,8 +8,9 @@ from bench.report.evaluation import Evaluation
 from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubts
 from bench.report.summary.errors import error_lines
 from bench.report.summary.gauges import gauge_lines
+from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import run_lines, verdict
+from bench.report.summary.verdict import gauges_of_all, run_lines, verdict
 from bench.trials.compare import judge
 
 DONE, DOUBTFUL = 0, 1
@@ -21,7 +22,7 @@ def write_summary(evaluation: Evaluation, scores: Sequence[str], figures: Sequen
 
     scores: lines on a synthetic session's truth; figures: names of the pictures.
     """
-    doubtful = [*evaluation.doubts, *whisk_doubts(evaluation.results)]
+    doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
     text = "\n".join(_lines(evaluation, doubtful, scores, figures)).rstrip()
     write_whole(evaluation.out / "summary.txt", text + "\n")
     print(text)
@@ -31,9 +32,10 @@ def write_summary(evaluation: Evaluation, scores: Sequence[str], figures: Sequen
 def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str], figures: Sequence[str]) -> list[str]:
     results, settings, judged = evaluation.results, evaluation.settings, judge(evaluation.results)
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
-    truth = [*truth_lines(results), *budget_lines(results), *beam_lines(results)]
+    truth = [*truth_lines(results), *budget_lines(results), *shared_lines(results), *beam_lines(results)]
     return [
         *verdict(evaluation.session, results, judged, settings, len(doubtful)),
+        *gauges_of_all(evaluation.gauges),
         "",
         *_titled("Truth, from the pictures (± one sigma)", truth),
         *_titled("Clocks", clock_lines(results)),

@@ -1,13 +1,14 @@
 """The truth of each whisk, where its variance comes from, what a spline would make of it, and the frames' clocks."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from bench.gauges.felt import GAUGE_DELAY_S, lateness
 from bench.records.trial import TrialResult, whisks
 from bench.report.assembly import beam_rows, budget_rows
+from bench.trials.clocks import shared_touch
 from vision.fit.uncertainty import CAUSES
 from vision.truth.value import Value
 
@@ -31,7 +32,7 @@ def truth_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         )
 
 
-def clock_lines(results: Iterable[TrialResult]) -> Iterator[str]:
+def clock_lines(results: Sequence[TrialResult]) -> Iterator[str]:
     """What ties the frames to the signals, a line for each way, and what the felt touch is late by."""
     clocks = [result.seen.clock for result in results if result.seen.clock]
     ways = Counter(clocks)
@@ -52,6 +53,8 @@ def clock_lines(results: Iterable[TrialResult]) -> Iterator[str]:
             f"felt − seen: its sigma holds {1e3 * GAUGE_DELAY_S:.2f} ms of delay by a gauges' filter of 800 Hz, fourth "
             "order (the session does not name its own)"
         )
+        shared = shared_touch(results)
+        yield from [shared.line] if shared else []
 
 
 def budget_lines(results: Iterable[TrialResult]) -> Iterator[str]:

@@ -7,6 +7,7 @@ import numpy as np
 from bench.base.drawing import label_of
 from bench.base.settings import Settings
 from bench.friction.runs import FITTED, RUNS, SEEN
+from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.compare import Judged
@@ -41,6 +42,16 @@ def _told(asked: Sequence[Judged]) -> str:
     parts = [f"{len(none)} of {len(asked)} without a distance ({none[0].status})"] if none else []
     parts += [f"{len(doubted)} with a status ({doubted[0].status})"] if doubted else []
     return f" {'; '.join(parts)}." if parts else ""
+
+
+def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
+    """What the verdict rests on where measured trials calibrated the gauges."""
+    if gauges is not None and gauges.source == FROM_ALL:
+        judged = sum(matrix is not None for matrix in gauges.without.values())
+        yield (
+            f"Gauges from {FROM_ALL}: {judged} of {len(gauges.without)} trials that served are judged, each by gauges "
+            "fitted without it; no estimate by gauges that its own trial calibrated is in the verdict."
+        )
 
 
 def _measured(judged: Sequence[Judged]) -> list[Judged]:

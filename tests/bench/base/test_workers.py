@@ -27,10 +27,24 @@ def test_no_workers_run_here():
 
 
 def test_each_process_has_one_thread_and_this_one_keeps_its_own(monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")  # not one: a process of its own
     with Workers(1) as pool:
         assert pool.run(os.getenv, ["OMP_NUM_THREADS"], "threads") == ["1"]
     assert os.environ["OMP_NUM_THREADS"] == "7"
+
+
+def test_one_process_of_one_thread_works_here(monkeypatch):
+    """It would load every library a second time. Pictures are read by one thread, as in a worker."""
+    import cv2
+
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(name, "1")
+    before = cv2.getNumThreads()
+    with Workers(1) as pool:
+        assert pool.run(lambda _: (os.getpid(), cv2.getNumThreads()), [1], "here") == [(os.getpid(), 1)]
+    assert cv2.getNumThreads() == before
+    with Workers(2) as pool:
+        assert pool.run(os.path.abspath, ["/"], "elsewhere") == ["/"] and pool._pool is not None
 
 
 def test_bad_input_comes_through_as_it_was():

@@ -9,7 +9,8 @@ from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_re
 from vision.calibration.adjust import solve
 from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
-from vision.calibration.calibrate import calibrate_alone, calibrate_cameras, lens_priors
+from vision.calibration.calibrate import calibrate_alone, calibrate_cameras
+from vision.calibration.tied import lens_priors
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 

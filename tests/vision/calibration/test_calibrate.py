@@ -6,7 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_recording, noisy
+from tests.ladder.board_scenes import (
+    BOARD,
+    SIZE_PX,
+    T_RIG_BOARD,
+    WORK_MM,
+    a_recording,
+    moving_board,
+    noisy,
+    noisy_view_at,
+)
 from vision.boards.corners import Corners
 from vision.boards.static_board import camera_moved, mean_view
 from vision.boards.sufficiency import check_lens
@@ -14,6 +23,7 @@ from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.camera import Camera
 from vision.geometry.errors import Refused
+from vision.geometry.rotation import exp_rotation
 
 SIGMA_PX = 0.04
 # The session's contract: 0 to 100 mm along x, a bar's ± 30 mm to either side.
@@ -231,3 +241,43 @@ def test_a_thousand_calibrations(rig):
         # A standard deviation of 1000 draws scatters by 2.2 %.
         assert np.abs(sample.ratio - 1).max() < 0.10
         assert 0.93 < sample.coverage < 0.97
+
+
+def elsewhere(T, rng):
+    """The pose T of a board, held by hand a second time: 2 degrees and 4 mm off, each about an axis."""
+    turn = exp_rotation(np.radians(2.0) * rng.standard_normal(3))
+    middle = T[:, :3] @ BOARD.corners_mm.mean(axis=0) + T[:, 3] + 4.0 * rng.standard_normal(3)
+    return np.column_stack([turn @ T[:, :3], middle - turn @ T[:, :3] @ BOARD.corners_mm.mean(axis=0)])
+
+
+@pytest.fixture
+def same_order(recording, rng):
+    """Each camera's own series of the same fourteen poses, in one order, a hand's accuracy apart; rig views."""
+    poses = [moving_board(0.9 * k) for k in range(14)]
+    boards = {c.name: [noisy_view_at(c, elsewhere(T, rng), SIGMA_PX, rng) for T in poses] for c in recording.cameras}
+    return boards, recording.seen(SIGMA_PX, rng)[1]
+
+
+def test_series_of_their_own_that_look_alike_are_each_camera_s_own(recording, same_order):
+    """Taken for views that both cameras had at once, they gave lenses 20 % off, or were refused for another cause."""
+    made = calibrated(*same_order)
+    assert not made.together and made.timing is None
+    assert any("they did not: so taken, corners of camera" in note for note in made.notes)
+    for report, camera in zip(made.report, made.cameras):
+        assert report.rms_px < 2 * SIGMA_PX and report.left_out == 0
+        assert np.abs(camera.lens - recording.cameras[camera.name].lens)[0] < 5 * report.intrinsics_sigma[0]
+
+
+def test_series_of_their_own_do_not_place_cameras(same_order):
+    boards, _ = same_order
+    with pytest.raises(Refused, match=r"by itself 0\.0. px; record views that all cameras see at once, or a picture"):
+        calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX)), BOARD, None)
+
+
+def test_views_that_no_lens_explains_are_refused(recording, rng):
+    """A board that bends as it is held: each view another way."""
+    boards, rig = recording.seen(SIGMA_PX, rng)
+    for view in boards["high"]:
+        view.px[:, 1] += 2.0 * np.sin(BOARD.corners_mm[view.ids, 0] / 20.0 + rng.uniform(0, 2 * np.pi))
+    with pytest.raises(Refused, match=r"camera high: corners are off by .* px an axis .*: the board is not flat"):
+        calibrated(boards, rig)

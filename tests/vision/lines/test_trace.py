@@ -5,11 +5,13 @@ import pytest
 
 from tests.ladder.lines import COLUMNS, FRAMES, KNOTS, NOISE, PIECE_PX, SCENES, SHAPE, axis_height, band, drawn, errors
 from tests.scenes.model_scenes import camera
+from vision.fit.first_bends import coarse_points
 from vision.geometry.centreline import centrelines
+from vision.geometry.contact import BarAxis, outline_of_bar
 from vision.geometry.rods import Wire
 from vision.lines.bands import cut_pieces
 from vision.lines.cylinder import WAVES
-from vision.lines.trace import settle_again, to_points, trace, wire_pieces
+from vision.lines.trace import clear_of_bar, settle_again, to_points, trace, wire_pieces
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 
@@ -46,3 +48,34 @@ def test_a_wire_is_found_again_from_a_curve_that_is_off_as_a_whole(rng, name):
     off = errors(scene, points, source)
     for third in np.array_split(np.argsort(points.place), 3):
         assert abs(np.mean(off[third])) < 0.02 + 3 * 0.014
+
+
+@pytest.fixture
+def still():
+    """A wire at 0 and 5 degrees before a camera, whose pictures are all the same."""
+    view, wire, grey = camera("one", (38, -175, 335)), Wire("cylinder", 100.0, 1.0), np.full((720, 1280), 60.0)
+    curves = {k: centrelines(np.zeros((2, 4)), np.zeros(2), np.array(60.0), np.radians(5.0 * k), wire)
+              for k in range(2)}
+    return View(view, dict.fromkeys(curves, grey), grey, Noise(1.0, 0.0)), curves, wire
+
+
+def test_a_wire_that_the_bar_hides_whole_has_no_points(still):
+    """There is no median width of no pieces: that ended the whole run."""
+    view, curves, wire = still
+    over_all = np.array([[640.0, 360.0]]), np.array([2000.0])
+    points, source = coarse_points(view, curves, wire, over_all)
+    assert len(points) == len(source) == 0
+
+
+def test_a_bar_that_passes_behind_the_camera_hides_no_more_than_what_is_before_it(still):
+    """60 mm towards the camera the bar has no place in the picture; the wire was lost there in all frames."""
+    view, curves, wire = still
+    sight = view.camera.centre_mm - np.array([70.0, 0.0, 0.0])
+    sight /= np.linalg.norm(sight)
+    beside = view.camera.centre_mm - 30.0 * sight + [0.0, 8.0, 0.0]
+    middle, radius = outline_of_bar(view.camera, BarAxis(beside, sight), 3.0)
+    assert np.isnan(radius).any() and np.isfinite(radius).any()
+    pieces = wire_pieces(view, curves, wire, 16, 7)
+    clear = clear_of_bar(pieces, middle, radius, 4.0)
+    finite = np.isfinite(radius)
+    assert np.array_equal(clear, clear_of_bar(pieces, middle[finite], radius[finite], 4.0)) and clear.any()

@@ -1,16 +1,57 @@
 """A trial of the sample session as the cameras show it, against its truth; and the ways in which it has none."""
 
+from copy import copy
 
 import numpy as np
 import pytest
 
 from tests.scenes.recorded import BAR, WIRE, Recorded
+from vision.geometry.camera import Camera, Cameras
 from vision.truth.observe import observe_trial
 
 
 @pytest.fixture(scope="module")
 def steep(small_session):
     return Recorded(small_session, "b60_4")
+
+
+def narrowed(recorded, name, left, right):
+    """The same trial where one camera's pictures are cut to these columns."""
+    cut, old = copy(recorded), recorded.cameras[name]
+    shift = np.array([[0, 0, left], [0, 0, 0], [0, 0, 0]])
+    new = Camera(name, (right - left, old.size_px[1]), old.matrix - shift, old.distortion, old.T_camera_rig)
+    cut.cameras = Cameras(tuple(new if camera is old else camera for camera in recorded.cameras))
+    cut.frames = recorded.frames | {name: {k: grey[:, left:right] for k, grey in recorded.frames[name].items()}}
+    cut.background = recorded.background | {name: recorded.background[name][:, left:right]}
+    return cut
+
+
+def test_a_camera_before_which_the_bar_hides_the_wire_leaves_what_is_known(steep):
+    """It ended the run ("cannot convert float NaN to integer"); the other camera sees the wire."""
+    truth, low = steep.truth, steep.cameras["low"]
+    turn = np.radians(truth["touch_deg"])
+    at, _ = low.project(truth["d_x_mm"] * np.array([[np.cos(turn), np.sin(turn), 0.0]]))[0].astype(int)
+    seen = narrowed(steep, "low", at - 10, at + 10).see()
+    assert seen.status.startswith("the bar's slope is known to")
+    assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=3 * seen.d_x_mm.sigma)
+
+
+def test_a_camera_with_the_whisker_behind_it_is_left_out(steep):
+    """Its pose is wrong; all else goes on."""
+    wrong, low = copy(steep), steep.cameras["low"]
+    about = np.diag([-1.0, 1.0, -1.0]) @ low.T_camera_rig
+    wrong.cameras = Cameras((steep.cameras["high"], Camera("low", low.size_px, low.matrix, low.distortion, about)))
+    seen = wrong.see()
+    assert "camera low was left out: by its pose the whisker is behind it, check T_camera_rig" in seen.status
+    assert seen.cameras == 1
+
+
+def test_a_camera_that_shows_one_grey_alone_tells_nothing(steep):
+    """A lens cap, or a picture that is white all over."""
+    white = copy(steep)
+    white.frames = steep.frames | {"low": {k: np.full_like(grey, 255) for k, grey in steep.frames["low"].items()}}
+    seen = white.see()
+    assert abs(seen.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
 
 
 def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
