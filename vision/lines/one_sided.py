@@ -65,13 +65,10 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
 
 @dataclass(frozen=True)
 class Lit:
-    """How one camera sees the wire: lens blur in px, the width seen, and where its line lies beside the fitted one, px:
-    as a whole, and at the tip farther than at the middle."""
+    """How one camera sees the wire: lens blur in px, and the width seen."""
 
     blur_px: float
     width: SeenWidth
-    off_px: float = 0.0
-    tilt_px: float = 0.0
 
 
 def one_sided_lines(whisks: Sequence[Mapping[str, Lit]]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from vision.bar.edges import measure_edges
 from vision.bar.one_view import seen_from_one_side
 from vision.bar.search import SeenBar, bar_lines, of_mean
 from vision.fit.first_bends import contact_arc, find_rest, follow_bends
-from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape, wire_lever
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.fit.scatter import honest, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
@@ -20,18 +20,15 @@ from vision.geometry.contact import BarAxis, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
-from vision.lines.cylinder import WAVES
 from vision.lines.one_sided import Lit, seen_width
 from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import clear_of_bar, observed, settle, settle_again, to_points, trace, wire_pieces
+from vision.lines.trace import clear_of_bar, observed, to_points, trace, wire_pieces
 from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
 _NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 _BESIDE_BAR_PX = 4.0
-_SEARCH_PX = 1.5
-_ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 # Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
 # another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
@@ -70,7 +67,6 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
         seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
         problem, state, _ = _fit(seen, cameras, rods, look, motor, light, by_onset)
         _check_scatter(problem, state)
-        light.update(_beside_fit(problem, state, light))
         look = _next_look(problem, state, look, motor, by_onset)
     seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
     return *_fit(seen, cameras, rods, look, motor, light, by_onset), list(motor)
@@ -132,13 +128,6 @@ def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, 
             raise Refused(_NEVER_TOUCHES)
     return _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
                  state.arcs_mm, _fitted(problem, state, motor), touching, free)
-
-
-def _beside_fit(problem: Problem, state: State, light: Mapping[str, Lit]) -> dict[str, Lit]:
-    """The same light, with where each camera's own line lies: it is looked for again from there."""
-    own = [state.vector[problem.wire_off(camera)][:2].tolist() for camera in range(len(problem.cameras))]
-    return {name: replace(light[name], off_px=off, tilt_px=tilt)
-            for name, (off, tilt) in zip(problem.cameras.names, own) if name in light}
 
 
 def _check_scatter(problem: Problem, state: State) -> None:
@@ -236,12 +225,7 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
         return []
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
-    if known:
-        own = known.off_px + known.tilt_px * wire_lever(rods.wire.length_mm, pieces.place)
-        pieces, blur = settle_again(pieces.moved(own), known.blur_px, knots), known.blur_px
-    else:
-        pieces, blur = settle(pieces, knots, _SEARCH_PX)
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST, last=last)
-    light[name] = known or Lit(blur, seen_width(pieces, blur))
-    points, source = to_points(pieces, found, misfit)
+    traced = trace(pieces, knots, known.blur_px, last=last) if known else trace(pieces, knots, last=last)
+    light[name] = known or Lit(traced.blur_px, seen_width(traced.pieces, traced.blur_px))
+    points, source = to_points(traced)
     return observed(points, source, number, list(curves))

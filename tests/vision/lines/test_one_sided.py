@@ -17,9 +17,9 @@ from vision.lines.trace import to_points
 
 def looked_at(name, rng):
     """Width seen in one of the drawn scenes, and the mean error of the axis found there."""
-    _, _, seen, blur = first_look(SCENES[name], rng, off_px=0.3)
-    points, source = to_points(*seen)
-    return seen_width(seen[0], blur), float(np.mean(errors(SCENES[name], points, source)))
+    *_, seen = first_look(SCENES[name], rng, off_px=0.3)
+    points, source = to_points(seen)
+    return seen_width(seen.pieces, seen.blur_px), float(np.mean(errors(SCENES[name], points, source)))
 
 
 @pytest.mark.parametrize("name", ["highlight and step", "highlight over printed squares"])
