@@ -57,16 +57,14 @@ def slopes_of(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, 
     return slopes * (rows / radius_px), curvatures * (rows / radius_px) ** 2
 
 
-def rim_bells(offset_px, radius_px, blur_px: float, powers: int = 2) -> np.ndarray:
-    """Bells (..., powers) where the blurred rod begins and ends: normal densities of z, the distance from the edge over
-    the blur, times 1, z, z² …; those of the edge at negative offset are taken away from the other's."""
-    bells = np.zeros((*np.broadcast_shapes(np.shape(offset_px), np.shape(radius_px)), powers))
+def rim_bells(offset_px, radius_px, blur_px: float) -> np.ndarray:
+    """Bells (..., 2) where the blurred rod begins and ends: normal densities of z, the distance from the edge over the
+    blur, and z times them; those of the edge at negative offset are taken away from the other's."""
+    bells = 0.0
     for side in (1.0, -1.0):
         z = (offset_px - side * radius_px) / blur_px
         bell = np.exp(-0.5 * z * z) * (side / np.sqrt(2.0 * np.pi))
-        for power in range(powers):
-            bells[..., power] += bell
-            bell *= z
+        bells = bells + np.stack([bell, z * bell], axis=-1)
     return bells
 
 

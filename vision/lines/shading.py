@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from vision.lines.bands import Pieces
-from vision.lines.cylinder import rim_bells, shading_basis, slopes_of
+from vision.lines.cylinder import shading_basis, slopes_of
 
 LEAST_POWER = 1e-9  # 1/px², of a piece that does not tell where it is
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
@@ -80,14 +80,6 @@ def _not_leaked(pieces: Pieces, bells, blur_px: float) -> np.ndarray:
     return bells[..., 0] * (blur_px * pieces.slope) - bells[..., 1] * ((0.5 * blur_px**2) * pieces.curvature)
 
 
-def _leak_slopes(pieces: Pieces, blur_px: float) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives (s, p) of `_not_leaked` by the offset, per px, and by the logarithm of the blur."""
-    bells = np.moveaxis(rim_bells(pieces.offset_px, pieces.radius_px[:, None], blur_px, powers=4), -1, 0)
-    slope, curvature = pieces.slope, (0.5 * blur_px) * pieces.curvature
-    return (-slope * bells[1] - curvature * (bells[0] - bells[2]),
-            blur_px * (slope * (bells[0] + bells[2]) - curvature * (bells[1] + bells[3])))
-
-
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust=None,
                 prior=None) -> tuple[Shading, float]:
     """Most probable radiance over all pieces with their positions as they stand; also how badly it fits, per pixel.
@@ -155,17 +147,16 @@ class Equations:
         return self.power + np.einsum("st,st->s", waves, (self.gram @ waves[..., None])[..., 0] - 2.0 * self.moment)
 
     def linearised(self, waves) -> "Slopes":
-        """How pieces of this shading, waves (s, terms), change with position and blur."""
+        """How pieces of this shading, waves (s, terms), change with position and blur; what leaks is taken to stay."""
         pieces, rest = self.pieces, self._rest
         left = rest[:, 2] - (self._rod @ waves[..., None])[..., 0]
         explained = self._inverse @ (rest[:, :2] @ left[..., None])  # gain and constant
         by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
         slopes, curvatures = slopes_of(pieces.offset_px, pieces.radius_px, self.blur_px, waves)
-        leaks = _leak_slopes(pieces, self.blur_px)
         columns = np.empty_like(rest)
-        columns[:, 0] = -(slopes[0] + slopes[1] * by_cover + explained[:, 0] * leaks[0])
+        columns[:, 0] = -(slopes[0] + slopes[1] * by_cover)
         # a normal density of variance v changes with v by half its second derivative
-        columns[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover) + explained[:, 0] * leaks[1]
+        columns[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
         columns[:, :2] *= pieces.weight[:, None]
         columns[:, 2] = left
         mixed = columns @ rest[:, :2].transpose(0, 2, 1)
@@ -179,8 +170,8 @@ class Equations:
 @dataclass(frozen=True)
 class Slopes:
     """Products of each piece's derivatives by position (px) and by the logarithm of the blur, the background's gain and
-    offset eliminated: with those by its shading, rod (s, 2, terms); gram (s, 3, 3): with each other and with what is left
-    unexplained. contrast (s,): see `Located`."""
+    offset eliminated: with those by its shading, rod (s, 2, terms); gram (s, 3, 3): with each other and with what is
+    left. contrast (s,): see `Located`."""
 
     rod: np.ndarray
     gram: np.ndarray
