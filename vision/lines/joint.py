@@ -154,8 +154,8 @@ class _Arrow:
         point, (step, by_blur, _) = self.point, self.step(damped)
         own = self.cross / self.power[:, None]
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
-        shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T
         chi2 = point.chi2 / point.task.pieces.freedom
+        shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T * np.sqrt(max(float(np.median(chi2)), 1.0))
         return Solved(point.shift_px + np.clip(step, -_LONGEST_PX, _LONGEST_PX),
                       np.sqrt(np.maximum(chi2, 1.0) / self.power), chi2, self.slopes.contrast, shared,
                       float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG))), point.robust)

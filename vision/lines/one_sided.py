@@ -30,12 +30,6 @@ class SeenWidth:
         """Whether an edge of the rod is not seen."""
         return self.seen_px < _ONE_SIDED * self.known_px
 
-    @property
-    def doubt_px(self) -> float:
-        """How far the axis, taken from one edge, may be off, one sigma: a quarter of the width that is not seen. In
-        tests/ladder/lines.py it is off by a quarter of it with the lamp at 15 degrees, by a hundredth at 45."""
-        return 0.25 * (self.known_px - self.seen_px) if self.one_sided else 0.0
-
     def line(self, camera: str) -> str:
         """For the report; empty where both edges are seen."""
         if not self.one_sided:

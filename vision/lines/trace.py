@@ -12,7 +12,7 @@ from vision.geometry.silhouette import outline
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.binned import binned, without
 from vision.lines.joint import BLUR_SIGMA, Task, solve
-from vision.lines.points import LinePoints, Observed
+from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
 from vision.pictures.view import View
 
@@ -88,7 +88,18 @@ def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
     """Trusted line points and the source of each, with sigmas that hold the misfit."""
     pieces, found = traced.pieces, traced.found
     good = (found.chi2 < _WORST_MISFIT * max(traced.misfit, 0.5)) & (found.sigma_px < _WORST_SIGMA_PX)
-    return LinePoints(pieces.foot_px, pieces.normal, found.sigma_px, pieces.place).select(good), pieces.source[good]
+    shared, rest = _leading(found.shared_px)
+    points = LinePoints(pieces.foot_px, pieces.normal, np.hypot(found.sigma_px, rest), pieces.place, shared)
+    return points.select(good), pieces.source[good]
+
+
+def _leading(shared_px) -> tuple[np.ndarray, np.ndarray]:
+    """The SHARED causes (s, SHARED) that make the most of what pieces share (s, k), and what others leave (s,)."""
+    _, _, turned = np.linalg.svd(shared_px.T @ shared_px)
+    causes = shared_px @ turned.T
+    most = np.zeros((len(causes), SHARED))
+    most[:, :causes.shape[1]] = causes[:, :SHARED]
+    return most, np.linalg.norm(causes[:, SHARED:], axis=1)
 
 
 def observed(points: LinePoints, source, camera: int, frames: Sequence[int]) -> list[Observed]:

@@ -65,11 +65,11 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
     motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
     for _ in range(settings.rounds):
         seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
-        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, by_onset)
+        problem, state, _ = _fit(seen, cameras, rods, look, motor, by_onset)
         _check_scatter(problem, state)
         look = _next_look(problem, state, look, motor, by_onset)
     seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
-    return *_fit(seen, cameras, rods, look, motor, light, by_onset), list(motor)
+    return *_fit(seen, cameras, rods, look, motor, by_onset), list(motor)
 
 
 def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
@@ -102,12 +102,11 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
     return motor, _Look(axis, rest, bend, arcs, curves, touching, free)
 
 
-def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float], light: dict,
+def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float],
          by_onset: bool) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
-    doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
     problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
-                      look.touching, ~look.free, seen, doubt_px=doubt_px)
+                      look.touching, ~look.free, seen)
     state, covariance = solve(problem, _begin(problem, look))
     if by_onset:
         problem, state = touch_by_onset(problem, state, covariance)
