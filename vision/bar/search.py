@@ -33,14 +33,14 @@ class SeenBar:
     lines: Mapping[str, BarLine]
 
     @property
-    def told(self) -> dict[str, BarLine]:
-        """Lines of the cameras that see a bar there."""
-        return {name: line for name, line in self.lines.items() if line.told}
+    def seen_by(self) -> list[str]:
+        """The cameras that see a bar there."""
+        return [name for name, line in self.lines.items() if line.is_bar]
 
     @property
-    def worth(self) -> tuple[int, float]:
-        """The more cameras see a bar there, and the better, the more."""
-        return len(self.told), -sum(line.misfit for line in self.told.values())
+    def evidence(self) -> float:
+        """How much more probable a bar is there than none, by all cameras: twice the log of the ratio."""
+        return sum(line.for_bar for line in self.lines.values())
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
@@ -60,14 +60,14 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
         return SeenBar(alone(views[0]), {})
     axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
     found = [settled(axis, FAR_PX, NEAR_PX)]
-    if found[0].worth[0] == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
+    if len(found[0].seen_by) == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
         return found[0]
     for view in views:
         with suppress(Refused):
             seen = settled(alone(view), NEAR_PX)
-            found += [seen] if view.camera.name in seen.told else []
+            found += [seen] if view.camera.name in seen.seen_by else []
     one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
-    return max(found[1:] if one_side else found, key=lambda one: one.worth)
+    return max(found[1:] if one_side else found, key=lambda one: one.evidence)
 
 
 def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
@@ -77,18 +77,16 @@ def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, ro
         lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         axis = settle_axis(axis, cameras, bars, rods.bar.radius_mm)
-        near = max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX
-        if near or all(line.told for line in lines.values()):
+        if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
             break
     return SeenBar(axis, lines)
 
 
-def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
-              last: bool = False) -> dict[str, BarLine]:
+def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *,
+              off_px: float = 0.0) -> dict[str, BarLine]:
     """The bar's line in each camera that shows enough of it."""
-    found = {view.camera.name: measure_bar(of_mean(view), view.mean, axis, rods.bar.radius_mm,
-                                           wires.get(view.camera.name, []), settings, off_px=off_px, last=last)
-             for view in views}
+    found = {view.camera.name: measure_bar(view, axis, rods.bar.radius_mm, wires.get(view.camera.name, []), settings,
+                                           off_px=off_px) for view in views}
     return {name: line for name, line in found.items() if line is not None}
 
 

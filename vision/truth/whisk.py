@@ -75,7 +75,7 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
 def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
     """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand
     on one side, or a single one sees it. None where two see it from different sides."""
-    told = [name for name in cameras.names if name in bar.told]
+    told = [name for name in cameras.names if name in bar.seen_by]
     if seen_from_one_side(cameras, bar.axis):
         return told or list(cameras.names)
     return told if len(told) == 1 else []
@@ -187,10 +187,10 @@ def _begin(problem: Problem, look: _Look) -> State:
 def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *,
                edges: Collection[str], last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. edges: see
-    `_told_by_edges`; last: see `measure_bar`."""
+    `_told_by_edges`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
              for view in views}
-    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
+    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges)
     seen = []
     for number, view in enumerate(views):
         seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
@@ -204,15 +204,16 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
     return seen
 
 
-def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
-               last: bool) -> list[dict[int, LinePoints]]:
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
+               edges: Collection[str]) -> list[dict[int, LinePoints]]:
     """Per camera the points of the bar's middle (side 0), or of its two edges where any tell them."""
     if edges:
         told = lambda view: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,  # noqa: E731
                                           wires[view.camera.name], settings)
         return [told(view) or {} if view.camera.name in edges else {} for view in views]
-    lines = bar_lines(views, axis, rods, wires, settings, last=last)
-    return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
+    lines = bar_lines(views, axis, rods, wires, settings)
+    seen = {name: line.points for name, line in lines.items() if line.is_bar}
+    return [{0: seen[view.camera.name]} if view.camera.name in seen else {} for view in views]
 
 
 def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
