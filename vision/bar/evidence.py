@@ -31,6 +31,7 @@ _STEP_SHARE, _RIM_SHARE = 0.3, 0.2
 _RIM_BLURRED_PX = 2.0
 _SLOPE_SHARE = 0.3  # of the contrast: by so much the background changes over _OUTSIDE_PX
 _MODEL_SHARE = 0.004  # of the contrast: what no such model explains
+_SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside an edge
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
 _TABLE_PX = 0.1
 
@@ -38,13 +39,14 @@ _TABLE_PX = 0.1
 @dataclass(frozen=True)
 class Profile:
     """A stretch of the bar, seen across. offset_px (b,): of bins from where its middle is expected; light, sigma,
-    behind (b,): light in parts of full scale, its sigma, and the light of the picture without rods; place_mm: of the
-    stretch along the bar; radius_px: half its width."""
+    behind (b,): light in parts of full scale, its sigma, and the light of the picture without rods; by_grey (b,): the
+    light's derivative by grey; place_mm: of the stretch along the bar; radius_px: half its width."""
 
     offset_px: np.ndarray
     light: np.ndarray
     sigma: np.ndarray
     behind: np.ndarray
+    by_grey: np.ndarray
     place_mm: float
     radius_px: float
 
@@ -62,7 +64,7 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> list[
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
     behind, _ = _light(pieces.background, gamma)
     place = np.clip(bins, 0, size - 1) + size * np.arange(len(pieces))[:, None]
-    added = [sums(weight * values, place, size) for values in (np.ones_like(light), light, behind, stretched)]
+    added = [sums(weight * values, place, size) for values in (np.ones_like(light), light, behind, stretched, slope)]
     order = np.argsort(pieces.place)
     return [_profile([part[some] for part in added], float(pieces.place[some].mean()), radius)
             for some in np.array_split(order, max(1, min(count, len(pieces) // 2)))]
@@ -75,22 +77,24 @@ def _light(grey, gamma: float):
 
 
 def _profile(added, place_mm: float, radius_px: float) -> Profile:
-    """Of sums (4, s, b) over the pieces of a stretch: weights, and weighted light, light behind, and offset.
+    """Of sums (5, s, b) over the pieces of a stretch: weights, and weighted light, light behind, offset and slope.
 
-    What differs from piece to piece beyond noise, in the picture or in its difference to the one without rods, is
-    texture of the bench.
+    What differs from piece to piece beyond noise, when the share of the picture without rods that is seen there has
+    been taken off, is texture of the bench.
     """
     total = added[0].sum(axis=0)
     use = total > 0
     own, total = added[0][:, use], total[use]
-    light, behind, offset = (part[:, use].sum(axis=0) / total for part in added[1:])
+    light, behind, offset, by_grey = (part[:, use].sum(axis=0) / total for part in added[1:])
     there = own > 0
     number = there.sum(axis=0)
-    spread = []
-    for values in (added[1], added[1] - added[2]):
-        away = np.where(there, values[:, use] / np.maximum(own, 1e-300) - values[:, use].sum(axis=0) / total, 0.0)
-        spread.append(np.sum(away**2, axis=0) / np.maximum(number - 1, 1) / number)
-    return Profile(offset, light, np.sqrt(1.0 / total + np.minimum(*spread)), behind, place_mm, radius_px)
+    spread = np.inf
+    for share in _SHARES:
+        values = (added[1] - share * added[2])[:, use]
+        away = np.where(there, values / np.maximum(own, 1e-300) - values.sum(axis=0) / total, 0.0)
+        spread = np.minimum(spread, np.sum(away**2, axis=0) / np.maximum(number - 1, 1) / number)
+    sigma = np.sqrt(1.0 / total + spread)
+    return Profile(offset, light, sigma, behind, by_grey, place_mm, radius_px)
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,8 @@ def _of_one(profile: Profile, shift_px, blur_px: float) -> tuple[np.ndarray, flo
     behind = profile.behind - np.median(profile.behind)
     none = np.stack([np.ones_like(behind), profile.offset_px / _OUTSIDE_PX, behind], axis=-1)[None]
     nothing, _ = _marginal(none, profile.light, weight, outside)
-    return value, float(left[np.argmin(value)] / len(weight)), float(nothing[0])
+    in_grey = -2.0 * np.sum(np.log(weight * profile.by_grey))  # a density of grey levels, whatever the transfer curve
+    return value + in_grey, float(left[np.argmin(value)] / len(weight)), float(nothing[0] + in_grey)
 
 
 def _range(light) -> float:
