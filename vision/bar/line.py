@@ -27,7 +27,7 @@ _STRETCHES = 6
 _FAR_STEP_PX = 0.75
 _STEPS, _GRID = 25, 121  # shifts at which the evidence is taken, and lines between, by shift and by tilt
 _FAR_BLUR_PX, _BLURS_PX = 1.6, (0.6, 0.8, 1.0, 1.25, 1.6)
-_GAMMAS = (1.0, 1.5, 2.2)  # a sensor's own, and an encoded picture's
+_GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded for a screen
 # Of minus twice the log evidence: neighbouring bins err alike, by compression and by what no model has. With this the
 # RMS of z over path-traced bars is 1.1 (tests/ladder/bar_scenes.py).
 _TEMPER = 4.0
@@ -99,7 +99,7 @@ def _posterior(pieces: Pieces, reach_px: float) -> _Posterior:
     """Over lines within reach_px, and over the transfer curves that explain them, each by its evidence."""
     shifts = np.linspace(-reach_px, reach_px, _STEPS)
     seen = [profiles(pieces, _STRETCHES, reach_px, gamma) for gamma in _GAMMAS]
-    blur = min(_BLURS_PX, key=lambda blur: float(np.sum(evidence(seen[1], shifts[::3], blur).of_bar.min(axis=1))))
+    blur = min(_BLURS_PX, key=lambda blur: float(np.sum(evidence(seen[0], shifts[::3], blur).of_bar.min(axis=1))))
     found = [evidence(one, shifts, blur) for one in seen]
     misfits, lines = zip(*(_over_lines(one, profile, reach_px) for one, profile in zip(found, seen)))
     misfit = np.stack(misfits)
