@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.lines import FINE, NOISE, coverage, squares
-from vision.bar.line import measure_bar
+from vision.bar.line import measure_bars
 from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
@@ -88,7 +88,7 @@ def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:
     off_mm, off_rad = rng.uniform(-0.5, 0.5) * AWAY_MM / FOCAL_PX, rng.uniform(-0.004, 0.004)
     direction = np.array([np.cos(angle + off_rad), np.sin(angle + off_rad), 0.0])
     axis = BarAxis((across_mm + off_mm) * normal, direction)
-    found = measure_bar(view, axis, RADIUS_MM, [], VisionSettings())
+    found = measure_bars([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name]
     return (found.points.px - CENTRE) @ normal[:2] - np.mean(edges_px(across_mm)), found.points.sigma_px
 
 

@@ -5,7 +5,7 @@ they give the posterior of a straight line. Where an edge is as dark as what is 
 taken for it, the posterior is wide or has several peaks, and the line's sigma is as wide.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,7 @@ _GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded fo
 # Of minus twice the log evidence: neighbouring bins err alike, by compression and by what no model has. With this the
 # RMS of z over path-traced bars is 1.1 (tests/ladder/bar_scenes.py).
 _TEMPER = 4.0
+_LEAST_CHANCE = 0.01  # of a transfer curve that is still looked at
 _MOST = 40.0  # of the same: what one stretch may say against a line; a clamp or a hole in the bench says anything
 _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 
@@ -50,31 +51,61 @@ class BarLine:
         return self.for_bar > _LEAST_EVIDENCE
 
 
-def measure_bar(view: View, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                settings: VisionSettings, *, off_px: float = 0.0) -> BarLine | None:
-    """The bar's line in the mean of the view's pictures; None where too little of it is clear of wire and clamps.
+def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
+                 settings: VisionSettings, *, off_px: float = 0.0) -> dict[str, BarLine]:
+    """The bar's line in the mean of each view's pictures, by camera; without those where too little of it is clear.
 
-    wires_px: lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be.
+    wires_px: by camera lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be.
     """
-    pieces = bar_pieces(_mean_noise(view), view.mean, axis, radius_mm, wires_px, settings)
-    if len(pieces) < FEWEST_PIECES:
-        return None
-    line = _far(pieces, off_px) if off_px > NEAR_PX else np.zeros(2)
-    for reach_px in (max(_WIDE_PX, min(off_px, NEAR_PX)), _CLOSE_PX):
-        found = _posterior(_moved(pieces, line), reach_px)
-        line = line + found.line
-        if np.sqrt(np.max(np.diag(found.covariance))) > _CLOSE_PX / _WITHIN_SIGMAS:
-            break
-    return BarLine(_two_points(pieces, line, found.covariance), float(np.sum(np.abs(line))), found.for_bar)
+    pieces = {view.camera.name: bar_pieces(_mean_noise(view), view.mean, axis, radius_mm,
+                                           wires_px.get(view.camera.name, []), settings) for view in views}
+    pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES}
+    line = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
+    reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
+    wide = {name: [_posterior(_moved(some, line[name]), reach_px, gamma) for gamma in _GAMMAS]
+            for name, some in pieces.items()}
+    return {name: _bar_line(some, line[name], wide[name], _chances(wide.values())) for name, some in pieces.items()}
 
 
 @dataclass(frozen=True)
 class _Posterior:
-    """Of shift and tilt over ARM_MM (2,), px: mean and covariance; and how much more probable a bar is than none."""
+    """Of shift and tilt over ARM_MM (2,), px, with one transfer curve and one blur: mean, covariance, minus twice the
+    log evidence, and how much more probable a bar is than none."""
 
     line: np.ndarray
     covariance: np.ndarray
+    evidence: float
     for_bar: float
+    gamma: float
+    blur_px: float
+
+
+def _chances(cameras: Iterable[Sequence[_Posterior]]) -> np.ndarray:
+    """Of each transfer curve: the cameras of a bench are of one kind."""
+    total = np.sum([[one.evidence for one in by_gamma] for by_gamma in cameras], axis=0)
+    chance = np.exp(-0.5 * (total - total.min()))
+    return chance / chance.sum()
+
+
+def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances) -> BarLine:
+    """The line by all transfer curves, each by its chance; looked for once more close by if it is known so well."""
+    mean, covariance = _mixed(wide, chances)
+    line, for_bar = line + mean, float(chances @ [one.for_bar for one in wide])
+    if np.sqrt(np.max(np.diag(covariance))) < _CLOSE_PX / _WITHIN_SIGMAS:
+        likely = chances > _LEAST_CHANCE
+        again = [_posterior(_moved(pieces, line), _CLOSE_PX, one.gamma, one.blur_px)
+                 for one, is_likely in zip(wide, likely) if is_likely]
+        mean, covariance = _mixed(again, chances[likely] / chances[likely].sum())
+        line = line + mean
+    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar)
+
+
+def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (2,) and covariance (2, 2) of a mixture."""
+    lines = np.array([one.line for one in posteriors])
+    mean = chances @ lines
+    own = np.array([one.covariance for one in posteriors])
+    return mean, np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - mean, lines - mean))
 
 
 def _mean_noise(view: View) -> View:
@@ -95,21 +126,22 @@ def _far(pieces: Pieces, off_px: float) -> np.ndarray:
     return lines[np.unravel_index(np.argmin(misfit), misfit.shape)]
 
 
-def _posterior(pieces: Pieces, reach_px: float) -> _Posterior:
-    """Over lines within reach_px, and over the transfer curves that explain them, each by its evidence."""
+def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | None = None) -> _Posterior:
+    """Over lines within reach_px, under the lens blur that explains the pieces best where it is not given."""
     shifts = np.linspace(-reach_px, reach_px, _STEPS)
-    seen = [profiles(pieces, _STRETCHES, reach_px, gamma) for gamma in _GAMMAS]
-    blur = min(_BLURS_PX, key=lambda blur: float(np.sum(evidence(seen[0], shifts[::3], blur).of_bar.min(axis=1))))
-    found = [evidence(one, shifts, blur) for one in seen]
-    misfits, lines = zip(*(_over_lines(one, profile, reach_px) for one, profile in zip(found, seen)))
-    misfit = np.stack(misfits)
+    seen = profiles(pieces, _STRETCHES, reach_px, gamma)
+    if blur_px is None:
+        least = [float(np.sum(evidence(seen, shifts[::3], blur).of_bar.min(axis=1))) for blur in _BLURS_PX]
+        blur_px = _BLURS_PX[int(np.argmin(least))]
+    found = evidence(seen, shifts, blur_px)
+    misfit, lines = _over_lines(found, seen, reach_px)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
-    chance = (chance / chance.sum()).sum(axis=0)
-    mean = np.einsum("ab,abi->i", chance, lines[0])
-    away = lines[0] - mean
-    best = found[int(np.argmin(misfit.min(axis=(1, 2))))]
-    for_bar = float(np.sum((best.of_none - best.of_bar.min(axis=1)) / _temper(best)))
-    return _Posterior(mean, np.einsum("ab,abi,abj->ij", chance, away, away), for_bar)
+    total = chance.sum()
+    mean = np.einsum("ab,abi->i", chance, lines) / total
+    away = lines - mean
+    for_bar = float(np.sum((found.of_none - found.of_bar.min(axis=1)) / _temper(found)))
+    return _Posterior(mean, np.einsum("ab,abi,abj->ij", chance, away, away) / total,
+                      float(misfit.min() - 2.0 * np.log(total)), for_bar, gamma, blur_px)
 
 
 def _temper(found: Evidence) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.bar.axis import find_bar, settle_axis
-from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bar
+from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bars
 from vision.bar.one_view import see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -74,20 +74,12 @@ def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, ro
              settings: VisionSettings) -> SeenBar:
     """The axis by the bar's lines, which are looked for so far away in turn."""
     for most_px in off_px:
-        lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
+        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=most_px)
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         axis = settle_axis(axis, cameras, bars, rods.bar.radius_mm)
         if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
             break
     return SeenBar(axis, lines)
-
-
-def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *,
-              off_px: float = 0.0) -> dict[str, BarLine]:
-    """The bar's line in each camera that shows enough of it."""
-    found = {view.camera.name: measure_bar(view, axis, rods.bar.radius_mm, wires.get(view.camera.name, []), settings,
-                                           off_px=off_px) for view in views}
-    return {name: line for name, line in found.items() if line is not None}
 
 
 def of_mean(view: View) -> View:

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.bar.edges import measure_edges
+from vision.bar.line import measure_bars
 from vision.bar.one_view import seen_from_one_side
-from vision.bar.search import SeenBar, bar_lines, of_mean
+from vision.bar.search import SeenBar, of_mean
 from vision.fit.first_bends import contact_arc, find_rest, follow_bends
 from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.fit.scatter import honest, scatter_px
@@ -211,7 +212,7 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings
         told = lambda view: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,  # noqa: E731
                                           wires[view.camera.name], settings)
         return [told(view) or {} if view.camera.name in edges else {} for view in views]
-    lines = bar_lines(views, axis, rods, wires, settings)
+    lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings)
     seen = {name: line.points for name, line in lines.items() if line.is_bar}
     return [{0: seen[view.camera.name]} if view.camera.name in seen else {} for view in views]
 
