@@ -10,8 +10,7 @@ from tests.ladder.lines import squares
 from tests.scenes.model_scenes import CAMERAS, REACH, begun, camera, scene, with_points
 from vision.bar.axis import settle_axis
 from vision.bar.edges import measure_edges
-from vision.bar.one_view import axis_from_edges, find_bar_alone, seen_from_one_side
-from vision.bar.search import of_mean
+from vision.bar.one_view import axis_from_edges, seen_from_one_side
 from vision.fit.onset import Onset, onset
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import jacobians
@@ -20,7 +19,6 @@ from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty, variance_by_cause
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis, upward
-from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import grazed, normals
 from vision.lines.points import LinePoints, Observed
@@ -72,12 +70,6 @@ def test_edges_of_a_drawn_bar_lie_where_they_say(rng):
     for (at, sigma), true in zip(seen, edges_px(across_mm)):
         assert sigma < 0.15
         assert abs(at - true) < 3 * sigma
-
-
-def test_without_a_bar_one_camera_says_so():
-    view = camera("one", (38, -175, 335))
-    with pytest.raises(Refused, match="no bar of diameter 6 mm is seen"):
-        find_bar_alone(np.zeros((360, 640)), view, 3.0, (0.0, 0.1), 100.0)
 
 
 def test_one_side_is_less_than_a_degree():
