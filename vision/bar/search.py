@@ -1,6 +1,6 @@
 """Where the bar is, before any wire is known: looked for by its edges, then by its lines in all cameras."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -40,17 +40,21 @@ class SeenBar:
         return [name for name, line in self.lines.items() if line.is_bar]
 
     @property
-    def evidence(self) -> float:
-        """How much more probable a bar is there than none, by all cameras: twice the log of the ratio."""
-        return sum(line.for_bar for line in self.lines.values())
+    def worth(self) -> float:
+        """How well all cameras see a bar there: the sum of the logs of each one's evidence.
+
+        Not of the evidence: each hypothesis has its own pixels, and a wrong one along something bright in one camera
+        has more evidence there than the bar has in both.
+        """
+        return float(sum(np.log1p(max(line.for_bar, 0.0)) for line in self.lines.values()))
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
     """The bar from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
 
-    Of the axes whose edges are clear in all cameras, that for which its lines are the best evidence. Where the sights
-    of all cameras are nearly the same, or not all see it, each is asked alone, too: by its two edges one camera tells
-    roughly how far away a bar is, and finds no other for it.
+    Of the axes whose edges are clear in all cameras, that whose lines are the best seen in all of them. Where the
+    sights of all cameras are nearly the same, or not all see it, each is asked alone, too: by its two edges one camera
+    tells roughly how far away a bar is, and finds no other for it.
     """
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     clear = [clear_edges(view.camera, _median_picture(view), view.background[::HALF, ::HALF], rods, sum(span) / 2)
@@ -58,8 +62,9 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
     if len(views) == 1:
         return SeenBar(_alone(views[0], clear[0], rods, motor_rad, settings), {})
     wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
-    settled = lambda axis, *off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
-    best = max((settled(axis, FAR_PX, NEAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.evidence)
+    settled = lambda axis, off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
+    likely = max((settled(axis, FAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.worth)
+    best = settled(likely.axis, NEAR_PX)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
         return best
     found = [best] if best.seen_by else []
@@ -70,7 +75,7 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
     if not found:
         raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm))
     one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
-    return max(found[1:] if one_side else found, key=lambda one: one.evidence)
+    return max(found[1:] if one_side else found, key=lambda one: one.worth)
 
 
 def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
@@ -79,16 +84,12 @@ def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSett
     return see_bar_alone(first, of_mean(view), rods.wire, rods.bar.radius_mm, motor_rad, settings)
 
 
-def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
+def _settled(axis: BarAxis, off_px: float, views, cameras: Cameras, rods: Rods, wires,
              settings: VisionSettings) -> SeenBar:
-    """The axis by the bar's lines, which are looked for so far away in turn."""
-    for most_px in off_px:
-        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=most_px)
-        bars = {name: line.points for name, line in lines.items() if line.is_bar}
-        axis = settle_axis(axis, cameras, bars, rods.bar.radius_mm)
-        if max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX:
-            break
-    return SeenBar(axis, lines)
+    """The axis by the bar's lines, which are looked for so far away."""
+    lines = bar_lines(views, axis, rods, wires, settings, off_px=off_px)
+    bars = {name: line.points for name, line in lines.items() if line.is_bar}
+    return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
 
 def of_mean(view: View) -> View:
