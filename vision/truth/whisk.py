@@ -13,7 +13,7 @@ from vision.fit.first_bends import contact_arc, find_rest, follow_bends
 from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.fit.scatter import honest, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
-from vision.fit.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
+from vision.fit.touch import FEWEST_FREE, frames_by_touch, frames_that_touch, touch_and_sigma
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves, one_curve
@@ -61,21 +61,20 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    edges = _told_by_edges(cameras, bar)
-    by_onset = bool(edges)
+    edges, by_onset = _told_by_edges(cameras, bar), seen_from_one_side(cameras, bar.axis)
     motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
     for _ in range(settings.rounds):
         seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
-        problem, state, _ = _fit(seen, cameras, rods, look, motor, by_onset)
+        problem, state, answer = _fit(seen, cameras, rods, look, motor, by_onset)
         _check_scatter(problem, state)
-        look = _next_look(problem, state, look, motor, by_onset)
+        look = _next_look(problem, state, answer, look, motor, by_onset)
     seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
     return *_fit(seen, cameras, rods, look, motor, by_onset), list(motor)
 
 
 def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
-    """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand
-    on one side, or a single one sees it. None where two see it from different sides."""
+    """Cameras whose edges of the bar tell how far away it is: where all stand on one side, or a single one sees it.
+    None where two see it from different sides."""
     told = [name for name in cameras.names if name in bar.seen_by]
     if seen_from_one_side(cameras, bar.axis):
         return told or list(cameras.names)
@@ -116,12 +115,12 @@ def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor:
     return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
 
 
-def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], by_onset: bool) -> _Look:
+def _next_look(problem: Problem, state: State, answer, look: _Look, motor: Mapping[int, float],
+               by_onset: bool) -> _Look:
     """What a fit tells; which frames touch: by clearance, or where cameras do not tell it, by the onset of bending."""
     touching, free = problem.touching, look.free
     if not by_onset:
-        touch = float(first_touch(problem, state.vector).motor_rad)
-        touching, free = frames_by_touch(problem.motor_rad, touch, np.radians(0.02))
+        touching, free = frames_by_touch(problem.motor_rad, *touch_and_sigma(problem, state.vector, answer))
         if np.sum(free) < FEWEST_FREE:
             raise Refused(_STARTS_TOUCHING)
         if not np.any(touching):
@@ -200,21 +199,22 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
         if not there:
             raise Refused(f"no camera shows enough of the {rod}")
-    if not edges and len({one.camera for one in seen if one.frame < 0}) < 2:
-        raise Refused("a single camera shows enough of the bar clear of the wire, and not well enough to ask it alone")
     return seen
 
 
 def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
                edges: Collection[str]) -> list[dict[int, LinePoints]]:
-    """Per camera the points of the bar's middle (side 0), or of its two edges where any tell them."""
+    """Per camera the points of the bar's middle (side 0), or of its two edges where these are seen and are to tell how
+    far away it is."""
     if edges:
-        told = lambda view: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,  # noqa: E731
-                                          wires[view.camera.name], settings)
-        return [told(view) or {} if view.camera.name in edges else {} for view in views]
-    lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings)
-    seen = {name: line.points for name, line in lines.items() if line.is_bar}
-    return [{0: seen[view.camera.name]} if view.camera.name in seen else {} for view in views]
+        views_told = [view for view in views if view.camera.name in edges]
+        found = {view.camera.name: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,
+                                                 wires[view.camera.name], settings) for view in views_told}
+    else:
+        views_told, found = views, {}
+    lines = bar_lines(views_told, axis, rods, wires, settings)
+    middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
+    return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
 
 def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
