@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.bar.axis import settle_axis
 from vision.bar.find import Clear, clear_edges, find_bars
-from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bar
+from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bars
 from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -62,7 +62,12 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
     if len(views) == 1:
         return SeenBar(_alone(views[0], clear[0], rods, motor_rad, settings), {})
     wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
-    settled = lambda axis, off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
+
+    def settled(axis: BarAxis, off_px: float) -> SeenBar:
+        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=off_px)
+        bars = {name: line.points for name, line in lines.items() if line.is_bar}
+        return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
+
     likely = max((settled(axis, FAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.worth)
     best = settled(likely.axis, NEAR_PX)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
@@ -82,14 +87,6 @@ def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSett
     """The axis as one camera alone sees it. Raises Refused where it sees none, or not how far away it is."""
     first = find_bars_alone(clear, rods, float(np.mean(motor_rad)))[0]
     return see_bar_alone(first, of_mean(view), rods.wire, rods.bar.radius_mm, motor_rad, settings)
-
-
-def _settled(axis: BarAxis, off_px: float, views, cameras: Cameras, rods: Rods, wires,
-             settings: VisionSettings) -> SeenBar:
-    """The axis by the bar's lines, which are looked for so far away."""
-    lines = bar_lines(views, axis, rods, wires, settings, off_px=off_px)
-    bars = {name: line.points for name, line in lines.items() if line.is_bar}
-    return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
 
 def of_mean(view: View) -> View:

@@ -212,7 +212,7 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings
                                                  wires[view.camera.name], settings) for view in views_told}
     else:
         views_told, found = views, {}
-    lines = bar_lines(views_told, axis, rods, wires, settings)
+    lines = measure_bars(views_told, axis, rods.bar.radius_mm, wires, settings)
     middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 

@@ -11,6 +11,7 @@ from tests.scenes.model_scenes import CAMERAS, REACH, begun, camera, scene, with
 from vision.bar.axis import settle_axis
 from vision.bar.edges import measure_edges
 from vision.bar.one_view import axis_from_edges, seen_from_one_side
+from vision.bar.search import of_mean
 from vision.fit.onset import Onset, onset
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import jacobians
