@@ -92,7 +92,8 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
 
 
 def _rows(results: Iterable[TrialResult]):
-    """Of each stroke felt − seen, the sigmas of seen (its clock apart) and felt (the filter's delay apart), rad; speed; the clock's sigma, s."""
+    """Of each stroke felt − seen, the sigmas of seen (its clock apart) and felt (the filter's delay apart), rad; its
+    speed, and the clock's sigma, s."""
     for result in results:
         clock_s, back = result.seen.clock.sigma_s if result.seen.clock else 0.0, result.seen.back
         pairs = [

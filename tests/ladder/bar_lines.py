@@ -4,7 +4,7 @@
 
 A bar of 6 mm at 376 mm before a pinhole camera is 32 px wide; its two edges are the tangents from the camera's
 centre, so that the picture is exact. It is drawn as in lines.py at random places and slopes, noise of 2 grey levels in
-the mean of 13 frames and in the background, and looked for from up to half a pixel off. The line is told at 20 mm to
+the mean of 13 frames and in the background, and looked for from up to half a pixel off. The line is given at 20 mm to
 either side; columns: mean and RMS error there in px, median stated sigma, and z, the RMS error over it.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.lines import FINE, NOISE, coverage, squares
-from vision.bar.line import measure_bar
+from vision.bar.line import measure_bars
 from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
@@ -70,25 +70,25 @@ def _seen(fine):
     return blurred.reshape(SIZE[1], FINE, SIZE[0], FINE).mean(axis=(1, 3))
 
 
-def noisy_view(shade, behind, angle: float, across_mm: float, rng) -> tuple[np.ndarray, View]:
-    """The mean picture of a bar with its noise, and the camera with its background and the noise of both."""
+def noisy_view(shade, behind, angle: float, across_mm: float, rng) -> View:
+    """A bar in some frames of a camera, and the picture without it, each with its noise."""
     picture, background = drawn(shade, behind, angle, across_mm)
-    picture = picture + NOISE / np.sqrt(FRAMES) * rng.standard_normal(picture.shape)
+    frames = {k: picture + NOISE * rng.standard_normal(picture.shape) for k in range(FRAMES)}
     background = background + NOISE * rng.standard_normal(picture.shape)
     matrix = [[FOCAL_PX, 0, CENTRE[0]], [0, FOCAL_PX, CENTRE[1]], [0, 0, 1]]
     camera = Camera("c", SIZE, matrix, np.zeros(5), np.column_stack([np.eye(3), [0, 0, AWAY_MM]]))
-    return picture, View(camera, {}, background, Noise(NOISE**2 * (1.0 + 1.0 / FRAMES), 0.0))
+    return View(camera, frames, background, Noise(NOISE**2, 0.0))
 
 
 def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:
     """Error across the bar of the line's two points, and what is stated of them, px."""
     angle, across_mm = rng.uniform(0.9, 2.2), rng.uniform(-2.0, 2.0)
-    picture, view = noisy_view(shade, behind, angle, across_mm, rng)
+    view = noisy_view(shade, behind, angle, across_mm, rng)
     normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
     off_mm, off_rad = rng.uniform(-0.5, 0.5) * AWAY_MM / FOCAL_PX, rng.uniform(-0.004, 0.004)
     direction = np.array([np.cos(angle + off_rad), np.sin(angle + off_rad), 0.0])
     axis = BarAxis((across_mm + off_mm) * normal, direction)
-    found = measure_bar(view, picture, axis, RADIUS_MM, [], VisionSettings(), last=True)
+    found = measure_bars([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name]
     return (found.points.px - CENTRE) @ normal[:2] - np.mean(edges_px(across_mm)), found.points.sigma_px
 
 

@@ -25,9 +25,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from vision.lines.bands import cut_pieces, read_band
-from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots
-from vision.lines.trace import clear_of_bar, settle, settle_again, to_points, trace
+from vision.lines.trace import Traced, clear_of_bar, to_points, trace
 from vision.pictures.pixel_noise import Noise
 
 FINE, FRAMES, SHAPE = 5, 13, (110, 300)
@@ -194,32 +193,35 @@ def bounds(scene: Scene, frames, background) -> np.ndarray:
 
 
 def first_look(scene: Scene, rng, off_px: float = 0.7):
-    """Noisy frames, background, and pieces brought in line from a rough curve, with the lens blur found."""
+    """Noisy frames, background, and the wire as it is found from a rough curve."""
     background = drawn(scene, None)
     pictures = [drawn(scene, f) + NOISE * rng.standard_normal(SHAPE) for f in range(FRAMES)]
     bands = [band(scene, p, background, rough_curve(scene, f, off_px)) for f, p in enumerate(pictures)]
     pieces = cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0))
     if scene.bar is not None:
         pieces = pieces.select(clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX))
-    near, blur = settle(pieces, KNOTS, 1.5)
-    return pictures, background, trace(near, blur, WAVES, KNOTS), blur
+    return pictures, background, trace(pieces, KNOTS)
 
 
-def find(scene: Scene, rng) -> Found:
-    """The scene's wire as vision finds it: from a rough start, then again beside a curve through what was found."""
-    pictures, background, seen, blur = first_look(scene, rng)
-    points, source = to_points(*seen)
+def look_again(scene: Scene, pictures, background, seen: Traced) -> tuple[Traced, np.ndarray]:
+    """The wire beside a curve through what was found, and the bound of each piece's position, px."""
+    points, source = to_points(seen)
     curves = [_through(points.select(source == f)) for f in range(FRAMES)]
     bands = [band(scene, p, background, c) for c, p in zip(curves, pictures)]
     pieces, bound = cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0)), bounds(scene, range(FRAMES), background)
     if scene.bar is not None:
         clear = clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX)
         pieces, bound = pieces.select(clear), bound[clear]
-    settled, found, chi2 = trace(settle_again(pieces, blur, KNOTS), blur, WAVES, KNOTS)
-    points, source = to_points(settled, found, chi2)
-    kept = np.isin(settled.place + 1e4 * settled.source, points.place + 1e4 * source)
+    return trace(pieces, KNOTS, seen.blur_px), bound
+
+
+def find(scene: Scene, rng) -> Found:
+    """The scene's wire as vision finds it: from a rough start, then again beside a curve through what was found."""
+    traced, bound = look_again(scene, *first_look(scene, rng))
+    points, source = to_points(traced)
+    kept = np.isin(traced.pieces.place + 1e4 * traced.pieces.source, points.place + 1e4 * source)
     return Found(errors(scene, points, source), points.sigma_px, bound[kept], np.round(points.place),
-                 _from_bar(scene, points), len(points) / len(pieces))
+                 _from_bar(scene, points), len(points) / len(traced.pieces))
 
 
 def errors(scene: Scene, points, source) -> np.ndarray:

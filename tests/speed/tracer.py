@@ -4,7 +4,7 @@
 
 Prints CPU milliseconds a frame, least of three, with pictures in memory (decoding apart). The tracer: the centreline
 of one wire 5.6 px wide and 570 px long from a start up to 2 px off, 13 frames together as in a whisk, which share the
-shading; "first" looks for the lens blur and the common shift too, "again" knows them. Janelia's whisk takes 132 to
+shading; "first" knows nothing, "again" the lens blur, and begins nearer. Janelia's whisk takes 132 to
 147 ms a frame of this size on one core; the bar is a tenth of that. SESSION is a synthetic one (its truth holds the
 cameras), fixtures/small-session by default. --profile prints the whisk's time by function.
 """
@@ -22,9 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.scenes.recorded import BAR, WIRE, Recorded
 from vision.lines.bands import cut_pieces, read_band
-from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots
-from vision.lines.trace import settle, to_points, trace
+from vision.lines.trace import to_points, trace
 from vision.pictures.pixel_noise import Noise
 from vision.truth.observe import observe_trial
 
@@ -59,15 +58,15 @@ def rough_bands(background, frames, heights, off_px: float):
 def trace_first(scene) -> float:
     """Everything for frames that were never looked at; returns the lens blur found."""
     pieces = cut_pieces(rough_bands(*scene, 1.0), 12, Noise(NOISE**2, 0.0))
-    near, blur = settle(pieces, KNOTS, 1.5)
-    to_points(*trace(near, blur, WAVES, KNOTS))
-    return blur
+    traced = trace(pieces, KNOTS)
+    to_points(traced)
+    return traced.blur_px
 
 
 def trace_again(scene, blur_px: float) -> None:
     """The same from a nearer start with the blur known."""
     pieces = cut_pieces(rough_bands(*scene, 0.2), 12, Noise(NOISE**2, 0.0))
-    to_points(*trace(pieces, blur_px, WAVES, KNOTS))
+    to_points(trace(pieces, KNOTS, blur_px))
 
 
 def cpu_ms(call) -> float:

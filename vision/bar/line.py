@@ -1,153 +1,169 @@
-"""The bar's line in one camera: shift and tilt against where it was expected, from its outline's two edges.
+"""The bar's line in one camera: shift and tilt against where it was expected, by the evidence of both its edges.
 
-The bar stands still, so its frames are averaged. Near each rim its shading is a free but smooth function of the angle
-round the bar, so that a dark rim is not taken for an edge farther in; the middle, with its highlights, is left out.
+The bar stands still, so its frames are averaged. Each stretch of it says by itself how probable a middle is; together
+they give the posterior of a straight line. Where an edge is as dark as what is behind it, or a shadow's border may be
+taken for it, the posterior is wide or has several peaks, and the line's sigma is as wide.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from vision.bar.pieces import (
-    ARM_MM,
-    FEWEST_PIECES,
-    NO_BAR,
-    at_arms,
-    bar_knots,
-    bar_pieces,
-    of_bar_alone,
-    rims_of,
-)
+from vision.bar.evidence import Evidence, Profile, evidence, profiles
+from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.geometry.contact import BarAxis
-from vision.geometry.newton import covariance_of, descend
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces
-from vision.lines.binned import binned, without
-from vision.lines.cylinder import RIMS, WAVES
 from vision.lines.points import LinePoints
-from vision.lines.shading import Knots, fit_shading, locate, wave_prior
-from vision.pictures.view import View
+from vision.pictures.pixel_noise import Noise
+from vision.pictures.view import MEAN_OF, View
 
-_THICK_PX = 6.0  # half-width from which a rim is wide enough beside the blur to be looked at alone
-_UNTOLD_PX, _LOST_PX = 0.25, 0.6  # sigmas beyond which the misfit has no minimum to speak of, and may lead anywhere
-_LEAST_OFF_PX = 0.15
-_ROUGHLY, _EXACTLY = (0.3,), (0.1, 0.05)  # px: what a line may still move by, round by round
-_STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shift, tilt (px), log blur
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
-_BIN_PX, _COARSE_BIN_PX = 0.25, 0.75
-_BLURS_PX = (0.55, 0.8, 1.15, 1.65, 2.4)  # to begin with
-# Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/truth.md).
-_FORMAL_TO_TRUE = 2.0
+# Lines are looked for as far off, at least, then once more close by if they are known so well.
+_WIDE_PX, _CLOSE_PX, _WITHIN_SIGMAS = 2.0, 1.0, 4.0
+_STRETCHES = 6
+_FAR_STEP_PX = 0.75
+_STEPS, _GRID = 25, 121  # shifts at which the evidence is taken, and lines between, by shift and by tilt
+_FAR_BLUR_PX, _BLURS_PX = 1.6, (0.6, 0.8, 1.0, 1.25, 1.6)
+_GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded for a screen
+# Of minus twice the log evidence: neighbouring bins err alike, by compression and by what no model has. With this the
+# RMS of z over path-traced bars is 1.1 (tests/ladder/bar_scenes.py).
+_TEMPER = 4.0
+_LEAST_CHANCE = 0.01  # of a transfer curve that is still looked at
+_MOST = 40.0  # of the same: what one stretch may say against a line; a clamp or a hole in the bench says anything
+_LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 
 
 @dataclass(frozen=True)
 class BarLine:
     """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; how far from there; and
-    how badly a bar explains the pixels (chi² each)."""
+    how much more probable a bar is there than none: twice the log of the ratio."""
 
     points: LinePoints
     moved_px: float
-    misfit: float
+    for_bar: float
 
     @property
     def is_bar(self) -> bool:
         """Whether what is seen is a bar."""
-        return self.misfit <= NO_BAR
-
-    @property
-    def told(self) -> bool:
-        """Whether it is one, and its line is told, well somewhere and not too badly anywhere."""
-        least, most = np.min(self.points.sigma_px), np.max(self.points.sigma_px)
-        return self.is_bar and bool(least <= _UNTOLD_PX and most <= _LOST_PX)
+        return self.for_bar > _LEAST_EVIDENCE
 
 
-def measure_bar(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                settings: VisionSettings, *, off_px: float = 0.0,
-                last: bool = False) -> BarLine | None:
-    """The bar's line in the mean picture `grey`; None where too little of it is clear, or what is seen is no bar.
+def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
+                 settings: VisionSettings, *, off_px: float = 0.0) -> dict[str, BarLine]:
+    """The bar's line in the mean of each view's pictures, by camera; without those where too little of it is clear.
 
-    wires_px: lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be; where it may be, a
-    line to a tenth of a pixel is enough. last: no better axis will come, so a line that is none is not handed on.
+    wires_px: by camera lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be.
     """
-    pieces, knots = bar_pieces(view, grey, axis, radius_mm, wires_px, settings), bar_knots(settings)
-    if len(pieces) < FEWEST_PIECES:
-        return None
-    line, blur_px = _sweep(pieces, knots, off_px), None
-    pieces = of_bar_alone(pieces, lambda some: _moved(some, line), knots)
-    for settled_px in _EXACTLY if last else _ROUGHLY:  # line, blur, and what counts as a rim depend on each other
-        model = _model(pieces, line, knots)
-        line, blur_px, covariance, misfit = _settle(model, line, blur_px, settled_px)
-        on_line = _on_line(replace(model, blur_px=blur_px), line)
-        pieces = pieces.select(on_line) if np.sum(on_line) >= FEWEST_PIECES else pieces
-    found = BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), misfit)
-    return found if found.told or not last else None
+    pieces = {view.camera.name: bar_pieces(_mean_noise(view), view.mean, axis, radius_mm,
+                                           wires_px.get(view.camera.name, []), settings) for view in views}
+    pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES}
+    line = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
+    reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
+    wide = {name: [_posterior(_moved(some, line[name]), reach_px, gamma) for gamma in _GAMMAS]
+            for name, some in pieces.items()}
+    return {name: _bar_line(some, line[name], wide[name], _chances(wide.values())) for name, some in pieces.items()}
 
 
 @dataclass(frozen=True)
-class _Model:
-    """How pieces of the bar are explained: with which shading (terms, its knots and prior) and which blur."""
+class _Posterior:
+    """Of shift and tilt over ARM_MM (2,), px, with one transfer curve and one blur: mean, covariance, minus twice the
+    log evidence, and how much more probable a bar is than none."""
 
-    pieces: Pieces
-    terms: int
-    knots: Knots
+    line: np.ndarray
+    covariance: np.ndarray
+    evidence: float
+    for_bar: float
+    gamma: float
     blur_px: float
-    prior: np.ndarray | None
 
-    def shading(self, line):
-        """Shading and misfit with the line shifted by line[0] px and tilted by line[1] px over ARM_MM."""
-        return fit_shading(_moved(self.pieces, line), self.blur_px, self.terms, self.knots, prior=self.prior)
 
-    def misfit(self, line) -> float:
-        """Mean chi² per pixel; with a prior, less the log evidence."""
-        return self.shading(line)[1]
+def _chances(cameras: Iterable[Sequence[_Posterior]]) -> np.ndarray:
+    """Of each transfer curve: the cameras of a bench are of one kind."""
+    total = np.sum([[one.evidence for one in by_gamma] for by_gamma in cameras], axis=0)
+    chance = np.exp(-0.5 * (total - total.min()))
+    return chance / chance.sum()
+
+
+def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances) -> BarLine:
+    """The line by all transfer curves, each by its chance; looked for once more close by if it is known so well."""
+    mean, covariance = _mixed(wide, chances)
+    line, for_bar = line + mean, float(chances @ [one.for_bar for one in wide])
+    if np.sqrt(np.max(np.diag(covariance))) < _CLOSE_PX / _WITHIN_SIGMAS:
+        likely = chances > _LEAST_CHANCE
+        again = [_posterior(_moved(pieces, line), _CLOSE_PX, one.gamma, one.blur_px)
+                 for one, is_likely in zip(wide, likely) if is_likely]
+        mean, covariance = _mixed(again, chances[likely] / chances[likely].sum())
+        line = line + mean
+    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar)
+
+
+def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (2,) and covariance (2, 2) of a mixture."""
+    lines = np.array([one.line for one in posteriors])
+    mean = chances @ lines
+    own = np.array([one.covariance for one in posteriors])
+    return mean, np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - mean, lines - mean))
+
+
+def _mean_noise(view: View) -> View:
+    """The view with the noise of its mean picture."""
+    share = 1.0 / min(len(view.frames), MEAN_OF)
+    return replace(view, noise=Noise(view.noise.floor * share, view.noise.gain * share))
 
 
 def _moved(pieces: Pieces, line) -> Pieces:
     return pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
 
 
-def _model(pieces: Pieces, line, knots) -> _Model:
-    """Rims alone where the bar is thick, all of it where it is thin."""
-    if float(np.median(pieces.radius_px)) > _THICK_PX:
-        return _Model(rims_of(pieces, _moved(pieces, line)), RIMS, knots, 1.0, None)
-    return _Model(pieces, WAVES, knots, 1.0, wave_prior(pieces, WAVES))
+def _far(pieces: Pieces, off_px: float) -> np.ndarray:
+    """The most probable line (2,) by blurred pictures, on a coarse grid."""
+    shifts = np.arange(-off_px, off_px + 0.5 * _FAR_STEP_PX, _FAR_STEP_PX)
+    seen = profiles(pieces, _STRETCHES, off_px, 1.0)
+    misfit, lines = _over_lines(evidence(seen, shifts, _FAR_BLUR_PX), seen, off_px)
+    return lines[np.unravel_index(np.argmin(misfit), misfit.shape)]
 
 
-def _on_line(model: _Model, line) -> np.ndarray:
-    """Which pieces (s,) lie on the line by themselves, to four times their scatter; a clamp's border does not."""
-    shift = locate(_moved(model.pieces, line), model.shading(line)[0]).shift_px
-    off = np.abs(shift - np.median(shift))
-    return off < max(4.0 * 1.48 * np.median(off), _LEAST_OFF_PX)
+def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | None = None) -> _Posterior:
+    """Over lines within reach_px, under the lens blur that explains the pieces best where it is not given."""
+    shifts = np.linspace(-reach_px, reach_px, _STEPS)
+    seen = profiles(pieces, _STRETCHES, reach_px, gamma)
+    if blur_px is None:
+        least = [float(np.sum(evidence(seen, shifts[::3], blur).of_bar.min(axis=1))) for blur in _BLURS_PX]
+        blur_px = _BLURS_PX[int(np.argmin(least))]
+    found = evidence(seen, shifts, blur_px)
+    misfit, lines = _over_lines(found, seen, reach_px)
+    chance = np.exp(-0.5 * (misfit - misfit.min()))
+    total = chance.sum()
+    mean = np.einsum("ab,abi->i", chance, lines) / total
+    away = lines - mean
+    for_bar = float(np.sum((found.of_none - found.of_bar.min(axis=1)) / _temper(found)))
+    return _Posterior(mean, np.einsum("ab,abi,abj->ij", chance, away, away) / total,
+                      float(misfit.min() - 2.0 * np.log(total)), for_bar, gamma, blur_px)
 
 
-def _sweep(pieces: Pieces, knots, off_px: float) -> np.ndarray:
-    """Coordinate descent over ± off_px of shift and tilt with a coarse, blurred model and every other piece."""
-    few, _ = binned(pieces.select(slice(None, None, 2)), _COARSE_BIN_PX)
-    line, model = np.zeros(2), _Model(few, WAVES, knots, 1.5, None)
-    for reach, step in ((FAR_PX, 1.5), (NEAR_PX, 0.75)):
-        if reach > off_px:
-            continue
-        grid = np.arange(-reach, reach + 1e-9, step)
-        for _ in range(2):
-            for k in range(2):
-                tries = [line + d * np.eye(2)[k] for d in grid]
-                line = tries[int(np.argmin([model.misfit(q) for q in tries]))]
-    return line
+def _temper(found: Evidence) -> np.ndarray:
+    """By how much (k,) each stretch's evidence is overstated."""
+    return _TEMPER * np.maximum(found.misfit, 1.0)
 
 
-def _settle(model: _Model, line, blur_px: float | None, settled_px: float):
-    """Line and lens blur at the least misfit, the line's covariance (2, 2) from the curvature there, and the misfit."""
-    pieces, blurred = binned(model.pieces, _BIN_PX)
-    few = replace(model, pieces=pieces)
-    misfit = lambda q: replace(few, blur_px=float(np.exp(q[2]))).misfit(q[:2])  # noqa: E731
-    blurs = np.log(_BLURS_PX if blur_px is None else [blur_px])
-    begin = min((np.array([*line, blur]) for blur in blurs), key=misfit)
-    q, _, curvature = descend(misfit, begin, _STEPS, _LONGEST, settled_px)
-    blur_px = without(np.exp(q[2]), blurred)
-    here = replace(model, blur_px=blur_px).misfit(q[:2])
-    covariance = covariance_of(curvature, here, float(np.sum(pieces.weight > 0)))
-    return q[:2], blur_px, covariance[:2, :2] * _FORMAL_TO_TRUE**2, here
+def _over_lines(found: Evidence, seen: Sequence[Profile], reach_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Minus twice the log probability (n, n) of lines (n, n, 2), shift and tilt in px, all within reach_px.
+
+    Where the stretches' own middles lie on no line to their sigmas, these are taken to be as much larger.
+    """
+    grid = np.linspace(-reach_px, reach_px, _GRID)
+    lines = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1)
+    own = found.of_bar / _temper(found)[:, None]
+    least = own.min(axis=1, keepdims=True)
+    total = np.zeros(lines.shape[:2])
+    for one, curve in zip(seen, np.minimum(own - least, _MOST)):
+        there = np.clip(lines @ [1.0, one.place_mm / ARM_MM], -reach_px, reach_px)
+        total += np.clip(CubicSpline(found.shift_px, curve)(there), 0.0, _MOST)
+    scatter = max(1.0, total.min() / max(len(seen) - 2, 1))
+    return float(np.sum(least)) + total / scatter, lines
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:

@@ -8,44 +8,27 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vision.bar.axis import standing_out
 from vision.bar.edges import measure_edges
+from vision.bar.find import Clear, likely
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import BarAxis, upward
 from vision.geometry.errors import Refused
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.points import LinePoints
 from vision.pictures.view import View
 
-_ALONG_MM = np.arange(-16.0, 16.1, 4.0)
-_INSIDE, _OUTSIDE = np.array([-0.9, -0.75, 0.0, 0.75, 0.9]), np.array([-1.2, 1.2])
-_FIRST_STEP = np.array([0.5, np.radians(2.5), 0.02])  # along the whisker, mm; round the sight; of the depth
-_AROUND = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-_STARTS, _MOST_CLIMBS, _SHRINKS = 6, 25, 4
-_LEAST_SCORE = 0.25
+_X_STEP = 0.35  # of the bar's radius
+_TURN_RAD, _FURTHER = np.radians(np.arange(0.0, 180.0, 5.0)), np.array([-0.05, 0.0, 0.05])
 _NEAREST, _FARTHEST = 0.7, 1.4  # of the distance at first: beyond, what passed for edges is none
 _SAME_PLANE_RAD = np.radians(1.0)
-def find_bar_alone(change: np.ndarray, camera: Camera, radius_mm: float, motor_rad: tuple[float, float],
-                   length_mm: float) -> BarAxis:
-    """Coarse axis of the bar in one camera, taken to be at right angles to the sight: its edges tell its tilt.
-
-    change: see `vision.bar.axis.changed`; motor_rad: lowest and highest motor angle, between which the whisker touches.
-    Raises Refused where nothing like a bar is seen.
-    """
-    x = np.arange(10.0, length_mm, 0.35 * radius_mm)
-    turn = np.radians(np.arange(0.0, 180.0, 5.0))
-    grid = np.stack(np.meshgrid(x, turn, [-0.05, 0.0, 0.05], indexing="ij"), axis=-1).reshape(-1, 3)
-    motor = 0.5 * sum(motor_rad)
-    score = lambda hypotheses: standing_out(_axis(hypotheses, camera, motor), change, camera,  # noqa: E731
-                                            radius_mm * _INSIDE, radius_mm * _OUTSIDE, _ALONG_MM)
-    found, best = _climb(grid[np.argsort(score(grid))[-_STARTS:]], score)
-    if best < _LEAST_SCORE:
-        raise Refused(f"no bar of diameter {2 * radius_mm:g} mm is seen near the whisker (best match "
-                      f"{best:.2f}, needed {_LEAST_SCORE:g}); record with the bar in view of every camera")
-    axis = _axis(found[None], camera, motor)
-    return upward(BarAxis(axis.point_mm[0], axis.direction[0]))
+def find_bars_alone(seen: Clear, rods: Rods, motor_rad: float) -> list[BarAxis]:
+    """Coarse axes of what may be the bar in one camera, taken to be at right angles to the sight: its edges tell its
+    tilt. motor_rad: about where the whisker touches."""
+    x = np.arange(10.0, rods.wire.length_mm, _X_STEP * rods.bar.radius_mm)
+    return likely([seen], (x, _TURN_RAD, _FURTHER), lambda each: _axis(each, seen.camera, motor_rad),
+                  rods.bar.radius_mm)
 
 
 def _axis(hypotheses, camera: Camera, motor_rad: float) -> BarAxis:
@@ -60,30 +43,13 @@ def _axis(hypotheses, camera: Camera, motor_rad: float) -> BarAxis:
     return BarAxis(point, np.cos(turn) * right + np.sin(turn) * np.cross(right, ahead))
 
 
-def _climb(starts, score) -> tuple[np.ndarray, float]:
-    """Best hypothesis (3,) and its score: from each start to the best neighbour, by ever smaller steps."""
-    best, best_score, step = starts, score(starts), np.ones(len(starts))
-    for _ in range(_MOST_CLIMBS):
-        around = best[:, None] + step[:, None, None] * _FIRST_STEP * _AROUND
-        scores = score(around.reshape(-1, 3)).reshape(len(best), -1)
-        chosen, rows = np.argmax(scores, axis=1), np.arange(len(best))
-        better = scores[rows, chosen]
-        step = np.where(better > best_score + 1e-3, step, 0.5 * step)
-        best, best_score = around[rows, chosen], better
-        if np.all(step < 0.5**_SHRINKS):
-            break
-    at = int(np.argmax(best_score))
-    return best[at], float(best_score[at])
-
-
-def see_bar_alone(change: np.ndarray, view: View, wire: Wire, radius_mm: float, motor_rad,
+def see_bar_alone(first: BarAxis, view: View, wire: Wire, radius_mm: float, motor_rad,
                   settings: VisionSettings) -> BarAxis:
-    """The bar's axis from one camera, before any wire is known. motor_rad (n,): of all frames.
+    """The bar's axis from one camera, from a coarse one, before any wire is known. motor_rad (n,): of all frames.
 
-    Raises Refused where no bar is seen, or its edges are not.
+    Raises Refused where its edges are not seen.
     """
-    camera, span = view.camera, (float(np.min(motor_rad)), float(np.max(motor_rad)))
-    first = axis = find_bar_alone(change, camera, radius_mm, span, wire.length_mm)
+    camera, axis = view.camera, first
     straight = resting_lines(camera, wire, np.unique(motor_rad))
     for coarse in (True, False):
         edges = measure_edges(view, view.mean, axis, radius_mm, straight, settings, coarse=coarse)

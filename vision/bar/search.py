@@ -1,27 +1,29 @@
-"""Where the bar is, before any wire is known: looked for among what has changed, then by its lines in all cameras."""
+"""Where the bar is, before any wire is known: looked for by its edges, then by its lines in all cameras."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bar.axis import find_bar, settle_axis
-from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bar
-from vision.bar.one_view import see_bar_alone, seen_from_one_side, widest_angle_rad
+from vision.bar.axis import settle_axis
+from vision.bar.find import Clear, clear_edges, find_bars
+from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bars
+from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
-from vision.pictures.change import HALF, changed
+from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import MEAN_OF, View
 
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
 _WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
+_NO_BAR = "no bar of diameter {:g} mm is seen near the whisker; record with the bar in view of every camera"
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
 
 
@@ -33,63 +35,58 @@ class SeenBar:
     lines: Mapping[str, BarLine]
 
     @property
-    def told(self) -> dict[str, BarLine]:
-        """Lines of the cameras that see a bar there."""
-        return {name: line for name, line in self.lines.items() if line.told}
+    def seen_by(self) -> list[str]:
+        """The cameras that see a bar there."""
+        return [name for name, line in self.lines.items() if line.is_bar]
 
     @property
-    def worth(self) -> tuple[int, float]:
-        """The more cameras see a bar there, and the better, the more."""
-        return len(self.told), -sum(line.misfit for line in self.told.values())
+    def worth(self) -> float:
+        """How well all cameras see a bar there: the sum of the logs of each one's evidence.
+
+        Not of the evidence: each hypothesis has its own pixels, and a wrong one along something bright in one camera
+        has more evidence there than the bar has in both.
+        """
+        return float(sum(np.log1p(max(line.for_bar, 0.0)) for line in self.lines.values()))
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
     """The bar from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
 
-    Where the sights of all cameras are nearly the same, or not all see the bar that two of them found, each is asked
-    alone, too: by its two edges one camera tells roughly how far away a bar is, and finds no other for it.
+    Of the axes whose edges are clear in all cameras, that whose lines are the best seen in all of them. Where the
+    sights of all cameras are nearly the same, or not all see it, each is asked alone, too: by its two edges one camera
+    tells roughly how far away a bar is, and finds no other for it.
     """
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
-    changes = {view.camera.name: changed(_median_picture(view), view.background[::HALF, ::HALF], view.noise)
-               for view in views}
-    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
-    alone = lambda view: see_bar_alone(changes[view.camera.name], of_mean(view), rods.wire,  # noqa: E731
-                                       rods.bar.radius_mm, motor_rad, settings)
-    settled = lambda axis, *off_px: _settled(axis, off_px, views, cameras, rods, wires, settings)  # noqa: E731
+    clear = [clear_edges(view.camera, _median_picture(view), view.background[::HALF, ::HALF], rods, sum(span) / 2)
+             for view in views]
     if len(views) == 1:
-        return SeenBar(alone(views[0]), {})
-    axis = find_bar(changes, cameras, rods.bar.radius_mm, rods.reach_mm, span, rods.wire.length_mm)
-    found = [settled(axis, FAR_PX, NEAR_PX)]
-    if found[0].worth[0] == len(views) and widest_angle_rad(cameras, found[0].axis) > _NARROW_RAD:
-        return found[0]
-    for view in views:
+        return SeenBar(_alone(views[0], clear[0], rods, motor_rad, settings), {})
+    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
+
+    def settled(axis: BarAxis, off_px: float) -> SeenBar:
+        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=off_px)
+        bars = {name: line.points for name, line in lines.items() if line.is_bar}
+        return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
+
+    likely = max((settled(axis, FAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.worth)
+    best = settled(likely.axis, NEAR_PX)
+    if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
+        return best
+    found = [best] if best.seen_by else []
+    for view, one in zip(views, clear):
         with suppress(Refused):
-            seen = settled(alone(view), NEAR_PX)
-            found += [seen] if view.camera.name in seen.told else []
+            seen = settled(_alone(view, one, rods, motor_rad, settings), NEAR_PX)
+            found += [seen] if view.camera.name in seen.seen_by else []
+    if not found:
+        raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm))
     one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
     return max(found[1:] if one_side else found, key=lambda one: one.worth)
 
 
-def _settled(axis: BarAxis, off_px: Sequence[float], views, cameras: Cameras, rods: Rods, wires,
-             settings: VisionSettings) -> SeenBar:
-    """The axis by the bar's lines, which are looked for so far away in turn."""
-    for most_px in off_px:
-        lines = bar_lines(views, axis, rods, wires, settings, off_px=most_px)
-        bars = {name: line.points for name, line in lines.items() if line.is_bar}
-        axis = settle_axis(axis, cameras, bars, rods.bar.radius_mm)
-        near = max((line.moved_px for line in lines.values()), default=0.0) < NEAR_PX
-        if near or all(line.told for line in lines.values()):
-            break
-    return SeenBar(axis, lines)
-
-
-def bar_lines(views, axis: BarAxis, rods: Rods, wires, settings: VisionSettings, *, off_px: float = 0.0,
-              last: bool = False) -> dict[str, BarLine]:
-    """The bar's line in each camera that shows enough of it."""
-    found = {view.camera.name: measure_bar(of_mean(view), view.mean, axis, rods.bar.radius_mm,
-                                           wires.get(view.camera.name, []), settings, off_px=off_px, last=last)
-             for view in views}
-    return {name: line for name, line in found.items() if line is not None}
+def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
+    """The axis as one camera alone sees it. Raises Refused where it sees none, or not how far away it is."""
+    first = find_bars_alone(clear, rods, float(np.mean(motor_rad)))[0]
+    return see_bar_alone(first, of_mean(view), rods.wire, rods.bar.radius_mm, motor_rad, settings)
 
 
 def of_mean(view: View) -> View:

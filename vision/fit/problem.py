@@ -10,24 +10,26 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, axis_frame, closest_arc, shifted_axis
 from vision.geometry.rods import Wire
-from vision.lines.points import Observed
+from vision.lines.points import SHARED, Observed
 
 BAR, REST = 4, 2 * REST_POWERS
 # One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
 # set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
-# How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
-WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
+# How far a traced line may be off as a whole beyond what light and lens are said to move it by: shadows, reflections.
+# RMS of 72 path-traced views (docs/proof.md).
+WIRE_OFFSET_PX, WIRE_TILT_PX = 0.12, 0.09
 # As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
-WIRE_DRIFT_PX = 0.01
+WIRE_DRIFT_PX = 0.02
 WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
-# It also wanders with what is behind it: by as much, over this length of wire.
-WANDER_PX, WANDER_MM = WIRE_OFFSET_PX, 12.0
+# It also wanders with what is behind it, over this length of wire.
+WANDER_PX, WANDER_MM = 0.25, 12.0
 BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
 BAR_TILT_ARM_MM = 20.0
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
-_MODES = len(WIRE_MODES_PX) + len(BAR_MODES_PX)
+# Sigmas of all that a camera's lines are off by as a whole.
+LIGHT_PX = np.array([*WIRE_MODES_PX, *np.ones(SHARED), *BAR_MODES_PX])
 CONTACT_SIGMA_MM = 0.002
 
 
@@ -37,9 +39,8 @@ class Problem:
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
     axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
-    cameras do not know whisker and bar well enough in space to tell when they touch. doubt_px: by camera, how far its
-    lines of the wire may be off as a whole besides the usual; none where empty. alike: by camera, how much of its error
-    a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`).
+    cameras do not know whisker and bar well enough in space to tell when they touch. alike: by camera, how much of its
+    error a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`).
     """
 
     cameras: Cameras
@@ -52,7 +53,6 @@ class Problem:
     bent: np.ndarray
     seen: Sequence[Observed]
     onset: Onset | None = None
-    doubt_px: Sequence[float] = ()
     alike: Sequence[float] = ()
 
     @property
@@ -63,12 +63,12 @@ class Problem:
     @property
     def first_bend(self) -> int:
         """Index of the first bend."""
-        return BAR + REST + 1 + _MODES * len(self.cameras)
+        return BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
 
     def wire_off(self, camera: int) -> slice:
-        """Parameters by which a camera's lines of the wire are off as a whole, see `wire_modes`."""
-        first = BAR + REST + 1 + _MODES * camera
-        return slice(first, first + len(WIRE_MODES_PX))
+        """Parameters by which a camera's lines of the wire are off as a whole: `wire_modes`, then what points share."""
+        first = BAR + REST + 1 + len(LIGHT_PX) * camera
+        return slice(first, first + len(WIRE_MODES_PX) + SHARED)
 
     def bar_off(self, camera: int) -> slice:
         """The same of the bar: offset, and tilt over BAR_TILT_ARM_MM."""

@@ -16,13 +16,12 @@ import numpy as np
 from vision.fit.onset import Onset
 from vision.fit.problem import (
     BAR,
-    BAR_MODES_PX,
     BAR_TILT_ARM_MM,
     BEND_PRIOR_RAD,
     CONTACT_SIGMA_MM,
+    LIGHT_PX,
     REST,
     REST_PRIOR_MM,
-    WIRE_MODES_PX,
     Problem,
     State,
     bar_axis,
@@ -120,6 +119,7 @@ def _wire_block(problem: Problem, number: int, group: Sequence[Observed], curves
         bent = names[frame] >= 0
         jacobian[row[bent], names[frame][bent]] = by_step[bent] / step
     modes = wire_modes(problem.wire.length_mm, points.place, problem.motor_rad[frame], problem.motor_rad)
+    modes = np.hstack([modes, points.shared_px])
     return _over_sigma(points, px, jacobian, problem.wire_off(number), modes, vector)
 
 
@@ -199,11 +199,8 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
 
 
 def _prior_block(problem: Problem, vector):
-    per_camera = np.tile([*WIRE_MODES_PX, *BAR_MODES_PX], (len(problem.cameras), 1))
-    if problem.doubt_px:
-        per_camera[:, 0] = np.hypot(per_camera[:, 0], problem.doubt_px)
     sigma = np.concatenate([[50.0, 50.0, 1.0, 1.0], REST_PRIOR_MM, REST_PRIOR_MM,
-                            [max(problem.reach_sigma_mm, 1e-6)], per_camera.ravel(),
+                            [max(problem.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import Problem, bar_axis, rest_shape
+from vision.fit.problem import BAR, REST, Problem, bar_axis, rest_shape
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Wire
 
 FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _SURE_BEND_RAD = np.radians(0.25)
+_STEP = 1e-5  # mm and rad, of differences
 _TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
 
 
@@ -38,6 +39,18 @@ def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
         low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
         high, (gap_high, arc, point) = new, _gap(rest, new, axis, reach, problem.wire)
     return FirstTouch(high, point, arc)
+
+
+def touch_and_sigma(problem: Problem, vector, answer) -> tuple[float, float]:
+    """Motor angle of first touch and its sigma, rad, by noise and priors alone: what it takes to part the frames.
+
+    answer (size, size): covariance that the fit gives.
+    """
+    geometry = np.arange(BAR + REST + 1)
+    here = float(first_touch(problem, vector).motor_rad)
+    moved = first_touch(problem, vector + _STEP * np.eye(len(vector))[geometry]).motor_rad
+    slope = (moved - here) / _STEP
+    return here, float(np.sqrt(slope @ answer[np.ix_(geometry, geometry)] @ slope))
 
 
 def _gap(rest_mm, motor_rad, axis: BarAxis, reach_mm, wire: Wire):

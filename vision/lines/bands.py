@@ -92,6 +92,11 @@ class Pieces:
     def __len__(self) -> int:
         return len(self.place)
 
+    @property
+    def freedom(self) -> np.ndarray:
+        """Pixels (s,) less the position and the background's gain and offset that each piece has of its own."""
+        return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
+
     def select(self, keep) -> "Pieces":
         """The pieces where `keep` (s,) holds, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))

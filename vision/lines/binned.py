@@ -15,9 +15,9 @@ def binned(pieces: Pieces, width_px: float) -> tuple[Pieces, float]:
     count = int(bins.max(initial=0)) + 1
     place = bins + count * np.arange(len(pieces))[:, None]
     weight = pieces.weight**2
-    total = _sum(weight, place, count)
+    total = sums(weight, place, count)
     share = weight / np.maximum(total, 1e-300).ravel()[place]
-    mean = {name: _sum(share * getattr(pieces, name), place, count)
+    mean = {name: sums(share * getattr(pieces, name), place, count)
             for name in ("offset_px", "grey", "background", "slope", "curvature")}
     spread = (pieces.offset_px - mean["offset_px"].ravel()[place]) ** 2
     values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__} | mean
@@ -30,7 +30,7 @@ def without(blur_px: float, variance_px2: float) -> float:
     return float(np.sqrt(max(blur_px**2 - variance_px2, 0.25 * blur_px**2)))
 
 
-def _sum(values, place, count: int) -> np.ndarray:
+def sums(values, place, count: int) -> np.ndarray:
     """Sums (s, count) of values (s, p) by their places in it."""
     size = len(values)
     return np.bincount(place.ravel(), values.ravel(), size * count).reshape(size, count)

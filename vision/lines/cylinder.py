@@ -31,28 +31,30 @@ def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarra
     return values
 
 
-def shaded(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, np.ndarray]:
-    """Blurred pictures (2, s, p) of s cylinders, what each adds to the light and what it hides, and their slopes by
-    offset, per px.
+def slopes_of(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, np.ndarray]:
+    """First and second derivatives (2, s, p) each, by offset, per px and per px², of what s cylinders add to the light
+    and of what they hide.
 
     offset_px (s, p), radius_px (s,); waves (s, terms): the radiance of each in terms of `round_the_rod`.
     """
     radius_px, terms = radius_px[:, None], waves.shape[1]
     ratio = _one_ratio(radius_px, blur_px)
     if ratio is None:
-        ends = [_integrated(offset_px + d, radius_px, blur_px, terms) for d in (-_DELTA_PX, _DELTA_PX)]
-        behind, ahead = (np.stack([np.einsum("spt,st->sp", end[..., :terms], waves), end[..., 0]]) for end in ends)
-        return 0.5 * (ahead + behind), (ahead - behind) / (2.0 * _DELTA_PX)
+        ends = [_integrated(offset_px + d, radius_px, blur_px, terms) for d in (-_DELTA_PX, 0.0, _DELTA_PX)]
+        behind, here, ahead = (np.stack([np.einsum("spt,st->sp", end[..., :terms], waves), end[..., 0]])
+                               for end in ends)
+        return (ahead - behind) / (2.0 * _DELTA_PX), (ahead - 2.0 * here + behind) / _DELTA_PX**2
     rows, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows, len(table))
     own = table[:, :terms] @ waves.T
     each = before * len(waves) + np.arange(len(waves))[:, None]
-    pictures, slopes = np.empty((2, 2, *offset_px.shape))
+    slopes, curvatures = np.empty((2, 2, *offset_px.shape))
     for k, (profile, place, next_row) in enumerate(((own, each, len(waves)), (table[:, 0], before, 1))):
-        for into, values in ((pictures[k], profile), (slopes[k], np.gradient(profile, axis=0))):
-            here = values.take(place, mode="clip")
-            into[:] = here + part * (values.take(place + next_row, mode="clip") - here)
-    return pictures, slopes * (rows / radius_px)
+        for into in (slopes[k], curvatures[k]):
+            profile = np.gradient(profile, axis=0)
+            here = profile.take(place, mode="clip")
+            into[:] = here + part * (profile.take(place + next_row, mode="clip") - here)
+    return slopes * (rows / radius_px), curvatures * (rows / radius_px) ** 2
 
 
 def rim_bells(offset_px, radius_px, blur_px: float) -> np.ndarray:

@@ -32,6 +32,7 @@ _BESIDE_PX = 5  # background read on either side of the edges
 _KNOT_PX = 25.0
 _HIDES = 1.5  # half-widths over blur from which what is behind the axis is hidden
 _FIRST_RADII_PX = (0.6, 1.2, 2.4, 4.0)
+_BLUR_SIGMA = 0.02  # of its logarithm: found with the width, which it would stand in for
 _EVEN = 1  # one brightness across: where neither width nor background is known, more would stand in for a shift
 _ROUNDS = 3
 _PATH_SIGMA_PX = 0.5  # a path goes from pixel to pixel
@@ -89,14 +90,15 @@ def follow(grey, start_px, end_px, *, dark: bool = True, noise: Noise | None = N
     for _ in range(_ROUNDS):
         width = _best_width(_pieces(grey, curve, width, piece_px, noise), width)
         pieces = _pieces(grey, curve, width, piece_px, noise)
-        settled, found, chi2 = trace(pieces, width.blur_px, _EVEN, _knots(pieces))
-        points, _ = to_points(settled, found, chi2)
-        _refuse_nothing(len(points), np.median(found.contrast) / np.sqrt(max(chi2, 1.0)), start_px, end_px)
+        traced = trace(pieces, _knots(pieces), width.blur_px, _BLUR_SIGMA, _EVEN)
+        points, _ = to_points(traced)
+        contrast = np.median(traced.found.contrast) / np.sqrt(max(traced.misfit, 1.0))
+        _refuse_nothing(len(points), contrast, start_px, end_px)
         points = points.select(np.argsort(points.place))
         curve = _smooth(points.px, np.maximum(points.sigma_px, _LEAST_SIGMA_PX), curve)
     scatter = scatter_of(points)
     points = replace(points, sigma_px=points.sigma_px * max(scatter, 1.0))
-    return Followed(points, width.radius(points.place, _arc(curve)[-1]), width.blur_px, chi2, scatter)
+    return Followed(points, width.radius(points.place, _arc(curve)[-1]), width.blur_px, traced.misfit, scatter)
 
 
 def scatter_of(points: LinePoints) -> float:

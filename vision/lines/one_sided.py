@@ -30,12 +30,6 @@ class SeenWidth:
         """Whether an edge of the rod is not seen."""
         return self.seen_px < _ONE_SIDED * self.known_px
 
-    @property
-    def doubt_px(self) -> float:
-        """How far the axis, taken from one edge, may be off, one sigma: a quarter of the width that is not seen. In
-        tests/ladder/lines.py it is off by a quarter of it with the lamp at 15 degrees, by a hundredth at 45."""
-        return 0.25 * (self.known_px - self.seen_px) if self.one_sided else 0.0
-
     def line(self, camera: str) -> str:
         """For the report; empty where both edges are seen."""
         if not self.one_sided:
@@ -65,13 +59,10 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
 
 @dataclass(frozen=True)
 class Lit:
-    """How one camera sees the wire: lens blur in px, the width seen, and where its line lies beside the fitted one, px:
-    as a whole, and at the tip farther than at the middle."""
+    """How one camera sees the wire: lens blur in px, and the width seen."""
 
     blur_px: float
     width: SeenWidth
-    off_px: float = 0.0
-    tilt_px: float = 0.0
 
 
 def one_sided_lines(whisks: Sequence[Mapping[str, Lit]]) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from vision.lines.bands import Pieces
-from vision.lines.cylinder import rim_bells, shaded, shading_basis
-from vision.lines.points import LinePoints
+from vision.lines.cylinder import shading_basis, slopes_of
 
+LEAST_POWER = 1e-9  # 1/px², of a piece that does not tell where it is
 _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
 # alike, moved all lines by half a pixel, and by a quarter of one from end to end.
@@ -90,18 +90,13 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust
     evidence: what a shift of the rod and a change of its shading explain alike is then not credited to the shading in
     full.
     """
-    gram, moment, power = _normal_equations(pieces, blur_px, terms)
+    equations = Equations(pieces, blur_px, terms)
     robust = np.ones(len(pieces)) if robust is None else robust
-    hats = knots.weights(pieces)
-    size = len(knots) * terms
-    pairs = (hats[:, :, None] * hats[:, None, :] * robust[:, None, None]).reshape(len(pieces), -1)
-    left = pairs.T @ gram.reshape(len(pieces), -1)
-    left = left.reshape(len(knots), len(knots), terms, terms).transpose(0, 2, 1, 3).reshape(size, size)
-    right = ((hats * robust[:, None]).T @ moment).reshape(size)
-    stiff = 1e-6 * np.trace(left) / size * np.eye(size) if prior is None else _stiffness(prior, knots)
+    left, right = equations.shared(knots.weights(pieces), robust)
+    stiff = 1e-6 * np.trace(left) / len(left) * np.eye(len(left)) if prior is None else stiffness(prior, knots)
     factors = lu_factor(left + stiff, check_finite=False)
     waves = lu_solve(factors, right, check_finite=False)
-    misfit = float(robust @ power - 2.0 * right @ waves + waves @ left @ waves)
+    misfit = float(robust @ equations.power - 2.0 * right @ waves + waves @ left @ waves)
     if prior is not None:
         misfit += float(waves @ stiff @ waves + np.sum(np.log(np.abs(np.diag(factors[0])))))
     pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
@@ -109,25 +104,78 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust
     return shading, misfit / max(1.0, pixels)
 
 
-def _normal_equations(pieces: Pieces, blur_px: float, terms: int):
+class Equations:
     """Each piece's normal equations for its shading, the background's gain and offset eliminated.
 
-    Gram matrices (s, terms, terms), moments (s, terms), and the squares (s,) that the background leaves.
+    gram (s, terms, terms), moment (s, terms), and the squares power (s,) that the background leaves.
     """
-    basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
-    basis *= pieces.weight[..., None]
-    rod = basis[..., :terms]
-    rest = np.empty((len(pieces), 3, pieces.offset_px.shape[1]))  # two of the background, and what is seen
-    np.subtract(pieces.weight, rod[..., 0], out=rest[:, 1])
-    np.multiply(rest[:, 1], pieces.background, out=rest[:, 0])
-    rest[:, 0] += _not_leaked(pieces, basis[..., terms:], blur_px)
-    np.multiply(pieces.grey, pieces.weight, out=rest[:, 2])
-    gram, mixed, own = rod.transpose(0, 2, 1) @ rod, rest @ rod, rest @ rest.transpose(0, 2, 1)
-    around, seen = mixed[:, :2].transpose(0, 2, 1), own[:, :2, 2:]
-    inverse = _inverse_of_two(own[:, :2, :2] + _WEAK * np.eye(2))
-    explained = inverse @ seen
-    return (gram - around @ (inverse @ mixed[:, :2]), mixed[:, 2] - (around @ explained)[..., 0],
-            own[:, 2, 2] - np.sum(seen * explained, axis=(1, 2)))
+
+    def __init__(self, pieces: Pieces, blur_px: float, terms: int):
+        self.pieces, self.blur_px = pieces, blur_px
+        basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
+        basis *= pieces.weight[..., None]
+        self._rod = basis[..., :terms]
+        self._rest = rest = np.empty((len(pieces), 3, pieces.offset_px.shape[1]))  # background's two, and what is seen
+        np.subtract(pieces.weight, self._rod[..., 0], out=rest[:, 1])
+        np.multiply(rest[:, 1], pieces.background, out=rest[:, 0])
+        rest[:, 0] += _not_leaked(pieces, basis[..., terms:], blur_px)
+        np.multiply(pieces.grey, pieces.weight, out=rest[:, 2])
+        own = rest @ rest.transpose(0, 2, 1)
+        self._inverse = _inverse_of_two(own[:, :2, :2] + _WEAK * np.eye(2))
+        mixed = rest @ self._rod
+        self._around, seen = mixed[:, :2], own[:, :2, 2:]
+        turned = self._around.transpose(0, 2, 1)
+        explained = self._inverse @ seen
+        self.gram = self._rod.transpose(0, 2, 1) @ self._rod - turned @ (self._inverse @ self._around)
+        self.moment = mixed[:, 2] - (turned @ explained)[..., 0]
+        self.power = own[:, 2, 2] - np.sum(seen * explained, axis=(1, 2))
+
+    def shared(self, hats, robust) -> tuple[np.ndarray, np.ndarray]:
+        """Normal matrix (size, size) and right side (size,) of all knots' coefficients, the pieces' positions kept.
+
+        hats (s, knots): weight of each knot in each piece; robust (s,): weight of each piece.
+        """
+        knots, terms = hats.shape[1], self.moment.shape[1]
+        size = knots * terms
+        pairs = (hats[:, :, None] * hats[:, None, :] * robust[:, None, None]).reshape(len(hats), -1)
+        left = (pairs.T @ self.gram.reshape(len(hats), -1)).reshape(knots, knots, terms, terms)
+        return (left.transpose(0, 2, 1, 3).reshape(size, size),
+                ((hats * robust[:, None]).T @ self.moment).reshape(size))
+
+    def chi2(self, waves) -> np.ndarray:
+        """What pieces of this shading, waves (s, terms), leave (s,)."""
+        return self.power + np.einsum("st,st->s", waves, (self.gram @ waves[..., None])[..., 0] - 2.0 * self.moment)
+
+    def linearised(self, waves) -> "Slopes":
+        """How pieces of this shading, waves (s, terms), change with position and blur; what leaks is taken to stay."""
+        pieces, rest = self.pieces, self._rest
+        left = rest[:, 2] - (self._rod @ waves[..., None])[..., 0]
+        explained = self._inverse @ (rest[:, :2] @ left[..., None])  # gain and constant
+        by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
+        slopes, curvatures = slopes_of(pieces.offset_px, pieces.radius_px, self.blur_px, waves)
+        columns = np.empty_like(rest)
+        columns[:, 0] = -(slopes[0] + slopes[1] * by_cover)
+        # a normal density of variance v changes with v by half its second derivative
+        columns[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
+        columns[:, :2] *= pieces.weight[:, None]
+        columns[:, 2] = left
+        mixed = columns @ rest[:, :2].transpose(0, 2, 1)
+        reduced = mixed @ self._inverse
+        gram = columns @ columns.transpose(0, 2, 1) - reduced @ mixed.transpose(0, 2, 1)
+        rod = columns[:, :2] @ self._rod - reduced[:, :2] @ self._around
+        covered = left - rest[:, 2] - self._rod[..., 0] * by_cover
+        return Slopes(rod, gram, np.sqrt(np.sum(covered**2, axis=1)))
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Products of each piece's derivatives by position (px) and by the logarithm of the blur, the background's gain and
+    offset eliminated: with those by its shading, rod (s, 2, terms); gram (s, 3, 3): with each other and with what is
+    left. contrast (s,): see `Located`."""
+
+    rod: np.ndarray
+    gram: np.ndarray
+    contrast: np.ndarray
 
 
 def _inverse_of_two(matrices) -> np.ndarray:
@@ -146,7 +194,7 @@ _CHANGE_SHARE = 0.1
 _TURNED_SHARE = 0.3
 
 
-def _stiffness(prior, knots: Knots) -> np.ndarray:
+def stiffness(prior, knots: Knots) -> np.ndarray:
     """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
     between = _between(len(knots.turn_rad), len(knots.place_mm))
     both, size = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :], len(knots) * len(prior)
@@ -172,13 +220,21 @@ def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
 class Located:
     """Where each piece lies: shift_px, sigma_px (s,) along the normal; chi2 (s,) per pixel; contrast (s,).
 
-    contrast: signal of the rod against its background over the noise, over the whole piece.
+    contrast: signal of the rod against its background over the noise, over the whole piece. shared_px (s, k): by how
+    much each moves with what all share, light and lens, by one sigma of each of k independent causes; beside sigma_px.
     """
 
     shift_px: np.ndarray
     sigma_px: np.ndarray
     chi2: np.ndarray
     contrast: np.ndarray
+    shared_px: np.ndarray | None = None
+
+    @property
+    def whole_sigma_px(self) -> np.ndarray:
+        """Sigma (s,) of each piece alone, what it shares with others included."""
+        shared = 0.0 if self.shared_px is None else np.linalg.norm(self.shared_px, axis=1)
+        return np.hypot(self.sigma_px, shared)
 
 
 def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
@@ -186,44 +242,10 @@ def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 
 
     Sigma, misfit and contrast are those of the last round, before its step.
     """
-    waves = shading.of(pieces)
-    shift = np.zeros(len(pieces))
+    waves, shift = shading.of(pieces), np.zeros(len(pieces))
     for _ in range(rounds):
-        residual, slope, contrast = _linearise(pieces, shading, waves, shift)
-        power = np.maximum(np.sum(slope * slope, axis=1), 1e-9)
-        step = np.sum(slope * residual, axis=1) / power
-        shift = np.clip(shift + np.clip(step, -0.7, 0.7), -limit_px, limit_px)
-    free = np.maximum((pieces.weight > 0).sum(axis=1) - 3, 1)
-    chi2 = np.sum(residual**2, axis=1) / free
-    return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, contrast)
-
-
-def _linearise(pieces: Pieces, shading: Shading, waves, shift):
-    """Residual, its slope by position (both s, p; free of the background's gain and offset), and the contrast."""
-    offset, weight = pieces.offset_px - shift[:, None], pieces.weight
-    (rod, cover), (rod_slope, cover_slope) = shaded(offset, pieces.radius_px, shading.blur_px, waves)
-    around = np.empty((len(pieces), 2, offset.shape[1]))
-    np.multiply(1.0 - cover, weight, out=around[:, 1])
-    np.multiply(around[:, 1], pieces.background, out=around[:, 0])
-    bells = rim_bells(offset, pieces.radius_px[:, None], shading.blur_px)
-    around[:, 0] += _not_leaked(pieces, bells, shading.blur_px) * weight
-    turned = around.transpose(0, 2, 1)
-    inverse = _inverse_of_two(around @ turned + _WEAK * np.eye(2))
-    seen = (pieces.grey - rod) * weight
-    explained = inverse @ (around @ seen[..., None])  # gain and constant
-    by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
-    slope = -(rod_slope + cover_slope * by_cover) * weight
-    contrast = np.sqrt(np.sum(((rod + cover * by_cover) * weight) ** 2, axis=1))
-    free = [values - (turned @ share)[..., 0]
-            for values, share in ((seen, explained), (slope, inverse @ (around @ slope[..., None])))]
-    return *free, contrast
-
-
-def line_points(pieces: Pieces, located: Located, *, worst_chi2: float, worst_sigma_px: float,
-                worst_shift_px: float = 1.45) -> tuple[LinePoints, np.ndarray]:
-    """The pieces that can be trusted as points of the axis, and which band each came from."""
-    good = ((located.chi2 < worst_chi2) & (located.sigma_px < worst_sigma_px)
-            & (np.abs(located.shift_px) < worst_shift_px))
-    px = pieces.foot_px + located.shift_px[:, None] * pieces.normal
-    points = LinePoints(px, pieces.normal, located.sigma_px, pieces.place).select(good)
-    return points, pieces.source[good]
+        slopes = Equations(pieces.moved(shift), shading.blur_px, waves.shape[1]).linearised(waves)
+        power = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER)
+        shift = np.clip(shift + np.clip(slopes.gram[:, 0, 2] / power, -0.7, 0.7), -limit_px, limit_px)
+    chi2 = slopes.gram[:, 2, 2] / pieces.freedom
+    return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, slopes.contrast)

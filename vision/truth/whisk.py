@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.bar.edges import measure_edges
+from vision.bar.line import measure_bars
 from vision.bar.one_view import seen_from_one_side
-from vision.bar.search import SeenBar, bar_lines, of_mean
+from vision.bar.search import SeenBar, of_mean
 from vision.fit.first_bends import contact_arc, find_rest, follow_bends
-from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape, wire_lever
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.fit.scatter import honest, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
-from vision.fit.touch import FEWEST_FREE, first_touch, frames_by_touch, frames_that_touch
+from vision.fit.touch import FEWEST_FREE, frames_by_touch, frames_that_touch, touch_and_sigma
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves, one_curve
@@ -20,18 +21,15 @@ from vision.geometry.contact import BarAxis, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
-from vision.lines.cylinder import WAVES
 from vision.lines.one_sided import Lit, seen_width
 from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import clear_of_bar, observed, settle, settle_again, to_points, trace, wire_pieces
+from vision.lines.trace import clear_of_bar, observed, to_points, trace, wire_pieces
 from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
 _NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 _BESIDE_BAR_PX = 4.0
-_SEARCH_PX = 1.5
-_ROUNDS_FIRST, _ROUNDS_AGAIN = 5, 3
 # Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
 # another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
@@ -63,23 +61,21 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    edges = _told_by_edges(cameras, bar)
-    by_onset = bool(edges)
+    edges, by_onset = _told_by_edges(cameras, bar), seen_from_one_side(cameras, bar.axis)
     motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
     for _ in range(settings.rounds):
         seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
-        problem, state, _ = _fit(seen, cameras, rods, look, motor, light, by_onset)
+        problem, state, answer = _fit(seen, cameras, rods, look, motor, by_onset)
         _check_scatter(problem, state)
-        light.update(_beside_fit(problem, state, light))
-        look = _next_look(problem, state, look, motor, by_onset)
+        look = _next_look(problem, state, answer, look, motor, by_onset)
     seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
-    return *_fit(seen, cameras, rods, look, motor, light, by_onset), list(motor)
+    return *_fit(seen, cameras, rods, look, motor, by_onset), list(motor)
 
 
 def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
-    """Cameras whose edges of the bar tell how far away it is, and the whisker's bend when it touches: where all stand
-    on one side, or a single one sees it. None where two see it from different sides."""
-    told = [name for name in cameras.names if name in bar.told]
+    """Cameras whose edges of the bar tell how far away it is: where all stand on one side, or a single one sees it.
+    None where two see it from different sides."""
+    told = [name for name in cameras.names if name in bar.seen_by]
     if seen_from_one_side(cameras, bar.axis):
         return told or list(cameras.names)
     return told if len(told) == 1 else []
@@ -106,12 +102,11 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
     return motor, _Look(axis, rest, bend, arcs, curves, touching, free)
 
 
-def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float], light: dict,
+def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float],
          by_onset: bool) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
-    doubt_px = [light[name].width.doubt_px if name in light else 0.0 for name in cameras.names]
     problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
-                      look.touching, ~look.free, seen, doubt_px=doubt_px)
+                      look.touching, ~look.free, seen)
     state, covariance = solve(problem, _begin(problem, look))
     if by_onset:
         problem, state = touch_by_onset(problem, state, covariance)
@@ -120,25 +115,18 @@ def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor:
     return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
 
 
-def _next_look(problem: Problem, state: State, look: _Look, motor: Mapping[int, float], by_onset: bool) -> _Look:
+def _next_look(problem: Problem, state: State, answer, look: _Look, motor: Mapping[int, float],
+               by_onset: bool) -> _Look:
     """What a fit tells; which frames touch: by clearance, or where cameras do not tell it, by the onset of bending."""
     touching, free = problem.touching, look.free
     if not by_onset:
-        touch = float(first_touch(problem, state.vector).motor_rad)
-        touching, free = frames_by_touch(problem.motor_rad, touch, np.radians(0.02))
+        touching, free = frames_by_touch(problem.motor_rad, *touch_and_sigma(problem, state.vector, answer))
         if np.sum(free) < FEWEST_FREE:
             raise Refused(_STARTS_TOUCHING)
         if not np.any(touching):
             raise Refused(_NEVER_TOUCHES)
     return _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
                  state.arcs_mm, _fitted(problem, state, motor), touching, free)
-
-
-def _beside_fit(problem: Problem, state: State, light: Mapping[str, Lit]) -> dict[str, Lit]:
-    """The same light, with where each camera's own line lies: it is looked for again from there."""
-    own = [state.vector[problem.wire_off(camera)][:2].tolist() for camera in range(len(problem.cameras))]
-    return {name: replace(light[name], off_px=off, tilt_px=tilt)
-            for name, (off, tilt) in zip(problem.cameras.names, own) if name in light}
 
 
 def _check_scatter(problem: Problem, state: State) -> None:
@@ -199,10 +187,10 @@ def _begin(problem: Problem, look: _Look) -> State:
 def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *,
                edges: Collection[str], last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. edges: see
-    `_told_by_edges`; last: see `measure_bar`."""
+    `_told_by_edges`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
              for view in views}
-    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
+    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges)
     seen = []
     for number, view in enumerate(views):
         seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
@@ -211,20 +199,22 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
         if not there:
             raise Refused(f"no camera shows enough of the {rod}")
-    if not edges and len({one.camera for one in seen if one.frame < 0}) < 2:
-        raise Refused("a single camera shows enough of the bar clear of the wire, and not well enough to ask it alone")
     return seen
 
 
-def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
-               last: bool) -> list[dict[int, LinePoints]]:
-    """Per camera the points of the bar's middle (side 0), or of its two edges where any tell them."""
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
+               edges: Collection[str]) -> list[dict[int, LinePoints]]:
+    """Per camera the points of the bar's middle (side 0), or of its two edges where these are seen and are to tell how
+    far away it is."""
     if edges:
-        told = lambda view: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,  # noqa: E731
-                                          wires[view.camera.name], settings)
-        return [told(view) or {} if view.camera.name in edges else {} for view in views]
-    lines = bar_lines(views, axis, rods, wires, settings, last=last)
-    return [{0: lines[view.camera.name].points} if view.camera.name in lines else {} for view in views]
+        views_told = [view for view in views if view.camera.name in edges]
+        found = {view.camera.name: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,
+                                                 wires[view.camera.name], settings) for view in views_told}
+    else:
+        views_told, found = views, {}
+    lines = measure_bars(views_told, axis, rods.bar.radius_mm, wires, settings)
+    middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
+    return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
 
 def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
@@ -236,12 +226,7 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
         return []
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
-    if known:
-        own = known.off_px + known.tilt_px * wire_lever(rods.wire.length_mm, pieces.place)
-        pieces, blur = settle_again(pieces.moved(own), known.blur_px, knots), known.blur_px
-    else:
-        pieces, blur = settle(pieces, knots, _SEARCH_PX)
-    pieces, found, misfit = trace(pieces, blur, WAVES, knots, _ROUNDS_AGAIN if known else _ROUNDS_FIRST, last=last)
-    light[name] = known or Lit(blur, seen_width(pieces, blur))
-    points, source = to_points(pieces, found, misfit)
+    traced = trace(pieces, knots, known.blur_px, last=last) if known else trace(pieces, knots, last=last)
+    light[name] = known or Lit(traced.blur_px, seen_width(traced.pieces, traced.blur_px))
+    points, source = to_points(traced)
     return observed(points, source, number, list(curves))

@@ -10,7 +10,8 @@ from tests.ladder.lines import squares
 from tests.scenes.model_scenes import CAMERAS, REACH, begun, camera, scene, with_points
 from vision.bar.axis import settle_axis
 from vision.bar.edges import measure_edges
-from vision.bar.one_view import axis_from_edges, find_bar_alone, seen_from_one_side
+from vision.bar.one_view import axis_from_edges, seen_from_one_side
+from vision.bar.search import of_mean
 from vision.fit.onset import Onset, onset
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import jacobians
@@ -19,7 +20,6 @@ from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty, variance_by_cause
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis, upward
-from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import grazed, normals
 from vision.lines.points import LinePoints, Observed
@@ -63,20 +63,14 @@ def test_edges_give_the_axis_back():
 def test_edges_of_a_drawn_bar_lie_where_they_say(rng):
     """From a pixel off and 4 % too wide, both edges within three of their own sigmas, an eighth of a pixel."""
     angle, across_mm = 1.2, 0.7
-    picture, view = noisy_view(painted, squares, angle, across_mm, rng)
+    view = noisy_view(painted, squares, angle, across_mm, rng)
     across = np.array([-np.sin(angle), np.cos(angle), 0.0])
     axis = BarAxis((across_mm + 0.2) * across - [0, 0, 0.04 * AWAY_MM], np.array([np.cos(angle), np.sin(angle), 0.0]))
-    found = measure_edges(view, picture, axis, RADIUS_MM, [], VisionSettings(), coarse=True)
+    found = measure_edges(of_mean(view), view.mean, axis, RADIUS_MM, [], VisionSettings(), coarse=True)
     seen = sorted([(float(np.mean((p.px - CENTRE) @ across[:2])), float(p.sigma_px.max())) for p in found.values()])
     for (at, sigma), true in zip(seen, edges_px(across_mm)):
         assert sigma < 0.15
         assert abs(at - true) < 3 * sigma
-
-
-def test_without_a_bar_one_camera_says_so():
-    view = camera("one", (38, -175, 335))
-    with pytest.raises(Refused, match="no bar of diameter 6 mm is seen"):
-        find_bar_alone(np.zeros((360, 640)), view, 3.0, (0.0, 0.1), 100.0)
 
 
 def test_one_side_is_less_than_a_degree():

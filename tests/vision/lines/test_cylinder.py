@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from vision.lines.cylinder import WAVES, rim_bells, round_the_rod, shaded, shading_basis
+from vision.lines.cylinder import WAVES, _integrated, rim_bells, round_the_rod, shading_basis, slopes_of
 
 # Linear between 12 rows a blur and between steps of 5 % in radius over blur: (1/12)²/8 and 0.05²/8, times at most the
 # 0.5 of a blurred edge's curvature; and of higher waves somewhat more.
@@ -39,16 +39,22 @@ def test_every_wave_is_its_integral_round_the_rod(offset):
 
 
 @pytest.mark.parametrize("taper", [0.05, 0.5])
-def test_shaded_is_the_basis_times_its_waves_with_its_slope(rng, taper):
-    """Along one radius by tables, along a taper by integration: the same rule, and slopes by differences."""
+def test_slopes_are_differences_of_the_basis(rng, taper):
+    """Along one radius by tables, along a taper by integration: the same rule."""
     offset = rng.uniform(-5.0, 5.0, (6, 40))
     radius, waves = 2.0 * np.linspace(1.0, 1.0 + taper, 6), rng.normal(0.0, 1.0, (6, WAVES))
-    at = lambda d: shading_basis(offset + d, radius[:, None], 0.8, WAVES)  # noqa: E731
-    (light, hidden), (slope, uncovered) = shaded(offset, radius, 0.8, waves)
-    assert np.allclose(light, np.sum(at(0.0)[..., :WAVES] * waves[:, None], axis=-1), atol=TABLED * np.abs(waves).sum())
-    assert np.allclose(hidden, at(0.0)[..., 0], atol=TABLED)
-    # differences over a tenth of a pixel: the third derivative, of the order of 1/blur³, times 0.05²/6
-    by_difference = (at(0.05) - at(-0.05)) / 0.1
-    assert np.allclose(uncovered, by_difference[..., 0], atol=4e-3)
-    expected = np.sum(by_difference[..., :WAVES] * waves[:, None], axis=-1)
-    assert np.allclose(slope, expected, atol=4e-3 * np.abs(waves).sum())
+    behind, ahead = (shading_basis(offset + d, radius[:, None], 0.8, WAVES) for d in (-0.05, 0.05))
+    slopes, curvatures = slopes_of(offset, radius, 0.8, waves)
+    # differences over a tenth of a pixel: the next but one derivative, of the order of 1/blur³ (1/blur⁴), times 0.05²/6
+    # (0.05²/12); differences twice over rows a twelfth of a blur apart tell the curvature to some 5 % of 0.4/blur²
+    for found, expected, most in ((slopes, (ahead - behind) / 0.1, 4e-3),
+                                  (curvatures, _integrated_bends(offset, radius, waves.shape[1]), 3e-2)):
+        assert np.allclose(found[1], expected[..., 0], atol=most)
+        assert np.allclose(found[0], np.sum(expected[..., :WAVES] * waves[:, None], axis=-1),
+                           atol=most * np.abs(waves).sum())
+
+
+def _integrated_bends(offset, radius, terms):
+    """Second differences (s, p, terms + 2) of the basis without tables, whose steps they would show."""
+    behind, here, ahead = (_integrated(offset + d, radius[:, None], 0.8, terms) for d in (-0.05, 0.0, 0.05))
+    return (ahead - 2.0 * here + behind) / 0.05**2

@@ -1,25 +1,19 @@
 """Light from one side: seen by the width against the known diameter, corrected from the lit edge, told in a line."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bench.rig.protocol import PicturesTable
 from tests.ladder.lines import SCENES, errors, first_look
-from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.fit.problem import WIRE_OFFSET_PX
-from vision.fit.quantities import jacobians
-from vision.fit.solve import solve
 from vision.lines.one_sided import Lit, SeenWidth, one_sided_lines, seen_width
 from vision.lines.trace import to_points
 
 
 def looked_at(name, rng):
     """Width seen in one of the drawn scenes, and the mean error of the axis found there."""
-    _, _, seen, blur = first_look(SCENES[name], rng, off_px=0.3)
-    points, source = to_points(*seen)
-    return seen_width(seen[0], blur), float(np.mean(errors(SCENES[name], points, source)))
+    *_, seen = first_look(SCENES[name], rng, off_px=0.3)
+    points, source = to_points(seen)
+    return seen_width(seen.pieces, seen.blur_px), float(np.mean(errors(SCENES[name], points, source)))
 
 
 @pytest.mark.parametrize("name", ["highlight and step", "highlight over printed squares"])
@@ -47,20 +41,3 @@ def test_the_report_names_camera_and_width_once():
     narrow, whole = SeenWidth(3.1, 5.6, -1.4), SeenWidth(5.5, 5.6, 0.0)
     (line,) = one_sided_lines([{"high": Lit(0.9, narrow), "low": Lit(0.9, whole)}, {"high": Lit(0.9, whole)}])
     assert line.startswith("camera high sees 3.1 of the wire's 5.6 px: light from one side")
-
-
-def test_what_is_not_seen_is_priced():
-    """A quarter of the hidden width is in the prior of that camera's offset, and in what follows from it."""
-    narrow, whole = SeenWidth(3.2, 5.6, -1.4), SeenWidth(5.5, 5.6, 0.0)
-    assert (narrow.doubt_px, whole.doubt_px) == (pytest.approx(0.6), 0.0)
-    scene = draw_scene(0, pictures=PicturesTable(step_deg=1.5))
-    plain = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
-    doubted = replace(plain, doubt_px=(narrow.doubt_px, *[0.0] * (len(scene.cameras) - 1)))
-    d_x, offset = [], []
-    for problem in (plain, doubted):
-        state, covariance = solve(problem, begin(problem), scales=(1e9,) * 6)
-        _, by = jacobians(problem, state)
-        d_x.append(np.sqrt(by.whisk["d_x"] @ covariance @ by.whisk["d_x"]))
-        offset.append(np.sqrt(np.diag(covariance)[problem.wire_off(0)][0]))
-    assert offset[1] > 1.2 * offset[0] and d_x[1] > d_x[0]
-    assert offset[1] < np.hypot(WIRE_OFFSET_PX, 0.6)  # the other camera tells some of it

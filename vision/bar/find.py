@@ -1,0 +1,169 @@
+"""The bar in space before any wire is known: the cylinders whose two edges stand out in all cameras at once.
+
+An edge is where the picture changes across a line, to brighter or to darker, and the picture without rods does not. A
+shadow is soft, or has no second edge at the bar's width in every camera; a change that the picture without rods has
+under other light, such as a square of the board in shadow, does not count. Which of several cylinders is the bar, their
+lines tell (see `vision.bar.search`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from vision.geometry.camera import Camera
+from vision.geometry.centreline import rotation_z
+from vision.geometry.contact import BarAxis, upward
+from vision.geometry.rods import Rods
+from vision.pictures.change import HALF
+
+_EDGE_BLUR, _LEAST_BLUR_PX = 0.06, 0.7  # of the bar's half-width: an edge's own, so that rim and highlight stay apart
+# Edges are spread so far, in half-widths, that the grid cannot step over them; then less and less.
+_SPREADS = (0.3, 0.12, 0.06)
+_MOST_LIGHT = 1.5  # times the picture without rods: more is no other light on the same thing
+_OVER_NOISE, _ASIDE_BLURS = 1.5, 2.0
+# Where edges are looked for, in half-widths, and how they count. A dark rim is seen as an edge farther in, which counts
+# less; one farther out is no edge of this bar, and counts against it, but in a first look would hide the way to it.
+_AT, _COUNTS = np.array([1.0, 0.8, 0.6, 1.3, 1.6]), np.array([1.0, 0.8, 0.6, -0.5, -0.5])
+_ALONG_MM = np.arange(-30.0, 30.1, 6.0)  # bars are clamped farther out
+_BETA_RAD, _PSI_RAD = np.radians(np.arange(-84.0, 85.0, 6.0)), np.radians([-8.0, 0.0, 8.0])
+_X_STEP, _TOUCH_STEP = 0.7, 0.8  # of the bar's radius, the second along the arc in the middle of the whisker
+_STARTS, _LESS, _KEPT = 24, 8, 4  # how many hypotheses go on, look by look
+_MOST_CLIMBS, _SHRINKS = 20, 2
+
+
+@dataclass(frozen=True)
+class Clear:
+    """What one camera shows of edges, at every HALF-th pixel: field (3, h, w), see `edges_px`; and half the width, in
+    these pixels, of the bar in the middle of the whisker."""
+
+    camera: Camera
+    field: np.ndarray
+    half_px: float
+
+
+def clear_edges(camera: Camera, still, background, rods: Rods, motor_rad: float) -> Clear:
+    """The edges of still things in a picture beside one without rods, both (h, w) at every HALF-th pixel."""
+    middle = 0.5 * rods.wire.length_mm * rotation_z(motor_rad)[:, 0]
+    focal_px = float(np.mean(np.diag(camera.matrix)[:2])) / HALF
+    half_px = rods.bar.radius_mm * focal_px / float(np.linalg.norm(middle - camera.centre_mm))
+    return Clear(camera, edges_px(still, background, max(_EDGE_BLUR * half_px, _LEAST_BLUR_PX)), half_px)
+
+
+def find_bars(seen: Sequence[Clear], rods: Rods, motor_rad: tuple[float, float]) -> list[BarAxis]:
+    """Coarse axes of what may be the bar, the most likely first: few pixels off, _KEPT at most.
+
+    motor_rad: lowest and highest motor angle, between which the whisker touches.
+    """
+    radius, length = rods.bar.radius_mm, rods.wire.length_mm
+    x = np.arange(10.0, length, _X_STEP * radius)
+    count = int(np.ceil(np.ptp(motor_rad) * 0.5 * length / (_TOUCH_STEP * radius)))
+    touch = np.linspace(*motor_rad, max(3, count))
+    return likely(seen, (x, touch, _BETA_RAD, _PSI_RAD), lambda each: axis_from_angles(*each.T, rods.reach_mm), radius)
+
+
+def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callable, radius_mm: float) -> list[BarAxis]:
+    """The axes whose edges are the clearest, near a grid of hypotheses.
+
+    values: of each of their numbers; axis_of: the axes (n, 3) of hypotheses (n, k).
+    """
+    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    steps, found = 0.5 * np.array([one[1] - one[0] for one in values]), None
+    for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)):
+        near = [replace(one, field=gaussian_filter(one.field, (0.0, *[spread * one.half_px] * 2))) for one in seen]
+        counts = _COUNTS if spread == _SPREADS[-1] else np.maximum(_COUNTS, 0.0)
+        score = lambda each, along=_ALONG_MM: np.mean(  # noqa: E731
+            [both_edges(axis_of(each), one, radius_mm, counts, along) for one in near], axis=0)  # noqa: B023
+        if found is None:
+            found = _apart(grid, score(grid, _ALONG_MM[::2]), 4.0 * steps, _STARTS)
+        found = _apart(*climb(found, steps * (spread / _SPREADS[0]), score), steps, kept)
+    return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(found)).values())]
+
+
+def _apart(each, score, apart, most: int) -> np.ndarray:
+    """At most so many of the hypotheses (n, k), the best, of which no two lie within so much of each other (k,)."""
+    chosen: list[np.ndarray] = []
+    for one in each[np.argsort(score)[::-1]]:
+        if all(np.any(np.abs(one - other) > apart) for other in chosen):
+            chosen.append(one)
+        if len(chosen) == most:
+            break
+    return np.array(chosen)
+
+
+def edges_px(grey, background, blur_px: float) -> np.ndarray:
+    """Edges (3, h, w) of a picture that its background does not have: how clear, by direction across (xx, xy, yy).
+
+    From 0 to 1: beside the noise, and more than the light changes a little aside.
+    """
+    pictures = (np.asarray(picture, dtype=np.float32) for picture in (grey, background))
+    seen, known = (np.stack([gaussian_filter(picture, blur_px, order=order) for order in ((0, 1), (1, 0))])
+                   for picture in pictures)
+    light = np.sum(seen * known, axis=0) / np.maximum(np.sum(known**2, axis=0), 1e-12)
+    left = seen - np.clip(light, 0.0, _MOST_LIGHT) * known
+    size = np.linalg.norm(left, axis=0)
+    clear = np.maximum(size - gaussian_filter(size, _ASIDE_BLURS * blur_px), 0.0)
+    x, y = left / np.maximum(size, 1e-12)
+    share = clear**2 / (clear**2 + (_OVER_NOISE * np.median(size)) ** 2 + 1e-12)
+    return share * np.stack([x * x, x * y, y * y])
+
+
+def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
+    """The bar that a straight whisker first touches at distance x, at motor angle touch, with these slopes.
+
+    All arguments (n,); reach_mm: bar radius + whisker radius.
+    """
+    turn = rotation_z(np.asarray(touch_rad, dtype=float))
+    zero = np.zeros_like(turn[..., 0, 0])
+    a = np.stack(np.broadcast_arrays(np.sin(psi_rad) + zero, np.cos(psi_rad) * np.sin(beta_rad) + zero,
+                                     np.cos(psi_rad) * np.cos(beta_rad) + zero), axis=-1)
+    n = np.stack([zero, np.cos(beta_rad) + zero, -np.sin(beta_rad) + zero], axis=-1)
+    p = np.stack([x_mm + zero, zero, zero], axis=-1) + reach_mm * n
+    return BarAxis(*(np.einsum("...ij,...j->...i", turn, v) for v in (p, a)))
+
+
+def both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) -> np.ndarray:
+    """How clear both edges are of bars (n,) in a camera, up to 1, at these places beside each axis's point.
+
+    counts: see _COUNTS.
+    """
+    field, camera = seen.field, seen.camera
+    along = axis.point_mm[:, None] + along_mm[:, None] * axis.direction[:, None]
+    sideways = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
+    sideways = radius_mm * sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
+    px = camera.project(np.stack([along, along + sideways[:, None]]).reshape(-1, 3)).reshape(2, *along.shape[:2], 2)
+    middle, aside = px[0] / HALF, (px[1] - px[0]) / HALF
+    across = np.stack([_across(field, middle + at * aside) for at in np.concatenate([_AT, -_AT])])
+    sides = across.reshape(2, len(_AT), -1) * counts[:, None]
+    best = np.max(sides, axis=1) + np.min(sides, axis=1)
+    return np.sqrt(np.prod(np.maximum(best, 0.0), axis=0))
+
+
+def _across(field, px) -> np.ndarray:
+    """Mean (n,) of the edges along lines (n, t, 2) of pixels."""
+    x, y = np.moveaxis(np.gradient(px, axis=1), -1, 0)
+    column, row = np.moveaxis(np.round(px), -1, 0)
+    inside = (column >= 0) & (row >= 0) & (column < field.shape[2]) & (row < field.shape[1])
+    place = np.where(inside, row * field.shape[2] + column, 0).astype(np.intp)
+    xx, xy, yy = (part.ravel()[place] for part in field)
+    across = (xx * y**2 - 2.0 * xy * x * y + yy * x**2) / (x**2 + y**2)
+    return np.mean(np.where(inside, across, 0.0), axis=-1)
+
+
+def climb(starts, first_step, score: Callable) -> tuple[np.ndarray, np.ndarray]:
+    """Best hypotheses (n, k) and their scores (n,): from each start to the best neighbour, by ever smaller steps."""
+    size = len(first_step)
+    steps = first_step * np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * size, indexing="ij"), axis=-1).reshape(-1, size)
+    best, part = starts, np.ones(len(starts))
+    highest = np.full(len(starts), -np.inf)
+    for _ in range(_MOST_CLIMBS):
+        around = best[:, None] + part[:, None, None] * steps
+        scores = score(around.reshape(-1, size)).reshape(len(best), -1)
+        chosen, rows = np.argmax(scores, axis=1), np.arange(len(best))
+        better = scores[rows, chosen]
+        part = np.where(better > highest + 1e-3, part, 0.5 * part)
+        best, highest = around[rows, chosen], better
+        if np.all(part < 0.5**_SHRINKS):
+            break
+    return best, highest
