@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator.domain import elementwise, require_positive
 
@@ -11,7 +12,7 @@ NMM2_PER_GPA_MM4 = 1000.0
 SHAPES = ("cylinder", "cone", "tapered")
 
 
-def second_moment_of_area(diameter_mm):
+def second_moment_of_area(diameter_mm: ArrayLike):
     """I = pi d^4 / 64 of a round section, in mm^4.
 
     >>> round(second_moment_of_area(1.0), 7)
@@ -20,7 +21,7 @@ def second_moment_of_area(diameter_mm):
     return np.pi * diameter_mm**4 / 64
 
 
-def flexural_rigidity(youngs_modulus_GPa, diameter_mm):
+def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike):
     """EI in N·mm² of a round section.
 
     >>> round(flexural_rigidity(60.0, 1.0), 1)
@@ -29,7 +30,7 @@ def flexural_rigidity(youngs_modulus_GPa, diameter_mm):
     return NMM2_PER_GPA_MM4 * youngs_modulus_GPa * second_moment_of_area(diameter_mm)
 
 
-def diameter_at(arc_mm, base_diameter_mm, length_mm, taper):
+def diameter_at(arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike):
     """Diameter in mm at the arc length `arc_mm` from the base.
 
     `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a cone.
@@ -37,12 +38,12 @@ def diameter_at(arc_mm, base_diameter_mm, length_mm, taper):
     return base_diameter_mm * (1 - taper * arc_mm / length_mm)
 
 
-def rigidity_at(arc_mm, base_rigidity_Nmm2, length_mm, taper):
+def rigidity_at(arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike):
     """EI in N·mm² at the arc length `arc_mm`; it goes with the fourth power of the diameter."""
     return base_rigidity_Nmm2 * (1 - taper * arc_mm / length_mm) ** 4
 
 
-def moment_in_EI_per_metre(moment_Nmm, rigidity_Nmm2):
+def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike):
     """Moment in the paper's unit EI/metre, i.e. the curvature at the base in 1/m (Fig. 8).
 
     >>> moment_in_EI_per_metre(2.0, 4000.0)

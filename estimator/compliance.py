@@ -8,12 +8,13 @@ Two whisks from bases a known shift apart give two such equations. Lengths in mm
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator.domain import elementwise, require_positive, require_sigma
 
 
 @elementwise
-def compliance_on_soft_object(d_x, stiffness, C):
+def compliance_on_soft_object(d_x: ArrayLike, stiffness: ArrayLike, C: ArrayLike):
     """k_θ in rad/(N·mm) of a whisker that touches an object of the given stiffness [N/mm] at d_x [mm]."""
     require_positive("C", C, "N·mm²")
     inside = (d_x > 0) & (stiffness > 0)
@@ -21,7 +22,7 @@ def compliance_on_soft_object(d_x, stiffness, C):
 
 
 @elementwise
-def two_distances(compliance_near, compliance_far, shift, C):
+def two_distances(compliance_near: ArrayLike, compliance_far: ArrayLike, shift: ArrayLike, C: ArrayLike):
     """(d_x, k): distance of the nearer whisk in mm, stiffness of the object in N/mm.
 
     compliance_near and compliance_far are k_θ of (1) in rad/(N·mm), as of `distance.rotational_compliance`; the
@@ -51,7 +52,9 @@ def _positive_root(square, linear, constant):
 
 
 @elementwise
-def two_distances_sigma(d_x, stiffness, shift, C, near_sigma, far_sigma):
+def two_distances_sigma(
+    d_x: ArrayLike, stiffness: ArrayLike, shift: ArrayLike, C: ArrayLike, near_sigma: ArrayLike, far_sigma: ArrayLike
+):
     """(sigma of d_x in mm, sigma of k in N/mm) of `two_distances` from those of the two compliances.
 
     With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg.

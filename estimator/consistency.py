@@ -50,7 +50,7 @@ class Contacts:
         if not np.isfinite(self.distances(0.0)).all():
             raise ValueError("a contact is no push against an object (see distance.why_not): leave it out")
 
-    def without(self, index):
+    def without(self, index: int) -> "Contacts":
         """All contacts but one."""
         rows = ("theta", "m_y", "m_z", "touch", "z_c", "poses", "weights")
         kept = {name: getattr(self, name) for name in rows}
@@ -67,11 +67,11 @@ class Contacts:
         """Slip angles (n,), rad."""
         return distance.felt_slip_angle(self.m_y, self.m_z)
 
-    def distances(self, alpha):
+    def distances(self, alpha: float) -> np.ndarray:
         """d_x (n,) in mm for an assumed friction angle."""
         return distance.with_friction(self.theta, self.m_y, self.m_z, alpha, self.C)
 
-    def points(self, alpha):
+    def points(self, alpha: float) -> np.ndarray:
         """Contact points (n, 3) in mm, in the object's frame."""
         r_c, theta_c, z_c = distance.contact_point(self.distances(alpha), self.touch, self.z_c)
         points = np.stack(distance.cartesian(r_c, theta_c, z_c), axis=-1)
@@ -91,7 +91,7 @@ class Consistency:
     status: str = ""
 
 
-def most_consistent_alpha(contacts, *, curve="line", stiffness=1e-3) -> Consistency:
+def most_consistent_alpha(contacts: Contacts, *, curve: str = "line", stiffness: float = 1e-3) -> Consistency:
     """α that minimises the weighted distance of the contact points to their best line or smoothing spline.
 
     Distances count as shares of d_x, so that a larger α, which shrinks all of them, is not preferred for

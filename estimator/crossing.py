@@ -6,6 +6,7 @@ ideal broken line (level, then rise) through the same filter.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator.onset import Touch, columns, felt_touch, usable
 
@@ -14,7 +15,7 @@ THRESHOLD_IN_SIGMAS = 10.0
 NOT_CROSSED = "never touches: the filtered moment does not cross the threshold"
 
 
-def zero_phase_lowpass(x, rate_Hz, cutoff_Hz):
+def zero_phase_lowpass(x: ArrayLike, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:
     """Low-pass of samples along the first axis, forwards and backwards: no delay, −3 dB at cutoff_Hz over both passes.
 
     Second-order Butterworth each way. Missing samples (NaN) are bridged by lines for the filter, and stay NaN. Raises
@@ -37,7 +38,9 @@ def _bridged(x):
     return np.interp(np.arange(len(x)), known, x[known]) if known.size else np.zeros(len(x))
 
 
-def threshold_touch(motor_rad, moments, time_s, cutoff_Hz, *, threshold=None) -> Touch:
+def threshold_touch(
+    motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float, *, threshold: float | None = None
+) -> Touch:
     """Touch as the paper finds it: where the filtered moment above its level crosses a threshold for good.
 
     threshold is in the unit of the moments, for their magnitude; left out, it is ten times the filtered noise.
@@ -59,7 +62,7 @@ def threshold_touch(motor_rad, moments, time_s, cutoff_Hz, *, threshold=None) ->
     return _touch(found, np.sqrt(scatter) / steepness, ideal, felt)
 
 
-def touch_on_rate(motor_rad, moments, time_s, cutoff_Hz) -> Touch:
+def touch_on_rate(motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float) -> Touch:
     """Touch where the filtered moment's rate over the motor angle reaches half of its rate in the fitted rise."""
     felt = felt_touch(motor_rad, moments, time_s)
     if felt.status:

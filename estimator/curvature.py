@@ -17,6 +17,7 @@ ValueError.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator import circle
 from estimator.domain import elementwise, first_failure, require_friction_angle
@@ -40,7 +41,7 @@ __all__ = [
 ]
 
 
-def normalized_curvature(d_x, r_kappa):
+def normalized_curvature(d_x: ArrayLike, r_kappa: ArrayLike):
     """κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both are positive.
 
     >>> normalized_curvature(50.0, 100.0)
@@ -49,66 +50,66 @@ def normalized_curvature(d_x, r_kappa):
     return _positive_ratio(d_x, r_kappa)
 
 
-def normalized_radius(d_x, r_kappa):
+def normalized_radius(d_x: ArrayLike, r_kappa: ArrayLike):
     """r_n = 1/κ_n, both arguments in mm; NaN unless both are positive."""
     return _positive_ratio(r_kappa, d_x)
 
 
 @elementwise
-def initial_contact(r_n, beta_0):
+def initial_contact(r_n: ArrayLike, beta_0: ArrayLike):
     """(y_c, z_c) of (26)–(28): the first contact seen from the centre of curvature, r_n (cos β_0, sin β_0)."""
     return circle.inside(r_n, 0.0, beta_0, r_n * np.cos(beta_0), r_n * np.sin(beta_0))
 
 
 @elementwise
-def virtual_angle(r_n, theta, beta_0):
+def virtual_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike):
     """ζ of (25) and (29), in rad: direction of the virtual point from the centre, β_0 and what the push adds."""
     return circle.inside(r_n, theta, beta_0, beta_0 + circle.turn(theta / r_n, beta_0))[0]
 
 
 @elementwise
-def virtual_radius(r_n, theta, beta_0):
+def virtual_radius(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike):
     """p of (32): distance of the virtual point from the centre, over d_x."""
     return circle.inside(r_n, theta, beta_0, r_n * circle.relative_virtual_radius(theta / r_n, beta_0))[0]
 
 
-def slip_angle(r_n, theta, beta_0, alpha):
+def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
     """φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α / p)."""
     require_friction_angle("alpha", alpha)
     return circle.exact(r_n, theta, beta_0, alpha)[0]
 
 
-def slip_angle_printed(r_n, theta, beta_0, alpha):
+def slip_angle_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
     """φ of (24) as printed, in rad: max(0, ζ − α) with ζ at the virtual point."""
     require_friction_angle("alpha", alpha)
     return circle.printed(r_n, theta, beta_0, alpha)[0]
 
 
-def deflection(r_n, theta, beta_0, alpha):
+def deflection(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
     """d of (31) with the exact φ: how far the whisker is bent in the sensing plane, over d_x."""
     require_friction_angle("alpha", alpha)
     return circle.exact(r_n, theta, beta_0, alpha)[1]
 
 
-def deflection_printed(r_n, theta, beta_0, alpha):
+def deflection_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
     """d of (31) with φ of (24) as printed, over d_x."""
     require_friction_angle("alpha", alpha)
     return circle.printed(r_n, theta, beta_0, alpha)[1]
 
 
-def moments(r_n, theta, beta_0, alpha):
+def moments(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
     """(m_y, m_z) of (22) with the exact φ, over C/d_x: d sin φ, d cos φ."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.exact(r_n, theta, beta_0, alpha))
 
 
-def moments_printed(r_n, theta, beta_0, alpha):
+def moments_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
     """(m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.printed(r_n, theta, beta_0, alpha))
 
 
-def why_not(r_n, theta, beta_0, alpha=0.0):
+def why_not(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0):
     """Why this module's functions give NaN for these arguments: a sentence, empty inside the domain."""
     require_friction_angle("alpha", alpha)
     arguments = (np.asarray(a, dtype=float) for a in (r_n, theta, beta_0, alpha))

@@ -10,6 +10,7 @@ doubles where what stands between them in an equation is none. So no distance th
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator.domain import (
     RIGHT_ANGLE,
@@ -23,7 +24,7 @@ from estimator.domain import (
 
 
 @elementwise
-def rotational_compliance(theta, m_z):
+def rotational_compliance(theta: ArrayLike, m_z: ArrayLike):
     """k_θ of (1), in rad/(N·mm): how far the base turns per moment, from two angles or a whole stroke.
 
     theta and m_z have the samples along their last axis, two at least (ValueError otherwise). It is one over
@@ -42,14 +43,14 @@ def rotational_compliance(theta, m_z):
 
 
 @elementwise
-def from_compliance(compliance, C):
+def from_compliance(compliance: ArrayLike, C: ArrayLike):
     """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
     return _distance(quotient((C, compliance), ()), (("the compliance is missing", np.isfinite(compliance)),))
 
 
 @elementwise
-def no_slip(theta, m_z, C):
+def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike):
     """d_x of (2), in mm: Cθ / m_z, exact where the whisker does not slip sideways.
 
     >>> no_slip(0.05, 9.0, 9000.0)
@@ -60,14 +61,14 @@ def no_slip(theta, m_z, C):
 
 
 @elementwise
-def known_slope(theta, m_y, m_z, beta, C):
+def known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike):
     """d_x of (6), in mm, for a surface of known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
     require_positive("C", C, "N·mm²")
     return _distance(_by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
 
 
 @elementwise
-def friction_angle(mu):
+def friction_angle(mu: ArrayLike):
     """α of (7), in rad: atan μ. A negative or infinite coefficient raises ValueError."""
     if not np.all((mu >= 0) & np.isfinite(mu)):
         raise ValueError(f"mu = {mu}: a friction coefficient must be zero or positive, and finite")
@@ -75,13 +76,13 @@ def friction_angle(mu):
 
 
 @elementwise
-def felt_slip_angle(m_y, m_z):
+def felt_slip_angle(m_y: ArrayLike, m_z: ArrayLike):
     """φ of (8), in rad: atan2(m_y, m_z). NaN unless m_z > 0, since the whisker pushes towards +y."""
     return np.where((m_z > 0) & np.isfinite(m_y) & np.isfinite(m_z), np.arctan2(m_y, m_z), np.nan)
 
 
 @elementwise
-def estimated_slope(m_y, m_z, alpha_est):
+def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike):
     """β_est of (9), in rad: φ ± α_est on the side of φ; NaN where it reaches 90°, and for m_z ≤ 0."""
     require_friction_angle("alpha_est", alpha_est)
     steep = np.arctan2(np.abs(m_y), m_z) + alpha_est
@@ -90,7 +91,7 @@ def estimated_slope(m_y, m_z, alpha_est):
 
 
 @elementwise
-def with_friction(theta, m_y, m_z, alpha_est, C):
+def with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike):
     """d_x of (10), in mm, for an assumed friction cone angle: Cθ (m_z − μ |m_y|) / (m_z² + m_y²), μ = tan
     α_est.
 
@@ -101,20 +102,20 @@ def with_friction(theta, m_y, m_z, alpha_est, C):
 
 
 @elementwise
-def frictionless_sum(theta, m_y, m_z, C):
+def frictionless_sum(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike):
     """d_x of (11), in mm: Cθ / (m_z + m_y²/m_z), (10) without friction; computed as (12), which it equals."""
     return frictionless(theta, m_y, m_z, C)
 
 
 @elementwise
-def frictionless(theta, m_y, m_z, C):
+def frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike):
     """d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²)."""
     require_positive("C", C, "N·mm²")
     return _distance(_by_friction(theta, m_y, m_z, 0.0, C), _conditions(theta, m_y, m_z))
 
 
 @elementwise
-def general_printed(theta, m_y, m_z, nu):
+def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: ArrayLike):
     """d_x of (16) as printed, in mm: ν(θ, |m|) cos φ, for a no-slip extraction `nu(theta, magnitude)`.
 
     Exact only where ν is proportional to θ/|m|, that is for a cylinder; use `general`.
@@ -124,7 +125,7 @@ def general_printed(theta, m_y, m_z, nu):
 
 
 @elementwise
-def general(theta, m_y, m_z, alpha_est, nu):
+def general(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: ArrayLike):
     """d_x of (16) with the angle scaled in place of the distance, in mm; for any no-slip extraction ν.
 
     ν(θ cos(φ + α_est) / cos α_est, |m|): slip takes its share from the deflection, hence from the angle.
@@ -138,14 +139,14 @@ def general(theta, m_y, m_z, alpha_est, nu):
 
 
 @elementwise
-def cone_no_slip(theta, m, C, length):
+def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike):
     """ν(θ, |m|) of a cone that comes to a point at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
     _require_settings(0.0, C, length)
     return _distance(_harmonic(quotient((C, theta), (m,)), length), _conditions(theta, 0.0, m))
 
 
 @elementwise
-def cone_printed(theta, m_y, m_z, C, length):
+def cone_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike):
     """d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ. Far off under slip; use `cone`."""
     _require_settings(0.0, C, length)
     magnitude = np.hypot(m_y, m_z)
@@ -154,7 +155,7 @@ def cone_printed(theta, m_y, m_z, C, length):
 
 
 @elementwise
-def cone(theta, m_y, m_z, alpha_est, C, length):
+def cone(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike):
     """d_x of a cone, in mm, by (17) at the scaled angle: 1 / (1/L + 1/d) with d from (10) for the base's
     cylinder.
     """
@@ -164,14 +165,14 @@ def cone(theta, m_y, m_z, alpha_est, C, length):
 
 
 @elementwise
-def taper(d_x, length):
+def taper(d_x: ArrayLike, length: ArrayLike):
     """Distance along a cone from that which its base's cylinder would give, in mm: 1 / (1/d_x + 1/L)."""
     require_positive("length", length, "mm")
     return np.where((d_x > 0) & np.isfinite(d_x), _harmonic(d_x, length), np.nan)
 
 
 @elementwise
-def clamp_to_length(d_x, length):
+def clamp_to_length(d_x: ArrayLike, length: ArrayLike):
     """(d_x no longer than the whisker, mask of those that were): past the tip means tip contact, section VII.
 
     >>> clamp_to_length(120.0, 100.0)
@@ -183,7 +184,7 @@ def clamp_to_length(d_x, length):
 
 
 @elementwise
-def contact_point(d_x, touch, z_c=0.0):
+def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0):
     """(r_c, θ_c, z_c) of section II: cylindrical coordinates of the contact, in mm, rad, mm.
 
     `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All
@@ -194,12 +195,20 @@ def contact_point(d_x, touch, z_c=0.0):
 
 
 @elementwise
-def cartesian(r_c, theta_c, z_c):
+def cartesian(r_c: ArrayLike, theta_c: ArrayLike, z_c: ArrayLike):
     """(x, y, z) in mm of a contact in cylindrical coordinates, as of `contact_point`."""
     return r_c * np.cos(theta_c), r_c * np.sin(theta_c), z_c + 0 * r_c
 
 
-def why_not(theta, m_y, m_z, *, alpha_est=0.0, beta=None, C=None):
+def why_not(
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    *,
+    alpha_est: ArrayLike = 0.0,
+    beta: ArrayLike | None = None,
+    C: ArrayLike | None = None,
+):
     """Why there is no distance for these arguments, a sentence; empty where there is one. str or array of str.
 
     Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C a distance too large or too

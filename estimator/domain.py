@@ -4,14 +4,16 @@ Measured arguments outside an equation's domain give NaN; settings that no measu
 ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
 """
 
+from collections.abc import Callable, Sequence
 from functools import wraps
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 RIGHT_ANGLE = np.pi / 2
 
 
-def elementwise(function):
+def elementwise(function: Callable) -> Callable:
     """Let a formula on float64 arrays take anything array-like, broadcast, and return floats for scalars.
 
     Functions among the arguments pass through.
@@ -39,7 +41,9 @@ def _plain(result):
     return np.asarray(result).item() if np.ndim(result) == 0 else result
 
 
-def quotient(numerator, denominator, exponent=0):
+def quotient(
+    numerator: Sequence[np.ndarray], denominator: Sequence[np.ndarray], exponent: int | np.ndarray = 0
+) -> np.ndarray:
     """2^exponent times `numerator`'s factors over `denominator`'s, without overflow or underflow on the way.
 
     Significands and exponents go separate ways, so only the result itself can leave the range of float64.
@@ -54,28 +58,28 @@ def quotient(numerator, denominator, exponent=0):
     return np.ldexp(value, exponent)
 
 
-def require_positive(name: str, value, unit: str) -> None:
+def require_positive(name: str, value: ArrayLike, unit: str) -> None:
     """Raise ValueError unless every `value` is positive and finite."""
     array = np.asarray(value, dtype=float)
     if not np.all((array > 0) & np.isfinite(array)):
         raise ValueError(f"{name} = {value} {unit}: must be positive and finite")
 
 
-def require_friction_angle(name: str, value) -> None:
+def require_friction_angle(name: str, value: ArrayLike) -> None:
     """Raise ValueError unless every `value` [rad] lies in [0°, 90°)."""
     array = np.asarray(value, dtype=float)
     if not np.all((array >= 0) & (array < RIGHT_ANGLE)):
         raise ValueError(f"{name} = {value} rad: must lie in [0, pi/2), that is from 0 to below 90 degrees")
 
 
-def require_sigma(name: str, value) -> None:
+def require_sigma(name: str, value: ArrayLike) -> None:
     """Raise ValueError unless every `value` is a standard deviation: zero or positive, and finite."""
     array = np.asarray(value, dtype=float)
     if not np.all((array >= 0) & np.isfinite(array)):
         raise ValueError(f"{name} = {value}: a standard deviation must be zero or positive, and finite")
 
 
-def first_failure(conditions, shape):
+def first_failure(conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int, ...]) -> str | np.ndarray:
     """Text of the first condition that does not hold, element by element; empty where all do.
 
     `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else an array of str.
@@ -87,7 +91,7 @@ def first_failure(conditions, shape):
     return reasons.item() if shape == () else reasons.astype(str)
 
 
-def where_all(conditions, value):
+def where_all(conditions: Sequence[tuple[str, np.ndarray]], value: np.ndarray) -> np.ndarray:
     """`value` where all conditions hold, NaN elsewhere."""
     holds = np.logical_and.reduce(np.broadcast_arrays(*(mask for _, mask in conditions)))
     return np.where(holds, value, np.nan)

@@ -7,6 +7,7 @@ Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from estimator import slip
@@ -101,7 +102,7 @@ def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
     return _fit(alpha, sigma, freedom, residuals, _fits_as_well_without_slip(residuals, beta, data, scale, reading))
 
 
-def curves(alpha, beta, d_x, theta, C):
+def curves(alpha: ArrayLike, beta: ArrayLike, d_x: ArrayLike, theta: ArrayLike, C: ArrayLike):
     """(|m|, φ) over β for a fitted α: the solid lines of Fig. 8, in N·mm and rad."""
     return slip.moment_magnitude(d_x, theta, beta, alpha, C), slip.slip_angle(beta, alpha)
 
@@ -148,7 +149,7 @@ def _least_squares(beta, data, scale, reading):
     best = np.argmin(cost, axis=-1)
     low, high = GRID[np.maximum(best - 1, 0)], GRID[np.minimum(best + 1, len(GRID) - 1)]
 
-    def cost_at(alpha):
+    def cost_at(alpha: ArrayLike):
         return ((data - _model(alpha, beta, scale, reading)) ** 2).sum(axis=-1)
 
     for _ in range(SHRINKINGS):
@@ -209,7 +210,7 @@ def _float_or_array(value):
     return float(value) if np.ndim(value) == 0 else value
 
 
-def alpha_from_tilts(tilt, phi, *, phi_sigma=0.0) -> FrictionFit:
+def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 0.0) -> FrictionFit:
     """Friction cone angle from tilting the whole array about the whisker's x axis (section VII, way 1).
 
     tilt (n,) and the felt slip angles φ (n,) in rad. φ follows the tilt less α beyond the range in which
@@ -249,7 +250,7 @@ def _dead_band(tilt, phi, phi_sigma):
 
 
 @elementwise
-def confidence(phi, alpha_est, alpha_est_sigma, relative_sigma=0.01):
+def confidence(phi: ArrayLike, alpha_est: ArrayLike, alpha_est_sigma: ArrayLike, relative_sigma: ArrayLike = 0.01):
     """Weight in (0, 1] of a contact whose slip angle is φ (section VII, way 3): less where α matters more.
 
     The variance that would be left with α known over the whole: s² / (s² + (σ_α ∂ln d_x/∂α_est)²), with s the

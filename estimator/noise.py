@@ -25,7 +25,7 @@ class Memory:
     seen: np.ndarray
 
     @classmethod
-    def of(cls, x, samples, *stretches) -> "Memory":
+    def of(cls, x: np.ndarray, samples: np.ndarray, *stretches: np.ndarray) -> "Memory":
         """Memory of samples (n, k) about a line over x (n,) in each stretch, a mask (n,); stretches do not overlap."""
         used = np.logical_or.reduce(stretches)
         residuals, bases = np.zeros_like(samples), []
@@ -42,12 +42,12 @@ class Memory:
         kept = np.where(np.arange(lags) == 0, pairs, 0.0) - lost
         return cls(np.moveaxis(products * (taper / pairs), -1, 0), kept * taper / pairs)
 
-    def of_sum(self, weights):
+    def of_sum(self, weights: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of Σ w_i x_i; gaps can leave a negative direction, which is taken as no scatter."""
         values, axes = np.linalg.eigh(self._raw(weights, weights, self.covariance))
         return (axes * np.maximum(values, 0.0)) @ axes.T * self._missing(weights)
 
-    def between_sums(self, weights, other):
+    def between_sums(self, weights: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of Σ w_i x_i with Σ v_i x_i."""
         raise_by = np.sqrt(self._missing(weights) * self._missing(other))
         return self._raw(weights, other, self.covariance) * raise_by
@@ -84,35 +84,35 @@ def _line_basis(x, used):
     return [used / np.sqrt(np.count_nonzero(used)), spread / np.sqrt(max(spread @ spread, TINY))]
 
 
-def wider(one, other):
+def wider(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """The wider of two covariances (k, k)."""
     return one if np.trace(one) >= np.trace(other) else other
 
 
-def weighted_sum(weights, samples, used):
+def weighted_sum(weights: np.ndarray, samples: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Σ w_i x_i (k,) over the marked samples."""
     return weights[used] @ samples[used]
 
 
-def mean_weights(used):
+def mean_weights(used: np.ndarray) -> np.ndarray:
     """Weights (n,) that make the mean of the marked samples."""
     return used / np.count_nonzero(used)
 
 
-def line_weights(x, used, at):
+def line_weights(x: np.ndarray, used: np.ndarray, at: float) -> np.ndarray:
     """Weights (n,) that make the least-squares line's value at x = `at` from the marked samples."""
     middle = x[used].mean()
     spread = np.where(used, x - middle, 0.0)
     return mean_weights(used) + spread * (at - middle) / max(spread @ spread, TINY)
 
 
-def line_slope(x, samples, used):
+def line_slope(x: np.ndarray, samples: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Slope (k,) of the least-squares line through the marked samples."""
     spread = x[used] - x[used].mean()
     return spread @ samples[used] / max(spread @ spread, TINY)
 
 
-def line_residuals(x, samples, used):
+def line_residuals(x: np.ndarray, samples: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Residuals (m, k) of the marked samples from their least-squares line."""
     spread = x[used] - x[used].mean()
     return samples[used] - samples[used].mean(axis=0) - np.outer(spread, line_slope(x, samples, used))

@@ -7,6 +7,7 @@ The fit of the rise is here; half height of the rate and the paper's threshold a
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator import noise
 
@@ -39,7 +40,7 @@ class Level:
     drift: np.ndarray
     centre_rad: float
 
-    def covariance_between(self, one_rad, other_rad):
+    def covariance_between(self, one_rad: float, other_rad: float) -> np.ndarray:
         """Covariance (k, k) of the level's errors at two motor angles."""
         return self.covariance + np.diag(self.drift**2) * (one_rad - self.centre_rad) * (other_rad - self.centre_rad)
 
@@ -82,7 +83,14 @@ class Touch:
         return self.level.offset
 
 
-def felt_touch(motor_rad, moments, time_s=None, *, window_rad=WINDOW_RAD, guard_rad=GUARD_RAD) -> Touch:
+def felt_touch(
+    motor_rad: ArrayLike,
+    moments: ArrayLike,
+    time_s: ArrayLike | None = None,
+    *,
+    window_rad: float = WINDOW_RAD,
+    guard_rad: float = GUARD_RAD,
+) -> Touch:
     """Touch where a line fitted to the rise of the moments meets the level of the free stroke.
 
     The rise is fitted from guard_rad to window_rad past the touch, and over 60 ms at least where time_s is given, so
@@ -107,7 +115,7 @@ def felt_touch(motor_rad, moments, time_s=None, *, window_rad=WINDOW_RAD, guard_
     return found
 
 
-def columns(motor_rad, moments):
+def columns(motor_rad: ArrayLike, moments: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Motor angles (n,) and moments (n, k) as float arrays; ValueError where the samples do not match."""
     motor = np.asarray(motor_rad, dtype=float)
     samples = np.asarray(moments, dtype=float)
@@ -117,7 +125,7 @@ def columns(motor_rad, moments):
     return motor, samples
 
 
-def usable(motor, samples):
+def usable(motor: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """Mask (n,) of the samples that are known in all columns and no isolated spikes."""
     known = np.isfinite(motor) & np.isfinite(samples).all(axis=1)
     if np.count_nonzero(known) < 5:
@@ -130,7 +138,7 @@ def usable(motor, samples):
     return known
 
 
-def speed(motor, time_s):
+def speed(motor: np.ndarray, time_s: ArrayLike | None) -> float:
     """Usual speed of the motor in rad/s; 0 where there are no times."""
     if time_s is None or len(motor) < 2:
         return 0.0

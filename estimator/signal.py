@@ -6,6 +6,7 @@ Everything takes plain arrays; moments may be in N·mm or in volts. Angles in ra
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator import noise
 from estimator.crossing import threshold_touch, touch_on_rate, zero_phase_lowpass
@@ -43,7 +44,15 @@ class MomentAt:
     status: str = ""
 
 
-def moment_at(theta_rad, motor_rad, moments, touch, *, time_s=None, half_window_rad=HALF_WINDOW_RAD) -> MomentAt:
+def moment_at(
+    theta_rad: ArrayLike,
+    motor_rad: ArrayLike,
+    moments: ArrayLike,
+    touch: Touch,
+    *,
+    time_s: ArrayLike | None = None,
+    half_window_rad: ArrayLike = HALF_WINDOW_RAD,
+) -> MomentAt:
     """Moments at the pushing angle theta_rad past `touch`, from a line fitted to the samples around it.
 
     The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum, and never reaches

@@ -4,6 +4,7 @@ Angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed fo
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator import circle
 from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive
@@ -13,7 +14,16 @@ SEARCH_STEP = np.radians(0.25)
 HALVINGS = 50
 
 
-def distance_error(beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
+def distance_error(
+    beta_0: ArrayLike,
+    alpha: ArrayLike,
+    alpha_est: ArrayLike,
+    *,
+    r_n: ArrayLike = np.inf,
+    theta: ArrayLike = 0.0,
+    equation: str = "with_friction",
+    printed: bool = False,
+):
     """Relative error of (2) or (10), estimate over truth minus one, for a surface of slope β_0 at first touch.
 
     α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature (15).
@@ -26,7 +36,16 @@ def distance_error(beta_0, alpha, alpha_est, *, r_n=np.inf, theta=0.0, equation=
     return _curved_error(beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed))
 
 
-def slope_threshold(error, alpha, alpha_est=0.0, *, r_n=np.inf, theta=0.0, equation="with_friction", printed=False):
+def slope_threshold(
+    error: float,
+    alpha: ArrayLike,
+    alpha_est: ArrayLike = 0.0,
+    *,
+    r_n: ArrayLike = np.inf,
+    theta: ArrayLike = 0.0,
+    equation: str = "with_friction",
+    printed: bool = False,
+):
     """β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN if never.
 
     Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0.

@@ -7,6 +7,7 @@ C = 3EI has no place in the sum: where the gauge factors were found with the sam
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator import distance
 from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive, require_sigma
@@ -15,20 +16,20 @@ Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigma
 _STEEPEST_RAD = RIGHT_ANGLE - 1e-9  # of a friction angle: at 90° its tangent has no number
 
 
-def gradient_no_slip(theta, m_z, C):
+def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike):
     """∂d_x/∂(θ, m_y, m_z, α_est) of (2): d_x (1/θ, 0, −1/m_z, 0)."""
     d_x = distance.no_slip(theta, m_z, C)
     return _stack(d_x, _inverse(theta), 0.0, -_inverse(m_z), 0.0)
 
 
-def gradient_known_slope(theta, m_y, m_z, beta, C):
+def gradient_known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike):
     """∂d_x/∂(θ, m_y, m_z, α_est) of (6), the slope taken as exact."""
     d_x = distance.known_slope(theta, m_y, m_z, beta, C)
     share = _inverse(np.multiply(m_z, np.cos(beta)) + np.multiply(m_y, np.sin(beta)))
     return _stack(d_x, _inverse(theta), -np.sin(beta) * share, -np.cos(beta) * share, 0.0)
 
 
-def gradient_with_friction(theta, m_y, m_z, alpha_est, C):
+def gradient_with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike):
     """∂d_x/∂(θ, m_y, m_z, α_est) of (10).
 
     ∂ln d_x/∂α_est = −tan(φ + α_est) + tan α_est. At m_y = 0, where |m_y| has a kink, the derivative of
@@ -38,13 +39,15 @@ def gradient_with_friction(theta, m_y, m_z, alpha_est, C):
     return _stack(d_x, *_log_gradient(theta, m_y, m_z, alpha_est))
 
 
-def gradient_frictionless(theta, m_y, m_z, C):
+def gradient_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike):
     """∂d_x/∂(θ, m_y, m_z, α_est) of (11) and (12); the last one is 0."""
     d_x = distance.frictionless(theta, m_y, m_z, C)
     return _stack(d_x, *_log_gradient(theta, m_y, m_z, 0.0)[:3], 0.0)
 
 
-def gradient_cone(theta, m_y, m_z, alpha_est, C, length):
+def gradient_cone(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike
+):
     """∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's d_x)²."""
     cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
     shrink = (distance.cone(theta, m_y, m_z, alpha_est, C, length) / cylinder) ** 2
@@ -62,13 +65,13 @@ def gradient_printed(theta, m_y, m_z, C, taper_per_mm):
 
 
 def sigma(
-    gradient,
+    gradient: ArrayLike,
     *,
-    theta_sigma=0.0,
-    touch_sigma=0.0,
-    covariance=None,
-    alpha_est_sigma=0.0,
-    theta_moment_covariance=None,
+    theta_sigma: ArrayLike = 0.0,
+    touch_sigma: ArrayLike = 0.0,
+    covariance: ArrayLike | None = None,
+    alpha_est_sigma: ArrayLike = 0.0,
+    theta_moment_covariance: ArrayLike | None = None,
 ):
     """Standard deviation of d_x, in mm, for one of the gradients above.
 
@@ -95,27 +98,29 @@ def sigma(
     return _root(variance)
 
 
-def sigma_no_slip(theta, m_z, C, **sigmas):
+def sigma_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas):
     """Standard deviation of (2), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_no_slip(theta, m_z, C), **sigmas)
 
 
-def sigma_known_slope(theta, m_y, m_z, beta, C, **sigmas):
+def sigma_known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike, **sigmas):
     """Standard deviation of (6), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_known_slope(theta, m_y, m_z, beta, C), **sigmas)
 
 
-def sigma_with_friction(theta, m_y, m_z, alpha_est, C, **sigmas):
+def sigma_with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, **sigmas):
     """Standard deviation of (10), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_with_friction(theta, m_y, m_z, alpha_est, C), **sigmas)
 
 
-def sigma_frictionless(theta, m_y, m_z, C, **sigmas):
+def sigma_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas):
     """Standard deviation of (11) and (12), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_frictionless(theta, m_y, m_z, C), **sigmas)
 
 
-def sigma_cone(theta, m_y, m_z, alpha_est, C, length, **sigmas):
+def sigma_cone(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike, **sigmas
+):
     """Standard deviation of the cone's distance, in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_cone(theta, m_y, m_z, alpha_est, C, length), **sigmas)
 

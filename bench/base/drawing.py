@@ -1,5 +1,6 @@
 """What all figures share: look, colours, and files that are written whole with the hash of what they show."""
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import matplotlib
@@ -38,7 +39,7 @@ _STAMP = "Source"
 SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
 
 
-def style():
+def style() -> AbstractContextManager[None]:
     """Context in which figures are made."""
     return matplotlib.rc_context(_STYLE)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +70,7 @@ def hash_of_code(places: tuple[str, ...], root: Path = _ROOT) -> str:
     return digest.hexdigest()
 
 
-def plain(value):
+def plain(value: object) -> Any:
     """The value as JSON has it: arrays as lists, NaN as null, dataclasses as tables."""
     if is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name)) for f in fields(value)}

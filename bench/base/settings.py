@@ -42,10 +42,12 @@ class Settings:
 
     @property
     def theta_rad(self) -> float:
+        """The pushing angle, rad."""
         return math.radians(self.theta_deg)
 
     @property
     def alpha_est_rad(self) -> float:
+        """The friction angle that (10) assumes, rad."""
         return math.radians(self.alpha_est_deg)
 
     @property

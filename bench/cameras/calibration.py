@@ -3,6 +3,7 @@
 Kept in OUT/calibration with the hash of what it was made from, and made again only where that changed.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -87,7 +88,9 @@ def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...], np.
     return read_cameras(folder / "cameras.toml"), tuple(kept["notes"]), T_rig_board
 
 
-def on_the_rig(session: Session, cameras: Cameras, T_world_board: np.ndarray | None):
+def on_the_rig(
+    session: Session, cameras: Cameras, T_world_board: np.ndarray | None
+) -> tuple[Cameras, np.ndarray | None, str | None]:
     """Cameras in the rig frame, T_rig_board (None where there is no such board) and a note, by a first look at the
     free strokes where session.toml does not say where the rig is."""
     if session.T_rig_board is not None:
@@ -126,7 +129,9 @@ def _median(session: Session, camera: str) -> np.ndarray | None:
     return np.median(pictures, axis=0).astype(np.float32) if pictures else None
 
 
-def moved_cameras(session: Session, calibration: SessionCalibration, frames) -> dict[str, str]:
+def moved_cameras(
+    session: Session, calibration: SessionCalibration, frames: Mapping[str, Mapping[int, np.ndarray]]
+) -> dict[str, str]:
     """Cameras that stand elsewhere in the first or last of these frames than when calibrated: name to what was seen.
 
     A camera that does not see the rig board is not checked.

@@ -41,26 +41,26 @@ class Cell:
 
 
 def write_error_map(
-    out: Path, results: Sequence[TrialResult], found: Sequence[SurfaceFriction], alpha_est_rad: float
+    out: Path, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
 ) -> list[str]:
     """error_map.csv, and error_map.png where there is a cell. Names of the pictures."""
-    cells = measured_cells(results, found, alpha_est_rad)
+    cells = measured_cells(results, friction, alpha_est_rad)
     write_table(out / f"{NAME}.csv", COLUMNS, map(_row, cells))
     if not cells:
         return []
     path, stamp = out / f"{NAME}.png", hash_of([vars(cell) for cell in cells], alpha_est_rad, COLUMNS)
     if not is_drawn(path, stamp):
         with style():
-            save(draw_error_map(cells, alpha_est_rad, _typical_taper(found)), path, stamp)
+            save(draw_error_map(cells, alpha_est_rad, _typical_taper(friction)), path, stamp)
     return [path.name]
 
 
 def measured_cells(
-    results: Sequence[TrialResult], found: Sequence[SurfaceFriction], alpha_est_rad: float
+    results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
 ) -> list[Cell]:
     """The cells that hold a whisk, by slope and friction."""
     cells: dict[tuple, list[tuple[float, float]]] = {}
-    for beta_deg, alpha_rad, error, share in _whisks(results, found):
+    for beta_deg, alpha_rad, error, share in _whisks(results, friction):
         half = 0.5 * _BETA_DEG
         edges = _edge(abs(beta_deg) + half, _BETA_DEG) - half, _edge(np.degrees(alpha_rad), _ALPHA_DEG)
         predicted = 100.0 * float(share(distance_error(np.radians(abs(beta_deg)), alpha_rad, alpha_est_rad)))
@@ -72,11 +72,11 @@ def _edge(value: float, size: float) -> float:
     return float(np.floor(value / size) * size)
 
 
-def _whisks(results: Sequence[TrialResult], found: Sequence[SurfaceFriction]) -> Iterator[tuple]:
+def _whisks(results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> Iterator[tuple]:
     """(β in degrees, α in rad, error in per cent) of every whisk for which all three are known, and how its whisker's
     taper changes a relative error."""
     errors = {(j.trial, j.whisk): j for j in judge(results) if j.estimator == "with_friction" and not j.one_factor}
-    for surface in found:
+    for surface in friction:
         seen, fitted = surface.alpha("seen")[0], surface.alpha("least_squares")[0]
         alpha = seen if np.isfinite(seen) else fitted
         mine = (errors[whisk.key] for whisk in surface.whisks if whisk.key in errors)

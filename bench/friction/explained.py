@@ -15,7 +15,7 @@ from bench.base.drawing import is_drawn, save, style
 from bench.base.results import hash_of
 from bench.base.tables import write_table
 from bench.friction.alphas import seen_friction
-from bench.gauges.readings import known_from_pictures
+from bench.gauges.readings import reference_from_pictures
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.distance import with_friction
@@ -78,7 +78,13 @@ def _shares(
     return {"d_x_mm": truth, "error_mm": d_x[0] - truth, **by, "remainder_mm": d_x[3] - truth}
 
 
-def by_10(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker: Whisker):
+def by_10(
+    theta_rad: float | np.ndarray,
+    m_y_Nmm: float | np.ndarray,
+    m_z_Nmm: float | np.ndarray,
+    alpha_rad: float | np.ndarray,
+    whisker: Whisker,
+) -> float | np.ndarray:
     """d_x of (10), mm; arrays or floats."""
     beam = whisker.beam
     return beam.distance_mm(with_friction(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, beam.C_Nmm2))
@@ -86,11 +92,11 @@ def by_10(theta_rad, m_y_Nmm, m_z_Nmm, alpha_rad, whisker: Whisker):
 
 def _moments_seen(seen: SeenWhisk, theta: float, whisker: Whisker) -> tuple[float, float]:
     """(m_y, m_z) of the exact rod through the contact seen, at a pushing angle: per angle, between the frames."""
-    known = known_from_pictures(seen, whisker)
-    if known is None:
+    reference = reference_from_pictures(seen, whisker)
+    if reference is None:
         return float("nan"), float("nan")
-    per_angle = known.moments / known.theta_rad[:, None]
-    m_y, m_z = (theta * float(np.interp(theta, known.theta_rad, column)) for column in per_angle.T)
+    per_angle = reference.moments / reference.theta_rad[:, None]
+    m_y, m_z = (theta * float(np.interp(theta, reference.theta_rad, column)) for column in per_angle.T)
     return m_y, m_z
 
 
@@ -98,8 +104,8 @@ def mean_row(rows: Sequence[dict]) -> dict:
     """Mean error and mean shares over the whisks for which all are known; shares keep their signs, so they add up."""
     names = ("d_x_mm", "error_mm", *SHARES)
     values = np.array([[row[name] for name in names] for row in rows])
-    known = values[np.isfinite(values).all(axis=1)]
-    return {"trial": TOTAL} | (dict(zip(names, known.mean(axis=0).tolist())) if len(known) else {})
+    complete = values[np.isfinite(values).all(axis=1)]
+    return {"trial": TOTAL} | (dict(zip(names, complete.mean(axis=0).tolist())) if len(complete) else {})
 
 
 def draw_explained(rows: Sequence[dict]) -> Figure:

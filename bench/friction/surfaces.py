@@ -37,10 +37,12 @@ class Felt:
 
     @property
     def m_Nmm(self) -> float:
+        """|m|."""
         return float(np.hypot(self.m_y_Nmm, self.m_z_Nmm))
 
     @property
     def m_sigma_Nmm(self) -> float:
+        """One sigma of |m|."""
         return float(np.hypot(self.m_y_Nmm * self.m_y_sigma_Nmm, self.m_z_Nmm * self.m_z_sigma_Nmm)) / self.m_Nmm
 
 
@@ -73,6 +75,7 @@ class Surface:
 
     @property
     def title(self) -> str:
+        """Surface and speed in words."""
         speed = f"{self.speed_deg_s:g}°/s" if self.speed_deg_s is not None else ""
         return ", ".join(filter(None, [self.name or "surface not named", speed]))
 

@@ -97,14 +97,14 @@ def _rms(squares, shares) -> float:
 
 
 def write_friction(
-    out: Path, results: Sequence[TrialResult], found: Sequence[SurfaceFriction], alpha_est_rad: float
+    out: Path, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
 ) -> None:
     """friction.csv, phases.csv and surfaces.csv."""
     alphas = alphas_of(results)
-    phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for s in found for f in s.surface.felt}
+    phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for s in friction for f in s.surface.felt}
     write_table(out / "friction.csv", WHISK_COLUMNS, (_whisk_row(a, phi.get(a.key), alpha_est_rad) for a in alphas))
     write_table(out / "phases.csv", PHASE_COLUMNS, (row for a in alphas for row in _phase_rows(a)))
-    write_table(out / "surfaces.csv", SURFACE_COLUMNS, map(_surface_row, found))
+    write_table(out / "surfaces.csv", SURFACE_COLUMNS, map(_surface_row, friction))
 
 
 def _whisk_row(a: WhiskAlphas, phi_rad: float | None, alpha_est_rad: float) -> dict:
@@ -140,15 +140,15 @@ def _cells(name: str, pair: tuple[float, float]) -> dict:
     return {column: float(np.degrees(pair[0])), sigma_name(column): float(np.degrees(pair[1]))}
 
 
-def alpha_lines(found: Sequence[SurfaceFriction]) -> Iterator[str]:
+def alpha_lines(friction: Sequence[SurfaceFriction]) -> Iterator[str]:
     """The summary's table: α by every way, a line a surface; then stick–slip and section VII."""
-    if not found:
+    if not friction:
         return
     yield f"{'surface':<24}{'whisks':>7}  {'seen':>15}  {'felt':>15}  {'Fig. 8 fit':>15}"
-    for s in found:
+    for s in friction:
         cells = "  ".join(f"{_shown(s.alpha(name)):>15}" for name in (*RECORDS, "least_squares"))
         yield f"{s.surface.title:<24}{len(s.whisks):>7}  {cells}"
-    for s in found:
+    for s in friction:
         yield from (f"{s.surface.title}: {line}" for line in (*_stick_slip(s), *_section_vii(s)))
 
 

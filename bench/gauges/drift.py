@@ -56,7 +56,7 @@ def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
     return np.sqrt(excess + information.sum(axis=0) ** -0.5)
 
 
-def allow_drift(touch: Touch, rate, speed_rad_s: float) -> Touch:
+def allow_drift(touch: Touch, rate: np.ndarray, speed_rad_s: float) -> Touch:
     """The same touch, with a zero that may drift at `rate` (k,) per second: the session's, and not the stroke's own,
     which is mostly noise. The touch's sigma takes the one for the other too, so that it agrees with its covariances."""
     if touch.status or speed_rad_s <= 0:

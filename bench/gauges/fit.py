@@ -109,7 +109,7 @@ def _weight(p: Pairs, matrix) -> np.ndarray:
     return np.linalg.inv(p.moments_covariance + np.outer(fitted, fitted) + through @ p.volts_covariance @ through.T)
 
 
-def widening(pairs: Sequence[Pairs], matrix) -> float:
+def widening(pairs: Sequence[Pairs], matrix: np.ndarray) -> float:
     """By how much the residuals' squares exceed what was stated; 1 where they do so no more than chance allows.
 
     Sound sigmas, widened whenever chance makes the residuals large, would be too wide in the mean: 95 % intervals would

@@ -70,7 +70,9 @@ def read_gauges(path: Path, C_Nmm2: float) -> Gauges:
     )
 
 
-def write_gauges(path: Path, gauges: Gauges, zero, C: tuple[float, float], header: list[str]) -> None:
+def write_gauges(
+    path: Path, gauges: Gauges, zero: tuple[np.ndarray, np.ndarray], C: tuple[float, float], header: list[str]
+) -> None:
     """Write gauges.toml whole; `header` goes before it as comments.
 
     zero: volts (2,) and their sigma (2,); C: the stiffness in whose unit the coefficients are, with its sigma.

@@ -29,7 +29,7 @@ class GaugeMatrix:
         """In another unit of stiffness."""
         return GaugeMatrix(factor * self.matrix, factor**2 * self.covariance)
 
-    def covariance_at(self, volts) -> np.ndarray:
+    def covariance_at(self, volts: np.ndarray) -> np.ndarray:
         """Covariance (2, 2) that the coefficients' uncertainty gives the moment of `volts` (2,)."""
         rows = np.kron(np.eye(2), np.asarray(volts)[None, :])
         return rows @ self.covariance @ rows.T
@@ -65,7 +65,7 @@ class Gauges:
         """The coefficients that this trial may be judged by; None where there are none."""
         return self.without.get(name, self.all)
 
-    def beyond(self, moments_Nmm) -> str:
+    def beyond(self, moments_Nmm: np.ndarray) -> str:
         """What to say of moments (2,) in the follicle's axes that exceed the calibrated range; '' within."""
         if self.full_scale_Nmm is None:
             return ""

@@ -54,7 +54,7 @@ class Pairs:
 
 
 @dataclass(frozen=True)
-class Known:
+class ReferenceMoments:
     """Moments (n, 2) in the hub's axes at motor angles motor_rad (n,), with covariance (2n, 2n); touch and distance.
 
     scale_sigma: share by which all moments may be wrong together; not in the covariance.
@@ -70,21 +70,21 @@ class Known:
 
 
 def pairs_of(
-    trial: Trial, seen: SeenWhisk, stroke: Stroke, drift_rate, whisker: Whisker, theta_rad: float
+    trial: Trial, seen: SeenWhisk, stroke: Stroke, drift_rate: np.ndarray, whisker: Whisker, theta_rad: float
 ) -> Pairs | None:
     """Pairs of one whisk, or None where it has none. theta_rad: the paper's pushing angle."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:
         return None
     is_seen = seen.deflection is not None
-    known = known_from_pictures(seen, whisker) if is_seen else known_from_nominal(trial, touch, whisker)
-    if known is None:
+    reference = reference_from_pictures(seen, whisker) if is_seen else reference_from_nominal(trial, touch, whisker)
+    if reference is None:
         return None
-    rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, known.d_x_mm)
-    return _paired(trial, seen.whisk, known, stroke, touch, rigid_Nmm, theta_rad)
+    rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
+    return _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
 
 
-def known_from_pictures(seen: SeenWhisk, whisker: Whisker) -> Known | None:
+def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMoments | None:
     """Moments of the frames in which the whisker touches, from the exact rod through the contact that was seen.
 
     The deflection is from the unbent whisker as the free stroke shows it, so a sag or a set of the wire is no moment.
@@ -103,7 +103,7 @@ def known_from_pictures(seen: SeenWhisk, whisker: Whisker) -> Known | None:
     covariance = covariance + _shared(_FRICTION_SIGMA * by_friction)
     by_distance = 2.0 * d_x.sigma / d_x.value
     theta, motor = d.theta_rad[good], d.motor_rad[good]
-    return Known(seen.touch_rad.value, d_x.value, motor, theta, moments, covariance, by_distance)
+    return ReferenceMoments(seen.touch_rad.value, d_x.value, motor, theta, moments, covariance, by_distance)
 
 
 def _drawn_share(across, along, slip) -> np.ndarray:
@@ -126,7 +126,7 @@ def _with_friction(along, across, share, whisker: Whisker) -> tuple[np.ndarray, 
     return (rough / size)[:, None] * across, ((rough - smooth) / _FRICTION / size)[:, None] * across
 
 
-def moments_per_mm(moments, across) -> np.ndarray:
+def moments_per_mm(moments: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Stiffness (n,) of each pair: moment over deflection."""
     return np.linalg.norm(moments, axis=1) / np.linalg.norm(across, axis=1)
 
@@ -136,7 +136,7 @@ def _shared(effect) -> np.ndarray:
     return np.outer(effect.ravel(), effect.ravel())
 
 
-def known_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Known | None:
+def reference_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> ReferenceMoments | None:
     """Moments of a bar at right angles to the push, at the distance that a ruler gave; None where there is none.
 
     The bent whisker leans by half the pushing angle where it touches, and rolls that far over the bar towards its base.
@@ -152,35 +152,42 @@ def known_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Known | 
     by_distance = trial.d_x_sigma_mm / trial.d_x_mm or _NOMINAL_SHARE
     by_touch = touch.sigma_rad * moments / theta[:, None]
     covariance = _shared(by_touch) + _shared(_FRICTION_SIGMA * by_friction)
-    return Known(touch.motor_rad, trial.d_x_mm, touch.motor_rad + theta, theta, moments, covariance, by_distance)
+    motor = touch.motor_rad + theta
+    return ReferenceMoments(touch.motor_rad, trial.d_x_mm, motor, theta, moments, covariance, by_distance)
 
 
 def _paired(
-    trial: Trial, whisk: int, known: Known, stroke: Stroke, touch: Touch, rigid_Nmm: float, theta_rad: float
+    trial: Trial,
+    whisk: int,
+    reference: ReferenceMoments,
+    stroke: Stroke,
+    touch: Touch,
+    rigid_Nmm: float,
+    theta_rad: float,
 ) -> Pairs | None:
     """Volts at the same motor angles, each from a short line through the samples around it."""
-    theta = known.motor_rad - touch.motor_rad
-    half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(known.motor_rad), initial=np.inf))
+    theta = reference.motor_rad - touch.motor_rad
+    half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(reference.motor_rad), initial=np.inf))
     after = theta > 0.5 * _LEAST_THETA_RAD
     read = [stroke.at(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
     kept = np.array([r is not None and not r.status for r in read], dtype=bool)
     if not kept.any():
         return None
     read, rows = [r for r, keep in zip(read, kept) if keep], np.repeat(kept, 2)
-    moments, covariance = _seen_from_follicle(trial, known.moments[kept], known.covariance[np.ix_(rows, rows)])
-    at = stroke.at(known.touch_rad + theta_rad - touch.motor_rad, touch)
+    moments, covariance = _seen_from_follicle(trial, reference.moments[kept], reference.covariance[np.ix_(rows, rows)])
+    at = stroke.at(reference.touch_rad + theta_rad - touch.motor_rad, touch)
     return Pairs(
         trial.name,
         whisk,
         trial.follicle_roll_deg,
-        known.theta_rad[kept],
+        reference.theta_rad[kept],
         moments,
         covariance,
         np.array([r.values for r in read]),
         _volts_covariance(read, theta[kept], touch),
         to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
         at.values,
-        known.scale_sigma,
+        reference.scale_sigma,
     )
 
 

@@ -69,7 +69,9 @@ def _line_at(motor, channels) -> np.ndarray:
     return np.polyfit(motor, channels, 1)[-1]
 
 
-def in_percent(found: Sequence[Reversal], matrix, full_scale_Nmm) -> tuple[np.ndarray | None, np.ndarray | None]:
+def in_percent(
+    found: Sequence[Reversal], matrix: np.ndarray, full_scale_Nmm: np.ndarray
+) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Largest hysteresis (2,) and largest return error (2,) of m_y, m_z in % of full scale; None where not measured."""
     scale = 100.0 / np.asarray(full_scale_Nmm)
     differences = [np.nanmax(np.abs(one.difference @ matrix.T), axis=0) for one in found]

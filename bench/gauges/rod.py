@@ -17,7 +17,9 @@ _ROUNDS = 60
 _SETTLED = 1e-12
 
 
-def moment_at_clamp(along_mm, across_mm, rigidity_Nmm2: Callable, friction: float = 0.0) -> np.ndarray:
+def moment_at_clamp(
+    along_mm: float | np.ndarray, across_mm: float | np.ndarray, rigidity_Nmm2: Callable, friction: float = 0.0
+) -> np.ndarray:
     """Size (n,) of the moment at the clamp, N·mm, of rods whose contacts lie at along_mm, across_mm (n,).
 
     rigidity_Nmm2: EI as a function of the arc length in mm. friction: friction over normal force along the rod at the

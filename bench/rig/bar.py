@@ -8,14 +8,14 @@ import numpy as np
 from bench.rig.rod import Rod
 
 
-def turned(vectors, angle_rad: float) -> np.ndarray:
+def turned(vectors: np.ndarray, angle_rad: float) -> np.ndarray:
     """Vectors (..., 3) turned about the rotation axis z."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     x, y, z = np.moveaxis(np.asarray(vectors, float), -1, 0)
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
 
 
-def cross(a, b) -> np.ndarray:
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross product of two vectors; numpy's own takes ten times as long for one pair."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
@@ -29,7 +29,16 @@ class Bar:
     radius_mm: float
 
     @classmethod
-    def placed(cls, *, d_x_mm, beta_rad, psi_rad, touch_rad, radius_mm, whisker_radius_mm) -> "Bar":
+    def placed(
+        cls,
+        *,
+        d_x_mm: float,
+        beta_rad: float,
+        psi_rad: float,
+        touch_rad: float,
+        radius_mm: float,
+        whisker_radius_mm: float,
+    ) -> "Bar":
         """The bar that a straight whisker at motor angle `touch_rad` would just touch at `d_x_mm`."""
         axis = np.array([math.sin(psi_rad), math.cos(psi_rad) * math.sin(beta_rad),
                          math.cos(psi_rad) * math.cos(beta_rad)])
@@ -37,7 +46,7 @@ class Bar:
         point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
         return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm)
 
-    def foot_mm(self, point_mm) -> np.ndarray:
+    def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
         """The axis' point nearest to a point."""
         return self.point_mm + ((point_mm - self.point_mm) @ self.axis) * self.axis
 
@@ -61,7 +70,7 @@ class Touch:
         return float(np.linalg.norm(self.point_mm))
 
 
-def unloaded(rod: Rod, motor_rad: float, arc_mm):
+def unloaded(rod: Rod, motor_rad: float, arc_mm: float | np.ndarray):
     """Points and tangents of the unloaded whisker in the rig frame, each (..., 3)."""
     arc = np.asarray(arc_mm, float)
     along = np.stack([arc, 0 * arc, 0 * arc], -1)

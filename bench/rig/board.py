@@ -34,6 +34,7 @@ class Board:
             raise ValueError("a board's marker is smaller than its square, and both are positive")
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
+        """The board as OpenCV has it."""
         known = _dictionary(self.dictionary)
         board = cv2.aruco.CharucoBoard(tuple(self.squares), self.square_mm, self.marker_mm, known)
         board.setLegacyPattern(self.legacy)
@@ -41,6 +42,7 @@ class Board:
 
     @property
     def size_mm(self) -> tuple[float, float]:
+        """Width and height."""
         return self.squares[0] * self.square_mm, self.squares[1] * self.square_mm
 
     @property

@@ -16,24 +16,28 @@ from bench.rig.sensor import Sensor
 
 
 def rod(protocol: Protocol) -> Rod:
+    """The whisker of a protocol."""
     w = protocol.whisker
     rest = Rest(w.length_mm, w.sag_mm, w.set_y_mm, w.set_z_mm)
     return Rod(w.shape, w.length_mm, w.diameter_mm, w.youngs_modulus_GPa, w.density_kg_m3, rest, w.tip_diameter_mm)
 
 
 def gauges(protocol: Protocol) -> Gauges:
+    """The gauges of a protocol."""
     g = protocol.gauges
     return Gauges(np.array(g.matrix_Nmm_per_V), np.array(g.offset_V), g.noise_V, g.hum_V, g.hum_Hz, g.drift_V_per_s,
                   g.filter_Hz, g.rate_Hz, g.adc_bits, g.range_V)
 
 
 def cameras(protocol: Protocol) -> list[Camera]:
+    """The cameras of a protocol, in its order."""
     return [Camera.looking(c.name, size_px=c.size_px, focal_px=c.focal_px, aspect=c.aspect, distortion=c.distortion,
                            position_mm=np.array(c.position_mm), target_mm=np.array(c.target_mm),
                            roll_rad=math.radians(c.roll_deg), centre_px=c.centre_px) for c in protocol.cameras]
 
 
 def board(protocol: Protocol) -> Board:
+    """The board of a protocol."""
     b = protocol.board
     return Board(tuple(b.squares), b.square_mm, b.marker_mm, b.dictionary, b.legacy, b.inverted)
 
@@ -58,6 +62,7 @@ def stated_T_rig_board(protocol: Protocol, rng: np.random.Generator) -> np.ndarr
 
 
 def scene(protocol: Protocol) -> Scene:
+    """The scene of a protocol: its light and what things look like in it."""
     table = protocol.light
     towards = np.array(table.towards) / np.linalg.norm(table.towards)
     looks = Looks(Light(towards, table.lamp, table.soft), Ink(table.paper, table.ink),
@@ -68,5 +73,6 @@ def scene(protocol: Protocol) -> Scene:
 
 
 def sensor(protocol: Protocol) -> Sensor:
+    """The sensor of the protocol's cameras."""
     p = protocol.pictures
     return Sensor(p.blur_px, p.vignetting, p.read_noise, p.shot_noise, p.grain, p.bits)

@@ -1,6 +1,7 @@
 """Pinhole cameras with Brown–Conrady lenses, projecting through OpenCV."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,8 +24,19 @@ class Camera:
     translation_mm: np.ndarray
 
     @classmethod
-    def looking(cls, name, *, size_px, focal_px, distortion, position_mm, target_mm, roll_rad=0.0, centre_px=None,
-                aspect=1.0) -> "Camera":
+    def looking(
+        cls,
+        name: str,
+        *,
+        size_px: tuple[int, int],
+        focal_px: float,
+        distortion: Sequence[float],
+        position_mm: np.ndarray,
+        target_mm: np.ndarray,
+        roll_rad: float = 0.0,
+        centre_px: Sequence[float] | None = None,
+        aspect: float = 1.0,
+    ) -> "Camera":
         """A camera at a position looking at a point, the rig's z upwards in its picture up to `roll_rad`.
 
         Raises ValueError where it looks straight up or down (there is no upwards then) or stands on its target.
@@ -36,15 +48,16 @@ class Camera:
 
     @property
     def centre_mm(self) -> np.ndarray:
+        """Where the camera is in the rig frame, (3,)."""
         return -self.rotation.T @ self.translation_mm
 
-    def project(self, points_mm) -> np.ndarray:
+    def project(self, points_mm: np.ndarray) -> np.ndarray:
         """Pixels (n, 2) of points (n, 3) in the rig frame."""
         turn, _ = cv2.Rodrigues(self.rotation)
         points = np.ascontiguousarray(np.asarray(points_mm, float).reshape(-1, 1, 3))
         return cv2.projectPoints(points, turn, self.translation_mm, self.matrix, self.distortion)[0][:, 0]
 
-    def in_camera(self, points_mm) -> np.ndarray:
+    def in_camera(self, points_mm: np.ndarray) -> np.ndarray:
         """Camera coordinates of points (..., 3)."""
         return np.asarray(points_mm, float) @ self.rotation.T + self.translation_mm
 

@@ -48,6 +48,7 @@ class State:
 
     @property
     def unknowns(self) -> np.ndarray:
+        """What the equilibrium is solved for, (4,): the force (3,) in the hub's axes and the arc length."""
         return np.append(self.force_hub_N, self.arc_mm)
 
 
@@ -68,17 +69,19 @@ class Contact:
         return State(touch.motor_rad, np.zeros(3), touch.arc_mm, touch.point_mm,
                      _turn(touch.motor_rad) @ tangent, 0.0, status)
 
-    def hold(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip=False) -> State:
+    def hold(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip: bool = False) -> State:
         """Equilibrium at which the material has not moved along the bar since `old`, friction being what the cone
         leaves.
         """
         return self._solve(motor_rad, old, guess, Held(friction), tip)
 
-    def slide(self, motor_rad, old: State, guess: np.ndarray, heading_rad: float, friction: float, tip=False) -> State:
+    def slide(
+        self, motor_rad: float, old: State, guess: np.ndarray, heading_rad: float, friction: float, tip: bool = False
+    ) -> State:
         """Equilibrium on the edge of the cone, the force against the motion since `old`."""
         return self._solve(motor_rad, old, np.append(guess, heading_rad), Sliding(friction), tip)
 
-    def ease(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip=False) -> State:
+    def ease(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip: bool = False) -> State:
         """Sliding where no heading is at hand (the motor has just turned back): friction first as soft as oil, then
         ever stiffer, until it gives way by no more than 10 nm."""
         for give_mm in np.geomspace(1.0, GIVE_MM, 16):

@@ -40,6 +40,7 @@ class Nodes:
 
     @classmethod
     def make(cls, count: int) -> "Nodes":
+        """So many Chebyshev points with the matrices that integrate over them."""
         at = 0.5 * (1 - np.cos(np.pi * np.arange(count) / (count - 1)))
         values = chebyshev.chebvander(2 * at - 1, count - 1)
         integrals = np.stack([_integral(k, count, at) for k in range(count)], -1)
@@ -64,7 +65,7 @@ class Elastica:
         self.nodes = Nodes.make(nodes or (20 if rod.shape == "cylinder" else 40))
         self._uniform = self.nodes.from_base @ self.nodes.to_load
 
-    def solve(self, force_x_N: float, force_e_N: float, arc_mm: float, guess=None) -> Bent:
+    def solve(self, force_x_N: float, force_e_N: float, arc_mm: float, guess: np.ndarray | None = None) -> Bent:
         """Equilibrium under a force (along the clamped tangent, across it) at arc length.
 
         Raises ArithmeticError where Newton's method does not settle (loads far past buckling with no guess nearby).
@@ -105,7 +106,7 @@ class Elastica:
         end_by[:, 2] += unit_end
         return Bent(angle, arc_mm, arc_mm * unit_end, end_by, angle[-1], angle_by[-1])
 
-    def curve_mm(self, bent: Bent, arc_mm) -> np.ndarray:
+    def curve_mm(self, bent: Bent, arc_mm: np.ndarray) -> np.ndarray:
         """Points (n, 2) of the bent rod at arc lengths (n,), straight beyond the load."""
         arc = np.asarray(arc_mm, float)
         within = np.clip(arc / bent.arc_mm, 0, 1)

@@ -13,7 +13,7 @@ class Light:
     lamp: float
     soft: float
 
-    def flat(self, normal) -> float:
+    def flat(self, normal: np.ndarray) -> float:
         """What a matt white face with this normal sends back."""
         return self.soft + self.lamp * max(0.0, float(np.dot(normal, self.towards)))
 
@@ -30,7 +30,9 @@ class Material:
     rim: float = 0.0
 
 
-def round_shade(light: Light, material: Material, across, facing, aside, mirror):
+def round_shade(
+    light: Light, material: Material, across: np.ndarray, facing: np.ndarray, aside: np.ndarray, mirror: np.ndarray
+):
     """Brightness on a round bar at `across` (−1…1 from silhouette to silhouette).
 
     `facing`, `aside`: the lamp's components towards the camera and across the bar; `mirror`: the same two (stacked)

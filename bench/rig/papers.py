@@ -15,6 +15,7 @@ _TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m
 
 
 def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
+    """session.toml, with T_rig_board (3, 4) as someone would have measured it."""
     w, b, g = protocol.whisker, protocol.board, protocol.gauges
     rig = {"T_rig_board": [[round(float(x), 9) for x in row] for row in stated_T_rig_board]}
     for unit, sigma in (("mm", b.pose_sigma_mm), ("deg", b.pose_sigma_deg)):
@@ -62,6 +63,7 @@ def _alpha_deg(*coefficients):
 
 
 def trial_toml(recording: Recording) -> str:
+    """trial.toml of a recording."""
     run, table = recording.run, recording.run.table
     trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "beta_deg": float(run.beta_deg),
              "d_x_mm": float(run.d_x_mm), "purpose": table.purpose}
@@ -73,11 +75,13 @@ def trial_toml(recording: Recording) -> str:
 
 
 def frames_csv(recording: Recording, clock_offset_s: float) -> str:
+    """frames.csv, by a clock that is late by so much."""
     lines = [f"{i},{time - clock_offset_s:.6f}" for i, time in enumerate(recording.frames.time_s)]
     return "\n".join(["frame,time_s", *lines]) + "\n"
 
 
 def signals_csv(recording: Recording) -> str:
+    """signals.csv of a recording, V."""
     lines = [f"{time:.6f},{motor:.5f},{y:.6f},{z:.6f}" for time, motor, y, z in recording.signals.tolist()]
     return "\n".join(["time_s,motor_deg,y_V,z_V", *lines]) + "\n"
 

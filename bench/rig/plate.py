@@ -23,7 +23,8 @@ class Print:
     y_mm: np.ndarray
 
     @classmethod
-    def plain(cls, width_mm, height_mm, reflectance) -> "Print":
+    def plain(cls, width_mm: float, height_mm: float, reflectance: float) -> "Print":
+        """A print of one grey."""
         return cls(np.array([[reflectance]]), np.array([0.0, width_mm]), np.array([0.0, height_mm]))
 
     def moved(self, x_mm: float, y_mm: float) -> "Print":
@@ -51,7 +52,7 @@ class Plate:
         flat = np.array([[x[0], y[0], 0], [x[1], y[0], 0], [x[1], y[1], 0], [x[0], y[1], 0]])
         return flat @ self.pose[:, :3].T + self.pose[:, 3]
 
-    def faces(self, point_mm) -> bool:
+    def faces(self, point_mm: np.ndarray) -> bool:
         """Whether the print is seen from a point."""
         return float((point_mm - self.pose[:, 3]) @ self.pose[:, 2]) < 0
 

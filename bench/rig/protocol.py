@@ -27,6 +27,8 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class WhiskerTable(Table):
+    """[whisker] of a protocol."""
+
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     length_mm: Positive = 100.0
     diameter_mm: Positive = 1.0
@@ -39,6 +41,8 @@ class WhiskerTable(Table):
 
 
 class BoardTable(Table):
+    """[board] of a protocol."""
+
     squares: Size = (8, 6)
     square_mm: Positive = 15.0
     marker_mm: Positive = 11.0
@@ -54,6 +58,8 @@ class BoardTable(Table):
 
 
 class CameraTable(Table, kw_only=True):
+    """One [[cameras]] of a protocol."""
+
     name: Name
     position_mm: Three
     target_mm: Three = (55.0, 0.0, 0.0)
@@ -66,6 +72,8 @@ class CameraTable(Table, kw_only=True):
 
 
 class LightTable(Table):
+    """[light] of a protocol."""
+
     towards: Three = (-0.3, -0.5, 0.8)  # direction of the lamp
     lamp: Zero = 0.55
     soft: Zero = 0.35  # light from all round, in parts of full scale
@@ -84,6 +92,8 @@ class LightTable(Table):
 
 
 class PicturesTable(Table):
+    """[pictures] of a protocol."""
+
     format: Literal["jpg", "png", "mkv"] = "jpg"  # JPEG quality 95, PNG, lossless FFV1
     bits: Literal[8, 12] = 8
     blur_px: Annotated[float, msgspec.Meta(ge=0.3, le=6)] = 0.9  # sigma of lens and defocus
@@ -123,6 +133,8 @@ class PicturesTable(Table):
 
 
 class MotorTable(Table):
+    """[motor] of a protocol."""
+
     before_deg: Zero = 1.605  # the stroke: from before touch …
     after_deg: Zero = 4.6  # … to after it
     ramp_s: Zero = 0.0  # to reach the speed and to lose it again
@@ -132,12 +144,16 @@ class MotorTable(Table):
 
 
 class FrictionTable(Table):
+    """[friction] of a protocol."""
+
     scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
     irregular: Zero = 0.0  # sigma (of a log-normal) of how much of its excess over motion each single rest reaches
     finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
 
 
 class GaugesTable(Table):
+    """[gauges] of a protocol."""
+
     matrix_Nmm_per_V: tuple[Pair, Pair] = ((11.3, 0.32), (-0.25, 10.5))
     offset_V: Pair = (-0.015, -0.026)
     noise_V: Zero = 0.0064

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.rig.bar import Bar, turned
 from bench.rig.board import Board, Ink, marker
+from bench.rig.camera import Camera
 from bench.rig.light import Light, Material
 from bench.rig.plate import Plate, Print
 from bench.rig.tube import Tube
@@ -60,7 +61,9 @@ class Box:
         pose = np.column_stack([first, second, inward, self.origin_mm + corner])
         return Plate(Print.plain(high[i] - low[i], high[j] - low[j], self.reflectance), pose)
 
-    def paint(self, window, paint, light, print_=None, on=(2, 1)):
+    def paint(
+        self, window: Window, paint: np.ndarray, light: Light, print_: Print | None = None, on: tuple[int, int] = (2, 1)
+    ):
         """All faces, and a print centred on one of them."""
         for name, plate in self.faces():
             plate.paint(window, paint, light)
@@ -83,7 +86,7 @@ class Scene:
         self.print_board(window, paint, self.T_rig_board)
         return paint
 
-    def print_board(self, window, paint, T_rig_board) -> None:
+    def print_board(self, window: Window, paint: np.ndarray, T_rig_board: np.ndarray) -> None:
         """The board anywhere, as the views for the lens show it."""
         looks = self.looks
         plate = Plate(self.board.printed(looks.ink, looks.margin_mm), T_rig_board)
@@ -115,6 +118,7 @@ class Scene:
         return len(known.bytesList) + from_end
 
     def hub(self, motor_rad: float) -> Box:
+        """The hub at a motor angle."""
         return Box(_HUB_LOW, _HUB_HIGH, turned(np.eye(3), motor_rad).T, np.zeros(3), 0.05)
 
     def move(self, window: Window, paint: np.ndarray, motor_rad: float, whisker: Tube) -> None:
@@ -129,13 +133,13 @@ class Scene:
             whisker.paint(window, paint, self.looks.light)
             hub.paint(window, paint, self.looks.light, print_)
 
-    def moving_px(self, camera, motor_rad: float, whisker: Tube) -> np.ndarray:
+    def moving_px(self, camera: Camera, motor_rad: float, whisker: Tube) -> np.ndarray:
         """Pixels (n, 2) between which all that moves lies."""
         corners = np.concatenate([p.corners_mm() for _, p in self.hub(motor_rad).faces()])
         return np.concatenate([camera.project(corners), *whisker.silhouette(camera)])
 
 
-def floor_and_wall(window, looks):
+def floor_and_wall(window: Window, looks: Looks):
     """A grey floor that darkens away from the rig, and the wall behind it."""
     coarse = Window(window.camera, window.left, window.top, window.right, window.bottom, 1, 1.0)
     x, y = coarse.rays()

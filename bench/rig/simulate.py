@@ -18,13 +18,13 @@ _PICTURE_S, _WHISK_S = 0.08, 0.3  # of one core
 
 
 def simulate(
-    session,
+    session: Path | str,
     *,
-    protocol="quick",
-    signals_only=False,
-    seed=0,
-    workers=0,
-    progress=False,
+    protocol: Path | str = "quick",
+    signals_only: bool = False,
+    seed: int = 0,
+    workers: int = 0,
+    progress: bool = False,
     announce: Callable[[str], object] | None = None,
 ) -> Path:
     """Write the session folder that a protocol describes; go on where an interrupted one stopped.

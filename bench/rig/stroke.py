@@ -16,7 +16,17 @@ class Stroke:
     back: tuple[tuple[float, float], ...] = ()  # and of each back stroke
 
     @classmethod
-    def plan(cls, low_rad, high_rad, speed_rad_s, *, whisks=1, ramp_s=0.0, pause_s=0.0, back=False) -> "Stroke":
+    def plan(
+        cls,
+        low_rad: float,
+        high_rad: float,
+        speed_rad_s: float,
+        *,
+        whisks: int = 1,
+        ramp_s: float = 0.0,
+        pause_s: float = 0.0,
+        back: bool = False,
+    ) -> "Stroke":
         """`whisks` strokes from below `low_rad` to above `high_rad`, at constant speed between the two."""
         knots, forward = [(0.0, low_rad - 0.5 * speed_rad_s * ramp_s, 0.0 if ramp_s else speed_rad_s)], []
         backward = []
@@ -32,9 +42,10 @@ class Stroke:
 
     @property
     def end_s(self) -> float:
+        """When the recording ends."""
         return float(self.times_s[-1])
 
-    def angle_rad(self, time_s) -> np.ndarray:
+    def angle_rad(self, time_s: float | np.ndarray) -> np.ndarray:
         """Motor angle at times within the recording."""
         i = np.clip(np.searchsorted(self.times_s, time_s, side="right") - 1, 0, len(self.times_s) - 2)
         length = self.times_s[i + 1] - self.times_s[i]
@@ -43,7 +54,7 @@ class Stroke:
         straight = self.angles_rad[i] + self.speeds_rad_s[i] * part + 0.5 * gained * part**2
         return straight
 
-    def time_s(self, whisk: int, angle_rad, back: bool = False) -> np.ndarray:
+    def time_s(self, whisk: int, angle_rad: float | np.ndarray, back: bool = False) -> np.ndarray:
         """When a whisk's forward (or back) stroke passes angles (at constant speed)."""
         start, end = (self.back if back else self.forward)[whisk]
         first, last = self.angle_rad(start), self.angle_rad(end)

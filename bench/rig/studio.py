@@ -41,7 +41,7 @@ class Studio:
         """Painted samples of what the board picture of the rig shows."""
         return self.scene.backdrop(self.window)
 
-    def board_brightness(self, T_rig_board) -> np.ndarray:
+    def board_brightness(self, T_rig_board: np.ndarray) -> np.ndarray:
         """The board held in the air. Nothing covers it, so its edges take lens and pixel area at once."""
         window = Window.whole(self.camera, 1, math.hypot(self.sensor.blur_px, math.sqrt(1 / 12)))
         paint = floor_and_wall(window, self.scene.looks)
@@ -52,7 +52,7 @@ class Studio:
         """The board standing on the rig."""
         return self.cropped(self.window.seen(self.backdrop, self.sensor.blur_px))
 
-    def setting(self, bar: Bar, middle_mm) -> "Setting":
+    def setting(self, bar: Bar, middle_mm: np.ndarray) -> "Setting":
         """The still scene of a trial: the rig with a bar whose middle is near a point."""
         paint = self.backdrop.copy()
         self.scene.stand_bar(self.window, paint, bar, middle_mm)

@@ -23,7 +23,10 @@ class Tube:
     material: Material
 
     @classmethod
-    def straight(cls, start_mm, end_mm, radius_mm, material, stations=160) -> "Tube":
+    def straight(
+        cls, start_mm: np.ndarray, end_mm: np.ndarray, radius_mm: float, material: Material, stations: int = 160
+    ) -> "Tube":
+        """A straight tube of one radius."""
         at = np.linspace(0, 1, stations)[:, None]
         axis = (1 - at) * np.asarray(start_mm, float) + at * np.asarray(end_mm, float)
         return cls(axis, np.full(stations, float(radius_mm)), material)

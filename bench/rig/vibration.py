@@ -78,7 +78,16 @@ def _integral(values, step):
     return np.concatenate([[0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
 
 
-def ring(times_s, start_s, end_s, frequency_rad_s, damping, *, value=0.0, rate=0.0) -> np.ndarray:
+def ring(
+    times_s: np.ndarray,
+    start_s: float,
+    end_s: float,
+    frequency_rad_s: float,
+    damping: float,
+    *,
+    value: float = 0.0,
+    rate: float = 0.0,
+) -> np.ndarray:
     """A damped oscillation from `start_s` with a first value and a first rate; zero before it and after `end_s`."""
     t = np.asarray(times_s) - start_s
     alive = (t >= 0) & (np.asarray(times_s) < end_s)

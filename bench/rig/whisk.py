@@ -1,5 +1,6 @@
 """One whisk: what the exact mechanics says at every motor angle of its forward and back stroke."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +23,8 @@ class Instants:
     states: tuple[State | None, ...]
 
     @classmethod
-    def of(cls, path_rad, states) -> "Instants":
+    def of(cls, path_rad: np.ndarray, states: Sequence[State | None]) -> "Instants":
+        """What a path of motor angles and the states on it (None while free) tell."""
         free = np.full(3, np.nan), np.nan, (0.0, 0.0)
         rows = [free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s)) for s in states]
         points, arcs, moments = (np.array(column) for column in zip(*rows))
@@ -32,7 +34,7 @@ class Instants:
     def _way(self) -> int:
         return -1 if self.motor_rad[-1] < self.motor_rad[0] else 1
 
-    def moments_at(self, motor_rad) -> np.ndarray:
+    def moments_at(self, motor_rad: np.ndarray) -> np.ndarray:
         """(m_y, m_z) at motor angles, straight lines between instants, zero before touch."""
         at, knots = self._way * np.asarray(motor_rad), self._way * self.motor_rad
         return np.stack([np.interp(at, knots, m) for m in self.moment_Nmm.T], -1)
@@ -77,7 +79,18 @@ class Whisk:
     back: Instants | None
 
     @classmethod
-    def run(cls, rod: Rod, bar: Bar, friction: Friction, touch: Touch, end_rad, *, step_rad, stops_rad=(), back=False):
+    def run(
+        cls,
+        rod: Rod,
+        bar: Bar,
+        friction: Friction,
+        touch: Touch,
+        end_rad: float,
+        *,
+        step_rad: float,
+        stops_rad: Sequence[float] = (),
+        back: bool = False,
+    ):
         """March from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad` on the way there."""
         march = March(rod, bar, friction, touch)
         up = _stations(touch.motor_rad, end_rad, step_rad, stops_rad)
@@ -89,7 +102,7 @@ class Whisk:
         down, returned = march.along(np.append(up[-2::-1], touch.motor_rad))
         return cls(rod, bar, touch, friction, forward, Instants.of(np.append(path[-1], down), [states[-1], *returned]))
 
-    def slip_mm(self, point_mm) -> np.ndarray:
+    def slip_mm(self, point_mm: np.ndarray) -> np.ndarray:
         """Along the bar since first touch."""
         return (np.asarray(point_mm) - self.touch.point_mm) @ self.bar.axis
 
@@ -99,12 +112,12 @@ class Whisk:
             raise ValueError("this whisk has no back stroke")
         return self.back if back else self.forward
 
-    def slip_at(self, theta_rad) -> np.ndarray:
+    def slip_at(self, theta_rad: float | np.ndarray) -> np.ndarray:
         """Slip (mm) on the forward stroke at pushing angles, NaN where it does not reach them."""
         motor = self.touch.motor_rad + np.asarray(theta_rad)
         return np.interp(motor, self.forward.motor_rad, self.slip_mm(self.forward.point_mm), right=np.nan)
 
-    def centreline_mm(self, motor_rad: float, state: State | None, arc_mm) -> np.ndarray:
+    def centreline_mm(self, motor_rad: float, state: State | None, arc_mm: np.ndarray) -> np.ndarray:
         """Points (n, 3) of the whisker at arc lengths (n,) in the rig frame, bent by the force of `state` or free."""
         if state is None or not state.force_hub_N.any():
             return unloaded(self.rod, motor_rad, arc_mm)[0]

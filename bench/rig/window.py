@@ -45,6 +45,7 @@ class Window:
 
     @property
     def shape(self) -> tuple[int, int]:
+        """Rows and columns of samples."""
         return (self.bottom - self.top) * self.fine, (self.right - self.left) * self.fine
 
     @cached_property
@@ -54,9 +55,11 @@ class Window:
 
     @cached_property
     def v_px(self) -> np.ndarray:
+        """Rows' positions in the picture."""
         return self.top + (np.arange(self.shape[0]) + 0.5) / self.fine - 0.5
 
     def rays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Directions x/z and y/z of the samples' sights."""
         return self.camera.rays(self.u_px, self.v_px)
 
     def seen(self, paint: np.ndarray, blur_px: float) -> np.ndarray:

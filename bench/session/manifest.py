@@ -12,6 +12,8 @@ Pair = Annotated[list[float], msgspec.Meta(min_length=2, max_length=2)]
 
 
 class WhiskerKeys(Keys, kw_only=True):
+    """[whisker] of session.toml."""
+
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     length_mm: float
     length_sigma_mm: float = 0.0
@@ -33,6 +35,8 @@ class WhiskerKeys(Keys, kw_only=True):
 
 
 class BarKeys(Keys, kw_only=True):
+    """[bar] of session.toml."""
+
     diameter_mm: float
     diameter_sigma_mm: float = 0.0
 
@@ -40,6 +44,8 @@ class BarKeys(Keys, kw_only=True):
 
 
 class BoardKeys(Keys, kw_only=True):
+    """[board] of session.toml."""
+
     squares: Annotated[list[int], msgspec.Meta(min_length=2, max_length=2)]
     square_mm: float
     square_sigma_mm: float = 0.0
@@ -56,12 +62,16 @@ class BoardKeys(Keys, kw_only=True):
 
 
 class RigKeys(Keys, kw_only=True):
+    """[rig] of session.toml."""
+
     T_rig_board: Annotated[list[Row4], msgspec.Meta(min_length=3, max_length=3)] | None = None
     T_rig_board_sigma_mm: float = 0.0
     T_rig_board_sigma_deg: float = 0.0
 
 
 class CameraKeys(Keys, kw_only=True):
+    """One [[cameras]] of session.toml."""
+
     name: str
     exposure_s: float | None = None
     exposure_sigma_s: float = 0.0
@@ -70,6 +80,8 @@ class CameraKeys(Keys, kw_only=True):
 
 
 class GaugeKeys(Keys, kw_only=True):
+    """[gauges] of session.toml, and gauges.toml."""
+
     offset_V: Pair
     offset_sigma_V: Pair | None = None
     matrix_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)]
@@ -77,6 +89,8 @@ class GaugeKeys(Keys, kw_only=True):
 
 
 class TrialKeys(Keys, kw_only=True):
+    """trial.toml, and [trial] of session.toml for all trials."""
+
     surface: str = ""
     speed_deg_s: float | None = None
     speed_sigma_deg_s: float = 0.0
@@ -112,6 +126,8 @@ class TrialKeys(Keys, kw_only=True):
 
 
 class SessionKeys(Keys, kw_only=True):
+    """session.toml."""
+
     format: int
     name: str = ""
     whisker: WhiskerKeys | None = None

@@ -29,6 +29,7 @@ class Window:
 
     @property
     def allowed(self) -> str:
+        """The window in words."""
         return f"{self.low:g} or more" if self.high == math.inf else f"from {self.low:g} to {self.high:g}"
 
     def guess(self, value: float) -> str:

@@ -7,7 +7,7 @@ _LEAST_RUN = 3
 _FAR = 0.5  # of the channel's range, from its level at the start: noise without an ADC stands still at zero too
 
 
-def off_the_rails(channels) -> np.ndarray:
+def off_the_rails(channels: np.ndarray) -> np.ndarray:
     """Channels (n, k) with NaN where a channel is at its rail: three equal samples in a row, or more, at its maximum
     or minimum, more than half of its range from the level of its first samples."""
     kept = np.array(channels, dtype=float)

@@ -4,6 +4,7 @@
 left is the small-angle model itself, and slip along the whisker, which the paper assumes away (sections II and VII).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,7 +90,7 @@ def predicted_percent(push: Push) -> float:
     return float(100.0 * theta * (by_friction - 0.375 * reach * np.cos(beta) / np.cos(psi) ** 2))
 
 
-def tilt_map(pool: Workers, *, beta_deg=BETA_DEG, psi_deg=PSI_DEG) -> list[Panel]:
+def tilt_map(pool: Workers, *, beta_deg: Sequence[float] = BETA_DEG, psi_deg: Sequence[float] = PSI_DEG) -> list[Panel]:
     """β × ψ at d_x = 60 mm on a bar of 6 mm: without friction, on the paper's steel and on its sandpaper."""
     return [
         _panel(pool, f"α = {alpha:g}°", Push(alpha_deg=alpha), ("beta_deg", beta_deg), ("psi_deg", psi_deg))
@@ -97,7 +98,9 @@ def tilt_map(pool: Workers, *, beta_deg=BETA_DEG, psi_deg=PSI_DEG) -> list[Panel
     ]
 
 
-def radius_map(pool: Workers, *, d_x_mm=D_X_MM, bar_radius_mm=BAR_RADIUS_MM) -> list[Panel]:
+def radius_map(
+    pool: Workers, *, d_x_mm: Sequence[float] = D_X_MM, bar_radius_mm: Sequence[float] = BAR_RADIUS_MM
+) -> list[Panel]:
     """d_x × bar radius at ψ = 0: slip along the whisker alone, with friction, and with slip sideways."""
     return [
         _panel(

@@ -31,10 +31,12 @@ class Judged:
 
     @property
     def error_mm(self) -> float:
+        """Estimate less truth."""
         return self.d_x_est_mm - self.d_x_mm
 
     @property
     def error_percent(self) -> float:
+        """Estimate less truth, in per cent of the truth."""
         return 100.0 * self.error_mm / self.d_x_mm
 
     @property

@@ -47,10 +47,10 @@ def _own(name: str) -> Estimator:
 
 
 @dataclass(frozen=True)
-class Hand:
+class Readout:
     """How a trial's channels become moments in the hub's axes: the follicle's turn with its sigma, and the gauges.
 
-    Moments that were recorded as such need neither (`Hand.bare`).
+    Moments that were recorded as such need neither (`Readout.bare`).
     """
 
     gauges: GaugeMatrix
@@ -59,12 +59,12 @@ class Hand:
     is_gauged: bool = False
 
     @classmethod
-    def bare(cls) -> "Hand":
+    def bare(cls) -> "Readout":
         """For signals that are moments already."""
         return cls(GaugeMatrix(np.eye(2)))
 
     @classmethod
-    def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Hand":
+    def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Readout":
         """The trial's follicle with these gauges."""
         return cls(gauges, math.radians(trial.follicle_roll_deg), math.radians(trial.follicle_roll_sigma_deg), True)
 
@@ -77,7 +77,7 @@ class Hand:
         """The whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
         return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
-    def covariance(self, channels, of_channels) -> np.ndarray:
+    def covariance(self, channels: np.ndarray, of_channels: np.ndarray) -> np.ndarray:
         """Covariance (2, 2) of the moments of `channels` (2,): from the channels', the gauges' and the turn's."""
         back = to_follicle(self.roll_rad).T
         by_roll = to_follicle(self.roll_rad + np.pi / 2).T @ self.gauges.matrix @ channels * self.roll_sigma_rad
@@ -85,7 +85,9 @@ class Hand:
         return self.matrix @ of_channels @ self.matrix.T + of_gauges + np.outer(by_roll, by_roll)
 
 
-def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: float) -> tuple[Touch, Whisk | str]:
+def felt_whisk(
+    stroke: Stroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
+) -> tuple[Touch, Whisk | str]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:
@@ -93,8 +95,8 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
     at = stroke.at(theta_rad, touch)
     if at.status:
         return touch, at.status
-    moments = (stroke.filtered - touch.offset) @ hand.matrix.T
-    m_y, m_z = hand.matrix @ at.values
+    moments = (stroke.filtered - touch.offset) @ readout.matrix.T
+    m_y, m_z = readout.matrix @ at.values
     return touch, Whisk(
         stroke.time_s,
         stroke.motor_rad - touch.motor_rad,
@@ -103,10 +105,10 @@ def felt_whisk(stroke: Stroke, hand: Hand, drift_rate, beam: Beam, theta_rad: fl
         theta_rad,
         float(m_y),
         float(m_z),
-        hand.covariance(at.values, at.covariance),
+        readout.covariance(at.values, at.covariance),
         touch.sigma_rad,
         beam,
-        hand.matrix @ at.theta_covariance,
+        readout.matrix @ at.theta_covariance,
     )
 
 

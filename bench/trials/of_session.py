@@ -76,7 +76,7 @@ def _free_slopes(task: tuple[Trial, Settings]) -> list:
     return [slope for slope in slopes if slope is not None]
 
 
-def session_gauges(units: Sequence[Unit], rate, pool: Workers, doubts: Doubts) -> Gauges | None:
+def session_gauges(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Gauges | None:
     """Gauges as brought along, else from the gauge trials; None, and a note, where these cannot fix them."""
     given = given_gauges(units[0].session)
     trials = [unit for unit in units if unit.trial.purpose == "gauge" and read_signals(unit.trial).kind == "V"]

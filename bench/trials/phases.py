@@ -67,7 +67,9 @@ def _runs(mask) -> list[tuple[int, int]]:
     return [(run.start, run.stop) for (run,) in find_objects(label(mask)[0])]
 
 
-def felt_phases(time_s, theta_rad, moments_Nmm, beta_rad: float, d_x_mm: float, beam: Beam) -> Phases:
+def felt_phases(
+    time_s: np.ndarray, theta_rad: np.ndarray, moments_Nmm: np.ndarray, beta_rad: float, d_x_mm: float, beam: Beam
+) -> Phases:
     """Phases from the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left out.
 
     Between two jumps both moments are lines, whose ends give the friction angles.

@@ -33,7 +33,7 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
-from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
@@ -90,7 +90,7 @@ class Unit:
         made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
-    def with_gauges(self, drift_rate, gauges: Gauges | None) -> "Unit":
+    def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":
         """The unit complete, once the gauges are known."""
         return replace(self, drift_rate=drift_rate, gauges=gauges)
 
@@ -151,27 +151,27 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
-    hand, missing = _hand(unit, kind)
+    readout, missing = _readout(unit, kind)
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
-    touch, whisk = felt_whisk(stroke, hand or Hand.bare(), unit.drift_rate, beam, theta_rad)
+    touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
-    known = None if status else whisk
-    if known is not None and hand.is_gauged:
-        status = unit.gauges.beyond(hand.in_follicle(known))
-    felt = as_felt(number, touch, known, stroke.speed_rad_s)
+    usable = None if status else whisk
+    if usable is not None and readout.is_gauged:
+        status = unit.gauges.beyond(readout.in_follicle(usable))
+    felt = as_felt(number, touch, usable, stroke.speed_rad_s)
     felt = replace(felt, status=status, saturated=stroke.saturated)
-    if known is None:
+    if usable is None:
         return felt
-    felt = _against_pictures(felt, unit, stroke, hand, seen)
+    felt = _against_pictures(felt, unit, stroke, readout, seen)
     return replace(
         felt,
-        phases=_phases(unit.trial, stroke, touch, hand, seen, beam),
-        estimates=answers(known, estimators(unit.settings.estimators), unit.settings),
+        phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
+        estimates=answers(usable, estimators(unit.settings.estimators), unit.settings),
         one_factor=_one_factor(unit, kind, stroke),
     )
 
 
-def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, hand: Hand, seen: SeenWhisk) -> FeltWhisk:
+def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:
     """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status."""
     if seen.deflection is None:
         return felt
@@ -179,13 +179,13 @@ def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, hand: Hand, s
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
         return felt
-    own_newtons = not hand.is_gauged or unit.gauges.source != FROM_TRIALS
-    found = agreement(pairs, hand.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
+    own_newtons = not readout.is_gauged or unit.gauges.source != FROM_TRIALS
+    found = agreement(pairs, readout.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
     status = "; ".join(filter(None, [felt.status, found.status]))
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
 
 
-def _phases(trial: Trial, stroke: Stroke, touch: Touch, hand: Hand, seen: SeenWhisk, beam: Beam) -> Phases:
+def _phases(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, beam: Beam) -> Phases:
     """With the slope and distance as seen, or the nominal ones where no picture tells of them."""
     if seen.deflection is not None:
         beta_rad, d_x_mm = (seen.beta_rad.value, seen.d_x_mm.value) if slips(seen) else (None, None)
@@ -193,19 +193,19 @@ def _phases(trial: Trial, stroke: Stroke, touch: Touch, hand: Hand, seen: SeenWh
         beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
     if not beta_rad or not d_x_mm:
         return NO_PHASES
-    moments = (stroke.channels - touch.offset) @ hand.matrix.T
+    moments = (stroke.channels - touch.offset) @ readout.matrix.T
     theta = stroke.motor_rad - touch.motor_rad
     return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
 
 
-def _hand(unit: Unit, kind: str) -> tuple[Hand | None, str]:
+def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
     """How channels become moments, or why they cannot."""
     if kind == "Nmm":
-        return Hand.bare(), ""
+        return Readout.bare(), ""
     if unit.gauges is None:
         return None, NO_GAUGES
     fitted = unit.gauges.for_trial(unit.trial.name)
-    return (Hand.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
+    return (Readout.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
 
 
 def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:
@@ -214,7 +214,11 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...
     if kind == "Nmm" or plain_gauges is None or not np.isfinite(plain_gauges.matrix).all():
         return ()
     _, whisk = felt_whisk(
-        stroke, Hand.of(unit.trial, plain_gauges), unit.drift_rate, unit.session.whisker.beam, unit.settings.theta_rad
+        stroke,
+        Readout.of(unit.trial, plain_gauges),
+        unit.drift_rate,
+        unit.session.whisker.beam,
+        unit.settings.theta_rad,
     )
     return answers(whisk, estimators(()), unit.settings)
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,12 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import error_map, explained, tables
 from bench.gauges.gauges_file import FileKeys
-from bench.report import assembly
+from bench.report import assembly, figure_8
+from bench.rig.simulate import simulate
 from bench.session import manifest
+from bench.theory import model_error_maps
 from tests.scenes.formats import DOCUMENT, documented, keys
+from tests.scenes.rig_sessions import protocol_file
 
 ROOT = Path(__file__).resolve().parents[2]
 TOML = {
@@ -37,6 +41,8 @@ CSV = {
     "surfaces.csv": tables.SURFACE_COLUMNS,
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
+    "figure_8.csv": figure_8.COLUMNS,
+    "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 
 
@@ -56,6 +62,19 @@ def test_keys_of_results(steel_signals, exact_vision, tmp_path):
     written = keys(json.loads((tmp_path / "trials" / "b60_4.json").read_text()))
     named = set(documented("trials/<trial>.json"))
     assert {path for path in named if not path.startswith("seen.")} == {p for p in written if not p.startswith("seen.")}
+
+
+def test_truth_of_a_simulated_session(tmp_path):
+    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\n")
+    session = simulate(tmp_path / "session", protocol=protocol, seed=1, signals_only=True)
+    (folder,) = (session / "trials").iterdir()
+    written = {
+        "truth.json": json.loads((session / "truth.json").read_text()),
+        "truth.toml": tomllib.loads((folder / "truth.toml").read_text()),
+        "truth.csv": (folder / "truth.csv").read_text().split("\n")[0].split(","),
+    }
+    for heading, names in written.items():
+        assert sorted(documented(heading)) == sorted(names)
 
 
 def test_every_file_is_named():

@@ -24,19 +24,19 @@ def rows(path: Path) -> list[dict[str, str]]:
 def test_a_scene_is_seen_within_what_it_states(name, tmp_path):
     """Three values and some eight slips that err alike: |z| beyond 3 once in a hundred such scenes.
 
-    The truth lies outside of what is evaluated. Limits in millimetres and degrees are four times what two cameras
-    30 degrees apart leave at this resolution (tests/ladder/views.py), so that no wide sigma passes.
+    The truth lies outside of what is evaluated. So that no wide sigma passes, errors are below five times those of two
+    cameras 20 degrees apart in docs/proof.md (0.010 mm, 0.005 and 0.12 degrees, 0.003 mm of slip).
     """
     session = tmp_path / "session"
     shutil.copytree(SCENES / name, session, ignore=shutil.ignore_patterns("truth*"))
     evaluate(session, tmp_path / "out", Settings(), workers=1)
     truth = tomllib.loads((SCENES / name / "trials" / "w" / "truth.toml").read_text())
     (seen,) = rows(tmp_path / "out" / "whisks.csv")
-    for quantity, most in (("d_x_mm", 0.1), ("touch_deg", 0.02), ("beta_deg", 0.3)):
+    for quantity, most in (("d_x_mm", 0.05), ("touch_deg", 0.025), ("beta_deg", 0.6)):
         error, sigma = float(seen[quantity]) - truth[quantity], float(seen[sigma_name(quantity)])
         assert abs(error) < min(most, 3 * sigma), (quantity, error, sigma)
     true = {row["frame"]: float(row["slip_mm"]) for row in rows(SCENES / name / "trials" / "w" / "truth.csv")}
     track = [row for row in rows(tmp_path / "out" / "track" / "w.csv") if row["touching"] == "1"]
     errors = np.array([float(row["slip_mm"]) - true[row["frame"]] for row in track])
     assert np.all(np.abs(errors) < 3 * np.array([float(row["slip_sigma_mm"]) for row in track]))
-    assert np.sqrt(np.mean(errors**2)) < 0.02
+    assert np.sqrt(np.mean(errors**2)) < 0.015

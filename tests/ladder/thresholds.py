@@ -123,15 +123,11 @@ def _look(folder: Path, name: str, cameras: Cameras) -> partial:
 def told(look: partial) -> dict[str, tuple[float, float]]:
     """Values and sigmas of a whisk by name; nothing where there is no truth."""
     (whisk,) = look().whisks
-    if np.isnan(whisk.d_x_mm):
+    if np.isnan(whisk.d_x_mm.value):
         return {}
-    at = whisk.at(np.radians(3.0))
-    return {
-        "d_x": (whisk.d_x_mm, whisk.d_x_sigma_mm),
-        "touch": (whisk.touch_rad, whisk.touch_sigma_rad),
-        "slope": (whisk.beta_rad, whisk.beta_sigma_rad),
-        "slip": (at.slip_mm, at.slip_sigma_mm),
-    }
+    slip = whisk.at(np.radians(3.0)).slip_mm
+    found = {"d_x": whisk.d_x_mm, "touch": whisk.touch_rad, "slope": whisk.beta_rad, "slip": slip}
+    return {name: (value.value, value.sigma) for name, value in found.items()}
 
 
 def compared(before: dict[str, dict], after: dict[str, dict]) -> str:
@@ -146,11 +142,20 @@ def compared(before: dict[str, dict], after: dict[str, dict]) -> str:
     return "; ".join([line, *lost])
 
 
+def put(module, constant: str, value) -> None:
+    """Set the constant in its module and in all of vision that took it by name. What was made of it on import stays."""
+    usual = getattr(module, constant)
+    for name, other in list(sys.modules.items()):
+        if name.startswith("vision.") and getattr(other, constant, None) is usual:
+            setattr(other, constant, value)
+
+
 def sweep_whisks(module, constant: str, values: list[str]) -> None:
     looks = whisks()
     usual = {name: told(look) for name, look in looks.items()}
     for value in map(literal_eval, values):
-        setattr(module, constant, np.asarray(value) if isinstance(value, tuple) else value)
+        is_array = isinstance(getattr(module, constant), np.ndarray)
+        put(module, constant, np.asarray(value) if is_array else value)
         print(f"{value!s:>20}   {compared(usual, {name: told(look) for name, look in looks.items()})}", flush=True)
 
 
@@ -163,7 +168,7 @@ def main() -> None:
     usual = getattr(module, constant)
     print(constant)
     for value in (usual, *map(literal_eval, values)):
-        setattr(module, constant, value)
+        put(module, constant, value)
         print(f"{value!s:>20} {'*' if value == usual else ' '} {measure(session)}", flush=True)
 
 

@@ -21,7 +21,7 @@ from vision.lines.points import LinePoints
 from vision.lines.shading import fit_shading
 from vision.pictures.view import View
 
-# An edge's error beyond its formal one, which half-widths of path-traced and painted bars show (docs/proof.md).
+# An edge's error beyond its formal one, which half-widths of path-traced and painted bars show (docs/truth.md).
 EDGE_PX, FORMAL_TO_TRUE = 0.12, 2.0
 _SWEEP_BLUR_PX, _BIN_PX = 1.5, 0.5
 _SWEEP_REACH_MM = 20.0

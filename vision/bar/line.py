@@ -37,7 +37,7 @@ _STEPS, _LONGEST = np.array([0.15, 0.15, 0.1]), np.array([0.7, 0.7, 0.4])  # shi
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 _BIN_PX, _COARSE_BIN_PX = 0.25, 0.75
 _BLURS_PX = (0.55, 0.8, 1.15, 1.65, 2.4)  # to begin with
-# Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/proof.md).
+# Formal sigmas count every pixel's noise as independent; the shading's misfit is not (see docs/truth.md).
 _FORMAL_TO_TRUE = 2.0
 
 

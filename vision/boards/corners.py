@@ -41,6 +41,7 @@ class Corners:
 
     @staticmethod
     def none() -> "Corners":
+        """A view in which no board is seen."""
         return Corners(np.empty(0), np.empty((0, 2)), np.empty(0))
 
     def __len__(self) -> int:

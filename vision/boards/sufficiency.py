@@ -87,7 +87,7 @@ def check_rig_view(name: str, view: Corners | None, board: Board) -> None:
 def check_lenses(cameras: Cameras, reports: Sequence, views: Mapping[str, Iterable[Corners]]) -> None:
     """Refuses what the views could not settle: no tilt, no depth, a lens that diverged."""
     for camera, report in zip(cameras, reports):
-        check_geometry(report)
+        _check_geometry(camera.name, report.tilt_deg, report.depth_ratio)
         check_lens(camera, _reach(camera, np.concatenate([v.px for v in views[camera.name]])))
         spread = report.intrinsics_sigma[0] / camera.lens[0]
         if spread > _MOST_FOCAL_SIGMA:
@@ -97,16 +97,16 @@ def check_lenses(cameras: Cameras, reports: Sequence, views: Mapping[str, Iterab
             )
 
 
-def check_geometry(report) -> None:
+def _check_geometry(name: str, tilt_deg: float, depth_ratio: float) -> None:
     """Refuses views all square to the camera, or all at one distance."""
-    if report.tilt_deg < _LEAST_TILT_DEG:
+    if tilt_deg < _LEAST_TILT_DEG:
         raise Refused(
-            f"camera {report.name}: the board was never tilted by more than {report.tilt_deg:.0f} degrees, so focal "
+            f"camera {name}: the board was never tilted by more than {tilt_deg:.0f} degrees, so focal "
             "length and distance cannot be told apart: record views tilted by 20 to 45 degrees to all sides"
         )
-    if report.depth_ratio < _LEAST_DEPTH_RATIO:
+    if depth_ratio < _LEAST_DEPTH_RATIO:
         raise Refused(
-            f"camera {report.name}: the farthest corner is only {report.depth_ratio:.2f} times as far away as the "
+            f"camera {name}: the farthest corner is only {depth_ratio:.2f} times as far away as the "
             f"nearest ({_LEAST_DEPTH_RATIO} is the least): record views nearer to the camera and farther away"
         )
 
@@ -156,7 +156,9 @@ def _reach(camera: Camera, px: np.ndarray) -> float:
     return float(np.linalg.norm((px - camera.lens[2:4]) / camera.lens[:2], axis=1).max())
 
 
-def check_work(cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm) -> None:
+def check_work(
+    cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm: np.ndarray | None
+) -> None:
     """Refuses a camera whose board views leave out where whisker and bar will be, saying on which side."""
     if work_points_mm is None:
         return

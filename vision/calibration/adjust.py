@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, Knowledge, Sightings, State, predict
+from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, Priors, Sightings, State, predict
 from vision.geometry.rotation import pose_difference
 
 _GLOBAL = N_CAMERA + N_BOARD
@@ -77,7 +77,7 @@ class _Normal:
 
 
 def _normal_equations(
-    state: State, seen: Sightings, corners_mm: np.ndarray, known: Knowledge, width: float
+    state: State, seen: Sightings, corners_mm: np.ndarray, priors: Priors, width: float
 ) -> _Normal:
     px, J = predict(state, seen, corners_mm)
     residual = seen.px - px
@@ -87,10 +87,10 @@ def _normal_equations(
     root = np.sqrt(robust_weight(squared, width)) / seen.sigma_px
     weighed = np.concatenate([J, residual[:, :, None]], axis=2) * root[:, None, None]
     blocks = _shot_blocks(weighed, seen.shot_starts())
-    shots, blocks, late_cost = _without_instants(blocks, state, seen, known)
+    shots, blocks, late_cost = _without_instants(blocks, state, seen, priors)
     parts = _assemble(blocks, shots, state)
     cost = float(np.sum(robust_cost(squared, width)) + late_cost)
-    return _with_knowledge(parts, shots, cost, residual, state, known)
+    return _with_priors(parts, shots, cost, residual, state, priors)
 
 
 def _shot_blocks(weighed: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -105,15 +105,15 @@ def _shot_blocks(weighed: np.ndarray, starts: np.ndarray) -> np.ndarray:
     return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
 
 
-def _without_instants(blocks: np.ndarray, state: State, seen: Sightings, known: Knowledge):
+def _without_instants(blocks: np.ndarray, state: State, seen: Sightings, priors: Priors):
     """Eliminates each picture's instant from its block (25 × 26 or 37 × 38, the last column being the gradient)."""
     starts = seen.shot_starts()
     camera, view = seen.camera[starts], seen.view[starts]
     columns, poses = _columns(state, camera, view)
-    if state.trajectory is None or known.late_sigma_s is None:
+    if state.trajectory is None or priors.late_sigma_s is None:
         nothing = np.zeros(len(starts))
         return _Shots(camera, view, columns, poses, nothing + 1, nothing, 0 * blocks[:, :, 0]), blocks, 0.0
-    information, late = known.late_sigma_s[camera] ** -2.0, state.instants[view, camera]
+    information, late = priors.late_sigma_s[camera] ** -2.0, state.instants[view, camera]
     loose = ~state.trajectory.is_reference(view, camera)
     weight = blocks[:, CLOCK, CLOCK] + information
     gradient = (blocks[:, CLOCK, -1] - information * late) * loose
@@ -151,23 +151,23 @@ def _assemble(blocks: np.ndarray, shots: _Shots, state: State) -> tuple[np.ndarr
     return A, a, B, C, c
 
 
-def _with_knowledge(parts, shots: _Shots, cost: float, residual, state: State, known: Knowledge) -> _Normal:
+def _with_priors(parts, shots: _Shots, cost: float, residual, state: State, priors: Priors) -> _Normal:
     """Adds the observations beside the pictures, and takes out what is held."""
     A, a, B, C, c = parts
-    weight = 1.0 / known.sigma**2
-    miss = known.mean - state.globals()
+    weight = 1.0 / priors.sigma**2
+    miss = priors.mean - state.globals()
     miss[weight == 0] = 0.0
     A = A + np.diag(weight)
     a = a + weight * miss
     cost += float(np.sum(weight * miss**2))
-    if known.pose_view is not None and known.view_free[known.pose_view]:
-        rows = N_VIEW * known.pose_view + np.arange(N_VIEW)
-        information = 1.0 / known.pose_sigma**2
-        off = -pose_difference(known.pose_T, state.T_world_board[known.pose_view])
+    if priors.pose_view is not None and priors.view_free[priors.pose_view]:
+        rows = N_VIEW * priors.pose_view + np.arange(N_VIEW)
+        information = 1.0 / priors.pose_sigma**2
+        off = -pose_difference(priors.pose_T, state.T_world_board[priors.pose_view])
         C[0, rows] += information
         c[rows] += information * off
         cost += float(np.sum(information * off**2))
-    _hold(B, C, c, np.repeat(~known.view_free, N_VIEW) | (C[0] == 0))
+    _hold(B, C, c, np.repeat(~priors.view_free, N_VIEW) | (C[0] == 0))
     return _Normal(A, a, B, C, c, shots, cost, residual)
 
 
@@ -179,9 +179,9 @@ def _hold(B: np.ndarray, C: np.ndarray, c: np.ndarray, held: np.ndarray) -> None
     C[0, held] = 1.0
 
 
-def _solve_step(normal: _Normal, known: Knowledge, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _solve_step(normal: _Normal, priors: Priors, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C)."""
-    free = known.free
+    free = priors.free
     C = normal.C.copy()
     C[0] *= 1.0 + damping
     reduced, gradient, CB, Cc = _eliminate(normal, C, free)
@@ -236,7 +236,7 @@ def solve(
     state: State,
     seen: Sightings,
     corners_mm: np.ndarray,
-    known: Knowledge,
+    priors: Priors,
     *,
     width: float = np.inf,
     max_iterations: int = 60,
@@ -246,12 +246,12 @@ def solve(
 
     tolerance: relative fall of the cost at which it is done.
     """
-    normal = _normal_equations(state, seen, corners_mm, known, width)
+    normal = _normal_equations(state, seen, corners_mm, priors, width)
     damping, done, iteration, fall = 1e-4, False, 0, np.inf
     while not done and iteration < max_iterations and np.isfinite(normal.cost):
         iteration += 1
-        tried = state.stepped(*_solve_step(normal, known, damping))
-        trial = _normal_equations(tried, seen, corners_mm, known, width)
+        tried = state.stepped(*_solve_step(normal, priors, damping))
+        trial = _normal_equations(tried, seen, corners_mm, priors, width)
         if trial.cost <= normal.cost * (1 + 1e-13):
             fall = (normal.cost - trial.cost) / (1e-12 + normal.cost)
             done = fall <= tolerance
@@ -259,12 +259,12 @@ def solve(
         else:
             damping *= 10.0
             done = damping > 1e8
-    return _solution(state, normal, known, iteration, done or fall < _NEARLY_AT_REST)
+    return _solution(state, normal, priors, iteration, done or fall < _NEARLY_AT_REST)
 
 
-def _solution(state: State, normal: _Normal, known: Knowledge, iterations: int, done: bool) -> Solution:
-    covariance = np.zeros((len(known.free),) * 2)
-    if np.isfinite(normal.cost) and known.free.any():
-        reduced, *_ = _eliminate(normal, normal.C, known.free)
-        covariance[np.ix_(known.free, known.free)] = _inverse(reduced)
+def _solution(state: State, normal: _Normal, priors: Priors, iterations: int, done: bool) -> Solution:
+    covariance = np.zeros((len(priors.free),) * 2)
+    if np.isfinite(normal.cost) and priors.free.any():
+        reduced, *_ = _eliminate(normal, normal.C, priors.free)
+        covariance[np.ix_(priors.free, priors.free)] = _inverse(reduced)
     return Solution(state, normal.residual_px, covariance, normal.cost, iterations, done)

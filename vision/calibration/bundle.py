@@ -104,7 +104,7 @@ def _moved(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Knowledge:
+class Priors:
     """What is known beside the pictures, and what is held.
 
     free: (16 C + 3,) bool. mean, sigma: (16 C + 3,) of independent observations of the global parameters,

@@ -30,7 +30,7 @@ from vision.boards.sufficiency import (
 )
 from vision.calibration.adjust import solve
 from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Knowledge, State
+from vision.calibration.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Priors, State
 from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather, lay_out, looked_at_once, place_cameras
@@ -129,8 +129,8 @@ def calibrate_cameras(
     layout = lay_out(
         alone, poses, standing=standing, T_rig_board=T_rig_board, together=together, times_s=views.times_s
     )
-    known = _knowledge(layout.first, board, on_rig)
-    settled, timing = _settle(layout, board, known, _errors(alone, triggered), views.times_s is None)
+    priors = _priors(layout.first, board, on_rig)
+    settled, timing = _settle(layout, board, priors, _errors(alone, triggered), views.times_s is None)
     settled, notes = _settle_with_warp(layout, settled, board)
     if timing is not None:
         notes.append(_timing_note(alone, timing))
@@ -163,18 +163,20 @@ def _standing(rig_view: Corners, frames: Sequence[Corners], board: Board) -> Cor
     return mean_view(without_strays(rig_view, board), frames)
 
 
-def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, rough=False) -> Settled:
+def calibrate_alone(
+    views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, rough: bool = False
+) -> Settled:
     """One camera by itself, the world being the camera's frame. rough: robustly, as a start for more."""
     lens = first_lens(views, board.corners_mm, size_px)
     poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
     state = State(lens[None], np.eye(3, 4)[None], poses)
-    known = lens_knowledge(1, len(views))
-    known.free[POSE] = False
+    priors = lens_priors(1, len(views))
+    priors.free[POSE] = False
     seen = gather([(0, k, view) for k, view in enumerate(views)])
-    return settle(state, seen, board.corners_mm, known, rough=rough)
+    return settle(state, seen, board.corners_mm, priors, rough=rough)
 
 
-def lens_knowledge(n_cameras: int, n_views: int) -> Knowledge:
+def lens_priors(n_cameras: int, n_views: int) -> Priors:
     """Lenses and poses free, the lenses' prior; board exact, cameras triggered together."""
     size = N_CAMERA * n_cameras + N_BOARD
     free, mean, sigma = np.ones(size, dtype=bool), np.zeros(size), np.full(size, np.inf)
@@ -183,33 +185,33 @@ def lens_knowledge(n_cameras: int, n_views: int) -> Knowledge:
         sigma[rows] = LENS_PRIOR.get(name, np.inf)
         free[rows] = not name.endswith("_s")
     free[-N_BOARD:] = False
-    return Knowledge(free, mean, sigma, np.ones(n_views, dtype=bool))
+    return Priors(free, mean, sigma, np.ones(n_views, dtype=bool))
 
 
-def _knowledge(first: State, board: Board, on_rig: MeasuredPose | None) -> Knowledge:
+def _priors(first: State, board: Board, on_rig: MeasuredPose | None) -> Priors:
     """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the square.
 
     Without a rig board the first camera is the world's frame.
     """
-    known = lens_knowledge(len(first.lens), len(first.T_world_board))
+    priors = lens_priors(len(first.lens), len(first.T_world_board))
     if board.square_sigma_mm > 0:
-        known.free[-N_BOARD] = True
-        known.sigma[-N_BOARD] = board.square_sigma_mm / board.square_mm
+        priors.free[-N_BOARD] = True
+        priors.sigma[-N_BOARD] = board.square_sigma_mm / board.square_mm
     if on_rig is None:
-        known.free[POSE] = False
-        return known
-    known.view_free[0] = not on_rig.is_exact
+        priors.free[POSE] = False
+        return priors
+    priors.view_free[0] = not on_rig.is_exact
     pose_sigma = np.repeat([max(on_rig.sigma_rad, 1e-9), max(on_rig.sigma_mm, 1e-7)], 3)
-    return replace(known, pose_view=0, pose_T=on_rig.T_rig_board, pose_sigma=pose_sigma)
+    return replace(priors, pose_view=0, pose_T=on_rig.T_rig_board, pose_sigma=pose_sigma)
 
 
 def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Settled, list[str]]:
     """With a warped board where that lowers the cost, at the flat board's noise, by more than chance would."""
-    known = allow_warp(flat.known)
-    warped = solve(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, known, tolerance=1e-6)
+    priors = allow_warp(flat.priors)
+    warped = solve(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, priors, tolerance=1e-6)
     if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []
-    settled = settle(warped.state, layout.seen, board.corners_mm, known, error_px=flat.error_px, rounds=1)
+    settled = settle(warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1)
     x, y = settled.solution.state.board[1:]
     return settled, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
 
@@ -219,17 +221,17 @@ def _errors(alone: Mapping[str, Alone], triggered: bool) -> np.ndarray | None:
     return None if triggered or len(alone) < 2 else np.array([a.error_px for a in alone.values()])
 
 
-def _settle(layout: Layout, board: Board, known: Knowledge, error_alone: np.ndarray | None, in_frames: bool):
+def _settle(layout: Layout, board: Board, priors: Priors, error_alone: np.ndarray | None, in_frames: bool):
     """With pictures of one view at one instant, unless cameras agree far worse with each other than with themselves."""
     if layout.trajectory is None or error_alone is None:
-        return settle(layout.first, layout.seen, board.corners_mm, known), None
-    rough = settle(layout.first, layout.seen, board.corners_mm, known, rough=True)
+        return settle(layout.first, layout.seen, board.corners_mm, priors), None
+    rough = settle(layout.first, layout.seen, board.corners_mm, priors, rough=True)
     if np.median(rough.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:
-        return settle(rough.solution.state, layout.seen, board.corners_mm, known), None
+        return settle(rough.solution.state, layout.seen, board.corners_mm, priors), None
     state = replace(rough.solution.state, trajectory=layout.trajectory)
-    known = allow_lateness(known, layout.trajectory)
-    settled = settle(state, layout.seen, board.corners_mm, known, error_px=error_alone + _FIRST_EXCESS_PX)
-    return settled, Timing(settled.solution.state.clock, settled.known.late_sigma_s, in_frames)
+    priors = allow_lateness(priors, layout.trajectory)
+    settled = settle(state, layout.seen, board.corners_mm, priors, error_px=error_alone + _FIRST_EXCESS_PX)
+    return settled, Timing(settled.solution.state.clock, settled.priors.late_sigma_s, in_frames)
 
 
 def _timing_note(names, timing: Timing) -> str:
@@ -242,24 +244,24 @@ def _timing_note(names, timing: Timing) -> str:
     return f"Pictures of one view were not taken at one instant: {said}; taken into account."
 
 
-def allow_lateness(known: Knowledge, trajectory: Trajectory) -> Knowledge:
+def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
     """The same with clocks and pictures' instants free. The clock of the camera that ranks first is the clock."""
-    free, sigma = known.free.copy(), known.sigma.copy()
+    free, sigma = priors.free.copy(), priors.sigma.copy()
     clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
     free[clocks[trajectory.camera_rank > 0]] = True
     sigma[clocks] = _CLOCK_SIGMA * trajectory.interval_s
     late = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
-    return replace(known, free=free, sigma=sigma, late_sigma_s=late)
+    return replace(priors, free=free, sigma=sigma, late_sigma_s=late)
 
 
-def allow_warp(known: Knowledge) -> Knowledge:
+def allow_warp(priors: Priors) -> Priors:
     """The same with the board's two warps free."""
-    free, sigma = known.free.copy(), known.sigma.copy()
+    free, sigma = priors.free.copy(), priors.sigma.copy()
     free[-2:], sigma[-2:] = True, _WARP_SIGMA_MM
-    return replace(known, free=free, sigma=sigma)
+    return replace(priors, free=free, sigma=sigma)
 
 
-def as_cameras(names, sizes_px, settled: Settled) -> Cameras:
+def as_cameras(names: Sequence[str], sizes_px: Mapping[str, tuple[int, int]], settled: Settled) -> Cameras:
     """The cameras of a settled adjustment with the covariance of their 15 parameters each."""
     state = settled.solution.state
     cameras = tuple(

@@ -15,7 +15,7 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import check_lens, check_rig_view
 from vision.calibration.bundle import N_CAMERA, State
-from vision.calibration.calibrate import as_cameras, lens_knowledge
+from vision.calibration.calibrate import as_cameras, lens_priors
 from vision.calibration.corner_noise import settle
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
@@ -98,8 +98,8 @@ def place_on_rig(
 
 
 def _poses_only(n_cameras: int):
-    known = lens_knowledge(n_cameras, 1)
-    free = np.zeros_like(known.free)
+    priors = lens_priors(n_cameras, 1)
+    free = np.zeros_like(priors.free)
     for k in range(n_cameras):
         free[N_CAMERA * k + 9 : N_CAMERA * k + 15] = True
-    return replace(known, free=free, sigma=np.full_like(known.sigma, np.inf), view_free=np.zeros(1, dtype=bool))
+    return replace(priors, free=free, sigma=np.full_like(priors.sigma, np.inf), view_free=np.zeros(1, dtype=bool))

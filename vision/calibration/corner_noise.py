@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.calibration.adjust import Solution, solve
-from vision.calibration.bundle import Knowledge, Sightings, State, predict
+from vision.calibration.bundle import Priors, Sightings, State, predict
 from vision.geometry.errors import Refused
 
 # One Gaussian corner in 25 000 lies beyond (two axes): exp(-4.5² / 2).
@@ -42,7 +42,7 @@ class Settled:
     kept: np.ndarray
     residual_px: np.ndarray
     error_px: np.ndarray
-    known: Knowledge
+    priors: Priors
 
     def rms_px(self, camera: int) -> float:
         """Root mean square length of the kept residuals of one camera, as OpenCV counts it."""
@@ -54,7 +54,7 @@ def settle(
     state: State,
     seen: Sightings,
     corners_mm: np.ndarray,
-    known: Knowledge,
+    priors: Priors,
     *,
     error_px: np.ndarray | None = None,
     rounds: int | None = None,
@@ -62,7 +62,7 @@ def settle(
 ) -> Settled:
     """Adjusts robustly, learns each camera's model error, drops outliers once and adjusts by least squares.
 
-    Where the state has a trajectory, known.late_sigma_s is where the search for each camera's scatter of instants
+    Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's scatter of instants
     begins. error_px (C,): model errors to begin with. rounds: of learning the noise anew, where it is nearly known.
     rough: robustly and once only, to see how large the errors are.
     """
@@ -70,22 +70,22 @@ def settle(
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
     for _ in range(rounds or (_ROUNDS_MOVING if moving else _ROUNDS)):
         weighed = _weighed(seen, error)
-        solution = solve(state, weighed, corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-4)
+        solution = solve(state, weighed, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4)
         _require_finite(solution)
         state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
-        known = _with_lateness(known, state, seen) if moving else known
+        priors = _with_lateness(priors, state, seen) if moving else priors
         if rough:
-            return Settled(solution, weighed, np.ones(len(seen), dtype=bool), solution.residual_px, error, known)
+            return Settled(solution, weighed, np.ones(len(seen), dtype=bool), solution.residual_px, error, priors)
     kept = _inliers(solution.residual_px, _weighed(seen, error))
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
-        error = _error_by_mean(solution.residual_px, seen, kept, error, known)
+        error = _error_by_mean(solution.residual_px, seen, kept, error, priors)
         used = _weighed(seen, error).chosen(kept)
-        solution = solve(state, used, corners_mm, known)
+        solution = solve(state, used, corners_mm, priors)
         state = solution.state
         solution = replace(solution, residual_px=seen.px - predict(state, seen, corners_mm)[0])
-    return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error, known)
+    return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error, priors)
 
 
 def _require_finite(solution: Solution) -> None:
@@ -93,7 +93,7 @@ def _require_finite(solution: Solution) -> None:
         raise Refused("the views contradict each other from the start: is this the board as described?")
 
 
-def _with_lateness(known: Knowledge, state: State, seen: Sightings) -> Knowledge:
+def _with_lateness(priors: Priors, state: State, seen: Sightings) -> Priors:
     """Each camera's scatter of instants as the instants found have it; of pictures that give their view its time, none.
 
     A camera with few others keeps the scatter of all.
@@ -103,9 +103,9 @@ def _with_lateness(known: Knowledge, state: State, seen: Sightings) -> Knowledge
     loose = ~state.trajectory.is_reference(view, camera)
     squared = np.where(loose, state.instants[view, camera] ** 2, np.nan)
     overall = np.nanmean(squared)
-    of = [squared[loose & (camera == c)] for c in range(len(known.late_sigma_s))]
+    of = [squared[loose & (camera == c)] for c in range(len(priors.late_sigma_s))]
     sigma = np.sqrt([np.mean(s) if len(s) >= _MIN_LATE else overall for s in of])
-    return replace(known, late_sigma_s=np.maximum(sigma, 0.02 * np.sqrt(overall)))
+    return replace(priors, late_sigma_s=np.maximum(sigma, 0.02 * np.sqrt(overall)))
 
 
 def _weighed(seen: Sightings, error_px: np.ndarray) -> Sightings:
@@ -128,12 +128,12 @@ def _inliers(residual: np.ndarray, weighed: Sightings) -> np.ndarray:
 
 
 def _error_by_mean(
-    residual, seen: Sightings, kept: np.ndarray, error: np.ndarray, known: Knowledge
+    residual, seen: Sightings, kept: np.ndarray, error: np.ndarray, priors: Priors
 ) -> np.ndarray:
     """Model error at which the kept residuals' mean square is what so many fitted parameters leave of it."""
     squared = np.sum(residual**2, axis=1)
-    parameters = known.free.sum() + 6 * known.view_free.sum()
-    parameters += len(seen.shot_starts()) if known.late_sigma_s is not None else 0
+    parameters = priors.free.sum() + 6 * priors.view_free.sum()
+    parameters += len(seen.shot_starts()) if priors.late_sigma_s is not None else 0
     left = max(1.0 - parameters / max(2 * kept.sum(), 1), 0.1)
     return np.array(
         [_match(squared[rows] / left, seen.sigma_px[rows]) for rows in _by_camera(seen, kept, len(error))]

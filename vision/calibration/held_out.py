@@ -18,7 +18,7 @@ from vision.boards.corners import Corners
 from vision.boards.sufficiency import fixes_pose, without_strays
 from vision.calibration.adjust import Solution, solve
 from vision.calibration.bundle import predict
-from vision.calibration.calibrate import Calibration, lens_knowledge
+from vision.calibration.calibrate import Calibration, lens_priors
 from vision.calibration.first_guess import board_pose, has_pose
 from vision.calibration.layout import Alone, Layout, lay_out
 from vision.geometry.board import Board
@@ -119,9 +119,9 @@ def _alone_px(camera: Camera, alone: Alone, is_held: Sequence[bool], board: Boar
     if not held:
         return np.nan
     layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
-    known = lens_knowledge(1, len(held))
+    priors = lens_priors(1, len(held))
     even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
-    return _rms(solve(layout.first, even, board.corners_mm, _held(known)).residual_px)
+    return _rms(solve(layout.first, even, board.corners_mm, _held(priors)).residual_px)
 
 
 def _poses(cameras: Cameras) -> np.ndarray:
@@ -135,31 +135,31 @@ def _shared(layout: Layout) -> np.ndarray:
     return pictures[layout.seen.view] > 1
 
 
-def _held(known):
-    return replace(known, free=np.zeros_like(known.free))
+def _held(priors):
+    return replace(priors, free=np.zeros_like(priors.free))
 
 
 def _fit_boards(layout: Layout, calibration: Calibration, board: Board) -> Solution:
     """One pose a view for all cameras, all corners alike."""
     even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
     first = replace(layout.first, board=calibration.board)
-    known = _held(lens_knowledge(len(layout.first.lens), len(layout.index)))
-    return solve(first, even, board.corners_mm, known)
+    priors = _held(lens_priors(len(layout.first.lens), len(layout.index)))
+    return solve(first, even, board.corners_mm, priors)
 
 
 def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board, *, fit_instants: bool) -> Solution:
     """One pose a view for all cameras, on the board's path, each camera late by its offset; with or without each
     picture's own instant."""
     timing = calibration.timing
-    known = _held(lens_knowledge(len(layout.first.lens), len(layout.index)))
+    priors = _held(lens_priors(len(layout.first.lens), len(layout.index)))
     first = replace(layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory)
     if not fit_instants:
         even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
-        return solve(first, even, board.corners_mm, known)
+        return solve(first, even, board.corners_mm, priors)
     error = np.array([report.error_px for report in calibration.report])
     seen = replace(layout.seen, sigma_px=np.hypot(layout.seen.sigma_px, error[layout.seen.camera]))
-    known = replace(known, late_sigma_s=timing.scatter_s)
-    return solve(first, seen, board.corners_mm, known, width=_ROBUST_WIDTH, tolerance=1e-5)
+    priors = replace(priors, late_sigma_s=timing.scatter_s)
+    return solve(first, seen, board.corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-5)
 
 
 def _still(layout: Layout, fitted: Solution, board: Board) -> np.ndarray:

@@ -57,7 +57,7 @@ class Placement:
         sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         across = np.hypot(sigma[4], sigma[5]) / np.sqrt(2)
         axis = np.degrees(max(sigma[0], sigma[1]))
-        lean = f"axis ± {axis:.3f} degrees" if axis < _MOST_AXIS_SIGMA_DEG else "axis not told"
+        lean = f"axis ± {axis:.3f} degrees" if axis < _MOST_AXIS_SIGMA_DEG else "axis not observable"
         return (
             f"centre of rotation ± {across:.4f} mm across and ± {sigma[3]:.4f} mm along the whisker, {lean}, "
             f"encoder's zero {np.degrees(self.step[2]):+.3f} ± "

@@ -17,7 +17,7 @@ BAR, REST = 4, 2 * REST_POWERS
 # set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
-# How far a traced line may be off as a whole, measured on path-traced pictures (docs/proof.md).
+# How far a traced line may be off as a whole, measured on path-traced pictures (docs/truth.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.25, 0.1
 # As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
 WIRE_DRIFT_PX = 0.01

@@ -50,6 +50,7 @@ class Board:
 
     @property
     def markers_in_dictionary(self) -> int:
+        """How many markers the dictionary has."""
         return len(self._opencv_dictionary().bytesList)
 
     def _opencv_dictionary(self) -> cv2.aruco.Dictionary:

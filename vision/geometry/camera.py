@@ -176,6 +176,7 @@ class Cameras:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The cameras' names, in their order."""
         return tuple(camera.name for camera in self.cameras)
 
     def __len__(self) -> int:

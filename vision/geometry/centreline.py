@@ -12,13 +12,14 @@ from functools import lru_cache
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
+from vision.geometry.camera import Camera
 from vision.geometry.rods import Wire
 
 REST_POWERS = 4  # offset, slope, curvature and change of curvature, each across (y) and along the axis (z)
 _NODES = 41
 
 
-def tangent_growth(arc_mm, contact_mm, wire: Wire) -> np.ndarray:
+def tangent_growth(arc_mm: float | np.ndarray, contact_mm: float | np.ndarray, wire: Wire) -> np.ndarray:
     """Share (…) of the final tangent angle reached at an arc length, 0 at the base, 1 from the contact on."""
     turn, whole = (_turn(s, contact_mm, wire.taper_per_mm) for s in (np.minimum(arc_mm, contact_mm), contact_mm))
     return turn / whole
@@ -41,7 +42,7 @@ class Curves:
     points_mm: np.ndarray
     tangents: np.ndarray
 
-    def at(self, arc_mm) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, arc_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points and (unnormalised) tangents (…, k, 3) at arc lengths (k,) or (…, k), by cubic Hermite pieces."""
         arc = np.broadcast_to(arc_mm, (*self.points_mm.shape[:-2], np.shape(arc_mm)[-1]))
         k, t = self._place(arc)
@@ -49,7 +50,7 @@ class Curves:
                 for a in (self.points_mm, self.tangents) for d in (0, 1)]
         return self._point_between(t, *take), self._tangent_between(t, *take)
 
-    def at_one_each(self, which, arc_mm) -> np.ndarray:
+    def at_one_each(self, which: np.ndarray, arc_mm: np.ndarray) -> np.ndarray:
         """Points (…, n, 3), each on its own curve: which (n,) of the curves (…, f), at arc lengths (n,)."""
         k, t = self._place(np.asarray(arc_mm))
         one_row = [a.reshape(*a.shape[:-3], -1, 3) for a in (self.points_mm, self.tangents)]
@@ -75,7 +76,9 @@ class Curves:
         return (6.0 * t * u / h) * (p1 - p0) + (u * (1.0 - 3.0 * t)) * m0 - (t * (2.0 - 3.0 * t)) * m1
 
 
-def centrelines(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
+def centrelines(
+    rest_mm: np.ndarray, bend_rad: np.ndarray, contact_mm: np.ndarray, motor_rad: np.ndarray, wire: Wire
+) -> Curves:
     """Centrelines in the rig frame for batches of shapes.
 
     rest_mm (…, 2, 4): polynomials in s/length, (y, z); bend_rad (…, 2): the tangent angle at the contact,
@@ -108,7 +111,7 @@ def _rest_slope(rest_mm, u) -> np.ndarray:
     return powers @ np.swapaxes(rest_mm, -1, -2)
 
 
-def rotation_z(angle_rad) -> np.ndarray:
+def rotation_z(angle_rad: float | np.ndarray) -> np.ndarray:
     """Rotation matrices (…, 3, 3) about z."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     zero, one = np.zeros_like(c), np.ones_like(c)
@@ -116,13 +119,13 @@ def rotation_z(angle_rad) -> np.ndarray:
                      np.stack([zero, zero, one], -1)], -2)
 
 
-def one_curve(rest_mm, bend_rad, contact_mm, motor_rad, wire: Wire) -> Curves:
+def one_curve(rest_mm: np.ndarray, bend_rad: np.ndarray, contact_mm: float, motor_rad: float, wire: Wire) -> Curves:
     """The centreline of one frame."""
     return centrelines(np.asarray(rest_mm), np.asarray(bend_rad), np.asarray(contact_mm), np.asarray(motor_rad),
                        wire)
 
 
-def resting_lines(camera, wire: Wire, motor_rad) -> list[np.ndarray]:
+def resting_lines(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) in one camera of a straight, unbent wire at each of the motor angles (n,)."""
     return [camera.project(one_curve(np.zeros((2, REST_POWERS)), np.zeros(2), wire.length_mm, motor, wire).points_mm)
             for motor in motor_rad]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.silhouette import outline
 
@@ -21,7 +22,7 @@ def upward(axis: BarAxis) -> BarAxis:
     return axis if axis.direction[2] >= 0 else BarAxis(axis.point_mm, -axis.direction)
 
 
-def contact_frame_angles(direction, touch_rad: float) -> tuple[float, float]:
+def contact_frame_angles(direction: np.ndarray, touch_rad: float) -> tuple[float, float]:
     """Slope beta = atan2(a_y, a_z) and tilt psi = asin(a_x) of the bar in the frame turned by the touch angle."""
     c, s = np.cos(touch_rad), np.sin(touch_rad)
     a_x = c * direction[..., 0] + s * direction[..., 1]
@@ -43,7 +44,7 @@ def _across(vectors, axis: BarAxis) -> np.ndarray:
 _ROUNDS_FROM_NODE, _ROUNDS_FROM_NEAR = 4, 2
 
 
-def closest_arc(curves: Curves, axis: BarAxis, near_mm=None) -> np.ndarray:
+def closest_arc(curves: Curves, axis: BarAxis, near_mm: np.ndarray | None = None) -> np.ndarray:
     """Arc length (…) where each centreline is nearest to the axis, within the whisker's length.
 
     near_mm (…): where it was when curve and axis were nearly as they are; None looks along the whole of it.
@@ -60,7 +61,9 @@ def closest_arc(curves: Curves, axis: BarAxis, near_mm=None) -> np.ndarray:
     return arc
 
 
-def clearance(curves: Curves, axis: BarAxis, near_mm=None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def clearance(
+    curves: Curves, axis: BarAxis, near_mm: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Signed distance (…) from axis to centreline, contact arc (…), closest point (…, 3); near_mm: see `closest_arc`.
 
     Positive on the side that the whisker comes from (lower y), negative once the unbent whisker has passed.
@@ -74,21 +77,21 @@ def clearance(curves: Curves, axis: BarAxis, near_mm=None) -> tuple[np.ndarray, 
     return np.sum(away * normal, axis=-1) * side, arc, point[..., 0, :]
 
 
-def axis_frame(direction) -> np.ndarray:
+def axis_frame(direction: np.ndarray) -> np.ndarray:
     """Two unit vectors (2, 3) at right angles to a direction and to each other."""
     e1 = np.cross(direction, [1.0, 0.0, 0.0])
     e1 = e1 / np.linalg.norm(e1)
     return np.stack([e1, np.cross(direction, e1)])
 
 
-def shifted_axis(axis: BarAxis, across, vector) -> BarAxis:
+def shifted_axis(axis: BarAxis, across: np.ndarray, vector: np.ndarray) -> BarAxis:
     """An axis (batch of vectors (…, ≥ 4) allowed) moved by two shifts in mm and two tilts across itself."""
     direction = axis.direction + vector[..., 2:4] @ across
     return BarAxis(axis.point_mm + vector[..., 0:2] @ across,
                    direction / np.linalg.norm(direction, axis=-1, keepdims=True))
 
 
-def outline_of_bar(camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
+def outline_of_bar(camera: Camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Middle (m, 2) and half-width (m,) of the bar in one camera, 60 mm to either side of its point."""
     place = np.linspace(-60.0, 60.0, 121)
     points = axis.point_mm + place[:, None] * axis.direction

@@ -8,7 +8,7 @@ _MOST_STEPS = 12
 _LEAST_CURVATURE = 4.0  # px⁻²: what the pictures do not tell is told to half a pixel by nothing
 
 
-def descend(function: Callable, begin, steps, longest, settled: float,
+def descend(function: Callable, begin: np.ndarray, steps: np.ndarray, longest: np.ndarray, settled: float,
             parts: Sequence[float] = (1.0, 0.3)) -> tuple[np.ndarray, float, np.ndarray]:
     """Where the function is least near `begin` (n,), its value there, and its second derivatives (n, n).
 
@@ -29,7 +29,7 @@ def descend(function: Callable, begin, steps, longest, settled: float,
     return q, here, curvature
 
 
-def covariance_of(curvature, misfit: float, pixels: float) -> np.ndarray:
+def covariance_of(curvature: np.ndarray, misfit: float, pixels: float) -> np.ndarray:
     """Covariance (n, n) of the parameters at the least mean chi² of so many pixels, from noise alone."""
     values, vectors = np.linalg.eigh(0.5 * pixels * curvature / max(misfit, 1.0))
     return vectors @ np.diag(1.0 / np.maximum(values, _LEAST_CURVATURE)) @ vectors.T

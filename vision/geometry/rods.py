@@ -57,6 +57,7 @@ class Bar:
 
     @property
     def radius_mm(self) -> float:
+        """Half the diameter."""
         return 0.5 * self.diameter_mm
 
 
@@ -74,4 +75,5 @@ class Rods:
 
     @property
     def reach_sigma_mm(self) -> float:
+        """One sigma of the reach, by both diameters."""
         return 0.5 * float(np.hypot(self.bar.diameter_sigma_mm, self.wire.diameter_sigma_mm))

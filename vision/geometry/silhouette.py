@@ -5,7 +5,9 @@ import numpy as np
 from vision.geometry.camera import Camera
 
 
-def outline(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
+def outline(
+    camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Middle (n, 2) and half-width (n,) in pixels of a rod's outline at points (n, 3) of its axis.
 
     directions (n, 3) unit: the rod's local direction.
@@ -15,13 +17,17 @@ def outline(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarra
     return middle, 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=1))
 
 
-def edges(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
+def edges(
+    camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The two edges (n, 2) each of a rod's outline at points (n, 3) of its axis; directions (n, 3), unit."""
     one, other = np.split(camera.project(np.concatenate(grazed(camera, points_mm, directions, radius_mm))), 2)
     return one, other
 
 
-def grazed(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray, np.ndarray]:
+def grazed(
+    camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) and (n, 3) of a rod's surface on its two edges, as the camera sees them, see `outline`.
 
     The two lines of sight that graze a cylinder touch it r²/d before its axis and r √(1 - r²/d²) beside it, d being
@@ -38,7 +44,7 @@ def grazed(camera: Camera, points_mm, directions, radius_mm) -> tuple[np.ndarray
     return near + aside, near - aside
 
 
-def normals(curve_px) -> np.ndarray:
+def normals(curve_px: np.ndarray) -> np.ndarray:
     """Unit normals (n, 2) of a curve (n, 2) given point by point."""
     if len(curve_px) < 2:
         return np.tile([0.0, 1.0], (len(curve_px), 1))

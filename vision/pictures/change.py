@@ -8,7 +8,7 @@ from vision.pictures.pixel_noise import Noise
 HALF = 2  # a coarse look needs no more
 
 
-def changed(grey, background, noise: Noise) -> np.ndarray:
+def changed(grey: np.ndarray, background: np.ndarray, noise: Noise) -> np.ndarray:
     """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 3 × 3 pixels.
 
     Both pictures are given at every HALF-th pixel. The outermost pixels are 0.

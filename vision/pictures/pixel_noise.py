@@ -12,12 +12,12 @@ class Noise:
     floor: float
     gain: float
 
-    def sigma(self, grey):
+    def sigma(self, grey: np.ndarray) -> np.ndarray:
         """Standard deviation at the grey level, never under a third of a level (rounding)."""
         return np.sqrt(np.maximum(self.floor + self.gain * np.maximum(grey, 0.0), 1.0 / 12.0))
 
 
-def measure_noise(first, second) -> Noise:
+def measure_noise(first: np.ndarray, second: np.ndarray) -> Noise:
     """Noise from two pictures of the same scene: median absolute difference in classes of equal grey.
 
     Medians leave out what moved between the two. Every third pixel of every third row is plenty.
@@ -27,7 +27,7 @@ def measure_noise(first, second) -> Noise:
     return noise_by_level(mean, np.abs(first.astype(float) - second) / np.sqrt(2.0))
 
 
-def noise_by_level(level, deviation) -> Noise:
+def noise_by_level(level: np.ndarray, deviation: np.ndarray) -> Noise:
     """Noise from absolute deviations at grey levels (both of any one shape), by medians in classes of equal grey."""
     edges = np.unique(np.quantile(level, np.linspace(0, 1, 13)))
     classes = np.digitize(level, edges[1:-1])

@@ -32,9 +32,17 @@ _FEWEST_FRAMES = 4
 _USUAL = VisionSettings()
 
 
-def observe_trial(frames: Mapping[str, Mapping[int, np.ndarray]], time_s, motor_rad, whisks: Sequence[slice],
-                  cameras: Cameras, wire: Wire, bar: Bar, background: Mapping[str, np.ndarray | None],
-                  settings: VisionSettings = _USUAL) -> TrialTruth:
+def observe_trial(
+    frames: Mapping[str, Mapping[int, np.ndarray]],
+    time_s: np.ndarray,
+    motor_rad: np.ndarray,
+    whisks: Sequence[slice],
+    cameras: Cameras,
+    wire: Wire,
+    bar: Bar,
+    background: Mapping[str, np.ndarray | None],
+    settings: VisionSettings = _USUAL,
+) -> TrialTruth:
     """Truth of a trial: bar, first touch, contact and slip in each whisk.
 
     frames: per camera the grey pictures by frame index (a missing index is a lost frame); time_s, motor_rad (n,)

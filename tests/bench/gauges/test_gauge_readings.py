@@ -10,7 +10,7 @@ from bench.base.settings import Settings
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
-from bench.gauges.readings import known_from_nominal, known_from_pictures, pairs_of
+from bench.gauges.readings import pairs_of, reference_from_nominal, reference_from_pictures
 from bench.rig.bar import Bar, first_touch
 from bench.rig.contact import moments_Nmm
 from bench.rig.friction import Friction, March
@@ -37,11 +37,11 @@ def test_moments_from_the_deflection_seen(session, exactly_seen):
     """Within 0.15 % of the exact moments, which is the friction along the rod that is not known (0.1 % at 3°)."""
     for name in ("gauge_roll0", "gauge_roll90"):
         trial = session.trial(name)
-        known = known_from_pictures(exactly_seen(trial), WHISKER)
+        reference = reference_from_pictures(exactly_seen(trial), WHISKER)
         truth = np.genfromtxt(trial.folder / "truth.csv", delimiter=",", names=True)
         truth = truth[truth["contact"] == 1]
-        assert known.moments[:, 1] == pytest.approx(truth["m_z_Nmm"], rel=1.5e-3)
-        assert np.abs(known.moments[:, 0] - truth["m_y_Nmm"]).max() < 0.005
+        assert reference.moments[:, 1] == pytest.approx(truth["m_z_Nmm"], rel=1.5e-3)
+        assert np.abs(reference.moments[:, 0] - truth["m_y_Nmm"]).max() < 0.005
 
 
 def test_coefficients_of_the_sample_session(session, exactly_seen):
@@ -66,10 +66,10 @@ def test_coefficients_of_the_sample_session(session, exactly_seen):
 def test_a_nominal_bar_gives_the_moments_of_2(session):
     """Without pictures: (2) at small angles, a distance known to 1 %, and the touch's sigma in all of it."""
     trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=6.0)
-    known = known_from_nominal(trial, Touch(0.04, 1e-4), WHISKER)
-    assert known.moments[:, 1] == pytest.approx(WHISKER.C_Nmm2 * known.theta_rad / 50.0, rel=5e-3)
-    own = np.sqrt(np.diag(known.covariance))[1::2] / known.moments[:, 1]
-    sigma = np.hypot(own, known.scale_sigma)
+    reference = reference_from_nominal(trial, Touch(0.04, 1e-4), WHISKER)
+    assert reference.moments[:, 1] == pytest.approx(WHISKER.C_Nmm2 * reference.theta_rad / 50.0, rel=5e-3)
+    own = np.sqrt(np.diag(reference.covariance))[1::2] / reference.moments[:, 1]
+    sigma = np.hypot(own, reference.scale_sigma)
     assert np.all(sigma > 0.01) and np.all(sigma < 0.013)
 
 
@@ -86,15 +86,15 @@ def test_a_nominal_bar_gives_the_moments_of_the_exact_contact(bar_radius_mm):
         whisker_radius_mm=WHISKER.diameter_mm / 2,
     )
     trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=2 * bar_radius_mm)
-    known = known_from_nominal(trial, Touch(0.0, 1e-4), WHISKER)
+    reference = reference_from_nominal(trial, Touch(0.0, 1e-4), WHISKER)
     march = March(rod, bar, Friction(0.2, 0.2), first_touch(rod, bar, 0.0, 50.0))
-    exact = [moments_Nmm(state)[1] for state in march.along(known.theta_rad)[1]]
-    assert known.moments[:, 1] == pytest.approx(exact, rel=6e-4)
+    exact = [moments_Nmm(state)[1] for state in march.along(reference.theta_rad)[1]]
+    assert reference.moments[:, 1] == pytest.approx(exact, rel=6e-4)
 
 
 def test_a_steep_nominal_bar_gives_none():
     steep = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=30.0)
-    assert known_from_nominal(steep, Touch(0.04, 1e-4), WHISKER) is None
+    assert reference_from_nominal(steep, Touch(0.04, 1e-4), WHISKER) is None
 
 
 def test_no_touch_no_pairs(session, exactly_seen):

@@ -8,7 +8,7 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke
 from bench.gauges.matrix import GaugeMatrix
-from bench.trials.estimates import Hand, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
 from estimator.whisk import Estimate
@@ -33,14 +33,14 @@ def stroke(rng, d_x=60.0, noise=1e-3, roll=0.0) -> Stroke:
 @pytest.mark.parametrize("roll_deg", [0.0, 90.0, -30.0])
 def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
     """Noise of 1 mV is 0.01 N·mm a sample, some 200 of them: 1e-3 N·mm."""
-    hand = Hand(GaugeMatrix(MATRIX), np.radians(roll_deg))
-    _, whisk = felt_whisk(stroke(rng, roll=np.radians(roll_deg)), hand, np.zeros(2), BEAM, THETA)
+    readout = Readout(GaugeMatrix(MATRIX), np.radians(roll_deg))
+    _, whisk = felt_whisk(stroke(rng, roll=np.radians(roll_deg)), readout, np.zeros(2), BEAM, THETA)
     expected = slip.moments(60.0, THETA, BETA, ALPHA, BEAM.C_Nmm2)
     assert (whisk.m_y_at_Nmm, whisk.m_z_at_Nmm) == pytest.approx(expected, abs=0.01)
 
 
 def test_answers_carry_what_they_assumed(rng):
-    touch, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    touch, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     rows = {row.estimator: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))}
     assert np.isnan([rows["no_slip"].alpha_est_rad, rows["no_slip"].beta_est_rad]).all()
     assert rows["frictionless"].alpha_est_rad == 0.0
@@ -53,7 +53,7 @@ def test_sigma_of_10_is_its_scatter(rng):
     """Over 200 strokes the sampled standard deviation scatters by 5 %; the stated one averages over them."""
     stated, found = [], []
     for _ in range(200):
-        _, whisk = felt_whisk(stroke(rng, noise=0.01), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+        _, whisk = felt_whisk(stroke(rng, noise=0.01), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
         row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
         stated.append(row.d_x_est_sigma_alpha_exact_mm)
         found.append(row.d_x_est_mm.value)
@@ -62,8 +62,8 @@ def test_sigma_of_10_is_its_scatter(rng):
 
 def test_gauges_and_turn_add_to_the_moments_covariance():
     volts = np.array([0.3, 0.7])
-    hand = Hand(GaugeMatrix(MATRIX, 1e-2 * np.eye(4)), 0.0, np.radians(1.0))
-    added = hand.covariance(volts, np.zeros((2, 2)))
+    readout = Readout(GaugeMatrix(MATRIX, 1e-2 * np.eye(4)), 0.0, np.radians(1.0))
+    added = readout.covariance(volts, np.zeros((2, 2)))
     m_y, m_z = MATRIX @ volts
     turn = np.radians(1.0) * np.array([-m_z, m_y])
     assert added == pytest.approx(1e-2 * (volts @ volts) * np.eye(2) + np.outer(turn, turn))
@@ -72,7 +72,7 @@ def test_gauges_and_turn_add_to_the_moments_covariance():
 def test_no_touch_is_a_reason(rng):
     free = stroke(rng)
     silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
-    touch, reason = felt_whisk(silent, Hand.bare(), np.zeros(2), BEAM, THETA)
+    touch, reason = felt_whisk(silent, Readout.bare(), np.zeros(2), BEAM, THETA)
     assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
     assert np.isnan(as_felt(0, touch, None, 0.17).touch_felt_rad.value)
 
@@ -84,7 +84,7 @@ def test_estimators_that_cannot_be_had(name):
 
 
 def test_an_answer_must_be_an_estimate(rng):
-    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     with pytest.raises(BadInput, match="must return an Estimate"):
         answers(whisk, {"mine:f": lambda *_: 60.0}, Settings())
 
@@ -93,14 +93,14 @@ def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
     def fails(*_):
         raise ZeroDivisionError("no slope")
 
-    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f")
     assert np.isnan(row.d_x_est_mm.value) and row.status == "mine:f raised ZeroDivisionError: no slope"
 
 
 def asked(rng, function) -> dict:
     """The row of one's own estimator on a whisk at 60 mm."""
-    _, whisk = felt_whisk(stroke(rng), Hand(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     return answers(whisk, {"mine:f": function}, Settings())[0]
 
 

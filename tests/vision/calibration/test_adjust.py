@@ -9,7 +9,7 @@ from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_re
 from vision.calibration.adjust import solve
 from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
-from vision.calibration.calibrate import calibrate_alone, calibrate_cameras, lens_knowledge
+from vision.calibration.calibrate import calibrate_alone, calibrate_cameras, lens_priors
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 
@@ -122,10 +122,10 @@ def test_more_iterations_change_nothing_at_rest():
     recording = a_recording(views=6)
     boards, _ = recording.seen(0.05, np.random.default_rng(1))
     settled = calibrate_alone(boards["high"], BOARD, SIZE_PX)
-    known = lens_knowledge(1, 6)
-    known.free[9:15] = False
+    priors = lens_priors(1, 6)
+    priors.free[9:15] = False
     seen = settled.seen.chosen(settled.kept)
-    again = solve(settled.solution.state, seen, BOARD.corners_mm, replace(known), tolerance=1e-14)
+    again = solve(settled.solution.state, seen, BOARD.corners_mm, replace(priors), tolerance=1e-14)
     sigma = np.sqrt(np.diag(again.covariance)[:9])
     assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
 
