@@ -59,11 +59,11 @@ def felt_rows(session_path: Path, thetas_deg: Sequence[float]) -> Iterator[dict]
     rate = drift_rate([s for many in strokes.values() for one in many if (s := free_slope(one)) is not None])
     for trial in session.trials:
         truth = tomllib.loads((trial.folder / "truth.toml").read_text(encoding="utf-8"))
-        alpha, hand = float(np.arctan(truth["mu_kinetic"])), Readout.of(trial, gauges)
+        alpha, readout = float(np.arctan(truth["mu_kinetic"])), Readout.of(trial, gauges)
         for stroke in strokes[trial.name]:
             for theta_deg in thetas_deg:
                 row = {"speed": trial.speed_deg_s, "theta_deg": theta_deg}
-                touch, whisk = felt_whisk(stroke, hand, rate, session.whisker.beam, np.radians(theta_deg))
+                touch, whisk = felt_whisk(stroke, readout, rate, session.whisker.beam, np.radians(theta_deg))
                 felt = as_felt(0, touch, whisk, stroke.speed_rad_s).touch_felt_rad
                 row["touch"] = np.degrees(felt.value) - truth["touch_deg"]
                 row["touch_sigma"] = np.degrees(felt.sigma)
