@@ -126,12 +126,13 @@ def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.nd
     """What the rest shape's covariance lets all lines turn and shift alike, (6, 6): w rad, v mm at the base.
 
     An offset shifts the base; a slope in y turns it about z, one in z about −y. An offset in y that changes as the
-    whisker turns shifts the base along it.
+    whisker turns shifts the base along it; one in z passes for an axis that leans about the whisker.
     """
     hub = np.zeros((6, 4))
     hub[4, 0] = hub[5, 1] = 1.0
     hub[2, 2], hub[1, 3] = 1.0 / length_mm, -1.0 / length_mm
     to_rig = np.kron(np.eye(2), rotation_z(motor_rad)) @ hub
     along = np.append(np.zeros(3), rotation_z(motor_rad)[:, 0])
-    drift = _DRIFT_PER_RAD**2 * covariance[_LINE[0], _LINE[0]] * np.outer(along, along)
-    return to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T + drift
+    lean = np.append(along[3:], np.zeros(3)) / (0.5 * length_mm)
+    drift = [_DRIFT_PER_RAD**2 * covariance[k, k] * np.outer(way, way) for k, way in zip(_LINE[:2], (along, lean))]
+    return to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T + sum(drift)

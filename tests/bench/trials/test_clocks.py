@@ -33,7 +33,8 @@ def frames(speed_rad_s):
 def trial(seen, felt, **halves):
     """A result of one whisk, or of none that is known."""
     facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 3000.0)
-    felt_half = FeltTrial((FeltWhisk(touch_felt_rad=felt, theta_sigma_rad=felt.sigma),), halves.pop("felt_back", UNKNOWN))
+    whisk = FeltWhisk(touch_felt_rad=felt, theta_sigma_rad=felt.sigma)
+    felt_half = FeltTrial((whisk,), halves.pop("felt_back", UNKNOWN))
     return TrialResult(*facts, 3.0, SeenTrial((seen,), **halves), felt_half)
 
 
