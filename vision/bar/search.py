@@ -68,8 +68,9 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
-    likely = max((settled(axis, FAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.worth)
-    best = settled(likely.axis, NEAR_PX)
+    likely = max((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.worth)
+    farther = settled(likely.axis, FAR_PX)  # a bar whose rims are dark, found by its highlight
+    best = settled(max(likely, farther, key=lambda one: one.worth).axis, NEAR_PX)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
         return best
     found = [best] if best.seen_by else []

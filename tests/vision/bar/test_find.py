@@ -33,11 +33,11 @@ def test_squares_of_the_board_in_a_soft_shadow_are_no_edges(rng):
 def test_a_polished_bar_over_squares_is_found_by_one_camera(rng):
     """Within a quarter of its half-width, 16 px; the highlight's edges lie 4 to 8 px from its middle."""
     angle, across_mm = 1.3, 0.7
-    picture, view = noisy_view(metal, squares, angle, across_mm, rng)
+    view = noisy_view(metal, squares, angle, across_mm, rng)
     camera = Camera("c", view.camera.size_px, view.camera.matrix, np.zeros(5),
                     np.column_stack([np.eye(3), [-50.0, 0.0, AWAY_MM]]))
     rods = Rods(Wire("cylinder", 100.0, 0.5), Bar(2.0 * RADIUS_MM))
-    clear = clear_edges(camera, picture[::HALF, ::HALF], view.background[::HALF, ::HALF], rods, 0.0)
+    clear = clear_edges(camera, view.mean[::HALF, ::HALF], view.background[::HALF, ::HALF], rods, 0.0)
     found = find_bars_alone(clear, rods, 0.0)[0]
     px = camera.project(found.point_mm + np.array([-8.0, 8.0])[:, None] * found.direction)
     off = (px - CENTRE) @ [-np.sin(angle), np.cos(angle)] - np.mean(edges_px(across_mm))
