@@ -19,7 +19,7 @@ from vision.lines.bands import Pieces
 from vision.lines.binned import sums
 
 FULL_SCALE = 255.0
-_SATURATED = 250.0  # grey: what the sensor cut off is not known
+SATURATED = 250.0  # grey: what the sensor cut off is not known
 _BIN_PX = 0.35  # a third of a lens blur
 _RIM_PX = 8.0  # of a thick bar so much inside either edge is looked at
 _OUTSIDE_PX = 6.0  # beyond either edge, wherever it is looked for: a shadow's border is seldom as near
@@ -58,7 +58,7 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> list[
     half = radius + reach_px + _OUTSIDE_PX
     bins = np.floor((stretched + half) / _BIN_PX).astype(int)
     size = int(np.ceil(2.0 * half / _BIN_PX))
-    seen = (bins >= 0) & (bins < size) & (pieces.grey < _SATURATED)
+    seen = (bins >= 0) & (bins < size) & (pieces.grey < SATURATED)
     seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
     light, slope = _light(pieces.grey, gamma)
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
@@ -66,8 +66,9 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> list[
     place = np.clip(bins, 0, size - 1) + size * np.arange(len(pieces))[:, None]
     added = [sums(weight * values, place, size) for values in (np.ones_like(light), light, behind, stretched, slope)]
     order = np.argsort(pieces.place)
+    stretches = np.array_split(order, max(1, min(count, len(pieces) // 2)))
     return [_profile([part[some] for part in added], float(pieces.place[some].mean()), radius)
-            for some in np.array_split(order, max(1, min(count, len(pieces) // 2)))]
+            for some in stretches if np.any(added[0][some])]
 
 
 def _light(grey, gamma: float):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.bar.evidence import Evidence, Profile, evidence, profiles
+from vision.bar.evidence import SATURATED, Evidence, Profile, evidence, profiles
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
@@ -32,6 +32,7 @@ _GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded fo
 # RMS of z over path-traced bars is 1.1 (tests/ladder/bar_scenes.py).
 _TEMPER = 4.0
 _LEAST_CHANCE = 0.01  # of a transfer curve that is still looked at
+_LEAST_SHOWN = 0.5
 _MOST = 40.0  # of the same: what one stretch may say against a line; a clamp or a hole in the bench says anything
 _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 
@@ -59,7 +60,7 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     """
     pieces = {view.camera.name: bar_pieces(_mean_noise(view), view.mean, axis, radius_mm,
                                            wires_px.get(view.camera.name, []), settings) for view in views}
-    pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES}
+    pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}
     line = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
     reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
     wide = {name: [_posterior(_moved(some, line[name]), reach_px, gamma) for gamma in _GAMMAS]
@@ -108,6 +109,11 @@ def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.nd
     return mean, np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - mean, lines - mean))
 
 
+def _shows(pieces: Pieces) -> bool:
+    """Whether more than a half of the pixels are there, and not saturated."""
+    return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED)) > _LEAST_SHOWN)
+
+
 def _mean_noise(view: View) -> View:
     """The view with the noise of its mean picture."""
     share = 1.0 / min(len(view.frames), MEAN_OF)
@@ -130,9 +136,7 @@ def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | N
     """Over lines within reach_px, under the lens blur that explains the pieces best where it is not given."""
     shifts = np.linspace(-reach_px, reach_px, _STEPS)
     seen = profiles(pieces, _STRETCHES, reach_px, gamma)
-    if blur_px is None:
-        least = [float(np.sum(evidence(seen, shifts[::3], blur).of_bar.min(axis=1))) for blur in _BLURS_PX]
-        blur_px = _BLURS_PX[int(np.argmin(least))]
+    blur_px = _best_blur(seen, shifts[::3]) if blur_px is None else blur_px
     found = evidence(seen, shifts, blur_px)
     misfit, lines = _over_lines(found, seen, reach_px)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
@@ -142,6 +146,17 @@ def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | N
     for_bar = float(np.sum((found.of_none - found.of_bar.min(axis=1)) / _temper(found)))
     return _Posterior(mean, np.einsum("ab,abi,abj->ij", chance, away, away) / total,
                       float(misfit.min() - 2.0 * np.log(total)), for_bar, gamma, blur_px)
+
+
+def _best_blur(seen: Sequence[Profile], shifts) -> float:
+    """The lens blur, px, with the most evidence: of a few, then between them by a parabola of their logarithms."""
+    least = [float(np.sum(evidence(seen, shifts, blur).of_bar.min(axis=1))) for blur in _BLURS_PX]
+    best = min(max(int(np.argmin(least)), 1), len(least) - 2)
+    near = slice(best - 1, best + 2)
+    square, slope, _ = np.polyfit(np.log(_BLURS_PX[near]), least[near], 2)
+    if square <= 0.0:
+        return _BLURS_PX[int(np.argmin(least))]
+    return float(np.clip(np.exp(-0.5 * slope / square), *_BLURS_PX[near][::2]))
 
 
 def _temper(found: Evidence) -> np.ndarray:

@@ -87,6 +87,9 @@ def _hinge(motor_rad, bend_rad) -> float:
 
 
 def frames_by_touch(motor_rad, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same once touch is known to sigma: frames within three sigma of it are left undecided."""
+    """The same once touch is known to sigma: frames within three sigma of it are left undecided, but for the first two:
+    they are free if touch comes after them."""
     margin = max(3.0 * sigma_rad, np.radians(0.02))
-    return motor_rad > touch_rad + margin, motor_rad < touch_rad - margin
+    free = motor_rad < touch_rad - margin
+    free[:FEWEST_FREE] |= motor_rad[:FEWEST_FREE] < touch_rad
+    return motor_rad > touch_rad + margin, free

@@ -28,7 +28,6 @@ def touch_by_onset(problem: Problem, state: State, covariance) -> tuple[Problem,
         raise Refused(f"when the whisker begins to bend is told to {np.degrees(found.sigma_rad):.1f} deg only, "
                       f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known")
     touching, free = frames_by_touch(problem.motor_rad, found.motor_rad, 0.5 * found.sigma_rad)
-    free[:FEWEST_FREE] |= problem.motor_rad[:FEWEST_FREE] < found.motor_rad
     if np.sum(free) < FEWEST_FREE:
         at_deg, sigma_deg = np.degrees([found.motor_rad, found.sigma_rad])
         raise Refused(f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: fewer than "

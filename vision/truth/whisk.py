@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -61,10 +62,26 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    edges, by_onset = _told_by_edges(cameras, bar), seen_from_one_side(cameras, bar.axis)
+    edges, one_side = _told_by_edges(cameras, bar), seen_from_one_side(cameras, bar.axis)
+    fitted = partial(_fitted_to, views, cameras, rods, bar, motor, light, settings, edges)
+    try:
+        return fitted(by_onset=one_side)
+    except Misled:
+        raise
+    except Refused:
+        if one_side or not edges:
+            raise
+    return fitted(by_onset=True)  # one camera sees the wire, too: it alone tells when that begins to bend
+
+
+def _fitted_to(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float], light: dict[str, Lit],
+               settings: VisionSettings, edges: Collection[str], *, by_onset: bool):
+    """`fit_whisk` with touch by the frames that touch, or by the onset of bending."""
     motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
     for _ in range(settings.rounds):
         seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
+        if edges and not by_onset and len({one.camera for one in seen if one.frame >= 0}) < 2:
+            raise Refused("a single camera sees wire and bar")
         problem, state, answer = _fit(seen, cameras, rods, look, motor, by_onset)
         _check_scatter(problem, state)
         look = _next_look(problem, state, answer, look, motor, by_onset)
