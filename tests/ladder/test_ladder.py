@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from bench.rig.protocol import PicturesTable, WhiskerTable
-from tests.ladder import estimates_montecarlo
+from tests.ladder import estimates_montecarlo, path_traced
 from tests.ladder.coverage import COLUMNS, QUANTITIES, Seen, row_of, scene_row, see_points, summary
 from tests.ladder.exactness import model_errors, own_errors, scenes
 from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
@@ -110,3 +110,10 @@ def test_intervals_of_10_hold_whatever_the_friction(shape):
     z = whisks.z()[~whisks.status]
     assert np.nanmax(np.abs(z)) < 4
     assert np.nanmean(np.abs(whisks.z(alpha_exact=True)) < 1.96) < 0.5
+
+
+def test_the_last_rung_is_a_path_traced_scene():
+    """The scene in fixtures, as tests/ladder/path_traced.py sees it; z of four quantities beyond 4 is one in 4000."""
+    row = row_of(*path_traced.see_scene(0, path_traced.ROOT / "fixtures" / "scenes" / "ring"))
+    assert not path_traced.odd(row)
+    assert abs(row["d_x_mm_error"]) < 0.05
