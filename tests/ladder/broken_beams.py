@@ -26,7 +26,7 @@ from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene
 from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.problem import Problem
 from vision.fit.quantities import jacobians
-from vision.fit.scatter import honest
+from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.uncertainty import uncertainty
 from vision.lines.points import Observed
@@ -95,7 +95,7 @@ COLUMNS = ("seed", "chance", "alarm", *(f"{name}_{what}" for name in QUANTITIES 
 def check_of(problem: Problem) -> BeamCheck:
     """The check of line points, fitted as those of a trial."""
     state, _ = solve(problem, begin(problem), scales=SCALES)
-    problem = honest(problem, state)
+    problem = inflated_by_residuals(problem, state)
     state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
     covariance = uncertainty(problem, state, lines).covariance
     return check_beam(problem, state, covariance, *jacobians(problem, state))

@@ -29,7 +29,7 @@ from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene
 from vision.bar.one_view import seen_from_one_side
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import jacobians
-from vision.fit.scatter import honest
+from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
@@ -60,7 +60,7 @@ def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
     if seen_from_one_side(problem.cameras, problem.axis):
         problem, state = touch_by_onset(problem, state, covariance)
         state, _ = solve(problem, state)
-    problem = honest(problem, state)
+    problem = inflated_by_residuals(problem, state)
     state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
     covariance = uncertainty(problem, state, lines).covariance
     measured, by = jacobians(problem, state)

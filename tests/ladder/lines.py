@@ -60,7 +60,7 @@ def lit(t, x):
 
 
 def changing(t, x):
-    """Lit, and fading from light to dark along the wire."""
+    """WireAppearance, and fading from light to dark along the wire."""
     return lit(t, x) - 0.45 * (x - 20.0)
 
 

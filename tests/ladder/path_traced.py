@@ -3,9 +3,9 @@
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/ladder/path_traced.py SCENES TABLE.csv
 
 SCENES holds sessions of one whisk each (trials/w) with exact cameras, rig pictures and the truth (truth.toml,
-truth.csv), as fixtures/scenes does. Each is seen by `observe_trial`. A scene is a row of TABLE.csv by its place among the folders'
-names; one that is there is not seen again. Prints the coverage of all rows, and the rows without a truth or beyond
-four sigma.
+truth.csv), as fixtures/scenes does. Each is seen by `observe_trial`. A scene is a row of TABLE.csv by its place among
+the folders' names; one that is there is not seen again. Prints the coverage of all rows, and the rows without a truth
+or beyond four sigma.
 """
 
 import sys

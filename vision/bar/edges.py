@@ -7,6 +7,7 @@ the middle cancels, and to the width it does not, so each edge has its own error
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from vision.lines.bands import Pieces
 from vision.lines.binned import binned
 from vision.lines.cylinder import RIMS, WAVES
 from vision.lines.points import LinePoints
-from vision.lines.shading import fit_shading
+from vision.lines.shading import Knots, fit_shading
 from vision.pictures.view import View
 
 # An edge's error beyond its formal one, which half-widths of path-traced and painted bars show (docs/truth.md).
@@ -48,11 +49,15 @@ def measure_edges(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: S
     pieces = of_bar_alone(pieces, lambda some: _placed(some, found), knots)
     for _ in range(_ROUNDS):
         rims = rims_of(pieces, _placed(pieces, found))
-        misfit = lambda q: fit_shading(_placed(rims, q), float(np.exp(q[4])), RIMS, knots)[1]  # noqa: B023, E731
-        found, left, curvature = descend(misfit, found, _STEPS, _LONGEST, _SETTLED_PX, _PARTS)
+        found, left, curvature = descend(partial(_misfit, rims, knots), found, _STEPS, _LONGEST, _SETTLED_PX, _PARTS)
     if left > NO_BAR:
         return None
     return _edges(pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4])
+
+
+def _misfit(rims: Pieces, knots: Knots, q) -> float:
+    """Of rims placed by q[:4] under a lens blur of exp(q[4]) px."""
+    return fit_shading(_placed(rims, q), float(np.exp(q[4])), RIMS, knots)[1]
 
 
 def _placed(pieces: Pieces, q) -> Pieces:
@@ -68,7 +73,10 @@ def _sweep(pieces: Pieces, knots) -> np.ndarray:
     near = np.abs(pieces.place) < _SWEEP_REACH_MM
     some, _ = binned(pieces.select(near) if np.sum(near) >= FEWEST_PIECES else pieces, _BIN_PX)
     found = np.zeros(4)
-    misfit = lambda q: fit_shading(_placed(some, q), _SWEEP_BLUR_PX, WAVES, knots)[1]  # noqa: E731
+
+    def misfit(q) -> float:
+        return fit_shading(_placed(some, q), _SWEEP_BLUR_PX, WAVES, knots)[1]
+
     most = np.array([*_SWEEP_MOST_PX, *np.median(pieces.radius_px) * _SWEEP_MOST_SHARE])
     for part in _SWEEP_PARTS:
         for _ in range(2):

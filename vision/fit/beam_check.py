@@ -114,7 +114,10 @@ def _departure(problem: Problem, state: State, frame: int):
     moves = _moves(problem, state, curves)
     by_departure, by_wander = _line_rows(problem, curves, moves)
     on_bar, slip_by = _contact_rows(problem, state, curves, moves, frame)
-    fill = lambda *parts: _filled(len(root), *parts) * root  # noqa: E731
+
+    def fill(*parts: np.ndarray) -> np.ndarray:
+        return _filled(len(root), *parts) * root
+
     own = np.hstack([linear.jacobian * root, fill(by_wander)])
     prior = np.eye(own.shape[1])[problem.size :] / WANDER_PX
     cameras = fill(camera_rows(problem, state))

@@ -52,7 +52,10 @@ def _deflection(problem: Problem, vector, touch: FirstTouch, point):
     motor = np.broadcast_to(problem.motor_rad, shape)
     unbent = centrelines(rest, np.zeros((*shape, 2)), np.full(shape, 50.0), motor, problem.wire)
     cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
-    forward = lambda v: cosine * v[..., 0] + sine * v[..., 1]  # noqa: E731
+
+    def forward(v):
+        return cosine * v[..., 0] + sine * v[..., 1]
+
     wanted = forward(touch.point_mm[..., None, :])
     arc = np.broadcast_to(touch.arc_mm[..., None], shape)
     for _ in range(3):

@@ -31,7 +31,7 @@ class Scatter:
     over_frames: float
 
 
-def honest(problem: Problem, state: State, least_shared: float = 1.0) -> Problem:
+def inflated_by_residuals(problem: Problem, state: State, least_shared: float = 1.0) -> Problem:
     """The same problem with the wire points' sigmas as large as their residuals show, and shared errors counted once.
 
     The excess over the points' own sigmas is one figure a camera (median of the residuals, so that outliers do
@@ -43,7 +43,7 @@ def honest(problem: Problem, state: State, least_shared: float = 1.0) -> Problem
     own = [_own_sigma_px(problem, camera) for camera in cameras]
     excess = [float(np.sqrt(max(seen.sigma_px**2 - few**2, 0.0))) for seen, few in zip(scatter, own)]
     wider = [float(np.sqrt(max(one.along * one.over_frames, least_shared))) for one in scatter]
-    seen = [_honest_points(one, excess[one.camera], wider[one.camera]) if one.frame >= 0 else one
+    seen = [_inflated(one, excess[one.camera], wider[one.camera]) if one.frame >= 0 else one
             for one in problem.seen]
     return replace(problem, seen=seen, alike=[(one.along - 1.0) / (one.along + 1.0) for one in scatter])
 
@@ -115,6 +115,6 @@ def _own_sigma_px(problem: Problem, camera: int) -> float:
     return float(np.median(np.concatenate(mine))) if mine else 0.0
 
 
-def _honest_points(seen: Observed, excess_px: float, wider: float) -> Observed:
+def _inflated(seen: Observed, excess_px: float, wider: float) -> Observed:
     sigma = np.hypot(seen.points.sigma_px, excess_px) * wider
     return replace(seen, points=replace(seen.points, sigma_px=sigma))

@@ -58,16 +58,16 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
 
 
 @dataclass(frozen=True)
-class Lit:
+class WireAppearance:
     """How one camera sees the wire: lens blur in px, and the width seen."""
 
     blur_px: float
     width: SeenWidth
 
 
-def one_sided_lines(whisks: Sequence[Mapping[str, Lit]]) -> tuple[str, ...]:
+def one_sided_lines(whisks: Sequence[Mapping[str, WireAppearance]]) -> tuple[str, ...]:
     """A line a camera that sees light from one side, from the whisk in which it saw least."""
-    least: dict[str, Lit] = {}
+    least: dict[str, WireAppearance] = {}
     for whisk in whisks:
         for camera, lit in whisk.items():
             if camera not in least or lit.width.seen_px < least[camera].width.seen_px:

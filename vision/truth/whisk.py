@@ -12,7 +12,7 @@ from vision.bar.one_view import seen_from_one_side
 from vision.bar.search import SeenBar, of_mean
 from vision.fit.first_bends import contact_arc, find_rest, follow_bends
 from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
-from vision.fit.scatter import honest, scatter_px
+from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import FEWEST_FREE, frames_by_touch, frames_that_touch, touch_and_sigma
 from vision.fit.touch_by_onset import touch_by_onset
@@ -22,7 +22,7 @@ from vision.geometry.contact import BarAxis, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
-from vision.lines.one_sided import Lit, seen_width
+from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
 from vision.lines.trace import clear_of_bar, observed, to_points, trace, wire_pieces
@@ -55,8 +55,8 @@ class _Look:
     free: np.ndarray
 
 
-def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float], light: dict[str, Lit],
-              settings: VisionSettings):
+def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
+              light: dict[str, WireAppearance], settings: VisionSettings):
     """Problem and state after the last round, how its parameters answer (see `Uncertainty`), and the frames in it: all
     but those far before touch.
 
@@ -74,8 +74,8 @@ def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[
     return fitted(by_onset=True)  # one camera sees the wire, too: it alone tells when that begins to bend
 
 
-def _fitted_to(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float], light: dict[str, Lit],
-               settings: VisionSettings, edges: Collection[str], *, by_onset: bool):
+def _fitted_to(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
+               light: dict[str, WireAppearance], settings: VisionSettings, edges: Collection[str], *, by_onset: bool):
     """`fit_whisk` with touch by the frames that touch, or by the onset of bending."""
     motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
     for _ in range(settings.rounds):
@@ -128,7 +128,7 @@ def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor:
     if by_onset:
         problem, state = touch_by_onset(problem, state, covariance)
         state, _ = solve(problem, state)
-    problem = honest(problem, state)
+    problem = inflated_by_residuals(problem, state)
     return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
 
 
@@ -178,7 +178,7 @@ def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mappin
     alone = replace(problem, motor_rad=np.array(list(free.values())), touching=nothing, bent=nothing, seen=seen)
     there = State(state.vector[:problem.first_bend], np.full(len(free), 0.5 * rods.wire.length_mm))
     there, _ = solve(alone, there, scales=[LAST_SCALE] * 3)
-    return honest(alone, there, _FREE_SHARED), there
+    return inflated_by_residuals(alone, there, _FREE_SHARED), there
 
 
 def _early(motor: Mapping[int, float]) -> dict[int, float]:
@@ -244,6 +244,6 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
     knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
     traced = trace(pieces, knots, known.blur_px, last=last) if known else trace(pieces, knots, last=last)
-    light[name] = known or Lit(traced.blur_px, seen_width(traced.pieces, traced.blur_px))
+    light[name] = known or WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px))
     points, source = to_points(traced)
     return observed(points, source, number, list(curves))

@@ -12,7 +12,7 @@ from vision.fit.uncertainty import Uncertainty, uncertainty
 from vision.geometry.camera import Cameras
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
-from vision.lines.one_sided import Lit
+from vision.lines.one_sided import WireAppearance
 from vision.pictures.view import View
 from vision.truth.value import Value
 
@@ -36,7 +36,7 @@ class WhiskPictures:
     rods: Rods
     bar: SeenBar
     settings: VisionSettings
-    light: dict[str, Lit] = field(default_factory=dict)
+    light: dict[str, WireAppearance] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
     @cached_property

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.ladder.scenes import LUMP, as_problem, begin, draw_scene, line_points, lumpy_noise
-from vision.fit.scatter import honest
+from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve, weighted_jacobian
 from vision.fit.uncertainty import uncertainty
 
@@ -67,7 +67,7 @@ def test_what_neighbours_share_is_measured(lump):
     exact = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     problem = replace(exact, seen=[_with_noise(seen, lump, rng) if seen.frame >= 0 else seen for seen in exact.seen])
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
-    wider = [(1.0 + alike) / (1.0 - alike) for alike in honest(problem, state).alike]
+    wider = [(1.0 + alike) / (1.0 - alike) for alike in inflated_by_residuals(problem, state).alike]
     assert np.mean(wider) == pytest.approx({1: 1.0, LUMP: 0.8 * LUMP}[lump], abs={1: 0.3, LUMP: 0.8}[lump])
 
 

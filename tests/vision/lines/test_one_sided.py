@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.ladder.lines import SCENES, errors, first_look
-from vision.lines.one_sided import Lit, SeenWidth, one_sided_lines, seen_width
+from vision.lines.one_sided import SeenWidth, WireAppearance, one_sided_lines, seen_width
 from vision.lines.trace import to_points
 
 
@@ -38,6 +38,6 @@ def test_a_rod_lit_from_one_side_is_seen_narrower_and_its_axis_is_found(rng, nam
 
 
 def test_the_report_names_camera_and_width_once():
-    narrow, whole = SeenWidth(3.1, 5.6, -1.4), SeenWidth(5.5, 5.6, 0.0)
-    (line,) = one_sided_lines([{"high": Lit(0.9, narrow), "low": Lit(0.9, whole)}, {"high": Lit(0.9, whole)}])
+    narrow, whole = (WireAppearance(0.9, SeenWidth(*width)) for width in ((3.1, 5.6, -1.4), (5.5, 5.6, 0.0)))
+    (line,) = one_sided_lines([{"high": narrow, "low": whole}, {"high": whole}])
     assert line.startswith("camera high sees 3.1 of the wire's 5.6 px: light from one side")
