@@ -68,7 +68,7 @@ def see_scene(number: int, folder: Path) -> tuple[PathTraced, Seen]:
 
 def odd(row: dict) -> bool:
     """Whether a row has no truth, or one beyond FAR_SIGMAS of what is stated."""
-    z = [abs(row[f"{name}_error"] / row[f"{name}_sigma"]) for name in QUANTITIES]
+    z = [abs(row.get(f"{name}_error", np.nan) / row.get(f"{name}_sigma", np.nan)) for name in QUANTITIES]
     return not max(z) <= FAR_SIGMAS
 
 
@@ -77,11 +77,13 @@ def main() -> None:
     folders = sorted(path.parents[2] for path in scenes.glob("*/trials/w/truth.toml"))
     rows = all_rows(table, COLUMNS, range(len(folders)), lambda number: row_of(*see_scene(number, folders[number])))
     print(*summary(rows), sep="\n")
-    errors = np.abs([[row["d_x_mm_error"], row["beta_deg_error"], row["slip_rms_mm"]] for row in rows])
+    names = ("d_x_mm_error", "beta_deg_error", "slip_rms_mm")
+    errors = np.abs([[row.get(name, np.nan) for name in names] for row in rows])
     print("median |d_x| {:.4f} mm, |beta| {:.3f} deg, slip RMS {:.4f} mm".format(*np.nanmedian(errors, axis=0)))
     for row in filter(odd, rows):
-        far = ", ".join(f"{name} {row[f'{name}_error']:+.4f} ± {row[f'{name}_sigma']:.4f}" for name in QUANTITIES)
-        print(f"{folders[row['seed']].name}: {row['status'] or far}")
+        values = [(name, row.get(f"{name}_error", np.nan), row.get(f"{name}_sigma", np.nan)) for name in QUANTITIES]
+        far = ", ".join("{} {:+.4f} ± {:.4f}".format(*value) for value in values)
+        print(f"{folders[row['seed']].name}: {far} {row['status']}")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import numpy as np
 
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
+from vision.geometry.newton import cauchy_weights
 from vision.geometry.silhouette import outline
 from vision.lines.points import LinePoints
 
@@ -37,7 +38,7 @@ def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm, step
 
     here = middle(vector)
     left = np.sum(points.normal * (points.px - here), axis=1) / points.sigma_px
-    weight = 1.0 / np.sqrt(1.0 + (left / 5.0) ** 2)
+    weight = np.sqrt(cauchy_weights(left, 5.0))
     columns = [np.sum(points.normal * (middle(vector + step[k] * np.eye(4)[k]) - here), axis=1) / step[k]
                for k in range(4)]
     return left * weight, np.stack(columns, axis=1) / points.sigma_px[:, None] * weight[:, None]

@@ -13,6 +13,7 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, one_curve
 from vision.geometry.contact import BarAxis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
+from vision.geometry.newton import cauchy_weights
 from vision.geometry.rods import Wire
 from vision.lines.bands import strongest_shift
 from vision.lines.points import LinePoints, Observed
@@ -108,7 +109,7 @@ def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire
         for k in range(2):
             moved = _bend_residual(views, seen, rest_mm, bend + step * np.eye(2)[k], arc, motor, wire)
             columns.append((moved - left) / step)
-        weight = 1.0 / (1.0 + (left / 2.0) ** 2)
+        weight = cauchy_weights(left, 2.0)
         jacobian = np.stack(columns, axis=1)
         normal = jacobian.T @ (weight[:, None] * jacobian) + pull
         change = np.linalg.solve(normal, jacobian.T @ (weight * left) + pull @ bend)

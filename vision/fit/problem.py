@@ -13,6 +13,9 @@ from vision.geometry.rods import Wire
 from vision.lines.points import SHARED, Observed
 
 BAR, REST = 4, 2 * REST_POWERS
+REACH = BAR + REST  # index of the reach's error
+# Of the bar from where it was found, mm and rad: nothing is believed of it.
+BAR_PRIOR = np.array([50.0, 50.0, 1.0, 1.0])
 # One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
 # set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])

@@ -8,15 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, rest_shape
+from vision.fit.differences import perturbed
+from vision.fit.problem import REACH, Problem, State, bar_axis, curves_of, rest_shape
 from vision.fit.touch import FirstTouch, first_touch
-from vision.geometry.centreline import Curves, centrelines
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
-
-_STEP = dict.fromkeys((0, 1, *range(BAR, BAR + REST + 1)), 1e-4) | dict.fromkeys((2, 3), 1e-6)
-_BEND_STEP = 1e-5
-GLOBALS = ("touch", "x", "y", "z", "d_x", "beta", "psi")
-PER_FRAME = ("x", "y", "z", "slip", "longitudinal_slip", "d_y", "d_z", "phi", "alpha", "arc")
 
 
 @dataclass(frozen=True)
@@ -48,9 +44,9 @@ def measure(problem: Problem, vector, arcs_mm) -> Measured:
 def _deflection(problem: Problem, vector, touch: FirstTouch, point):
     """d_y = V_y - P_y and d_z = P_z - V_z (…, f) in the contact frame."""
     shape = point.shape[:-1]
-    rest = np.broadcast_to(rest_shape(vector)[..., None, :, :], (*shape, 2, 4))
+    rest = np.broadcast_to(rest_shape(vector)[..., None, :, :], (*shape, 2, REST_POWERS))
     motor = np.broadcast_to(problem.motor_rad, shape)
-    unbent = centrelines(rest, np.zeros((*shape, 2)), np.full(shape, 50.0), motor, problem.wire)
+    unbent = centrelines(rest, np.zeros((*shape, 2)), np.full(shape, problem.wire.length_mm / 2), motor, problem.wire)
     cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
 
     def forward(v):
@@ -93,21 +89,12 @@ class Jacobians:
 
 def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
     """All quantities and their derivatives by finite differences, the frames' bends moved all at once."""
-    rows, moves = [state.vector], []
-    order = np.cumsum(problem.bent) - 1
-    for k, step in _STEP.items():
-        rows.append(state.vector + step * (np.arange(problem.size) == k))
-        moves.append((step, np.full(len(problem.motor_rad), k)))
-    for part in range(2):
-        row = state.vector.copy()
-        row[problem.first_bend + part::2] += _BEND_STEP
-        rows.append(row)
-        moves.append((_BEND_STEP, np.where(problem.bent, problem.first_bend + 2 * order + part, -1)))
-    all_rows = measure(problem, np.stack(rows), state.arcs_mm)
+    moved, moves = perturbed(problem, state.vector, reach=True)
+    all_rows = measure(problem, moved, state.arcs_mm)
     whisk = {name: np.zeros(problem.size) for name in all_rows.whisk}
     frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in all_rows.frame}
     for number, (step, columns) in enumerate(moves, start=1):
-        shared = number <= len(_STEP)
+        shared = number <= REACH + 1
         for name, values in all_rows.whisk.items():
             if shared:
                 whisk[name][columns[0]] = (values[number] - values[0]) / step

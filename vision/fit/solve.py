@@ -13,13 +13,16 @@ from itertools import groupby
 
 import numpy as np
 
+from vision.fit.differences import perturbed, steps
 from vision.fit.onset import Onset
 from vision.fit.problem import (
     BAR,
+    BAR_PRIOR,
     BAR_TILT_ARM_MM,
     BEND_PRIOR_RAD,
     CONTACT_SIGMA_MM,
     LIGHT_PX,
+    REACH,
     REST,
     REST_PRIOR_MM,
     Problem,
@@ -31,19 +34,13 @@ from vision.fit.problem import (
 )
 from vision.geometry.centreline import Curves, centrelines
 from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.newton import cauchy_weights
 from vision.geometry.silhouette import edges
 from vision.lines.points import LinePoints, Observed
 
 LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
 _ALIKE = 1000.0  # steps of differences (0.1 mm, 1 mrad; bends 10 mrad): so near the slopes are what they were
 _STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
-
-
-def _steps(problem: Problem) -> np.ndarray:
-    """Finite-difference step of each geometric parameter: about 1e-5 of its size."""
-    step = np.full(problem.size, 1e-5)
-    step[0:2], step[2:4], step[BAR:BAR + REST] = 1e-4, 1e-6, 1e-4
-    return step
 
 
 @dataclass(frozen=True)
@@ -60,7 +57,7 @@ def linearise(problem: Problem, state: State, jacobian: np.ndarray | None = None
 
     jacobian: that of a state nearby, taken as it is, which saves nine tenths of the work.
     """
-    moved, columns = _perturbed(problem, state.vector) if jacobian is None else (state.vector[None], [])
+    moved, columns = perturbed(problem, state.vector) if jacobian is None else (state.vector[None], [])
     curves, arcs = curves_of(problem, moved, state.arcs_mm)
     alike = groupby(problem.seen, key=lambda seen: (seen.camera, seen.frame >= 0))
     blocks = [_wire_block(problem, camera, list(seen), curves, columns, state.vector) if on_wire
@@ -80,25 +77,6 @@ def linearise(problem: Problem, state: State, jacobian: np.ndarray | None = None
 def linear_at(problem: Problem, state: State) -> Linear:
     """`linearise`, kept for the next who asks the same: a fit that is done is asked for each of its uncertainties."""
     return linearise(problem, state)[0]
-
-
-def _perturbed(problem: Problem, vector):
-    """The vector itself and one copy per geometric degree: bar and rest each alone, all frames' bends at once.
-
-    columns: for each copy after the first, a function of the frame that names the parameter it moved.
-    """
-    step = _steps(problem)
-    rows, columns = [vector], []
-    for k in range(BAR + REST):
-        rows.append(vector + step[k] * (np.arange(problem.size) == k))
-        columns.append((step[k], np.full(len(problem.motor_rad), k)))
-    order = np.cumsum(problem.bent) - 1
-    for part in range(2):
-        row = vector.copy()
-        row[problem.first_bend + part::2] += step[-1] if np.any(problem.bent) else 0.0
-        rows.append(row)
-        columns.append((1e-5, np.where(problem.bent, problem.first_bend + 2 * order + part, -1)))
-    return np.stack(rows), columns
 
 
 def _together(group: Sequence[Observed]) -> LinePoints:
@@ -150,8 +128,8 @@ def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np
 def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns, vector):
     """Residuals and Jacobian rows of one camera's points of the bar: of its middle, or of an edge."""
     points, side = _together(group), np.repeat([s.side for s in group], [len(s.points) for s in group])
-    moving = [*range(BAR), *([BAR + REST] if np.any(side) else [])] if columns else []
-    step = _steps(problem)[moving]
+    moving = [*range(BAR), *([REACH] if np.any(side) else [])] if columns else []
+    step = steps(problem)[moving]
     moved = vector + step[:, None] * np.eye(problem.size)[moving]
     px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side)
     jacobian = np.zeros((len(points), problem.size))
@@ -162,7 +140,7 @@ def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns
 
 def _bar_px(problem: Problem, camera, vector, points: LinePoints, side) -> np.ndarray:
     """Where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's error is taken for the bar's."""
-    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., BAR + REST, None] * (side != 0))
+    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., REACH, None] * (side != 0))
     half = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
     return 0.5 * (one + other) + side[:, None] * half * points.normal
 
@@ -177,8 +155,8 @@ def _contact_block(problem: Problem, moved, curves: Curves, arcs_mm, columns, ve
     for (step, names), row in zip(columns, distance[1:]):
         held = names[frames] >= 0
         jacobian[np.flatnonzero(held), names[frames[held]]] = (row - distance[0])[frames[held]] / step
-    jacobian[:, BAR + REST] = -1.0
-    residual = distance[0, frames] - problem.reach_mm - vector[BAR + REST]
+    jacobian[:, REACH] = -1.0
+    residual = distance[0, frames] - problem.reach_mm - vector[REACH]
     return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
 
 
@@ -193,13 +171,13 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
     jacobian = np.zeros((1, problem.size))
     for k, (step, _) in enumerate(columns[:BAR + REST]):
         jacobian[0, k] = (distance[k + 1] - distance[0]) / step
-    jacobian[0, BAR + REST] = -1.0
-    residual = distance[:1] - problem.reach_mm - vector[BAR + REST]
+    jacobian[0, REACH] = -1.0
+    residual = distance[:1] - problem.reach_mm - vector[REACH]
     return residual / sigma_mm, jacobian / sigma_mm
 
 
 def _prior_block(problem: Problem, vector):
-    sigma = np.concatenate([[50.0, 50.0, 1.0, 1.0], REST_PRIOR_MM, REST_PRIOR_MM,
+    sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
                             [max(problem.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
@@ -207,7 +185,7 @@ def _prior_block(problem: Problem, vector):
 
 def robust_weights(linear: Linear, scale: float) -> np.ndarray:
     """Cauchy weights of line points; observations of touch and priors keep theirs."""
-    return np.where(linear.is_point, 1.0 / (1.0 + (linear.residual / scale) ** 2), 1.0)
+    return np.where(linear.is_point, cauchy_weights(linear.residual, scale), 1.0)
 
 
 def solve(problem: Problem, state: State, *,
@@ -226,7 +204,7 @@ def solve(problem: Problem, state: State, *,
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
-        known = linear.jacobian if np.all(np.abs(step[geometry]) < _ALIKE * _steps(problem)[geometry]) else None
+        known = linear.jacobian if np.all(np.abs(step[geometry]) < _ALIKE * steps(problem)[geometry]) else None
     else:
         jacobian = weighted_jacobian(problem, state, scales[-1], known)
     return state, np.linalg.inv(jacobian.T @ jacobian)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import BAR, REST, Problem, bar_axis, rest_shape
+from vision.fit.problem import REACH, Problem, bar_axis, rest_shape
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Wire
@@ -27,7 +27,7 @@ class FirstTouch:
 def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
     """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
     axis = bar_axis(problem, vector)
-    reach = problem.reach_mm + vector[..., 4 + 8]
+    reach = problem.reach_mm + vector[..., REACH]
     rest = rest_shape(vector)
     low = np.full(vector.shape[:-1], np.min(problem.motor_rad))
     high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
@@ -46,7 +46,7 @@ def touch_and_sigma(problem: Problem, vector, answer) -> tuple[float, float]:
 
     answer (size, size): covariance that the fit gives.
     """
-    geometry = np.arange(BAR + REST + 1)
+    geometry = np.arange(REACH + 1)
     here = float(first_touch(problem, vector).motor_rad)
     moved = first_touch(problem, vector + _STEP * np.eye(len(vector))[geometry]).motor_rad
     slope = (moved - here) / _STEP

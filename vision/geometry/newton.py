@@ -53,3 +53,8 @@ def _downhill(slope, curvature, longest) -> np.ndarray:
     values = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values)))
     step = -vectors @ ((vectors.T @ slope) / values)
     return step / max(1.0, np.max(np.abs(step) / longest))
+
+
+def cauchy_weights(residual: np.ndarray, scale: float) -> np.ndarray:
+    """Weights of least squares by which a residual counts as under a Cauchy distribution of this scale."""
+    return 1.0 / (1.0 + (residual / scale) ** 2)
