@@ -101,21 +101,22 @@ def _profile(added, place_mm: float, radius_px: float) -> Profile:
 @dataclass(frozen=True)
 class Evidence:
     """Minus twice the log evidence (k, g) of each profile's middle at each shift, the misfit (k,) per bin at its best,
-    and minus twice the log evidence (k,) that there is no bar."""
+    and both, (k,) each, of there being no bar."""
 
     shift_px: np.ndarray
     of_bar: np.ndarray
     misfit: np.ndarray
     of_none: np.ndarray
+    misfit_of_none: np.ndarray
 
 
 def evidence(seen: Sequence[Profile], shift_px, blur_px: float) -> Evidence:
     """Evidence of the bar's middle at shifts (g,) px, in each profile."""
-    of_bar, misfit, of_none = zip(*(_of_one(profile, shift_px, blur_px) for profile in seen))
-    return Evidence(np.asarray(shift_px), np.array(of_bar), np.array(misfit), np.array(of_none))
+    columns = zip(*(_of_one(profile, shift_px, blur_px) for profile in seen))
+    return Evidence(np.asarray(shift_px), *map(np.array, columns))
 
 
-def _of_one(profile: Profile, shift_px, blur_px: float) -> tuple[np.ndarray, float, float]:
+def _of_one(profile: Profile, shift_px, blur_px: float) -> tuple[np.ndarray, float, float, float]:
     contrast = _range(profile.light)
     weight = 1.0 / np.hypot(profile.sigma, _MODEL_SHARE * contrast)
     level = 3.0 * contrast + float(np.median(profile.light))
@@ -127,9 +128,10 @@ def _of_one(profile: Profile, shift_px, blur_px: float) -> tuple[np.ndarray, flo
     value, left = _marginal(_columns(profile, shift_px, blur_px), profile.light, weight, prior)
     behind = profile.behind - np.median(profile.behind)
     none = np.stack([np.ones_like(behind), profile.offset_px / _OUTSIDE_PX, behind], axis=-1)[None]
-    nothing, _ = _marginal(none, profile.light, weight, outside)
+    nothing, remains = _marginal(none, profile.light, weight, outside)
     in_grey = -2.0 * np.sum(np.log(weight * profile.by_grey))  # a density of grey levels, whatever the transfer curve
-    return value + in_grey, float(left[np.argmin(value)] / len(weight)), float(nothing[0] + in_grey)
+    misfits = np.array([left[np.argmin(value)], remains[0]]) / len(weight)
+    return value + in_grey, float(misfits[0]), float(nothing[0] + in_grey), float(misfits[1])
 
 
 def _range(light) -> float:

@@ -40,11 +40,13 @@ _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 @dataclass(frozen=True)
 class BarLine:
     """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; how far from there; and
-    how much more probable a bar is there than none: twice the log of the ratio."""
+    how much more probable a bar is there than none: twice the log of the ratio; and how clearly it is one, whatever its
+    contrast: the log of how many times worse the light is explained without it."""
 
     points: LinePoints
     moved_px: float
     for_bar: float
+    clearness: float
 
     @property
     def is_bar(self) -> bool:
@@ -71,12 +73,13 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
 @dataclass(frozen=True)
 class _Posterior:
     """Of shift and tilt over ARM_MM (2,), px, with one transfer curve and one blur: mean, covariance, minus twice the
-    log evidence, and how much more probable a bar is than none."""
+    log evidence, how much more probable a bar is than none, and by how much its misfit is less."""
 
     line: np.ndarray
     covariance: np.ndarray
     evidence: float
     for_bar: float
+    clearness: float
     gamma: float
     blur_px: float
 
@@ -92,13 +95,14 @@ def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances) -> BarL
     """The line by all transfer curves, each by its chance; looked for once more close by if it is known so well."""
     mean, covariance = _mixed(wide, chances)
     line, for_bar = line + mean, float(chances @ [one.for_bar for one in wide])
+    clearness = float(chances @ [one.clearness for one in wide])
     if np.sqrt(np.max(np.diag(covariance))) < _CLOSE_PX / _WITHIN_SIGMAS:
         likely = chances > _LEAST_CHANCE
         again = [_posterior(_moved(pieces, line), _CLOSE_PX, one.gamma, one.blur_px)
                  for one, is_likely in zip(wide, likely) if is_likely]
         mean, covariance = _mixed(again, chances[likely] / chances[likely].sum())
         line = line + mean
-    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar)
+    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar, clearness)
 
 
 def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +149,7 @@ def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | N
     away = lines - mean
     for_bar = float(np.sum((found.of_none - found.of_bar.min(axis=1)) / _temper(found)))
     return _Posterior(mean, np.einsum("ab,abi,abj->ij", chance, away, away) / total,
-                      float(misfit.min() - 2.0 * np.log(total)), for_bar, gamma, blur_px)
+                      float(misfit.min() - 2.0 * np.log(total)), for_bar, _clearness(found), gamma, blur_px)
 
 
 def _best_blur(seen: Sequence[Profile], shifts) -> float:
@@ -157,6 +161,11 @@ def _best_blur(seen: Sequence[Profile], shifts) -> float:
     if square <= 0.0:
         return _BLURS_PX[int(np.argmin(least))]
     return float(np.clip(np.exp(-0.5 * slope / square), *_BLURS_PX[near][::2]))
+
+
+def _clearness(found: Evidence) -> float:
+    """The log of how many times worse the light is explained without a bar: of the median stretch."""
+    return float(np.median(np.log(np.maximum(found.misfit_of_none, 1.0) / np.maximum(found.misfit, 1.0))))
 
 
 def _temper(found: Evidence) -> np.ndarray:

@@ -40,13 +40,10 @@ class SeenBar:
         return [name for name, line in self.lines.items() if line.is_bar]
 
     @property
-    def worth(self) -> float:
-        """How well all cameras see a bar there: the sum of the logs of each one's evidence.
-
-        Not of the evidence: each hypothesis has its own pixels, and a wrong one along something bright in one camera
-        has more evidence there than the bar has in both.
-        """
-        return float(sum(np.log1p(max(line.for_bar, 0.0)) for line in self.lines.values()))
+    def clearness(self) -> float:
+        """How clearly all cameras see a bar there. Not by the evidence: each hypothesis has its own pixels, and a wrong
+        one along something bright in one camera has more evidence there than the bar has in both."""
+        return sum(max(line.clearness, 0.0) for line in self.lines.values())
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
@@ -68,9 +65,9 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
-    likely = max((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.worth)
+    likely = max((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.clearness)
     farther = settled(likely.axis, FAR_PX)  # a bar whose rims are dark, found by its highlight
-    best = settled(max(likely, farther, key=lambda one: one.worth).axis, NEAR_PX)
+    best = settled(max(likely, farther, key=lambda one: one.clearness).axis, NEAR_PX)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
         return best
     found = [best] if best.seen_by else []
@@ -81,7 +78,7 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
     if not found:
         raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm))
     one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
-    return max(found[1:] if one_side else found, key=lambda one: one.worth)
+    return max(found[1:] if one_side else found, key=lambda one: one.clearness)
 
 
 def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
