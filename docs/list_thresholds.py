@@ -47,7 +47,7 @@ def _of_module(path: Path) -> Iterator[Number]:
         value = ast.unparse(node.value)
         is_number = [isinstance(n, ast.Constant) and type(n.value) in (int, float) for n in ast.walk(node.value)]
         named = ast.unparse(node.targets[0])
-        if any(is_number) and named.isupper() and not re.search(r"[\"']|range\(|zeros\(|full\(", value):
+        if any(is_number) and named.isupper() and not re.search(r"[\"']|\brange\(|zeros\(|full\(", value):
             place = path.relative_to(ROOT / "vision").as_posix()
             yield Number(place, named, value, _comment(lines, node))
 
