@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.bar.evidence import SATURATED, Evidence, Profile, evidence, profiles
+from vision.bar.evidence import FULL_SCALE, SATURATED, Evidence, Profile, evidence, profiles
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
@@ -60,8 +60,8 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
 
     wires_px: by camera lines (m, 2) where the wire lies in some frame. off_px: how far off the axis may be.
     """
-    pieces = {view.camera.name: bar_pieces(_mean_noise(view), view.mean, axis, radius_mm,
-                                           wires_px.get(view.camera.name, []), settings) for view in views}
+    pieces = {view.camera.name: _pieces(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings)
+              for view in views}
     pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}
     line = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
     reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
@@ -118,10 +118,14 @@ def _shows(pieces: Pieces) -> bool:
     return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED)) > _LEAST_SHOWN)
 
 
-def _mean_noise(view: View) -> View:
-    """The view with the noise of its mean picture."""
+def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
+    """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit."""
     share = 1.0 / min(len(view.frames), MEAN_OF)
-    return replace(view, noise=Noise(view.noise.floor * share, view.noise.gain * share))
+    quiet = replace(view, noise=Noise(view.noise.floor * share, view.noise.gain * share))
+    pieces = bar_pieces(quiet, view.mean, axis, radius_mm, wires_px, settings)
+    scale = FULL_SCALE / view.full_scale
+    return replace(pieces, grey=pieces.grey * scale, background=pieces.background * scale,
+                   weight=pieces.weight / scale)
 
 
 def _moved(pieces: Pieces, line) -> Pieces:

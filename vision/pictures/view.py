@@ -9,6 +9,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.pictures.pixel_noise import Noise
 
+_SCALE_OF = 3  # frames: what is saturated is so in all of them
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 
 
@@ -25,6 +26,12 @@ class View:
         """At most so many of the pictures, spread over all of them."""
         pictures = list(self.frames.values())
         return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
+
+    @cached_property
+    def full_scale(self) -> float:
+        """The brightest that the sensor can say, grey levels: of 8 bit, or of as many as the pictures show."""
+        brightest = max(float(np.max(picture)) for picture in self.some(_SCALE_OF))
+        return 2.0 ** max(8, int(np.ceil(np.log2(brightest + 1.0)))) - 1.0
 
     @cached_property
     def mean(self) -> np.ndarray:

@@ -1,10 +1,16 @@
 """The bar's line in pictures whose truth is known (tests/ladder/bar_lines.py, at small size)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.ladder.bar_lines import SCENES, errors_and_sigmas
+from tests.ladder.bar_lines import RADIUS_MM, SCENES, errors_and_sigmas, noisy_view
+from vision.bar.line import measure_bars
+from vision.geometry.contact import BarAxis
+from vision.geometry.settings import VisionSettings
+from vision.pictures.pixel_noise import Noise
 
 BARS = 4
 # Once in a thousand right sigmas the RMS of z lies outside. A bar's two points share its shading: counted once.
@@ -30,3 +36,15 @@ def test_before_an_even_wall_light_inside_the_bar_does_not_pull_its_line(bar, rn
     error, sigma = measured(bar, rng)
     assert np.sqrt(np.mean(error**2)) < 0.03
     assert np.sqrt(np.mean((error / sigma) ** 2)) < Z_HIGH
+
+
+def test_a_bar_in_pictures_of_twelve_bits_lies_where_it_does_in_eight(rng):
+    """Grey levels sixteen times as fine: the same light, and saturation is where the sensor's scale ends."""
+    view = noisy_view(*SCENES["painted, flat background"], 1.3, 0.4, rng)
+    frames = {k: 16.0 * grey for k, grey in view.frames.items()}
+    noise = Noise(256.0 * view.noise.floor, 0.0)
+    twelve = replace(view, frames=frames, background=16.0 * view.background, noise=noise)
+    axis = BarAxis(0.4 * np.array([-np.sin(1.3), np.cos(1.3), 0.0]), np.array([np.cos(1.3), np.sin(1.3), 0.0]))
+    one, other = (measure_bars([v], axis, RADIUS_MM, {}, VisionSettings())["c"].points for v in (view, twelve))
+    assert np.allclose(one.px, other.px, atol=0.1 * one.sigma_px.min())
+    assert np.allclose(one.sigma_px, other.sigma_px, rtol=0.1)
