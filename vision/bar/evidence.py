@@ -9,7 +9,7 @@ light does inside the bar, highlights and dark rims, then cannot pull its axis: 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -34,6 +34,7 @@ _MODEL_SHARE = 0.004  # of the contrast: what no such model explains
 _SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside an edge
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
 _TABLE_PX = 0.1
+_AT_ONCE = 5  # shifts: arrays that stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,59 @@ class Profile:
     by_grey: np.ndarray
     place_mm: float
     radius_px: float
+
+    @cached_property
+    def contrast(self) -> float:
+        """What the light varies by."""
+        return _range(self.light)
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """One over the sigma (b,) of what a model leaves."""
+        return 1.0 / np.hypot(self.sigma, _MODEL_SHARE * self.contrast)
+
+    @cached_property
+    def behind_weighted(self) -> np.ndarray:
+        """The picture without rods (b,), about its median, weighted."""
+        return self.weight * (self.behind - np.median(self.behind))
+
+    @cached_property
+    def in_grey(self) -> float:
+        """What makes minus twice the log evidence that of a density of grey levels, whatever the transfer curve."""
+        return float(-2.0 * np.sum(np.log(self.weight * self.by_grey)))
+
+    @cached_property
+    def _level(self) -> float:
+        """One sigma of how bright anything is."""
+        return 3.0 * self.contrast + float(np.median(self.light))
+
+    @cached_property
+    def _inside(self) -> float:
+        """What the light varies by on the bar, rims apart; of one too thin for that, over all of the profile."""
+        inner = np.abs(self.offset_px) < self.radius_px - _RIM_BLURRED_PX
+        return _range(self.light[inner]) if np.sum(inner) >= 5 else self.contrast
+
+    @cached_property
+    def of_outside(self) -> np.ndarray:
+        """Inverse prior covariance (3, 3) of level, slope and share of the background beyond an edge."""
+        return np.diag(np.array([self._level, _SLOPE_SHARE * self.contrast, 1.0]) ** -2.0)
+
+    @cached_property
+    def prior(self) -> np.ndarray:
+        """Inverse prior covariance (splines + 6, splines + 6) of the light on the rod and beyond both edges."""
+        steps = np.diff(np.eye(_SPLINES), axis=0) / (_STEP_SHARE * np.hypot(self._inside, _RIM_SHARE * self.contrast))
+        prior = np.zeros((_SPLINES + 6, _SPLINES + 6))
+        prior[:_SPLINES, :_SPLINES] = steps.T @ steps + np.eye(_SPLINES) / self._level**2
+        prior[_SPLINES:-3, _SPLINES:-3] = prior[-3:, -3:] = self.of_outside
+        return prior
+
+    @cached_property
+    def of_none(self) -> tuple[float, float]:
+        """Minus twice the log evidence that there is no rod, and the misfit per bin then."""
+        columns = [self.weight, self.weight * self.offset_px / _OUTSIDE_PX, self.behind_weighted,
+                   self.weight * self.light]
+        value, left = _marginal(_normal(np.stack(columns, axis=-1)[None]), self, self.of_outside)
+        return float(value[0]), float(left[0] / len(self.weight))
 
 
 def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> list[Profile]:
@@ -112,26 +166,16 @@ class Evidence:
 
 def evidence(seen: Sequence[Profile], shift_px, blur_px: float) -> Evidence:
     """Evidence of the bar's middle at shifts (g,) px, in each profile."""
-    columns = zip(*(_of_one(profile, shift_px, blur_px) for profile in seen))
-    return Evidence(np.asarray(shift_px), *map(np.array, columns))
+    of_bar, misfit = zip(*(_of_bar(profile, shift_px, blur_px) for profile in seen))
+    of_none = np.array([one.of_none for one in seen]).T
+    return Evidence(np.asarray(shift_px), np.array(of_bar), np.array(misfit), *of_none)
 
 
-def _of_one(profile: Profile, shift_px, blur_px: float) -> tuple[np.ndarray, float, float, float]:
-    contrast = _range(profile.light)
-    weight = 1.0 / np.hypot(profile.sigma, _MODEL_SHARE * contrast)
-    level = 3.0 * contrast + float(np.median(profile.light))
-    outside = np.diag(np.array([level, _SLOPE_SHARE * contrast, 1.0]) ** -2.0)
-    steps = np.diff(np.eye(_SPLINES), axis=0) / (_STEP_SHARE * np.hypot(_inside(profile), _RIM_SHARE * contrast))
-    prior = np.zeros((_SPLINES + 6, _SPLINES + 6))
-    prior[:_SPLINES, :_SPLINES] = steps.T @ steps + np.eye(_SPLINES) / level**2
-    prior[_SPLINES:-3, _SPLINES:-3] = prior[-3:, -3:] = outside
-    value, left = _marginal(_columns(profile, shift_px, blur_px), profile.light, weight, prior)
-    behind = profile.behind - np.median(profile.behind)
-    none = np.stack([np.ones_like(behind), profile.offset_px / _OUTSIDE_PX, behind], axis=-1)[None]
-    nothing, remains = _marginal(none, profile.light, weight, outside)
-    in_grey = -2.0 * np.sum(np.log(weight * profile.by_grey))  # a density of grey levels, whatever the transfer curve
-    misfits = np.array([left[np.argmin(value)], remains[0]]) / len(weight)
-    return value + in_grey, float(misfits[0]), float(nothing[0] + in_grey), float(misfits[1])
+def _of_bar(profile: Profile, shift_px, blur_px: float) -> tuple[np.ndarray, float]:
+    groups = np.array_split(shift_px, -(-len(shift_px) // _AT_ONCE))
+    normal = np.concatenate([_normal(_columns(profile, some, blur_px)) for some in groups])
+    value, left = _marginal(normal, profile, profile.prior)
+    return value, float(left[np.argmin(value)] / len(profile.weight))
 
 
 def _range(light) -> float:
@@ -139,38 +183,45 @@ def _range(light) -> float:
     return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))), 1.0 / FULL_SCALE)
 
 
-def _inside(profile: Profile) -> float:
-    """What the light varies by on the bar, rims apart; of one too thin for that, over all of the profile."""
-    inner = np.abs(profile.offset_px) < profile.radius_px - _RIM_BLURRED_PX
-    return _range(profile.light[inner] if np.sum(inner) >= 5 else profile.light)
+def _normal(columns) -> np.ndarray:
+    """Products (g, n, n) of columns (g, b, n)."""
+    return np.swapaxes(columns, -1, -2) @ columns
 
 
-def _marginal(columns, light, weight, prior) -> tuple[np.ndarray, np.ndarray]:
-    """Minus twice the log evidence (g,), but for what does not depend on the model, and chi² (g,), of models with
-    columns (g, b, n) and a Gaussian prior with this inverse covariance (n, n)."""
-    weighted = columns * weight[:, None]
-    turned = np.swapaxes(weighted, -1, -2)
-    root = np.linalg.cholesky(turned @ weighted + prior)
-    inner = np.linalg.solve(root, turned @ (light * weight)[:, None])[..., 0]
-    chi2 = np.sum((light * weight) ** 2) - np.sum(inner**2, axis=-1)
-    widths = np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
-    return chi2 + 2.0 * widths - np.linalg.slogdet(prior)[1], chi2
+def _marginal(normal, profile: Profile, prior) -> tuple[np.ndarray, np.ndarray]:
+    """Minus twice the log evidence (g,), and chi² (g,), of models with these products (g, n, n) of their weighted
+    columns, the light the last of them, and a Gaussian prior with this inverse covariance (n - 1, n - 1).
+
+    The light's own place in the root of the bordered normal equations is what the others leave of it.
+    """
+    normal[:, :-1, :-1] += prior
+    normal[:, -1, -1] += 1.0  # where nothing is left, a root yet
+    root = np.diagonal(np.linalg.cholesky(normal), axis1=-2, axis2=-1)
+    chi2 = root[:, -1] ** 2 - 1.0
+    widths = 2.0 * np.sum(np.log(root[:, :-1]), axis=-1)
+    return chi2 + widths - np.linalg.slogdet(prior)[1] + profile.in_grey, chi2
 
 
 def _columns(profile: Profile, shift_px, blur_px: float) -> np.ndarray:
-    """Blurred pictures (g, b, splines + 6) of what the light is made of, for middles at these shifts (g,)."""
-    radius = profile.radius_px
+    """Blurred pictures (g, b, splines + 7) of what the light is made of, for middles at these shifts (g,), and the
+    light; weighted."""
+    radius, weight = profile.radius_px, profile.weight
     away = profile.offset_px - np.asarray(shift_px)[:, None]
+    columns = np.empty((*away.shape, _SPLINES + 7))
     first, table = _round_the_rod(round(radius, 1), round(blur_px, 2))
     place = np.clip((away - first) / _TABLE_PX, 0.0, len(table) - 1.001)
-    before = place.astype(int)
-    part = (place - before)[..., None]
-    inside = (1.0 - part) * table[before] + part * table[before + 1]
-    behind = np.broadcast_to(profile.behind - np.median(profile.behind), away.shape)
-    sides = [share * of for share, edge in ((ndtr((-radius - away) / blur_px), away + radius),
-                                            (ndtr((away - radius) / blur_px), away - radius))
-             for of in (np.ones_like(away), edge / _OUTSIDE_PX, behind)]
-    return np.concatenate([inside, np.stack(sides, axis=-1)], axis=-1)
+    before = place.astype(np.intp)
+    part = weight * (place - before)
+    columns[..., :_SPLINES] = (weight - part)[..., None] * table.take(before, axis=0)
+    columns[..., :_SPLINES] += part[..., None] * table.take(before + 1, axis=0)
+    for side, first_column in ((-1.0, _SPLINES), (1.0, _SPLINES + 3)):
+        beyond = side * away - radius
+        share = ndtr(beyond / blur_px)
+        columns[..., first_column] = weight * share
+        columns[..., first_column + 1] = columns[..., first_column] * beyond / _OUTSIDE_PX
+        columns[..., first_column + 2] = share * profile.behind_weighted
+    columns[..., -1] = weight * profile.light
+    return columns
 
 
 @lru_cache(maxsize=64)

@@ -31,6 +31,7 @@ _BETA_RAD, _PSI_RAD = np.radians(np.arange(-84.0, 85.0, 6.0)), np.radians([-8.0,
 _X_STEP, _TOUCH_STEP = 0.7, 0.8  # of the bar's radius, the second along the arc in the middle of the whisker
 _STARTS, _LESS, _KEPT = 24, 8, 4  # how many hypotheses go on, look by look
 _MOST_CLIMBS, _SHRINKS = 20, 2
+_AT_ONCE = 1000  # hypotheses: arrays that stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -128,25 +129,34 @@ def both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) -
 
     counts: see _COUNTS.
     """
-    field, camera = seen.field, seen.camera
+    groups = np.array_split(np.arange(len(axis.point_mm)), -(-len(axis.point_mm) // _AT_ONCE))
+    return np.concatenate([_both_edges(BarAxis(axis.point_mm[some], axis.direction[some]), seen, radius_mm, counts,
+                                       along_mm) for some in groups])
+
+
+def _both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) -> np.ndarray:
+    camera = seen.camera
     along = axis.point_mm[:, None] + along_mm[:, None] * axis.direction[:, None]
     sideways = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
     sideways = radius_mm * sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
     px = camera.project(np.stack([along, along + sideways[:, None]]).reshape(-1, 3)).reshape(2, *along.shape[:2], 2)
-    middle, aside = px[0] / HALF, (px[1] - px[0]) / HALF
-    across = np.stack([_across(field, middle + at * aside) for at in np.concatenate([_AT, -_AT])])
+    lines = np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 1, 2) / HALF  # middle and aside, by x and y
+    tangents = np.gradient(lines, axis=-1)
+    across = np.stack([_across(seen, *(one[0] + at * one[1] for one in (lines, tangents)))
+                       for at in np.concatenate([_AT, -_AT])])
     sides = across.reshape(2, len(_AT), -1) * counts[:, None]
     best = np.max(sides, axis=1) + np.min(sides, axis=1)
     return np.sqrt(np.prod(np.maximum(best, 0.0), axis=0))
 
 
-def _across(field, px) -> np.ndarray:
-    """Mean (n,) of the edges along lines (n, t, 2) of pixels."""
-    x, y = np.moveaxis(np.gradient(px, axis=1), -1, 0)
-    column, row = np.moveaxis(np.round(px), -1, 0)
-    inside = (column >= 0) & (row >= 0) & (column < field.shape[2]) & (row < field.shape[1])
-    place = np.where(inside, row * field.shape[2] + column, 0).astype(np.intp)
-    xx, xy, yy = (part.ravel()[place] for part in field)
+def _across(seen: Clear, px, tangent) -> np.ndarray:
+    """Mean (n,) of the edges along lines of pixels with these tangents, both (2, n, t): by x and y."""
+    height, width = seen.field.shape[1:]
+    x, y = tangent
+    column, row = np.round(px)
+    inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+    place = np.where(inside, row * width + column, 0).astype(np.intp)
+    xx, xy, yy = (part.take(place) for part in seen.field)
     across = (xx * y**2 - 2.0 * xy * x * y + yy * x**2) / (x**2 + y**2)
     return np.mean(np.where(inside, across, 0.0), axis=-1)
 

@@ -7,6 +7,7 @@ taken for it, the posterior is wide or has several peaks, and the line's sigma i
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -157,14 +158,19 @@ def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | N
 
 
 def _best_blur(seen: Sequence[Profile], shifts) -> float:
-    """The lens blur, px, with the most evidence: of a few, then between them by a parabola of their logarithms."""
-    least = [float(np.sum(evidence(seen, shifts, blur).of_bar.min(axis=1))) for blur in _BLURS_PX]
-    best = min(max(int(np.argmin(least)), 1), len(least) - 2)
-    near = slice(best - 1, best + 2)
-    square, slope, _ = np.polyfit(np.log(_BLURS_PX[near]), least[near], 2)
+    """The lens blur, px, with the most evidence: of a few, downhill from the middle one, then between them by a
+    parabola of their logarithms."""
+    least = cache(lambda k: float(np.sum(evidence(seen, shifts, _BLURS_PX[k]).of_bar.min(axis=1))))
+    lowest, middle = len(_BLURS_PX) // 2, 0
+    while middle != min(max(lowest, 1), len(_BLURS_PX) - 2):
+        middle = min(max(lowest, 1), len(_BLURS_PX) - 2)
+        near = range(middle - 1, middle + 2)
+        lowest = min(near, key=least)
+    blurs = [_BLURS_PX[k] for k in near]
+    square, slope, _ = np.polyfit(np.log(blurs), [least(k) for k in near], 2)
     if square <= 0.0:
-        return _BLURS_PX[int(np.argmin(least))]
-    return float(np.clip(np.exp(-0.5 * slope / square), *_BLURS_PX[near][::2]))
+        return _BLURS_PX[lowest]
+    return float(np.clip(np.exp(-0.5 * slope / square), blurs[0], blurs[-1]))
 
 
 def _clearness(found: Evidence) -> float:
