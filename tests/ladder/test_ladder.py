@@ -116,4 +116,4 @@ def test_the_last_rung_is_a_path_traced_scene():
     """The scene in fixtures, as tests/ladder/path_traced.py sees it; z of four quantities beyond 4 is one in 4000."""
     row = row_of(*path_traced.see_scene(0, path_traced.ROOT / "fixtures" / "scenes" / "ring"))
     assert not path_traced.odd(row)
-    assert abs(row["d_x_mm_error"]) < 0.05
+    assert abs(row["d_x_mm_error"]) < 0.1
