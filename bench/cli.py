@@ -150,8 +150,8 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    names = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "estimators")
-    names = (*names, "gauges_from_all")
+    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s")
+    names = (*numbers, "estimators", "gauges_from_all")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])

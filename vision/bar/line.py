@@ -18,8 +18,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces
 from vision.lines.points import LinePoints
-from vision.pictures.pixel_noise import Noise
-from vision.pictures.view import MEAN_OF, View
+from vision.pictures.view import View
 
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 # Lines are looked for as far off, at least, then once more close by if they are known so well.
@@ -68,7 +67,8 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
     wide = {name: [_posterior(_moved(some, line[name]), reach_px, gamma) for gamma in _GAMMAS]
             for name, some in pieces.items()}
-    return {name: _bar_line(some, line[name], wide[name], _chances(wide.values())) for name, some in pieces.items()}
+    chances = _chances(wide.values()) if wide else None
+    return {name: _bar_line(some, line[name], wide[name], chances) for name, some in pieces.items()}
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,7 @@ def _shows(pieces: Pieces) -> bool:
 
 def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
     """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit."""
-    share = 1.0 / min(len(view.frames), MEAN_OF)
-    quiet = replace(view, noise=Noise(view.noise.floor * share, view.noise.gain * share))
+    quiet = replace(view, noise=view.noise.times(view.mean_share))
     pieces = bar_pieces(quiet, view.mean, axis, radius_mm, wires_px, settings)
     scale = FULL_SCALE / view.full_scale
     return replace(pieces, grey=pieces.grey * scale, background=pieces.background * scale,

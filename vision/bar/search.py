@@ -17,8 +17,7 @@ from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
 from vision.pictures.change import HALF
-from vision.pictures.pixel_noise import Noise
-from vision.pictures.view import MEAN_OF, View
+from vision.pictures.view import View
 
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
@@ -88,14 +87,8 @@ def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSett
 
 
 def of_mean(view: View) -> View:
-    """The view with the noise of its mean picture."""
-    return replace(view, noise=_quieter(view.noise, min(len(view.frames), MEAN_OF)))
-
-
-def _quieter(noise: Noise, count: int) -> Noise:
-    """Noise of a mean of `count` frames beside one picture of the background."""
-    share = 1.0 / count + 1.0
-    return Noise(noise.floor * share, noise.gain * share)
+    """The view with the noise of its mean picture beside one picture of the background."""
+    return replace(view, noise=view.noise.times(view.mean_share + 1.0))
 
 
 def _median_picture(view: View) -> np.ndarray:

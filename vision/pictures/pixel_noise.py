@@ -12,6 +12,10 @@ class Noise:
     floor: float
     gain: float
 
+    def times(self, share: float) -> "Noise":
+        """Noise of so many times the variance."""
+        return Noise(self.floor * share, self.gain * share)
+
     def sigma(self, grey: np.ndarray) -> np.ndarray:
         """Standard deviation at the grey level, never under a third of a level (rounding)."""
         return np.sqrt(np.maximum(self.floor + self.gain * np.maximum(grey, 0.0), 1.0 / 12.0))

@@ -33,6 +33,11 @@ class View:
         brightest = max(float(np.max(picture)) for picture in self.some(_SCALE_OF))
         return 2.0 ** max(8, int(np.ceil(np.log2(brightest + 1.0)))) - 1.0
 
+    @property
+    def mean_share(self) -> float:
+        """What part of one picture's variance the mean has."""
+        return 1.0 / min(len(self.frames), MEAN_OF)
+
     @cached_property
     def mean(self) -> np.ndarray:
         """Mean (h, w) of the pictures, of MEAN_OF at most."""
