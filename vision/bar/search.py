@@ -42,7 +42,7 @@ class SeenBar:
     def clearness(self) -> float:
         """How clearly all cameras see a bar there. Not by the evidence: each hypothesis has its own pixels, and a wrong
         one along something bright in one camera has more evidence there than the bar has in both."""
-        return sum(max(line.clearness, 0.0) for line in self.lines.values())
+        return sum(max(line.clearness, 0.0) for line in self.lines.values() if line.is_bar)
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
