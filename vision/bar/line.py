@@ -56,7 +56,12 @@ class BarLine:
     @property
     def is_bar(self) -> bool:
         """Whether what is seen is a bar."""
-        return self.for_bar > _LEAST_EVIDENCE and self.unresolved < _MOST_UNRESOLVED
+        return self.for_bar > _LEAST_EVIDENCE
+
+    @property
+    def has_edges(self) -> bool:
+        """Whether that bar's edges are seen, too: it lies somewhere among the lines that were possible."""
+        return self.is_bar and self.unresolved < _MOST_UNRESOLVED
 
 
 def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
