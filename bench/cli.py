@@ -60,7 +60,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_simulate, _add_info):
+    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 
@@ -124,6 +124,7 @@ def _add_evaluate(verbs) -> None:
         help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
         "else to half a frame)",
     )
+    _add_seeing(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -137,7 +138,19 @@ def _add_evaluate(verbs) -> None:
         metavar="MODULE:FUNCTION",
         help="one of your own, importable from here; may be given several times",
     )
+    verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
+    verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables and summary alone")
     _add_workers(verb)
+
+
+def _add_seeing(verb: argparse.ArgumentParser) -> None:
+    how = verb.add_mutually_exclusive_group()
+    how.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
+    )
+    how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
 def _evaluate(options: argparse.Namespace) -> int:
@@ -151,12 +164,46 @@ def _evaluate(options: argparse.Namespace) -> int:
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s")
-    names = (*numbers, "estimators", "gauges_from_all")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given["seeing"] = _seeing(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
     progress = sys.stderr.isatty()
     return evaluate(options.session, options.out, Settings(**given), workers=options.workers, progress=progress)
+
+
+def _seeing(options: argparse.Namespace):
+    """The settings of `--preset` or `--settings`."""
+    from bench.trials.seeing import STANDARD, by_preset, from_file
+
+    return from_file(options.settings) if options.settings else by_preset(options.preset or STANDARD)
+
+
+def _add_tradeoff(verbs) -> None:
+    verb = _add(
+        verbs,
+        "tradeoff",
+        _tradeoff,
+        "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
+        "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
+    )
+    _add_session(verb)
+    _add_out(verb, "OUT", "folder for the table, the plot and the settings files")
+    verb.add_argument("--trials", default="*", metavar="PATTERN", help="only trials of such names (default: all)")
+    verb.add_argument("--repeats", type=_count, default=2, metavar="N", help="how often each is timed (default 2)")
+
+
+def _tradeoff(options: argparse.Namespace) -> int:
+    from bench.base.workers import single_thread
+
+    single_thread()
+    from bench.base.environment import check_environment
+    from bench.tradeoff import tradeoff
+
+    check_environment()
+    progress = sys.stderr.isatty()
+    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, progress=progress)
 
 
 def _add_calibrate(verbs) -> None:

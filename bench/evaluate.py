@@ -1,9 +1,12 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
+from collections.abc import Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 
 from bench.base.atomic import lock_output
 from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.friction.error_map import write_error_map
@@ -13,9 +16,12 @@ from bench.friction.tables import friction_of, write_friction
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation
 from bench.session.check import checked_session
+from bench.session.trial import Trial
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
 from bench.trials.estimates import estimators
 from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
+
+_MOST_NAMED = 8
 
 
 def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False) -> int:
@@ -24,10 +30,12 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
     doubts = Doubts()
     session = checked_session(session_path, doubts)
     trials = judged(session)
+    _require_some(trials, settings)
     with lock_output(out), Workers(workers, progress) as pool:
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
-        results = tuple(with_runs(evaluated(units, pool), session.whisker, settings))
+        chosen = [unit for unit in units if settings.takes(unit.trial.name)]
+        results = tuple(with_runs(evaluated(chosen, pool), session.whisker, settings))
         shared = shared_touch(results)
         doubts.notes += filter(None, [shared_doubt(results, shared)])
         results = with_shared_touch(results, shared)
@@ -38,16 +46,33 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         return report(Evaluation(session, out, settings, results, friction, gauges, *notes), pool)
 
 
+def _require_some(trials: Sequence[Trial], settings: Settings) -> None:
+    """Raises BadInput where the settings take none of the trials, or ask a camera that has no pictures of any."""
+    if not any(settings.takes(trial.name) for trial in trials):
+        names = _some(trial.name for trial in trials)
+        raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
+    there = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
+    for name in settings.seeing.cameras:
+        if name not in there:
+            raise BadInput(f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some(there)}")
+
+
+def _some(names: Iterable[str]) -> str:
+    first = list(islice(names, _MOST_NAMED + 1))
+    return ", ".join([*first[:_MOST_NAMED], *["…"] * (len(first) > _MOST_NAMED)])
+
+
 def report(evaluation: Evaluation, pool: Workers) -> int:
-    """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
+    """Figures where they are wanted, and summary; returns the exit code. Results of a synthetic session are scored."""
     from bench.report.figures import write_figures
     from bench.report.score import score
     from bench.report.summary.page import write_summary
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
+    drawn = evaluation.settings.figures
     figures = [
-        *write_figures(evaluation, pool),
-        *write_explained(out, results, evaluation.session.whisker),
-        *write_error_map(out, results, evaluation.friction, alpha_est_rad),
+        *(write_figures(evaluation, pool) if drawn else []),
+        *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
+        *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
     return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures)

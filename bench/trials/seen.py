@@ -1,7 +1,7 @@
 """The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
-from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
 from vision.truth.records import WhiskTruth
 
@@ -57,7 +56,7 @@ def _see(
     places = [times.frames_in(signals, stroke) for stroke in strokes]
     back = _backwards(signals, times)
     truth = observe_trial(
-        {name: pictures for name, pictures in frames.items() if name not in moved},
+        {name: pictures for name, pictures in frames.items() if name not in moved and settings.seeing.asks(name)},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
         [*places, *back],
@@ -65,7 +64,7 @@ def _see(
         wire,
         Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
         calibration.background,
-        VisionSettings(clock_sigma_s=clock_sigma_s),
+        replace(settings.seeing.vision, clock_sigma_s=clock_sigma_s),
     )
     return SeenTrial(
         tuple(whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks[: len(places)]),

@@ -87,7 +87,7 @@ class Unit:
     @property
     def hash(self) -> str:
         """Hash of all that the result depends on."""
-        made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
+        made_from = self.drift_rate, self.gauges, self.settings.estimated(), self.settings.own_code()
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
     def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":

@@ -10,7 +10,7 @@ from bench.report.summary.errors import error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import gauges_of_all, run_lines, verdict
+from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, verdict
 from bench.trials.compare import judge
 
 DONE, DOUBTFUL = 0, 1
@@ -36,6 +36,7 @@ def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str
     return [
         *verdict(evaluation.session, results, judged, settings, len(doubtful)),
         *gauges_of_all(evaluation.gauges),
+        *looked_at(settings.seeing),
         "",
         *_titled("Truth, from the pictures (± one sigma)", truth),
         *_titled("Clocks", clock_lines(results)),

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from bench.base.drawing import label_of
-from bench.base.settings import Settings
+from bench.base.settings import Seeing, Settings
 from bench.friction.runs import FITTED, RUNS, SEEN
 from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial import TrialResult, whisks
@@ -52,6 +52,13 @@ def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
             f"Gauges from {FROM_ALL}: {judged} of {len(gauges.without)} trials that served are judged, each by gauges "
             "fitted without it; no estimate by gauges that its own trial calibrated is in the verdict."
         )
+
+
+def looked_at(seeing: Seeing) -> Iterator[str]:
+    """How hard pictures were looked at, where that is not the standard."""
+    if seeing != Seeing():
+        asked = f", cameras {', '.join(seeing.cameras)}" if seeing.cameras else ""
+        yield f"Pictures were looked at by the settings {seeing.name}{asked}."
 
 
 def _measured(judged: Sequence[Judged]) -> list[Judged]:
