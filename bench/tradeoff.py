@@ -77,11 +77,11 @@ def tradeoff(path: Path, out: Path, *, trials: str = "*", repeats: int = 2, prog
     """
     doubts, settings = Doubts(), Settings(trials=trials)
     session = checked_session(path, doubts)
+    if not any(settings.takes(trial.name) and trial.camera_sources for trial in judged(session)):
+        raise BadInput(f"--trials {trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:
         _, units = placed_units(session, judged(session), out, settings, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name) and unit.trial.camera_sources]
-        if not chosen:
-            raise BadInput(f"--trials {trials}: no trial with pictures has such a name")
         asked = list(ladder(tuple(chosen[0].trial.camera_sources)))
         each = tqdm(asked, desc="settings", disable=not progress, leave=False)
         trades = _against_truth(session, chosen, [_timed(chosen, seeing, repeats) for seeing in each])
@@ -126,7 +126,7 @@ def _clocked(units: Sequence[Unit], settings: Settings) -> tuple[list[SeenTrial]
 
 def _against_truth(session: Session, units: Sequence[Unit], trades: Sequence[Trade]) -> list[Trade]:
     """With errors: against the known truth, or the finest setting."""
-    finest = next(trade for trade in trades if trade.seeing.name == "fine").d_x_mm
+    finest = trades[len(PRESETS) - 1].d_x_mm  # the last rung
     counts = [len(forward_strokes(read_signals(unit.trial))) for unit in units]
     known = [truth_of(session, u.trial.name, number) for u, count in zip(units, counts) for number in range(count)]
     true = np.array([np.nan if truth is None else truth["d_x_mm"] for truth in known], dtype=float)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bench import tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import error_map, explained, tables
@@ -15,6 +16,7 @@ from bench.report import assembly, figure_8
 from bench.rig.simulate import simulate
 from bench.session import manifest
 from bench.theory import model_error_maps
+from bench.trials import seeing
 from tests.scenes.formats import DOCUMENT, documented, keys
 from tests.scenes.rig_sessions import protocol_file
 
@@ -29,6 +31,7 @@ TOML = {
     "[gauges]": manifest.GaugeKeys,
     "[trial]": manifest.TrialKeys,
     "gauges.toml": FileKeys,
+    "[seeing]": seeing.SeeingKeys,
 }
 CSV = {
     "whisks.csv": assembly.WHISK_COLUMNS,
@@ -42,6 +45,7 @@ CSV = {
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
+    "tradeoff.csv": tradeoff.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 
