@@ -150,6 +150,12 @@ def _add_seeing(verb: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
     )
+    how.add_argument(
+        "--accuracy-mm",
+        type=float,
+        metavar="X",
+        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
+    )
     how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
@@ -163,7 +169,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s")
+    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
     names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     given["seeing"] = _seeing(options)

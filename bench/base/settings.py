@@ -37,8 +37,8 @@ class Settings:
     cutoff_Hz: of the zero-phase low-pass; None goes by speed. estimators: "module:function" of one's own.
     clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
     (`FrameTimes.clock_sigma_s`). gauges_from_all: every trial that can, calibrates the gauges. trials: pattern of the
-    names of those that are evaluated. figures: whether any is drawn. seeing: how hard pictures are looked at. Raises
-    BadInput out of range.
+    names of those that are evaluated. figures: whether any is drawn. seeing: how hard pictures are looked at; with
+    accuracy_mm each whisk by the first preset by which d_x's stated sigma is no more. Raises BadInput out of range.
     """
 
     theta_deg: float = 3.0
@@ -51,6 +51,7 @@ class Settings:
     trials: str = "*"
     figures: bool = True
     seeing: Seeing = field(default_factory=Seeing)
+    accuracy_mm: float | None = None
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)
@@ -59,6 +60,8 @@ class Settings:
             _require("--alpha-est-sigma-deg", self.alpha_est_sigma_deg, 0.0, 45.0)
         if self.cutoff_Hz is not None:
             _require("--cutoff-Hz", self.cutoff_Hz, 0.0, 1e5, above=True)
+        if self.accuracy_mm is not None:
+            _require("--accuracy-mm", self.accuracy_mm, 0.0, 100.0, above=True)
         if self.clock_sigma_s is not None:
             _require("--clock-sigma-s", self.clock_sigma_s, 0.0, 10.0)
 
@@ -83,7 +86,7 @@ class Settings:
 
     def seen(self) -> list:
         """The settings that what is seen depends on."""
-        return [self.theta_deg, self.clock_sigma_s, self.seeing.vision, self.seeing.cameras]
+        return [self.theta_deg, self.clock_sigma_s, self.seeing.vision, self.seeing.cameras, self.accuracy_mm]
 
     def estimated(self) -> list:
         """The settings that a trial's whole result depends on."""

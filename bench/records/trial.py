@@ -69,7 +69,7 @@ class SeenWhisk:
 
     The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
     moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
-    (`bench.trials.clocks`).
+    (`bench.trials.clocks`). looked: preset or settings file by which the pictures were looked at.
     """
 
     whisk: int
@@ -89,6 +89,7 @@ class SeenWhisk:
     deflection: Deflection | None = None
     overlay: dict[str, Drawing] = field(default_factory=dict)
     touch_shared_rad: float = 0.0
+    looked: str = ""
 
     @property
     def has_truth(self) -> bool:

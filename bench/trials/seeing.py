@@ -8,7 +8,7 @@ import msgspec
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from bench.base.settings import Seeing
+from bench.base.settings import Seeing, Settings
 from bench.session.plausible import Window
 from bench.session.strict_toml import Keys, as_keys, read_toml, values
 from vision.geometry.settings import VisionSettings
@@ -67,6 +67,13 @@ def from_file(path: Path) -> Seeing:
     given = {name: value for name, value in values(keys, ("preset", "cameras")).items() if value is not None}
     base = by_preset(keys.preset)
     return Seeing(path.name if given else base.name, replace(base.vision, **given), keys.cameras)
+
+
+def rungs(settings: Settings) -> list[Seeing]:
+    """What is tried on a whisk, one after another until its d_x is known as well as asked."""
+    if settings.accuracy_mm is None:
+        return [settings.seeing]
+    return [replace(by_preset(name), cameras=settings.seeing.cameras) for name in PRESETS]
 
 
 def as_toml(seeing: Seeing) -> str:

@@ -36,7 +36,7 @@ def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str
     return [
         *verdict(evaluation.session, results, judged, settings, len(doubtful)),
         *gauges_of_all(evaluation.gauges),
-        *looked_at(settings.seeing),
+        *looked_at(results, settings),
         "",
         *_titled("Truth, from the pictures (± one sigma)", truth),
         *_titled("Clocks", clock_lines(results)),

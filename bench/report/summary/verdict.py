@@ -1,5 +1,6 @@
 """The verdict: how wrong each estimator is, over the measured whisks."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
@@ -54,9 +55,16 @@ def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
         )
 
 
-def looked_at(seeing: Seeing) -> Iterator[str]:
+def looked_at(results: Iterable[TrialResult], settings: Settings) -> Iterator[str]:
     """How hard pictures were looked at, where that is not the standard."""
-    if seeing != Seeing():
+    seeing, looked = settings.seeing, [seen for _, seen, _ in whisks(results) if seen.looked]
+    if settings.accuracy_mm is not None:
+        counts = Counter(seen.looked for seen in looked)
+        above = sum(not seen.d_x_mm.sigma <= settings.accuracy_mm for seen in looked)
+        by = ", ".join(f"{name} {count}" for name, count in counts.items())
+        above_it = f"{above} of {len(looked)} whisks are above."
+        yield f"Looked at until d_x's sigma is {settings.accuracy_mm:g} mm or less: {by}; {above_it}"
+    elif seeing != Seeing():
         asked = f", cameras {', '.join(seeing.cameras)}" if seeing.cameras else ""
         yield f"Pictures were looked at by the settings {seeing.name}{asked}."
 
