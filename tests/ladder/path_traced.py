@@ -56,11 +56,13 @@ def see_scene(number: int, folder: Path, settings: VisionSettings = _STANDARD) -
     told = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
     frames = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)
     slip = np.where(frames["contact"] > 0, frames["slip_mm"], np.nan)
-    truth = Truth(np.radians(told["touch_deg"]), told["d_x_mm"], np.radians(told["beta_deg"]), slip)
-    scene = PathTraced(number, truth, tuple(cameras), float(np.degrees(widest_angle_rad(cameras, axis))), motor_rad)
     (whisk,) = observe_trial({view.camera.name: view.frames for view in views}, frames["time_s"], motor_rad,
                              [slice(0, len(motor_rad))], cameras, rods.wire, rods.bar,
                              {view.camera.name: view.background for view in views}, settings).whisks
+    seen = slice(None) if whisk.frames is None else whisk.frames.index
+    truth = Truth(np.radians(told["touch_deg"]), told["d_x_mm"], np.radians(told["beta_deg"]), slip[seen])
+    plane_angle_deg = float(np.degrees(widest_angle_rad(cameras, axis)))
+    scene = PathTraced(number, truth, tuple(cameras), plane_angle_deg, motor_rad[seen])
     if np.isnan(whisk.d_x_mm.value):
         return scene, Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
