@@ -40,14 +40,17 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
 
 def report(evaluation: Evaluation, pool: Workers) -> int:
     """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
+    from bench.report.against_theta import write_against_theta
     from bench.report.figures import write_figures
     from bench.report.score import score
     from bench.report.summary.page import write_summary
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
+    by_theta, drawn = write_against_theta(out, results)
     figures = [
         *write_figures(evaluation, pool),
+        *drawn,
         *write_explained(out, results, evaluation.session.whisker),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad),
     ]
-    return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures)
+    return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta)

@@ -154,13 +154,26 @@ class EstimateRow:
 
 
 @dataclass(frozen=True, eq=False)
+class FeltAt:
+    """What is felt at one pushing angle, and the estimates of it; the fields are those of `FeltWhisk`."""
+
+    theta_rad: float
+    m_y_Nmm: Value
+    m_z_Nmm: Value
+    theta_sigma_rad: float
+    covariance_at: np.ndarray
+    theta_moment_covariance_at: np.ndarray
+    estimates: tuple[EstimateRow, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class FeltWhisk:
     """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle, phases, estimates.
 
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
     (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
     those of the seen shape, 2 degrees of freedom; apart: they are not those. one_factor: estimates with one factor a
-    channel.
+    channel. by_theta: moments and estimates at other pushing angles, up to the stroke's end.
     """
 
     whisk: int = 0
@@ -178,6 +191,7 @@ class FeltWhisk:
     phases: Phases = NO_PHASES
     estimates: tuple[EstimateRow, ...] = ()
     one_factor: tuple[EstimateRow, ...] = ()
+    by_theta: tuple[FeltAt, ...] = ()
 
     @property
     def has_moments(self) -> bool:

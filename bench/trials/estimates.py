@@ -12,7 +12,7 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import GAUGE_DELAY_S, Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
-from bench.records.trial import EstimateRow, FeltWhisk
+from bench.records.trial import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
@@ -26,6 +26,9 @@ from vision.truth.value import Value
 # 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
 OBJECT_REACH_MM = 3.5
 TILT_SIGMA_RAD = np.radians(5.0)
+# Pushing angles at which a run says how error and sigma go with θ; steps of a fifth or less of θ between 1° and 10°.
+THETAS_DEG = (0.2, 0.3, 0.5, 0.7, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0,
+              14.0, 16.0, 18.0, 20.0)  # fmt: skip
 
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
@@ -90,14 +93,17 @@ def felt_whisk(
 ) -> tuple[Touch, Whisk | str]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
-    if touch.status:
-        return touch, touch.status
+    return touch, touch.status or whisk_at(stroke, readout, touch, beam, theta_rad)
+
+
+def whisk_at(stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_rad: float) -> Whisk | str:
+    """`felt_whisk` of a touch that is known."""
     at = stroke.at(theta_rad, touch)
     if at.status:
-        return touch, at.status
+        return at.status
     moments = (stroke.filtered - touch.offset) @ readout.matrix.T
     m_y, m_z = readout.matrix @ at.values
-    return touch, Whisk(
+    return Whisk(
         stroke.time_s,
         stroke.motor_rad - touch.motor_rad,
         moments[:, 0],
@@ -122,15 +128,33 @@ def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float) 
     felt = FeltWhisk(number, Value(touch.motor_rad, late), theta_sigma_rad=touch.sigma_rad)
     if whisk is None:
         return felt
-    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
+    m_y, m_z = _moments(whisk)
     return replace(
         felt,
-        m_y_Nmm=Value(whisk.m_y_at_Nmm, sigma_y),
-        m_z_Nmm=Value(whisk.m_z_at_Nmm, sigma_z),
+        m_y_Nmm=m_y,
+        m_z_Nmm=m_z,
         phi_felt_rad=_slip_angle(whisk),
         covariance_at=whisk.covariance_at,
         theta_moment_covariance_at=whisk.theta_moment_covariance_at,
     )
+
+
+def _moments(whisk: Whisk) -> tuple[Value, Value]:
+    """m_y and m_z at the wanted angle, with their sigmas."""
+    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
+    return Value(whisk.m_y_at_Nmm, sigma_y), Value(whisk.m_z_at_Nmm, sigma_z)
+
+
+def felt_by_theta(
+    stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, answered: Callable[[Whisk], tuple[EstimateRow, ...]]
+) -> tuple[FeltAt, ...]:
+    """Moments and what estimators answer at THETAS_DEG, as far as the stroke goes."""
+    reached = (whisk_at(stroke, readout, touch, beam, theta) for theta in np.radians(THETAS_DEG).tolist())
+    return tuple(
+        FeltAt(whisk.theta_at_rad, *_moments(whisk), whisk.theta_sigma_rad, whisk.covariance_at,
+               whisk.theta_moment_covariance_at, answered(whisk))
+        for whisk in reached if isinstance(whisk, Whisk)
+    )  # fmt: skip
 
 
 def _slip_angle(whisk: Whisk) -> Value:

@@ -6,6 +6,7 @@ look at the pictures.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
-from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
@@ -164,10 +165,12 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     if usable is None:
         return felt
     felt = _against_pictures(felt, unit, stroke, readout, seen)
+    answered = partial(answers, asked=estimators(unit.settings.estimators), settings=unit.settings)
     return replace(
         felt,
         phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
-        estimates=answers(usable, estimators(unit.settings.estimators), unit.settings),
+        estimates=answered(usable),
+        by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         one_factor=_one_factor(unit, kind, stroke),
     )
 
