@@ -23,6 +23,7 @@ class TrialFacts:
     speed_deg_s: float | None
     d_x_nominal_mm: float = NAN
     beta_nominal_deg: float = NAN
+    bar_diameter_mm: float = NAN
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -140,7 +141,8 @@ class EstimateRow:
     """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
 
     d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm, d_x_est_high_mm: the 95 %
-    interval.
+    interval. d_y_est_mm, d_z_est_mm, slip_est_mm: of the contact at the pushing angle; touch_covariance_mm_rad: of the
+    distance with the angle of touch, NaN where unknown.
     """
 
     estimator: str
@@ -151,6 +153,10 @@ class EstimateRow:
     d_x_est_sigma_alpha_exact_mm: float = NAN
     d_x_est_low_mm: float = NAN
     d_x_est_high_mm: float = NAN
+    d_y_est_mm: Value = UNKNOWN
+    d_z_est_mm: Value = UNKNOWN
+    slip_est_mm: Value = UNKNOWN
+    touch_covariance_mm_rad: float = NAN
 
 
 @dataclass(frozen=True, eq=False)

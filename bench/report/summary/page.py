@@ -7,7 +7,7 @@ from bench.friction.tables import alpha_lines
 from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
 from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubts
-from bench.report.summary.errors import error_lines
+from bench.report.summary.errors import contact_lines, error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
@@ -51,7 +51,7 @@ def _lines(
         "",
         *_titled("Truth, from the pictures (± one sigma)", truth),
         *_titled("Clocks", clock_lines(results)),
-        *_titled(errors, error_lines(judged)),
+        *_titled(errors, [*error_lines(judged), *contact_lines(results)]),
         *_titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg)),
         *_titled("Friction angle α (± one sigma)", [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]),
         *_titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
