@@ -9,6 +9,7 @@ from bench.base.workers import Workers
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
 from bench.friction.runs import with_runs
+from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import friction_of, write_friction
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation
@@ -34,8 +35,10 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         friction = tuple(friction_of(results, session.whisker, settings.alpha_est_rad))
         write_tables(out, results)
         write_friction(out, results, friction, settings.alpha_est_rad)
+        soft = tuple(soft_objects(session, results, settings.alpha_est_rad))
+        write_compliance(out, soft)
         notes = calibration.notes, tuple(doubts.notes)
-        return report(Evaluation(session, out, settings, results, friction, gauges, *notes), pool)
+        return report(Evaluation(session, out, settings, results, friction, gauges, *notes, soft), pool)
 
 
 def report(evaluation: Evaluation, pool: Workers) -> int:
