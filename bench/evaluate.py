@@ -12,6 +12,7 @@ from bench.base.workers import Workers
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
 from bench.friction.runs import with_runs
+from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import friction_of, write_friction
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation
@@ -42,8 +43,10 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         friction = tuple(friction_of(results, session.whisker, settings.alpha_est_rad))
         write_tables(out, results)
         write_friction(out, results, friction, settings.alpha_est_rad)
+        soft = tuple(soft_objects(session, results, settings.alpha_est_rad))
+        write_compliance(out, soft)
         notes = calibration.notes, tuple(doubts.notes)
-        return report(Evaluation(session, out, settings, results, friction, gauges, *notes), pool)
+        return report(Evaluation(session, out, settings, results, friction, gauges, *notes, soft), pool)
 
 
 def _require_some(trials: Sequence[Trial], settings: Settings) -> None:
@@ -64,15 +67,18 @@ def _some(names: Iterable[str]) -> str:
 
 def report(evaluation: Evaluation, pool: Workers) -> int:
     """Figures where they are wanted, and summary; returns the exit code. Results of a synthetic session are scored."""
+    from bench.report.against_theta import write_against_theta
     from bench.report.figures import write_figures
     from bench.report.score import score
     from bench.report.summary.page import write_summary
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     drawn = evaluation.settings.figures
+    by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
     figures = [
         *(write_figures(evaluation, pool) if drawn else []),
+        *of_theta,
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
-    return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures)
+    return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta)

@@ -23,6 +23,7 @@ class TrialFacts:
     speed_deg_s: float | None
     d_x_nominal_mm: float = NAN
     beta_nominal_deg: float = NAN
+    bar_diameter_mm: float = NAN
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -141,7 +142,8 @@ class EstimateRow:
     """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
 
     d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm, d_x_est_high_mm: the 95 %
-    interval.
+    interval. d_y_est_mm, d_z_est_mm, slip_est_mm: of the contact at the pushing angle; touch_covariance_mm_rad: of the
+    distance with the angle of touch, NaN where unknown.
     """
 
     estimator: str
@@ -152,6 +154,23 @@ class EstimateRow:
     d_x_est_sigma_alpha_exact_mm: float = NAN
     d_x_est_low_mm: float = NAN
     d_x_est_high_mm: float = NAN
+    d_y_est_mm: Value = UNKNOWN
+    d_z_est_mm: Value = UNKNOWN
+    slip_est_mm: Value = UNKNOWN
+    touch_covariance_mm_rad: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class FeltAt:
+    """What is felt at one pushing angle, and the estimates of it; the fields are those of `FeltWhisk`."""
+
+    theta_rad: float
+    m_y_Nmm: Value
+    m_z_Nmm: Value
+    theta_sigma_rad: float
+    covariance_at: np.ndarray
+    theta_moment_covariance_at: np.ndarray
+    estimates: tuple[EstimateRow, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +180,7 @@ class FeltWhisk:
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
     (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
     those of the seen shape, 2 degrees of freedom; apart: they are not those. one_factor: estimates with one factor a
-    channel.
+    channel. by_theta: moments and estimates at other pushing angles, up to the stroke's end.
     """
 
     whisk: int = 0
@@ -179,6 +198,7 @@ class FeltWhisk:
     phases: Phases = NO_PHASES
     estimates: tuple[EstimateRow, ...] = ()
     one_factor: tuple[EstimateRow, ...] = ()
+    by_theta: tuple[FeltAt, ...] = ()
 
     @property
     def has_moments(self) -> bool:

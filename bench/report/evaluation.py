@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.base.settings import Settings
+from bench.friction.soft import Soft
 from bench.friction.tables import SurfaceFriction
 from bench.gauges.matrix import Gauges
 from bench.records.trial import TrialResult
@@ -13,7 +14,8 @@ from bench.session.session import Session
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """Results of all trials in the folder `out`. camera_notes: lines on calibration and placing; doubts: lines that the
-    user should read; friction: a surface and speed each; gauges: None where volts cannot become moments."""
+    user should read; friction: a surface and speed each; gauges: None where volts cannot become moments; soft: pairs of
+    distances."""
 
     session: Session
     out: Path
@@ -23,3 +25,4 @@ class Evaluation:
     gauges: Gauges | None
     camera_notes: tuple[str, ...]
     doubts: tuple[str, ...]
+    soft: tuple[Soft, ...] = ()

@@ -10,9 +10,9 @@ import pytest
 from bench import tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import error_map, explained, tables
+from bench.friction import error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
-from bench.report import assembly, figure_8
+from bench.report import against_theta, assembly, figure_8
 from bench.rig.simulate import simulate
 from bench.session import manifest
 from bench.theory import model_error_maps
@@ -44,6 +44,8 @@ CSV = {
     "surfaces.csv": tables.SURFACE_COLUMNS,
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
+    "compliance.csv": soft.COLUMNS,
+    "against_theta.csv": against_theta.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,

@@ -47,7 +47,8 @@ def read_scene(folder: Path) -> tuple[list[View], list[Camera], Rods, np.ndarray
     truth = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
     angles = np.radians([truth[name] for name in ("touch_deg", "beta_deg", "psi_deg")])
     motor = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)["motor_deg"]
-    return views, cameras, rods, np.radians(motor), upward(axis_from_angles(truth["d_x_mm"], *angles, rods.reach_mm))
+    axis = axis_from_angles(truth["d_x_mm"], *angles, rods.reach_mm(truth["d_x_mm"]))
+    return views, cameras, rods, np.radians(motor), upward(axis)
 
 
 def off_px(camera: Camera, true: BarAxis, radius_mm: float, px, normal) -> np.ndarray:

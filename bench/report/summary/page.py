@@ -3,10 +3,12 @@
 from collections.abc import Iterable, Sequence
 
 from bench.base.atomic import write_whole
+from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
+from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
 from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubts
-from bench.report.summary.errors import error_lines
+from bench.report.summary.errors import contact_lines, error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
@@ -14,22 +16,33 @@ from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, ve
 from bench.trials.compare import judge
 
 DONE, DOUBTFUL = 0, 1
-_TABLES = ("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map")
+_TABLES = (
+    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
+    *("against_theta", "compliance"),
+)
 
 
-def write_summary(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str]) -> int:
+def write_summary(
+    evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str], by_theta: Sequence[AtTheta] = ()
+) -> int:
     """Write and print the summary. Returns 0, or 1 where something is doubtful.
 
-    scores: lines on a synthetic session's truth; figures: names of the pictures.
+    scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta: errors against θ.
     """
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
-    text = "\n".join(_lines(evaluation, doubtful, scores, figures)).rstrip()
+    text = "\n".join(_lines(evaluation, doubtful, scores, figures, by_theta)).rstrip()
     write_whole(evaluation.out / "summary.txt", text + "\n")
     print(text)
     return DOUBTFUL if doubtful else DONE
 
 
-def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str], figures: Sequence[str]) -> list[str]:
+def _lines(
+    evaluation: Evaluation,
+    doubtful: Sequence[str],
+    scores: Sequence[str],
+    figures: Sequence[str],
+    by_theta: Sequence[AtTheta],
+) -> list[str]:
     results, settings, judged = evaluation.results, evaluation.settings, judge(evaluation.results)
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
     truth = [*truth_lines(results), *budget_lines(results), *shared_lines(results), *beam_lines(results)]
@@ -40,8 +53,10 @@ def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str
         "",
         *_titled("Truth, from the pictures (± one sigma)", truth),
         *_titled("Clocks", clock_lines(results)),
-        *_titled(errors, error_lines(judged)),
+        *_titled(errors, [*error_lines(judged), *contact_lines(results)]),
+        *_titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg)),
         *_titled("Friction angle α (± one sigma)", [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]),
+        *_titled("Stiffness of the object", soft_lines(evaluation.soft)),
         *_titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *_titled("Cameras", evaluation.camera_notes),
         *_titled("Light from one side", light_lines(results)),

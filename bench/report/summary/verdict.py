@@ -82,11 +82,21 @@ def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
 
 
 def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
-    errors = np.array([j.error_percent for j in judged])
-    worst = judged[int(np.argmax(np.abs(errors)))]
+    """The range of the errors of the whisks of which nothing is doubtful; of the others how many, and theirs."""
+    sound, doubtful = ([j for j in judged if j.doubtful == doubt] for doubt in (False, True))
     assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
-    spread = f"{errors.min():+.1f} to {errors.max():+.1f} %" if len(errors) > 1 else f"{errors[0]:+.1f} %"
+    if not sound:
+        all_of_them = f"all of its {len(judged)} whisks are doubtful ({_range(judged)})"
+        return f"{label_of(name)}{assumed} has no verdict: {all_of_them}."
+    worst = max(sound, key=lambda j: abs(j.error_percent))
+    left_out = f"; {len(doubtful)} doubtful left out ({_range(doubtful)})" if doubtful else ""
     return (
-        f"{label_of(name)}{assumed} is wrong by {spread} of d_x over {len(errors)} whisks, "
-        f"most at β = {worst.beta_deg:.1f}° ({worst.trial})."
+        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {len(sound)} whisks, "
+        f"most at β = {worst.beta_deg:.1f}° ({worst.trial}){left_out}."
     )
+
+
+def _range(judged: Sequence[Judged]) -> str:
+    """From the least to the largest error; one where there is one."""
+    errors = [j.error_percent for j in judged]
+    return f"{min(errors):+.1f} to {max(errors):+.1f} %" if len(errors) > 1 else f"{errors[0]:+.1f} %"
