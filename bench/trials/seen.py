@@ -6,13 +6,14 @@ from dataclasses import fields
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.cameras.calibration import SessionCalibration, moved_cameras
+from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
+from bench.trials.scene import still_scene
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
 from vision.geometry.settings import VisionSettings
@@ -51,13 +52,13 @@ def _see(
 ) -> SeenTrial:
     times = frame_times(trial)
     frames = read_trial(trial, times)
-    moved = moved_cameras(session, calibration, frames)
+    scene = still_scene(session, calibration, frames)
     wire = session.whisker.wire
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     places = [times.frames_in(signals, stroke) for stroke in strokes]
     back = _backwards(signals, times)
     truth = observe_trial(
-        {name: pictures for name, pictures in frames.items() if name not in moved},
+        {name: pictures for name, pictures in scene.frames.items() if name not in scene.left_out},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
         [*places, *back],
@@ -68,8 +69,8 @@ def _see(
         VisionSettings(clock_sigma_s=clock_sigma_s),
     )
     return SeenTrial(
-        tuple(whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks[: len(places)]),
-        (*truth.notes, *_lost(frames, times)),
+        tuple(whisk_record(whisk, settings, scene.left_out.values()) for whisk in truth.whisks[: len(places)]),
+        (*truth.notes, *_lost(frames, times), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
         0.5 * wire.diameter_mm,

@@ -143,8 +143,9 @@ def _knocked(grey: np.ndarray) -> np.ndarray:
     return np.roll(grey, (4, 6), axis=(0, 1))
 
 
-def _brighter(grey: np.ndarray) -> np.ndarray:
-    return np.clip(1.5 * grey, 0, 255).astype(np.uint8)
+def brighter(factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    """A change of exposure; what is too bright is clipped."""
+    return lambda grey: np.clip(np.rint(factor * grey), 0, 255).astype(np.uint8)
 
 
 def _exchanged_cameras(session: Path) -> None:
@@ -243,7 +244,10 @@ FAULTS: dict[str, Fault] = {
     "wrong squares": _manifest("squares = [8, 6]", "squares = [7, 5]"),
     "whisker 90 mm for 100": _manifest("length_mm = 100.0", "length_mm = 90.0"),
     "whisker 150 mm for 100": _manifest("length_mm = 100.0", "length_mm = 150.0"),
-    "exposure 1.5 from frame 6": _camera(_brighter, first=6),
+    "exposure 1.5 from frame 6": _camera(brighter(1.5), first=6),
+    "exposure 1.1 from frame 6": _camera(brighter(1.1), first=6),
+    "exposure 1.02 from frame 6": _camera(brighter(1.02), first=6),
+    "exposure 0.8 from frame 6": _camera(brighter(0.8), first=6),
     "camera knocked 6,4 px": _camera(_knocked),
     "camera mirrored": _camera(lambda grey: grey[:, ::-1]),
     "cameras exchanged": _exchanged_cameras,

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from bench.base.atomic import write_whole
 from bench.friction.tables import alpha_lines
 from bench.report.evaluation import Evaluation
-from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubts
+from bench.report.summary.doubts import frame_lines, light_lines, taken_as_exact, whisk_doubts
 from bench.report.summary.errors import error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
@@ -44,6 +44,7 @@ def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str
         *_titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *_titled("Cameras", evaluation.camera_notes),
         *_titled("Light from one side", light_lines(results)),
+        *_titled("Frames", frame_lines(results)),
         *_titled("Doubtful", doubtful),
         *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
         *_titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session)),
