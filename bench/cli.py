@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, format="%(message)s")
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        return options.run(options)
+        return _in_sound_environment(options)
     except (BadInput, Refused) as bad:
         return _complain(str(bad), BAD_INPUT)
     except KeyboardInterrupt:
@@ -38,6 +38,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         logging.getLogger(__name__).info("", exc_info=fault)
         found = f"{type(fault).__name__}: {fault}"
         return _complain(f"a fault of ours, please report it ({found}); -v shows where", FAULT_OF_OURS)
+
+
+def _in_sound_environment(options: argparse.Namespace) -> int:
+    """Run the verb where results can be trusted. `info` tells its versions first. Raises BadInput elsewhere."""
+    from bench.base.environment import check_environment
+
+    if options.run is _info:
+        _info(options)
+        check_environment()
+        return DONE
+    check_environment()
+    return options.run(options)
 
 
 def _interrupt(*_) -> None:
@@ -163,11 +175,9 @@ def _evaluate(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
-    from bench.base.environment import check_environment
     from bench.base.settings import Settings
     from bench.evaluate import evaluate
 
-    check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
     names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
@@ -244,10 +254,8 @@ def _add_calibrate(verbs) -> None:
 
 
 def _calibrate_gauges(options: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment
     from bench.calibrate_gauges import calibrate_gauges_command
 
-    check_environment()
     return calibrate_gauges_command(
         options.session,
         options.out,
@@ -258,10 +266,8 @@ def _calibrate_gauges(options: argparse.Namespace) -> int:
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment
     from bench.cameras.calibrate import calibrate_cameras_command
 
-    check_environment()
     return calibrate_cameras_command(options.session, options.out, options.lenses)
 
 
@@ -376,11 +382,10 @@ def _add_info(verbs) -> None:
 
 
 def _info(_: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment, versions
+    from bench.base.environment import versions
 
     for name, version in versions().items():
         print(f"{name} {version}")
-    check_environment()
     return DONE
 
 

@@ -17,6 +17,7 @@ from bench.friction.tables import friction_of, write_friction
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation
 from bench.session.check import checked_session
+from bench.session.inside import check_outside
 from bench.session.trial import Trial
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
 from bench.trials.estimates import estimators
@@ -28,6 +29,7 @@ _MOST_NAMED = 8
 def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput."""
     estimators(settings.estimators)
+    check_outside(out, session_path)
     doubts = Doubts()
     session = checked_session(session_path, doubts)
     trials = judged(session)

@@ -7,13 +7,14 @@ from functools import partial
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.cameras.calibration import SessionCalibration, moved_cameras
+from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
+from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
@@ -52,14 +53,14 @@ def _see(
 ) -> SeenTrial:
     times = frame_times(trial)
     frames = read_trial(trial, times)
-    moved = moved_cameras(session, calibration, frames)
+    scene = still_scene(session, calibration, frames)
     wire = session.whisker.wire
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     places = [times.frames_in(signals, stroke) for stroke in strokes]
     back = _backwards(signals, times)
     observe = partial(
         observe_trial,
-        {name: pictures for name, pictures in frames.items() if name not in moved and settings.seeing.asks(name)},
+        {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
         cameras=calibration.cameras,
@@ -73,8 +74,8 @@ def _see(
     for rung in harder:
         looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
     return SeenTrial(
-        tuple(replace(whisk_record(whisk, settings, moved.values()), looked=name) for name, whisk in looked),
-        (*truth.notes, *_lost(frames, times)),
+        tuple(replace(whisk_record(one, settings, scene.left_out.values()), looked=name) for name, one in looked),
+        (*truth.notes, *_lost(frames, times), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
         0.5 * wire.diameter_mm,

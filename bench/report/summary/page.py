@@ -7,7 +7,7 @@ from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
 from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
-from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubts
+from bench.report.summary.doubts import frame_lines, light_lines, taken_as_exact, whisk_doubts
 from bench.report.summary.errors import contact_lines, error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
@@ -60,6 +60,7 @@ def _lines(
         *_titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *_titled("Cameras", evaluation.camera_notes),
         *_titled("Light from one side", light_lines(results)),
+        *_titled("Frames", frame_lines(results)),
         *_titled("Doubtful", doubtful),
         *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
         *_titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session)),
