@@ -60,7 +60,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_simulate, _add_info):
+    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_report, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 
@@ -137,7 +137,18 @@ def _add_evaluate(verbs) -> None:
         metavar="MODULE:FUNCTION",
         help="one of your own, importable from here; may be given several times",
     )
+    _add_figure_format(verb)
     _add_workers(verb)
+
+
+def _add_figure_format(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--figure-format",
+        action="append",
+        default=[],
+        choices=("png", "pdf", "svg"),
+        help="figures for a paper too, as wide as a journal's column, in OUT/figures; may be given several times",
+    )
 
 
 def _evaluate(options: argparse.Namespace) -> int:
@@ -156,7 +167,37 @@ def _evaluate(options: argparse.Namespace) -> int:
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
     progress = sys.stderr.isatty()
-    return evaluate(options.session, options.out, Settings(**given), workers=options.workers, progress=progress)
+    return evaluate(
+        options.session,
+        options.out,
+        Settings(**given),
+        workers=options.workers,
+        progress=progress,
+        figure_formats=options.figure_format,
+    )
+
+
+def _add_report(verbs) -> None:
+    verb = _add(
+        verbs,
+        "report",
+        _report,
+        "report.html, methods.md and results.bib of an evaluated run again, from its results alone",
+        "whisker-bench report demo-out --figure-format pdf",
+    )
+    _add_run(verb)
+    _add_figure_format(verb)
+
+
+def _add_run(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("run_folder", type=Path, metavar="OUT", help="folder that `evaluate --out` wrote")
+
+
+def _report(options: argparse.Namespace) -> int:
+    from bench.report.page.write import report_again
+
+    print(*report_again(options.run_folder, options.figure_format), sep="\n")
+    return DONE
 
 
 def _add_calibrate(verbs) -> None:

@@ -1,5 +1,6 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from bench.base.atomic import lock_output
@@ -8,18 +9,27 @@ from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
-from bench.friction.runs import with_runs
-from bench.friction.tables import friction_of, write_friction
+from bench.friction.tables import write_friction
 from bench.report.assembly import write_tables
-from bench.report.evaluation import Evaluation
+from bench.report.evaluation import Evaluation, finished
 from bench.session.check import checked_session
-from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
 from bench.trials.estimates import estimators
 from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
 
 
-def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False) -> int:
-    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput."""
+def evaluate(
+    session_path: Path,
+    out: Path,
+    settings: Settings,
+    *,
+    workers: int = 1,
+    progress: bool = False,
+    figure_formats: Sequence[str] = (),
+) -> int:
+    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
+
+    figure_formats: of figures for a paper, beside the others.
+    """
     estimators(settings.estimators)
     doubts = Doubts()
     session = checked_session(session_path, doubts)
@@ -27,22 +37,23 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
     with lock_output(out), Workers(workers, progress) as pool:
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
-        results = tuple(with_runs(evaluated(units, pool), session.whisker, settings))
-        shared = shared_touch(results)
-        doubts.notes += filter(None, [shared_doubt(results, shared)])
-        results = with_shared_touch(results, shared)
-        friction = tuple(friction_of(results, session.whisker, settings.alpha_est_rad))
-        write_tables(out, results)
-        write_friction(out, results, friction, settings.alpha_est_rad)
-        notes = calibration.notes, tuple(doubts.notes)
-        return report(Evaluation(session, out, settings, results, friction, gauges, *notes), pool)
+        whole = finished(evaluated(units, pool), session.whisker, settings)
+        doubts.notes += filter(None, [whole.doubt])
+        write_tables(out, whole.results)
+        write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
+        recordings = {unit.trial.name: unit.files for unit in units}
+        found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings
+        return report(Evaluation(session, out, settings, *found), pool, figure_formats)
 
 
-def report(evaluation: Evaluation, pool: Workers) -> int:
-    """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
+def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> int:
+    """Figures, report and summary; returns the exit code. A synthetic session's finished results are scored."""
     from bench.report.figures import write_figures
+    from bench.report.page.write import write_report
+    from bench.report.paper import write_paper_figures
+    from bench.report.record import record_of, write_record
     from bench.report.score import score
-    from bench.report.summary.page import write_summary
+    from bench.report.summary.page import summary_of, write_summary
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     figures = [
@@ -50,4 +61,8 @@ def report(evaluation: Evaluation, pool: Workers) -> int:
         *write_explained(out, results, evaluation.session.whisker),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad),
     ]
-    return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures)
+    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures)
+    record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
+    write_report(out, record, results, evaluation.friction)
+    write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
+    return write_summary(out, summary)
