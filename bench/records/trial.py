@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
 from vision.fit.beam_check import BeamCheck
+from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth
@@ -69,7 +70,7 @@ class SeenWhisk:
 
     The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
     moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
-    (`bench.trials.clocks`).
+    (`bench.trials.clocks`). contradicted: what the recording says twice does not agree (`bench.trials.consistency`).
     """
 
     whisk: int
@@ -84,11 +85,13 @@ class SeenWhisk:
     budget: dict[str, float] = field(default_factory=dict)
     base: BaseLines | None = None
     beam: BeamCheck | None = None
+    turns: Turns | None = None
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
     overlay: dict[str, Drawing] = field(default_factory=dict)
     touch_shared_rad: float = 0.0
+    contradicted: bool = False
 
     @property
     def has_truth(self) -> bool:
@@ -123,8 +126,11 @@ class BackStroke:
 
 @dataclass(frozen=True, eq=False)
 class SeenTrial:
-    """The seen half of a trial; bar, radii and clock are missing where there are no pictures. back: the first back
-    stroke, where it was recorded and has a truth."""
+    """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
+
+    bar_looks: how thick the bar looks over how thick it is said to be, by camera. back: the first back stroke, where it
+    was recorded and has a truth.
+    """
 
     whisks: tuple[SeenWhisk, ...]
     notes: tuple[str, ...] = ()
@@ -132,6 +138,7 @@ class SeenTrial:
     bar_radius_mm: float = NAN
     wire_radius_mm: float = NAN
     clock: Clock | None = None
+    bar_looks: dict[str, float] = field(default_factory=dict)
     back: BackStroke | None = None
 
 
@@ -159,8 +166,8 @@ class FeltWhisk:
 
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
     (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
-    those of the seen shape, 2 degrees of freedom; apart: they are not those. one_factor: estimates with one factor a
-    channel.
+    those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
+    elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel.
     """
 
     whisk: int = 0

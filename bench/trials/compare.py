@@ -13,6 +13,7 @@ class Judged:
     """One estimate beside the truth. Truth is NaN where there is none; slope is the seen one, else the nominal one.
 
     one_factor: made with one gauge factor a channel. status: what the estimator or the bench says of the estimate.
+    apart: what the whisk's recording says twice does not agree, so that nothing is concluded from it.
     """
 
     trial: str
@@ -28,6 +29,7 @@ class Judged:
     d_x_est_sigma_mm: float
     one_factor: bool = False
     status: str = ""
+    apart: bool = False
 
     @property
     def error_mm(self) -> float:
@@ -54,14 +56,14 @@ def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
 def judge(results: Iterable[TrialResult]) -> list[Judged]:
     """Every estimate of every whisk."""
     return [
-        _judged(result, seen, answer, one_factor)
+        _judged(result, seen, answer, one_factor, felt.apart)
         for result, seen, felt in whisks(results)
         for one_factor, answers in ((False, felt.estimates), (True, felt.one_factor))
         for answer in answers
     ]
 
 
-def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool) -> Judged:
+def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool, apart: bool) -> Judged:
     trial = result.trial
     return Judged(
         trial.name,
@@ -77,4 +79,5 @@ def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_facto
         float(answer.d_x_est_mm.sigma),
         one_factor,
         answer.status,
+        apart,
     )

@@ -12,6 +12,8 @@ from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.compare import Judged
 
+_SIGNIFICANT = 2.0  # sigmas: no whisk beyond this, and the estimator may be right in all
+
 
 def verdict(
     session: Session, results: Iterable[TrialResult], judged: Sequence[Judged], settings: Settings, doubtful: int
@@ -20,19 +22,30 @@ def verdict(
     measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     known = sum(s.has_truth for s in seen)
-    asked = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
+    told = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
+    asked = [j for j in told if not j.apart]
     for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
         mine = [j for j in measured if j.estimator == name]
-        told = _told([j for j in asked if j.estimator == name])
-        yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + told
+        missing = _told([j for j in asked if j.estimator == name])
+        yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + missing
+    yield from _left_out([j for j in told if j.apart])
     if not measured:
-        yield "No verdict on the estimators: no whisk has both a truth and an estimate."
+        yield "No verdict on the estimators: no whisk free of doubt has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
     yield (
         f"{session.name}: truth for {known} of {len(seen)} measured whisks"
         if pictures
         else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
     ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
+
+
+def _left_out(apart: Sequence[Judged]) -> Iterator[str]:
+    """Which whisks the verdict does not rest on."""
+    names = list(dict.fromkeys((j.trial, j.whisk) for j in apart))
+    if names:
+        which = ", ".join(dict.fromkeys(trial for trial, _ in names))
+        count = f"{len(names)} whisks are" if len(names) > 1 else "1 whisk is"
+        yield f"{count} doubtful and in no verdict ({which})."
 
 
 def _told(asked: Sequence[Judged]) -> str:
@@ -55,7 +68,8 @@ def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
 
 
 def _measured(judged: Sequence[Judged]) -> list[Judged]:
-    return [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)]
+    usual = (j for j in judged if j.purpose == "measure" and not j.one_factor and not j.apart)
+    return [j for j in usual if np.isfinite(j.error_percent)]
 
 
 def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
@@ -68,10 +82,14 @@ def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
 
 def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
     errors = np.array([j.error_percent for j in judged])
+    sigmas = np.array([j.error_sigma_percent for j in judged])
     worst = judged[int(np.argmax(np.abs(errors)))]
     assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
-    spread = f"{errors.min():+.1f} to {errors.max():+.1f} %" if len(errors) > 1 else f"{errors[0]:+.1f} %"
+    ends = dict.fromkeys(int(k) for k in (np.argmin(errors), np.argmax(errors)))
+    spread = " to ".join(f"{errors[k]:+.1f} ± {sigmas[k]:.1f}" for k in ends)
+    count = f"{len(errors)} whisks" if len(errors) > 1 else "1 whisk"
+    significant = np.any(np.abs(errors) > _SIGNIFICANT * sigmas)
     return (
-        f"{label_of(name)}{assumed} is wrong by {spread} of d_x over {len(errors)} whisks, "
-        f"most at β = {worst.beta_deg:.1f}° ({worst.trial})."
+        f"{label_of(name)}{assumed} is wrong by {spread} % of d_x over {count}, most at β = {worst.beta_deg:.1f}° "
+        f"({worst.trial})" + ("." if significant else ": not significant.")
     )
