@@ -14,6 +14,7 @@ from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
+from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
@@ -73,13 +74,17 @@ def _see(
     looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]
     for rung in harder:
         looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
+    thick, left_out = width_doubt(truth.bar_looks, trial, session.board), scene.left_out.values()
+    odd = [[thick, slope_doubt(one.beta_rad, trial)] for _, one in looked]
+    whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
-        tuple(replace(whisk_record(one, settings, scene.left_out.values()), looked=name) for name, one in looked),
+        tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),
         (*truth.notes, *_lost(frames, times), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
         0.5 * wire.diameter_mm,
         Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
+        truth.bar_looks,
         _touch_alone(truth.whisks[-1]) if back else None,
     )
 
@@ -123,13 +128,19 @@ def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
             yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
 
 
-def whisk_record(truth: WhiskTruth, settings: Settings, doubts: Iterable[str] = ()) -> SeenWhisk:
+def whisk_record(
+    truth: WhiskTruth, settings: Settings, doubts: Iterable[str] = (), contradictions: Iterable[str] = ()
+) -> SeenWhisk:
     """One whisk: at first touch, at the wanted angle, a row a frame, and lines to draw."""
     at = truth.at(settings.theta_rad)
-    status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *doubts])))
+    contradictions = [*contradictions, turns_doubt(truth.turns, motor_speed(truth.frames)) if truth.frames else ""]
+    status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *contradictions, *doubts])))
     drawn = _overlay(truth, at.theta_rad)
     same = {name: getattr(truth, name) for name in _SAME}
-    return SeenWhisk(**same, status=status, at=at, deflection=_deflection(truth), overlay=drawn)
+    odd = any(contradictions)
+    return SeenWhisk(
+        **same, status=status, at=at, deflection=_deflection(truth), overlay=drawn, contradicted=odd
+    )
 
 
 def _deflection(truth: WhiskTruth) -> Deflection | None:

@@ -13,8 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from vision.bar.search import see_bar
+from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
 from vision.geometry.errors import Misled, Refused
@@ -67,8 +69,10 @@ def observe_trial(
     seen = [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
                           left_out=tuple(behind)) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
-    axis = bar_seen.axis
-    return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines([whisk.light for whisk in seen]))
+    axis, light = bar_seen.axis, [whisk.light for whisk in seen]
+    there = [view for view in views if view.camera.name in bar_seen.seen_by]
+    bars = seen_over_given(there, axis, wire, bar, (float(motor_rad.min()), float(motor_rad.max())), settings)
+    return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 
 
 def _nothing(whisks, reason: str) -> TrialTruth:
@@ -137,7 +141,8 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk.views, whisk.rods, *stroke, whisk.motor, fitted.frames, whisk.light, whisk.settings)
     status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *whisk.left_out]))
-    return replace(truth, base=base_lines(*stroke, fitted.uncertainty.lens), beam=beam, status=status)
+    turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
+    return replace(truth, base=base_lines(*stroke, fitted.uncertainty.lens), beam=beam, turns=turns, status=status)
 
 
 def _beam(fitted: FittedWhisk) -> BeamCheck:

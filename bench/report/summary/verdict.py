@@ -13,6 +13,8 @@ from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.compare import Judged
 
+_SIGNIFICANT = 2.0  # sigmas: no whisk beyond this, and the estimator may be right in all
+
 
 def verdict(
     session: Session, results: Iterable[TrialResult], judged: Sequence[Judged], settings: Settings, doubtful: int
@@ -24,8 +26,8 @@ def verdict(
     asked = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
     for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
         mine = [j for j in measured if j.estimator == name]
-        told = _told([j for j in asked if j.estimator == name])
-        yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + told
+        missing = _told([j for j in asked if j.estimator == name])
+        yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + missing
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
@@ -89,14 +91,17 @@ def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
         all_of_them = f"all of its {len(judged)} whisks are doubtful ({_range(judged)})"
         return f"{label_of(name)}{assumed} has no verdict: {all_of_them}."
     worst = max(sound, key=lambda j: abs(j.error_percent))
+    is_significant = any(abs(j.error_percent) > _SIGNIFICANT * j.error_sigma_percent for j in sound)
+    count = f"{len(sound)} whisks" if len(sound) > 1 else "1 whisk"
+    not_significant = "" if is_significant else ", not significant"
     left_out = f"; {len(doubtful)} doubtful left out ({_range(doubtful)})" if doubtful else ""
     return (
-        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {len(sound)} whisks, "
-        f"most at β = {worst.beta_deg:.1f}° ({worst.trial}){left_out}."
+        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {count}, most at β = {worst.beta_deg:.1f}° "
+        f"({worst.trial}){not_significant}{left_out}."
     )
 
 
 def _range(judged: Sequence[Judged]) -> str:
-    """From the least to the largest error; one where there is one."""
-    errors = [j.error_percent for j in judged]
-    return f"{min(errors):+.1f} to {max(errors):+.1f} %" if len(errors) > 1 else f"{errors[0]:+.1f} %"
+    """From the least to the largest error, each with its sigma; one where there is one."""
+    ends = dict.fromkeys(pick(judged, key=lambda j: j.error_percent) for pick in (min, max))
+    return " to ".join(f"{j.error_percent:+.1f} ± {j.error_sigma_percent:.1f}" for j in ends) + " %"
