@@ -16,6 +16,7 @@ from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
 from vision.pictures.view import View
 
+NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 WIRE_WAVES = 11  # round a wire: with fewer, what they lack of a highlight passes for blur and for position
 # A lens blur to begin with. Narrow: one too wide can be the best nearby, for light that darkens at the rims mends it.
 _BLUR_PX = 0.8
