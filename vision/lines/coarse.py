@@ -21,7 +21,7 @@ from vision.lines.points import LinePoints
 _NEAR_PX = 4  # a wire bends no farther than this out of the curves that are tried
 _SIGMA_PX = 1.0  # of a point with a whole vote: pieces are placed to a pixel
 _LEAST_VOTE = 1e-3
-_SURE_SIGMAS = 8.0  # the best of all curves through noise has 3, one in 100 has 5.4, and one in ten less each sigma on
+_SURE_SIGMAS = 8.0  # the best of all curves through noise has 3.4, one in 100 has 6, one in ten less each sigma on
 _SHADE_WIDTHS = 3  # of the rod: shade on what is behind changes over more
 _PLAIN_GAIN = 0.5  # a background scaled by more than this from 1 is none: the piece shows something else
 
@@ -29,10 +29,15 @@ _PLAIN_GAIN = 0.5  # a background scaled by more than this from 1 is none: the p
 @dataclass(frozen=True)
 class Votes:
     """Of pieces of a predicted curve the share (s, 2 reach + 1) of what is unexplained beside each that a rod at a
-    shift of -reach, …, reach px would account for."""
+    shift of -reach, …, reach px would account for.
+
+    share: by both pictures; changed: by that without rods alone. A wire that moves by less than its width is partly in
+    what stands still, and seems to lie on the side that is not.
+    """
 
     pieces: Pieces
     share: np.ndarray
+    changed: np.ndarray
 
     @property
     def reach_px(self) -> int:
@@ -40,15 +45,15 @@ class Votes:
         return self.share.shape[1] // 2
 
     def points(self, shift_px: np.ndarray) -> LinePoints:
-        """The point of each piece with most votes near a curve, shift_px (s,) away from the predicted one."""
+        """The middle of each piece's votes near a curve, shift_px (s,) away from the predicted one."""
         near = np.rint(shift_px).astype(int)[:, None] + np.arange(-_NEAR_PX, _NEAR_PX + 1)
-        inside = np.abs(near) <= self.reach_px
-        share = np.where(inside, np.take_along_axis(self.share, np.where(inside, near + self.reach_px, 0), axis=1), 0.0)
-        best = np.argmax(share, axis=1)[:, None]
-        shift, vote = (np.take_along_axis(of, best, axis=1)[:, 0] for of in (near, share))
+        share = np.take_along_axis(self.changed, np.clip(near + self.reach_px, 0, 2 * self.reach_px), axis=1)
+        share = np.where(np.abs(near) <= self.reach_px, share, 0.0) ** 2  # squared: what lies beside is no wire
+        whole = np.sum(share, axis=1)
+        shift = np.where(whole > 0.0, np.sum(share * near, axis=1) / np.maximum(whole, 1e-12), shift_px)
         px = self.pieces.foot_px + shift[:, None] * self.pieces.normal
-        sigma = _SIGMA_PX / np.sqrt(np.maximum(vote, _LEAST_VOTE))
-        return LinePoints(px, self.pieces.normal, sigma, self.pieces.place)
+        vote = np.sqrt(np.max(share, axis=1, initial=_LEAST_VOTE**2))
+        return LinePoints(px, self.pieces.normal, _SIGMA_PX / np.sqrt(vote), self.pieces.place)
 
 
 def likely_curve(seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[np.ndarray]) -> tuple[np.ndarray, bool]:
@@ -75,11 +80,15 @@ def votes(pieces: Pieces, still: np.ndarray, still_share: float, reach_px: int) 
     both = np.stack([sums(_unexplained(pieces, background, share), place, count) / pixels
                      for background, share in ((pieces.background, 1.0), (still, still_share))])
     both -= uniform_filter1d(both, _SHADE_WIDTHS * wide, axis=2)
-    alike = both[0] * both[1] > 0.0
-    energy = np.where(alike, np.min(both**2, axis=0) * pixels - 1.0, 0.0)
+    alike = np.where(both[0] * both[1] > 0.0, np.min(both**2, axis=0), 0.0)
+    return Votes(pieces, _share(alike * pixels - 1.0, wide), _share(both[0] ** 2 * pixels - 1.0, wide))
+
+
+def _share(energy, wide: int) -> np.ndarray:
+    """Part of the energy (s, c) of each row that a window of so many columns holds."""
     window = wide * uniform_filter1d(energy, wide, axis=1, mode="constant")
     whole = np.sum(np.maximum(energy, 0.0), axis=1, keepdims=True)
-    return Votes(pieces, np.maximum(window, 0.0) / np.maximum(whole, 1e-9))
+    return np.maximum(window, 0.0) / np.maximum(whole, 1e-9)
 
 
 def _places(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, int]:

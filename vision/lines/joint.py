@@ -25,7 +25,8 @@ _SETTLED = 0.02  # what a step may still gain in chi²: it moves what all share 
 @dataclass(frozen=True)
 class Solved:
     """Of each piece: shift_px, own_sigma_px by its own noise, chi2 per pixel, contrast, all (s,); shared_px (s, k): by
-    how much it moves with one sigma of each of k independent causes that all share; robust (s,): its weight."""
+    how much it moves with one sigma of each of k independent causes that all share; robust (s,): its weight;
+    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma."""
 
     shift_px: np.ndarray
     own_sigma_px: np.ndarray
@@ -34,6 +35,7 @@ class Solved:
     shared_px: np.ndarray
     blur_px: float
     robust: np.ndarray
+    widened_px2: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -158,4 +160,13 @@ class _Arrow:
         shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T * np.sqrt(max(float(np.median(chi2)), 1.0))
         return Solved(point.shift_px + np.clip(step, -_LONGEST_PX, _LONGEST_PX),
                       np.sqrt(np.maximum(chi2, 1.0) / self.power), chi2, self.slopes.contrast, shared,
-                      float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG))), point.robust)
+                      float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG))), point.robust,
+                      self._widened(np.maximum(chi2, 1.0)))
+
+    def _widened(self, chi2) -> np.ndarray:
+        """By how much each piece's own blur² is above that of all, and sigma, (s, 2), its position free as well."""
+        gram = self.slopes.gram
+        power = gram[:, 1, 1] - gram[:, 0, 1] ** 2 / self.power + LEAST_POWER
+        by_log = 2.0 * np.exp(2.0 * self.point.log_blur)
+        step = (gram[:, 1, 2] - gram[:, 0, 1] * gram[:, 0, 2] / self.power) / power
+        return by_log * np.stack([step, np.sqrt(chi2 / power)], axis=1)
