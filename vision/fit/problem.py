@@ -71,6 +71,11 @@ class Problem:
         """Index of the first bend."""
         return BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
 
+    def bend_of(self, frame: int) -> slice:
+        """Parameters of a frame's bend; the frame may bend."""
+        first = self.first_bend + 2 * int(np.sum(self.bent[:frame]))
+        return slice(first, first + 2)
+
     def wire_off(self, camera: int) -> slice:
         """Parameters by which a camera's lines of the wire are off as a whole: `wire_modes`, then what points share."""
         first = BAR + REST + 1 + len(LIGHT_PX) * camera

@@ -11,7 +11,7 @@ or a highlight no longer pulls the position to one side.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import correlate1d, uniform_filter1d
+from scipy.ndimage import correlate1d
 
 from vision.pictures.pixel_noise import Noise
 
@@ -147,31 +147,3 @@ def _changes(band: Band) -> list[np.ndarray]:
     known = np.where(np.isfinite(band.background), band.background, 0.0)
     return [correlate1d(known, share, axis=1, mode="nearest") / pitch**order
             for order, share in ((1, _FIRST), (2, _SECOND))]
-
-
-def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coarse position (s,) of a rod-wide difference from the background, and its share (s,) of all difference.
-
-    For each piece the squared difference (over the noise) is summed in a window as wide as the rod; the window
-    with the largest sum wins. The background's gain and offset are those that fit the whole piece. Its picture is as
-    noisy as a frame's: a dim rod must not drown in a noise that is no difference.
-    """
-    if len(pieces) == 0:  # hidden, or outside the picture
-        return np.zeros(0), np.zeros(0)
-    columns = np.stack([pieces.background, np.ones_like(pieces.background)], -1) * pieces.weight[..., None]
-    seen = pieces.grey * pieces.weight
-    turned = columns.transpose(0, 2, 1)
-    found = np.linalg.solve(turned @ columns + np.diag([1e-3, 1e-3]), turned @ seen[..., None])[..., 0]
-    trusted = np.abs(found[:, 0] - 1.0) < 0.5
-    found = np.where(trusted[:, None], found, [1.0, 0.0])
-    noise = 1.0 + found[:, :1] ** 2
-    energy = np.clip((seen - (columns @ found[..., None])[..., 0]) ** 2, 0.0, 400.0) - noise
-    bins = np.clip(np.round(pieces.offset_px).astype(int) + reach_px, 0, 2 * reach_px)
-    count = 2 * reach_px + 1
-    place = bins + count * np.arange(len(pieces))[:, None]
-    profile = np.bincount(place.ravel(), energy.ravel(), count * len(pieces)).reshape(len(pieces), count)
-    half = max(1, round(float(np.median(pieces.radius_px))))
-    window = uniform_filter1d(profile, 2 * half + 1, axis=1, mode="constant") * (2 * half + 1)
-    best = np.argmax(window, axis=1)
-    share = window.max(axis=1) / np.maximum(np.sum(np.maximum(profile, 0.0), axis=1), 1e-9)
-    return best - float(reach_px), share

@@ -222,6 +222,7 @@ class Located:
 
     contrast: signal of the rod against its background over the noise, over the whole piece. shared_px (s, k): by how
     much each moves with what all share, light and lens, by one sigma of each of k independent causes; beside sigma_px.
+    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
     """
 
     shift_px: np.ndarray
@@ -229,6 +230,7 @@ class Located:
     chi2: np.ndarray
     contrast: np.ndarray
     shared_px: np.ndarray | None = None
+    widened_px2: np.ndarray | None = None
 
     @property
     def whole_sigma_px(self) -> np.ndarray:
