@@ -18,6 +18,7 @@ COLOURS = {
     "corrected": "#542788",
     "with_friction_fitted": "#67a9cf",
     "with_friction_seen": "#35978f",
+    "with_friction_kinetic": "#999999",
 }
 OTHER_COLOURS = ("#1b7837", "#762a83", "#8c510a", "#01665e")
 LABELS = {
@@ -27,6 +28,7 @@ LABELS = {
     "corrected": "(10) corrected",
     "with_friction_fitted": "(10), α fitted",
     "with_friction_seen": "(10), α seen",
+    "with_friction_kinetic": "(10) at kinetic ends",
     "estimator.builtin:printed_17": "(17) as printed",
 }
 _STYLE = {

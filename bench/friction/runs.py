@@ -1,4 +1,7 @@
-"""(10) run again with what is known of the friction: α fitted per surface, and α as seen.
+"""(10) run again with what is known of the friction: α fitted per surface, α as seen, and on the kinetic cone.
+
+Of a whisk whose moments alone show that it sticks and slips (`bench.trials.gate`), (10) with α_est as given is asked
+once more at the kinetic ends of its teeth.
 
 α_est as given needs nothing and stands in each whisk's own result. The fit of Fig. 8 leaves out the whisk that it
 judges. The run with α as seen is no estimate that a robot could make: it shows what is left of the error when friction
@@ -21,7 +24,8 @@ from estimator.builtin import corrected, with_friction
 from estimator.whisk import Whisk
 
 GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
-RUNS = (FITTED, SEEN)
+KINETIC = "with_friction_kinetic"
+RUNS = (FITTED, SEEN, KINETIC)
 ASSUMING = {GIVEN: with_friction, "corrected": corrected}  # take α_est as given
 
 
@@ -76,7 +80,11 @@ def _answers(
     whisk = _whisk(felt, theta_rad, beam)
     angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
     runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma) for name, (a, sigma) in angles if np.isfinite(a)]
-    return (*_given(result, felt, theta_rad, beam, sigma_rad), *runs)
+    given = _given(result, felt, theta_rad, beam, sigma_rad)
+    if felt.kinetic is not None:
+        alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
+        runs.append(answer(KINETIC, with_friction, _whisk(felt.kinetic, theta_rad, beam), alpha, sigma_rad))
+    return (*given, *runs)
 
 
 def _given(

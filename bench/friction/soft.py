@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.tables import write_table
-from bench.records.trial import FeltWhisk, TrialResult, whisks
+from bench.records.trial import FeltWhisk, TrialFacts, TrialResult, whisks
 from bench.session.session import Session
+from bench.session.whisker import Whisker
 from bench.trials.compare import is_sound
 from estimator import compliance, first_order
 from estimator.uncertainty import Z_95, model_share
@@ -71,7 +72,8 @@ def soft_objects(session: Session, results: Sequence[TrialResult], alpha_est_rad
     for panel in dict.fromkeys(r.trial.panel for r in results if r.trial.purpose == "measure"):
         mine = [r for r in results if r.trial.purpose == "measure" and r.trial.panel == panel]
         places = [place for place in _places(session, mine) if place is not None]
-        found += [_soft(session, mine[0], *pair, alpha_est_rad) for pair in pairwise(places)
+        facts, theta = mine[0].trial, float(np.radians(mine[0].theta_deg))
+        found += [softness(session.whisker, facts, *pair, theta, alpha_est_rad) for pair in pairwise(places)
                   if pair[1].nominal_mm - pair[0].nominal_mm >= _LEAST_SHIFT_MM]  # fmt: skip
     return found
 
@@ -104,12 +106,14 @@ def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float]:
     return theta / m_z.value, theta / m_z.value * float(np.sqrt(max(shares @ shares - 2 * mixed, 0.0)))
 
 
-def _soft(session: Session, result: TrialResult, near: Place, far: Place, alpha_est_rad: float) -> Soft:
-    described = result.trial.surface, result.trial.speed_deg_s, near, far
-    if session.whisker.shape != "cylinder":
+def softness(whisker: Whisker, trial: TrialFacts, near: Place, far: Place, theta_rad: float, alpha_rad: float) -> Soft:
+    """What two places tell, whose whisks are those of `trial` but for the distance; alpha_rad: as assumed."""
+    described = trial.surface, trial.speed_deg_s, near, far
+    if whisker.shape != "cylinder":
         return Soft(*described, *(np.nan,) * 4, NO_CYLINDER)
-    C, shift = session.whisker.C_Nmm2, far.nominal_mm - near.nominal_mm
-    (k_near, near_sigma), (k_far, far_sigma) = (_corrected(session, result, p, alpha_est_rad) for p in (near, far))
+    C, shift = whisker.C_Nmm2, far.nominal_mm - near.nominal_mm
+    reach = 0.5 * float(np.nan_to_num(trial.bar_diameter_mm) + whisker.diameter_mm)
+    (k_near, near_sigma), (k_far, far_sigma) = (_corrected(p, C, reach, theta_rad, alpha_rad) for p in (near, far))
     d_x, _ = compliance.two_distances(k_near, k_far, shift, C)
     if not np.isfinite(d_x):
         return Soft(*described, *(np.nan,) * 4, NO_PUSH)
@@ -120,11 +124,10 @@ def _soft(session: Session, result: TrialResult, near: Place, far: Place, alpha_
     return Soft(*described, float(d_x), float(sigmas[0]), float(give), float(sigmas[1]), status)
 
 
-def _corrected(session: Session, result: TrialResult, place: Place, alpha_rad: float) -> tuple[float, float]:
+def _corrected(place: Place, C: float, reach: float, theta: float, alpha_rad: float) -> tuple[float, float]:
     """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`), and its sigma with what
-    is left of that."""
-    theta, C, d_x = float(np.radians(result.theta_deg)), session.whisker.C_Nmm2, place.nominal_mm
-    reach = 0.5 * (np.nan_to_num(result.trial.bar_diameter_mm) + session.whisker.diameter_mm)
+    is left of that. reach: radii of bar and whisker together, mm."""
+    d_x = place.nominal_mm
     share = first_order.rolling(theta, reach, 0.0, alpha_rad, d_x, 1.0)
     share += first_order.HELD_SHARE * first_order.dragging(theta, alpha_rad)
     left = model_share(theta, 0.0, alpha_rad, d_x, held_spread=first_order.HELD_SPREAD)

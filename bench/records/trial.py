@@ -189,7 +189,8 @@ class FeltWhisk:
     (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
     those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
     elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
-    moments and estimates at other pushing angles, up to the stroke's end.
+    moments and estimates at other pushing angles, up to the stroke's end. kinetic: as on the kinetic cone, where the
+    moments alone show that the contact sticks and slips.
     """
 
     whisk: int = 0
@@ -208,6 +209,7 @@ class FeltWhisk:
     estimates: tuple[EstimateRow, ...] = ()
     one_factor: tuple[EstimateRow, ...] = ()
     by_theta: tuple[FeltAt, ...] = ()
+    kinetic: FeltAt | None = None
 
     @property
     def has_moments(self) -> bool:

@@ -51,8 +51,12 @@ class Judged:
 
 
 def is_sound(seen: SeenWhisk, felt: FeltWhisk) -> bool:
-    """Is nothing doubtful of the whisk, in what was seen and what was felt? No verdict takes doubtful ones."""
-    return not ({seen.status, felt.status} - set(NO_DOUBTS))
+    """Is nothing doubtful of distance and moments, seen and felt? No verdict takes doubtful ones.
+
+    A slip that is seen to jump, or not up to the wanted angle, leaves the distance what it is.
+    """
+    of_slip = seen.at.status if seen.at is not None else ""
+    return not ({*seen.status.split("; "), felt.status} - {of_slip, *NO_DOUBTS})
 
 
 def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:

@@ -151,11 +151,13 @@ def felt_by_theta(
 ) -> tuple[FeltAt, ...]:
     """Moments and what estimators answer at THETAS_DEG, as far as the stroke goes."""
     reached = (whisk_at(stroke, readout, touch, beam, theta) for theta in np.radians(THETAS_DEG).tolist())
-    return tuple(
-        FeltAt(whisk.theta_at_rad, *_moments(whisk), whisk.theta_sigma_rad, whisk.covariance_at,
-               whisk.theta_moment_covariance_at, answered(whisk))
-        for whisk in reached if isinstance(whisk, Whisk)
-    )  # fmt: skip
+    return tuple(felt_at(whisk, answered(whisk)) for whisk in reached if isinstance(whisk, Whisk))
+
+
+def felt_at(whisk: Whisk, estimates: tuple[EstimateRow, ...] = ()) -> FeltAt:
+    """The record of a whisk at its pushing angle."""
+    covariances = whisk.theta_sigma_rad, whisk.covariance_at, whisk.theta_moment_covariance_at
+    return FeltAt(whisk.theta_at_rad, *_moments(whisk), *covariances, estimates)
 
 
 def _slip_angle(whisk: Whisk) -> Value:

@@ -21,6 +21,7 @@ from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial import (
     EstimateRow,
+    FeltAt,
     FeltTrial,
     FeltWhisk,
     SeenTrial,
@@ -34,11 +35,13 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
-from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
+from bench.trials.gate import kinetic_end
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
 from estimator.signal import Touch
+from estimator.whisk import Whisk
 from vision.truth.value import NAN, UNKNOWN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
@@ -168,10 +171,12 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     asked, radii_mm = estimators(unit.settings.estimators), _radii_mm(unit)
     answered = partial(answers, asked=asked, settings=unit.settings, radii_mm=radii_mm)
+    estimates = answered(usable)
     return replace(
         felt,
         phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
-        estimates=answered(usable),
+        estimates=estimates,
+        kinetic=_kinetic(stroke, touch, readout, usable, estimates),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         one_factor=_one_factor(unit, kind, stroke),
     )
@@ -203,6 +208,16 @@ def _phases(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: 
     moments = (stroke.channels - touch.offset) @ readout.matrix.T
     theta = stroke.motor_rad - touch.motor_rad
     return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
+
+
+def _kinetic(
+    stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, estimates: tuple[EstimateRow, ...]
+) -> FeltAt | None:
+    """The whisk on the kinetic cone, where its moments show teeth; no picture and no manifest has a part in it."""
+    given = next(row for row in estimates if row.estimator == "with_friction")
+    moments = (stroke.channels - touch.offset) @ readout.matrix.T
+    found = kinetic_end(stroke.time_s, stroke.motor_rad - touch.motor_rad, moments, whisk, given)
+    return None if found is None else felt_at(found)
 
 
 def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.base.drawing import label_of
 from bench.base.settings import Seeing, Settings
-from bench.friction.runs import FITTED, RUNS, SEEN
+from bench.friction.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
@@ -77,7 +77,11 @@ def _measured(judged: Sequence[Judged]) -> list[Judged]:
 
 def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
     """(10) once more with what is known of the friction, where that is anything."""
-    for name, what in ((FITTED, "to the other whisks of the surface"), (SEEN, "which no robot has; what is left then")):
+    for name, what in (
+        (FITTED, "to the other whisks of the surface"),
+        (SEEN, "which no robot has; what is left then"),
+        (KINETIC, "where moments alone show stick–slip"),
+    ):
         mine = [j for j in _measured(judged) if j.estimator == name]
         if mine:
             yield _verdict_on(name, mine, settings).replace(label_of(name), f"{label_of(name)} ({what}),", 1)
