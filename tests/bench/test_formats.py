@@ -12,7 +12,7 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import error_map, explained, tables
 from bench.gauges.gauges_file import FileKeys
-from bench.report import assembly, figure_8
+from bench.report import assembly, compare, figure_8
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
@@ -43,6 +43,7 @@ CSV = {
     "surfaces.csv": tables.SURFACE_COLUMNS,
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
+    "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
