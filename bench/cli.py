@@ -12,7 +12,7 @@ from pathlib import Path
 from bench.base.errors import BadInput
 from bench.cli_results import add_compare, add_report, add_view
 from bench.cli_setup import add_board, add_new
-from bench.options import BAD_INPUT, DONE, FAULT_OF_OURS, INTERRUPTED, add_figure_format
+from bench.options import BAD_INPUT, DONE, DOUBTFUL, FAULT_OF_OURS, INTERRUPTED, add_figure_format
 from bench.options import add_out as _add_out
 from bench.options import add_session as _add_session
 from bench.options import add_verb as _add
@@ -117,9 +117,9 @@ def _evaluate(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
+    from bench.api import evaluate_with
     from bench.base.environment import check_environment
     from bench.base.settings import Settings
-    from bench.evaluate import evaluate
 
     check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
@@ -128,15 +128,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
-    progress = sys.stderr.isatty()
-    return evaluate(
-        options.session,
-        options.out,
-        Settings(**given),
-        workers=options.workers,
-        progress=progress,
-        figure_formats=options.figure_format,
-    )
+    told = {"progress": sys.stderr.isatty(), "announce": print}
+    formats = options.figure_format
+    run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)
+    return DOUBTFUL if run.doubtful else DONE
 
 
 def _add_calibrate(verbs) -> None:

@@ -68,7 +68,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from bench.report.page.write import report_again
+    from bench.api import report
 
-    print(*report_again(options.run_folder, options.figure_format), sep="\n")
+    print(*report(options.run_folder, options.figure_format), sep="\n")
     return DONE
