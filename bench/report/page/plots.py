@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from bench.base.drawing import SLOPES_DEG, label_of
 from bench.base.settings import Settings
+from bench.friction.alphas import seen_friction
 from bench.friction.explained import SHARES, explained_rows
 from bench.friction.surfaces import Felt, Surface
 from bench.friction.tables import SurfaceFriction
@@ -113,7 +114,7 @@ def _predicted(panel: Panel, name: str, names, fitted: Sequence[Surface], settin
 
 def error_by_friction(judged: Sequence[Judged], keys: dict, rows: Sequence[Row]) -> Iterator[Figure]:
     """Error of (10) against the friction angle that the pictures show; nothing where none shows it."""
-    alpha = {row.key: math.degrees(row.seen.at.alpha_rad.value) for row in rows if row.seen.at is not None}
+    alpha = {row.key: math.degrees(seen_friction(row.seen)[0]) for row in rows if row.seen.deflection is not None}
     mine = [j for j in judged if j.estimator == "with_friction"]
     mine = [j for j in mine if math.isfinite(alpha.get(keys[j.trial, j.whisk], math.nan))]
     if len(mine) < 2:
@@ -124,7 +125,7 @@ def error_by_friction(judged: Sequence[Judged], keys: dict, rows: Sequence[Row])
     marks = [panel.mark(_error_mark(j, ["with_friction"], keys, x)) for j, x in zip(mine, places)]
     alt = f"Error of (10) in per cent against the friction angle seen: {len(mine)} points"
     drawn = panel.drawing(marks, ("friction angle α seen  [°]", "error of d_x  [%]"), "(10) with friction", alt)
-    said = "Error of (10) against the friction angle that the pictures show at θ: where α_est is not α, it errs."
+    said = "Against the friction angle that the pictures show, of whisks that slip: where α_est is not α, (10) errs."
     yield Figure("Error against friction", said, (drawn,))
 
 

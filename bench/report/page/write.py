@@ -14,7 +14,7 @@ from bench.friction.explained import SHARES
 from bench.friction.tables import SurfaceFriction
 from bench.records.trial import TrialResult
 from bench.report.evaluation import finished
-from bench.report.page.cards import card, cells, columns
+from bench.report.page.cards import SOUND, card, cells, columns
 from bench.report.page.cures import cure_of
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
@@ -25,6 +25,7 @@ from bench.report.paper import write_paper_figures
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run import CameraFacts, RunRecord
+from bench.report.summary.doubts import SILENT
 from vision.fit.uncertainty import CAUSES
 
 REPORT, METHODS, BIBLIOGRAPHY = "report.html", "methods.md", "results.bib"
@@ -89,6 +90,7 @@ def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction:
         others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
         citation=bibliography(record),
         number=number,
+        silent=(SOUND, *SILENT),
     ) + "\n"  # fmt: skip
 
 
