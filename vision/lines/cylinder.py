@@ -12,7 +12,7 @@ _RATIO_STEP, _ROWS_PER_BLUR, _REACH_BLURS = 0.05, 12, 6.0
 _LEAST_RADIUS_PX = 0.05  # thinner is as good as nothing
 
 
-def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
+def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, terms: int) -> np.ndarray:
     """Blurred pictures (..., terms + 2) of a cylinder whose radiance is each function of `round_the_rod` in turn; the
     last two are `rim_bells`.
 
@@ -34,7 +34,8 @@ def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarra
     return values
 
 
-def slopes_of(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, np.ndarray]:
+def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,
+              waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and second derivatives (2, s, p) each, by offset, per px and per px², of what s cylinders add to the light
     and of what they hide.
 
@@ -59,7 +60,7 @@ def slopes_of(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, 
     return slopes * (rows / radius_px), curvatures * (rows / radius_px) ** 2
 
 
-def rim_bells(offset_px, radius_px, blur_px: float) -> np.ndarray:
+def rim_bells(offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: float) -> np.ndarray:
     """Bells (..., 2) where the blurred rod begins and ends: normal densities of z, the distance from the edge over the
     blur, and z times them; those of the edge at negative offset are taken away from the other's."""
     bells = 0.0
@@ -125,7 +126,7 @@ def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
 _legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
-def round_the_rod(t, terms: int) -> np.ndarray:
+def round_the_rod(t: np.ndarray, terms: int) -> np.ndarray:
     """Functions (n, terms) of the angle t (n,) round the rod, from edge (-pi/2) to edge (pi/2); the first is 1.
 
     WAVES: 1, sin t, cos t, sin 2t …, the whole of a thin rod. RIMS: for each side its own square polynomial in the
