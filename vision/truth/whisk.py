@@ -55,7 +55,8 @@ class _Look:
 
 
 def fit_whisk(views: Sequence[View], cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
-              light: dict[str, WireAppearance], settings: VisionSettings):
+              light: dict[str, WireAppearance],
+              settings: VisionSettings) -> tuple[Problem, State, np.ndarray, list[int]]:
     """Problem and state after the last round, how its parameters answer (see `Uncertainty`), and the frames in it: all
     but those far before touch.
 
