@@ -72,7 +72,7 @@ def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: BarAxis, motor_ra
     if not any(len(one.points) for one in seen):
         raise Refused("no whisker is seen where the motor angle says it should be")
     nothing = np.zeros(len(motor), dtype=bool)
-    problem = Problem(cameras, rods.wire, rods.reach_mm, 0.0, axis, motor, nothing, nothing, seen)
+    problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
     state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
     return state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
 

@@ -123,7 +123,7 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
 def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float],
          by_onset: bool) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
-    problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
+    problem = Problem(cameras, rods, look.axis, np.array(list(motor.values())),
                       look.touching, ~look.free, seen)
     state, covariance = solve(problem, _begin(problem, look))
     if by_onset:
