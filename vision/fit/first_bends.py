@@ -171,7 +171,8 @@ def _pull(axis: BarAxis, views: int) -> np.ndarray:
     return np.eye(2) / _PULL_RAD**2 + np.outer(along, along) / _ALONG_BAR_RAD**2
 
 
-def contact_arc(rest_mm, bend, motor, axis: BarAxis, wire: Wire) -> float:
+def contact_arc(rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: BarAxis, wire: Wire) -> float:
+    """Arc length in mm at which a whisker of this rest shape (2, 4), mm, and bend (2,), rad, is nearest to the axis."""
     straight = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
     arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)
     bent = one_curve(rest_mm, bend, arc, motor, wire)

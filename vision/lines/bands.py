@@ -8,6 +8,7 @@ Where the background is bright on one piece and dark on the next, both edges are
 or a highlight no longer pulls the position to one side.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +35,8 @@ class Band:
     radius_px: np.ndarray
 
 
-def read_band(grey, background, curve_px, place, radius_px, half_width_px: int) -> Band:
+def read_band(grey: np.ndarray, background: np.ndarray, curve_px: np.ndarray, place: np.ndarray, radius_px: np.ndarray,
+              half_width_px: int) -> Band:
     """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along.
 
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals point to the same
@@ -97,22 +99,22 @@ class Pieces:
         """Pixels (s,) less the position and the background's gain and offset that each piece has of its own."""
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
 
-    def select(self, keep) -> "Pieces":
+    def select(self, keep: np.ndarray | slice) -> "Pieces":
         """The pieces where `keep` (s,) holds, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
-    def columns(self, keep) -> "Pieces":
+    def columns(self, keep: np.ndarray) -> "Pieces":
         """The same pieces with those of their pixels where `keep` (p,) holds."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
-    def moved(self, shift_px) -> "Pieces":
+    def moved(self, shift_px: np.ndarray) -> "Pieces":
         """The same pixels seen from curves moved by shift_px (s,) along their normals."""
         return replace(self, offset_px=self.offset_px - shift_px[:, None],
                        foot_px=self.foot_px + shift_px[:, None] * self.normal)
 
 
-def cut_pieces(bands, length_px: int, noise: Noise) -> Pieces:
+def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
     """All bands cut into pieces of `length_px` steps; what is left over at the end is not used."""
     parts = [_cut(band, length_px, noise, number) for number, band in enumerate(bands)
              if len(band.place) >= length_px]

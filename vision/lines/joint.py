@@ -19,7 +19,9 @@ BLUR_SIGMA = 0.5  # of the logarithm of the blur: pixels say much more, where th
 _MOST_STEPS, _LONGEST_PX, _LONGEST_LOG = 40, 0.7, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
-_SETTLED = 0.02  # what a step may still gain in chi²: it moves what all share by a seventh of a sigma at most
+# What a step may still gain in chi² by what all share, which it moves by a seventh of a sigma at most, and in the mean
+# by a piece's own position, which it moves by 0.03 sigma: pieces that tell nothing wander on for ever.
+_SETTLED, _SETTLED_EACH = 0.02, 1e-3
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class Task:
     blur_sigma: float = BLUR_SIGMA
 
 
-def solve(task: Task, shift_px=None, robust=None, damped: float = _DAMPED, most: int = _MOST_STEPS) -> Solved:
+def solve(task: Task, shift_px: np.ndarray | None = None, robust: np.ndarray | None = None, damped: float = _DAMPED,
+          most: int = _MOST_STEPS) -> Solved:
     """The most probable positions, shading and blur; begins with these shifts (s,) and weights (s,) of the pieces.
 
     The last step is taken without looking again: what is told of the pieces is as it was before it.
@@ -61,7 +64,7 @@ def solve(task: Task, shift_px=None, robust=None, damped: float = _DAMPED, most:
     arrow = _Arrow(task, here)
     for _ in range(most):
         step, by_blur, gain = arrow.step(damped)
-        if gain < _SETTLED:
+        if gain[0] < _SETTLED and gain[1] < _SETTLED_EACH * count:
             break
         there = here.moved(step, by_blur)
         if there.misfit > here.misfit:
@@ -143,8 +146,9 @@ class _Arrow:
         self.by_blur = (point.robust @ slopes.gram[:, 1, 2]
                         - (point.log_blur - np.log(task.blur_px)) / task.blur_sigma**2)
 
-    def step(self, damped: float) -> tuple[np.ndarray, float, float]:
-        """Steps of the positions (s,) and of the blur's logarithm, and by how much chi² is expected to fall."""
+    def step(self, damped: float) -> tuple[np.ndarray, float, tuple[float, float]]:
+        """Steps of the positions (s,) and of the blur's logarithm, and by how much chi² is expected to fall, by what
+        all share and by positions alone."""
         robust = self.point.robust
         power = robust * self.power
         power = power + damped * np.median(power) + LEAST_POWER
@@ -155,7 +159,7 @@ class _Arrow:
         shared_right[-1] += self.by_blur
         shared = cho_solve(cho_factor(left, check_finite=False), shared_right, check_finite=False)
         step = (right - cross @ shared) / power
-        return step, float(shared[-1]), float(right @ step + self.by_blur * shared[-1])
+        return step, float(shared[-1]), (float(shared_right @ shared), float(right @ (right / power)))
 
     def solved(self, damped: float) -> Solved:
         """A step farther on, with covariance: each piece's own, and what all move by with what they share."""

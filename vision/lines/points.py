@@ -34,7 +34,7 @@ class LinePoints:
     def __len__(self) -> int:
         return len(self.place)
 
-    def select(self, keep) -> "LinePoints":
+    def select(self, keep: np.ndarray) -> "LinePoints":
         """The points where `keep` holds."""
         return LinePoints(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 

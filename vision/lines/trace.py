@@ -47,7 +47,7 @@ def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.
     return arc, *outline(camera, points, directions, wire.radius_mm(arc))
 
 
-def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.ndarray:
+def clear_of_bar(pieces: Pieces, middle_px: np.ndarray, radius_px: np.ndarray, margin_px: float) -> np.ndarray:
     """Which pieces (s,) lie outside the bar's outline, given by its middle (m, 2) and half-width (m,); NaN where it
     passes behind the camera and hides nothing."""
     away = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
@@ -106,7 +106,7 @@ def _leading(shared_px) -> tuple[np.ndarray, np.ndarray]:
     return most, np.linalg.norm(causes[:, SHARED:], axis=1)
 
 
-def observed(points: LinePoints, source, camera: int, frames: Sequence[int]) -> list[Observed]:
+def observed(points: LinePoints, source: np.ndarray, camera: int, frames: Sequence[int]) -> list[Observed]:
     """One Observed per frame that has points; frames: the frame index of each position of the whisk."""
     return [Observed(position, camera, points.select(source == frame))
             for position, frame in enumerate(frames) if np.any(source == frame)]

@@ -1,6 +1,6 @@
 """One whisk: wire and bar traced in all its frames and fitted together, by turns."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -54,8 +54,9 @@ class _Look:
     free: np.ndarray
 
 
-def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
-              light: dict[str, WireAppearance], settings: VisionSettings):
+def fit_whisk(views: Sequence[View], cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
+              light: dict[str, WireAppearance],
+              settings: VisionSettings) -> tuple[Problem, State, np.ndarray, list[int]]:
     """Problem and state after the last round, how its parameters answer (see `Uncertainty`), and the frames in it: all
     but those far before touch.
 
@@ -166,8 +167,8 @@ def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> d
     return dict(list(motor.items())[begin:])
 
 
-def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mapping[int, float], near, light: dict,
-                settings: VisionSettings) -> tuple[Problem, State]:
+def free_stroke(views: Sequence[View], rods: Rods, problem: Problem, state: State, motor: Mapping[int, float],
+                near: Sequence[int], light: dict, settings: VisionSettings) -> tuple[Problem, State]:
     """All frames before touch and what is seen in them, about the bar and the shape at rest of a fit."""
     free = {f: angle for f, angle in motor.items() if f not in near or not problem.bent[near.index(f)]}
     rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
