@@ -45,10 +45,12 @@ class Votes:
         return self.share.shape[1] // 2
 
     def points(self, shift_px: np.ndarray) -> LinePoints:
-        """The middle of each piece's votes near a curve, shift_px (s,) away from the predicted one."""
+        """The middle of each piece's votes near a curve, shift_px (s,) away from the predicted one. A piece that what
+        stands still explains has none: a lens cap differs from the picture without rods everywhere."""
         near = np.rint(shift_px).astype(int)[:, None] + np.arange(-_NEAR_PX, _NEAR_PX + 1)
         share = np.take_along_axis(self.changed, np.clip(near + self.reach_px, 0, 2 * self.reach_px), axis=1)
         share = np.where(np.abs(near) <= self.reach_px, share, 0.0) ** 2  # squared: what lies beside is no wire
+        share = np.where(np.any(self.share > 0.0, axis=1, keepdims=True), share, 0.0)
         whole = np.sum(share, axis=1)
         shift = np.where(whole > 0.0, np.sum(share * near, axis=1) / np.maximum(whole, 1e-12), shift_px)
         px = self.pieces.foot_px + shift[:, None] * self.pieces.normal
