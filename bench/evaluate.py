@@ -6,9 +6,10 @@ from bench.base.atomic import lock_output
 from bench.base.doubts import Doubts
 from bench.base.settings import Settings
 from bench.base.workers import Workers
+from bench.friction.curved import curved_whisks, write_curvature
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
-from bench.friction.runs import with_runs
+from bench.friction.runs import alpha_est_sigma, with_runs
 from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import friction_of, write_friction
 from bench.report.assembly import write_tables
@@ -37,8 +38,11 @@ def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int 
         write_friction(out, results, friction, settings.alpha_est_rad)
         soft = tuple(soft_objects(session, results, settings.alpha_est_rad))
         write_compliance(out, soft)
+        alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in friction], settings)
+        shapes = tuple(curved_whisks(results, session.whisker, *alpha))
+        write_curvature(out, shapes)
         notes = calibration.notes, tuple(doubts.notes)
-        return report(Evaluation(session, out, settings, results, friction, gauges, *notes, soft), pool)
+        return report(Evaluation(session, out, settings, results, friction, gauges, *notes, soft, shapes), pool)
 
 
 def report(evaluation: Evaluation, pool: Workers) -> int:

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.base.settings import Settings
+from bench.friction.curved import Curved
 from bench.friction.soft import Soft
 from bench.friction.tables import SurfaceFriction
 from bench.gauges.matrix import Gauges
-from bench.records.trial import TrialResult
+from bench.records.trial import FeltWhisk, TrialResult
 from bench.session.session import Session
 
 
@@ -15,7 +16,7 @@ from bench.session.session import Session
 class Evaluation:
     """Results of all trials in the folder `out`. camera_notes: lines on calibration and placing; doubts: lines that the
     user should read; friction: a surface and speed each; gauges: None where volts cannot become moments; soft: pairs of
-    distances."""
+    distances; shapes: how each whisk's object is curved."""
 
     session: Session
     out: Path
@@ -26,3 +27,4 @@ class Evaluation:
     camera_notes: tuple[str, ...]
     doubts: tuple[str, ...]
     soft: tuple[Soft, ...] = ()
+    shapes: tuple[tuple[TrialResult, FeltWhisk, Curved], ...] = ()

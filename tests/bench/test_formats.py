@@ -9,7 +9,7 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import error_map, explained, soft, tables
+from bench.friction import curved, error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
 from bench.report import against_theta, assembly, figure_8
 from bench.rig.simulate import simulate
@@ -42,6 +42,7 @@ CSV = {
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
     "compliance.csv": soft.COLUMNS,
+    "curvature.csv": curved.COLUMNS,
     "against_theta.csv": against_theta.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from bench.base.atomic import write_whole
+from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
 from bench.report.against_theta import AtTheta, theta_lines
@@ -18,7 +19,7 @@ from bench.trials.compare import judge
 DONE, DOUBTFUL = 0, 1
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance"),
+    *("against_theta", "compliance", "curvature"),
 )
 
 
@@ -55,7 +56,7 @@ def _lines(
         *_titled(errors, [*error_lines(judged), *contact_lines(results)]),
         *_titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg)),
         *_titled("Friction angle α (± one sigma)", [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]),
-        *_titled("Stiffness of the object", soft_lines(evaluation.soft)),
+        *_titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)]),
         *_titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *_titled("Cameras", evaluation.camera_notes),
         *_titled("Light from one side", light_lines(results)),
