@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, format="%(message)s")
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        return options.run(options)
+        return _in_sound_environment(options)
     except (BadInput, Refused) as bad:
         return _complain(str(bad), BAD_INPUT)
     except KeyboardInterrupt:
@@ -38,6 +38,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         logging.getLogger(__name__).info("", exc_info=fault)
         found = f"{type(fault).__name__}: {fault}"
         return _complain(f"a fault of ours, please report it ({found}); -v shows where", FAULT_OF_OURS)
+
+
+def _in_sound_environment(options: argparse.Namespace) -> int:
+    """Run the verb where results can be trusted. `info` tells its versions first. Raises BadInput elsewhere."""
+    from bench.base.environment import check_environment
+
+    if options.run is _info:
+        _info(options)
+        check_environment()
+        return DONE
+    check_environment()
+    return options.run(options)
 
 
 def _interrupt(*_) -> None:
@@ -60,7 +72,8 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_simulate, _add_info):
+    first = (_add_new, _add_board, _add_check, _add_calibrate, _add_evaluate)
+    for add_verb in (*first, _add_report, _add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 
@@ -96,6 +109,78 @@ def _count(text: str) -> int:
     return int(text)
 
 
+def _squares(text: str) -> tuple[int, int]:
+    counts = text.lower().split("x")
+    if len(counts) != 2 or not all(count.isdecimal() and int(count) > 1 for count in counts):
+        raise argparse.ArgumentTypeError(f"{text!r} is not two counts of squares, such as 8x6")
+    return int(counts[0]), int(counts[1])
+
+
+def _add_new(verbs) -> None:
+    verb = _add(
+        verbs,
+        "new",
+        _new,
+        "the folders of a session and an annotated session.toml; asks in a terminal for what no option gives",
+        "whisker-bench new my-session --whisker-length-mm 100 --whisker-diameter-mm 1 --bar-diameter-mm 6",
+    )
+    _add_session(verb)
+    verb.add_argument("--name", default="", help="shown in reports (default: the folder's name)")
+    for option, what in _NUMBERS_OF_A_SESSION.items():
+        verb.add_argument(option, type=float, metavar="X", help=what)
+    verb.add_argument("--squares", type=_squares, default=(8, 6), metavar="NxM", help="of the board (default 8x6)")
+    verb.add_argument("--dictionary", default="DICT_5X5_100", metavar="NAME", help="of its markers, as OpenCV names it")
+
+
+_NUMBERS_OF_A_SESSION = {
+    "--whisker-length-mm": "from base to tip",
+    "--whisker-diameter-mm": "at the base",
+    "--youngs-modulus-GPa": "of the whisker",
+    "--bar-diameter-mm": "of the round bar that is touched",
+    "--square-mm": "side of a square of the board, as measured",
+    "--marker-mm": "side of one of its markers",
+}
+
+
+def _new(options: argparse.Namespace) -> int:
+    from bench.setup.new_session import new_session
+
+    names = [option.removeprefix("--").replace("-", "_") for option in _NUMBERS_OF_A_SESSION]
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    ask = input if sys.stdin.isatty() else None
+    print(*new_session(options.session, options.name, given, options.squares, options.dictionary, ask), sep="\n")
+    return DONE
+
+
+def _add_board(verbs) -> None:
+    verb = _add(
+        verbs,
+        "board",
+        _board,
+        "a ChArUco board as a PDF at exact scale with rulers, and its lines for session.toml",
+        "whisker-bench board --out board.pdf --squares 8x6 --square-mm 15",
+    )
+    _add_out(verb, "FILE", "PDF to write")
+    verb.add_argument("--squares", type=_squares, default=(8, 6), metavar="NxM", help="along x and y (default 8x6)")
+    verb.add_argument("--square-mm", type=float, default=15.0, metavar="X", help="side of a square (default 15)")
+    verb.add_argument("--marker-mm", type=float, metavar="X", help="side of a marker (default 11/15 of a square)")
+    verb.add_argument("--dictionary", default="DICT_5X5_100", metavar="NAME", help="as OpenCV names it")
+    verb.add_argument("--legacy", action="store_true", help="OpenCV's pattern from before 4.6")
+    verb.add_argument("--inverted", action="store_true", help="white on black")
+
+
+def _board(options: argparse.Namespace) -> int:
+    from bench.setup.board_pdf import MARKER_SHARE, toml_block, write_board
+    from vision.geometry.board import Board
+
+    marker_mm = options.marker_mm or round(MARKER_SHARE * options.square_mm, 2)
+    kind = options.dictionary, options.legacy, options.inverted
+    board = Board(options.squares, options.square_mm, marker_mm, *kind)
+    paper = write_board(options.out, board)
+    print(*toml_block(board), "", f"written: {options.out}, {paper.name}; print it at 100 %, then measure it", sep="\n")
+    return DONE
+
+
 def _add_evaluate(verbs) -> None:
     verb = _add(
         verbs,
@@ -124,6 +209,7 @@ def _add_evaluate(verbs) -> None:
         help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
         "else to half a frame)",
     )
+    _add_seeing(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -137,26 +223,117 @@ def _add_evaluate(verbs) -> None:
         metavar="MODULE:FUNCTION",
         help="one of your own, importable from here; may be given several times",
     )
+    verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
+    verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
+    _add_figure_format(verb)
     _add_workers(verb)
+
+
+def _add_figure_format(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--figure-format",
+        action="append",
+        default=[],
+        choices=("png", "pdf", "svg"),
+        help="figures for a paper too, as wide as a journal's column, in OUT/figures; may be given several times",
+    )
+
+
+def _add_seeing(verb: argparse.ArgumentParser) -> None:
+    how = verb.add_mutually_exclusive_group()
+    how.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
+    )
+    how.add_argument(
+        "--accuracy-mm",
+        type=float,
+        metavar="X",
+        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
+    )
+    how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
 def _evaluate(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
-    from bench.base.environment import check_environment
     from bench.base.settings import Settings
     from bench.evaluate import evaluate
 
-    check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s")
-    names = (*numbers, "estimators", "gauges_from_all")
+    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given["seeing"] = _seeing(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
     progress = sys.stderr.isatty()
-    return evaluate(options.session, options.out, Settings(**given), workers=options.workers, progress=progress)
+    return evaluate(
+        options.session,
+        options.out,
+        Settings(**given),
+        workers=options.workers,
+        progress=progress,
+        figure_formats=options.figure_format,
+    )
+
+
+def _add_report(verbs) -> None:
+    verb = _add(
+        verbs,
+        "report",
+        _report,
+        "report.html, methods.md and results.bib of an evaluated run again, from its results alone",
+        "whisker-bench report demo-out --figure-format pdf",
+    )
+    _add_run(verb)
+    _add_figure_format(verb)
+
+
+def _add_run(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("run_folder", type=Path, metavar="OUT", help="folder that `evaluate --out` wrote")
+
+
+def _report(options: argparse.Namespace) -> int:
+    from bench.report.page.write import report_again
+
+    print(*report_again(options.run_folder, options.figure_format), sep="\n")
+    return DONE
+
+
+def _seeing(options: argparse.Namespace):
+    """The settings of `--preset` or `--settings`."""
+    from bench.trials.seeing import STANDARD, by_preset, from_file
+
+    return from_file(options.settings) if options.settings else by_preset(options.preset or STANDARD)
+
+
+def _add_tradeoff(verbs) -> None:
+    verb = _add(
+        verbs,
+        "tradeoff",
+        _tradeoff,
+        "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
+        "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
+    )
+    _add_session(verb)
+    _add_out(verb, "OUT", "folder for the table, the plot and the settings files")
+    verb.add_argument("--trials", default="*", metavar="PATTERN", help="only trials of such names (default: all)")
+    verb.add_argument("--repeats", type=_count, default=2, metavar="N", help="how often each is timed (default 2)")
+
+
+def _tradeoff(options: argparse.Namespace) -> int:
+    from bench.base.workers import single_thread
+
+    single_thread()
+    from bench.base.environment import check_environment
+    from bench.tradeoff import tradeoff
+
+    check_environment()
+    progress = sys.stderr.isatty()
+    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, progress=progress)
 
 
 def _add_calibrate(verbs) -> None:
@@ -191,10 +368,8 @@ def _add_calibrate(verbs) -> None:
 
 
 def _calibrate_gauges(options: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment
     from bench.calibrate_gauges import calibrate_gauges_command
 
-    check_environment()
     return calibrate_gauges_command(
         options.session,
         options.out,
@@ -205,10 +380,8 @@ def _calibrate_gauges(options: argparse.Namespace) -> int:
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment
     from bench.cameras.calibrate import calibrate_cameras_command
 
-    check_environment()
     return calibrate_cameras_command(options.session, options.out, options.lenses)
 
 
@@ -323,11 +496,10 @@ def _add_info(verbs) -> None:
 
 
 def _info(_: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment, versions
+    from bench.base.environment import versions
 
     for name, version in versions().items():
         print(f"{name} {version}")
-    check_environment()
     return DONE
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
 from vision.fit.beam_check import BeamCheck
+from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth
@@ -70,7 +71,8 @@ class SeenWhisk:
 
     The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
     moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
-    (`bench.trials.clocks`).
+    (`bench.trials.clocks`). looked: preset or settings file by which the pictures were looked at. contradicted: what
+    the recording says twice does not agree (`bench.trials.consistency`).
     """
 
     whisk: int
@@ -85,11 +87,14 @@ class SeenWhisk:
     budget: dict[str, float] = field(default_factory=dict)
     base: BaseLines | None = None
     beam: BeamCheck | None = None
+    turns: Turns | None = None
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
     overlay: dict[str, Drawing] = field(default_factory=dict)
     touch_shared_rad: float = 0.0
+    looked: str = ""
+    contradicted: bool = False
 
     @property
     def has_truth(self) -> bool:
@@ -124,8 +129,11 @@ class BackStroke:
 
 @dataclass(frozen=True, eq=False)
 class SeenTrial:
-    """The seen half of a trial; bar, radii and clock are missing where there are no pictures. back: the first back
-    stroke, where it was recorded and has a truth."""
+    """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
+
+    bar_looks: how thick the bar looks over how thick it is said to be, by camera. back: the first back stroke, where it
+    was recorded and has a truth.
+    """
 
     whisks: tuple[SeenWhisk, ...]
     notes: tuple[str, ...] = ()
@@ -133,6 +141,7 @@ class SeenTrial:
     bar_radius_mm: float = NAN
     wire_radius_mm: float = NAN
     clock: Clock | None = None
+    bar_looks: dict[str, float] = field(default_factory=dict)
     back: BackStroke | None = None
 
 
@@ -178,9 +187,10 @@ class FeltWhisk:
 
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
     (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
-    those of the seen shape, 2 degrees of freedom; apart: they are not those. one_factor: estimates with one factor a
-    channel. by_theta: moments and estimates at other pushing angles, up to the stroke's end. kinetic: as on the
-    kinetic cone, where the moments alone show that the contact sticks and slips.
+    those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
+    elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
+    moments and estimates at other pushing angles, up to the stroke's end. kinetic: as on the kinetic cone, where the
+    moments alone show that the contact sticks and slips.
     """
 
     whisk: int = 0

@@ -86,11 +86,13 @@ def theta_lines(rows: Sequence[AtTheta], theta_deg: float) -> Iterator[str]:
         )
 
 
-def write_against_theta(out: Path, results: Sequence[TrialResult]) -> tuple[list[AtTheta], list[str]]:
-    """Table and figure; the rows, and the figure's name where there is one."""
+def write_against_theta(
+    out: Path, results: Sequence[TrialResult], *, drawn: bool = True
+) -> tuple[list[AtTheta], list[str]]:
+    """Table, and the figure where it is to be `drawn`; the rows, and the figure's name where there is one."""
     rows = against_theta(results)
     write_table(out / TABLE, COLUMNS, map(vars, rows))
-    if not any(row.whisks for row in rows):
+    if not drawn or not any(row.whisks for row in rows):
         return rows, []
     stamp = hash_of([vars(row) for row in rows], hash_of_code(DRAWING))
     if not is_drawn(out / FIGURE, stamp):

@@ -48,7 +48,7 @@ WHISK_COLUMNS = (
     *("trial", "whisk", "surface", "speed_deg_s", "beta_nominal_deg", "theta_deg"),
     *_with_sigmas(["touch_deg", "touch_felt_deg", *(name for name, _ in (*_SEEN[1:], *_AT_ANGLE, *_FELT[1:]))]),
     *_with_sigmas(_PLACE),
-    *("cameras", "frames_used", "status"),
+    *("cameras", "frames_used", "looked", "status"),
 )
 ESTIMATE_COLUMNS = (
     "trial",
@@ -113,7 +113,8 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
             for column, key in names:
                 row |= _cells(column, key, getattr(source, key, UNKNOWN))
         row |= _place(seen.point_mm.value, seen.point_mm.sigma)
-        yield row | _whisk_of(result, seen) | {"cameras": seen.cameras, "frames_used": seen.frames_used}
+        row |= {name: getattr(seen, name) for name in ("cameras", "frames_used", "looked")}
+        yield row | _whisk_of(result, seen)
 
 
 def budget_rows(results: Iterable[TrialResult]) -> Iterator[dict]:

@@ -91,7 +91,7 @@ class Unit:
     @property
     def hash(self) -> str:
         """Hash of all that the result depends on."""
-        made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
+        made_from = self.drift_rate, self.gauges, self.settings.estimated(), self.settings.own_code()
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
     def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":
@@ -183,9 +183,10 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
 
 
 def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:
-    """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status."""
-    if seen.deflection is None:
-        return felt
+    """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status. Where
+    pictures contradict encoder or lengths, they tell nothing of gauges."""
+    if seen.deflection is None or seen.contradicted:
+        return replace(felt, apart=seen.contradicted)
     whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
