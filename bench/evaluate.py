@@ -9,8 +9,10 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
+from bench.friction.curved import curved_whisks, write_curvature
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
+from bench.friction.runs import alpha_est_sigma
 from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import write_friction
 from bench.report.assembly import write_tables
@@ -56,8 +58,11 @@ def evaluate(
         write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
         soft = tuple(soft_objects(session, whole.results, settings.alpha_est_rad))
         write_compliance(out, soft)
+        alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)
+        shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
+        write_curvature(out, shapes)
         recordings = {unit.trial.name: unit.files for unit in chosen}
-        found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft
+        found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
         summary = report(Evaluation(session, out, settings, *found), pool, figure_formats)
     announce(summary.text.rstrip())
     return DOUBTFUL if summary.doubtful else DONE

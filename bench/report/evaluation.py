@@ -6,11 +6,12 @@ from pathlib import Path
 
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
+from bench.friction.curved import Curved
 from bench.friction.runs import with_runs
 from bench.friction.soft import Soft
 from bench.friction.tables import SurfaceFriction, friction_of
 from bench.gauges.matrix import Gauges
-from bench.records.trial import TrialResult
+from bench.records.trial import FeltWhisk, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
@@ -39,7 +40,8 @@ def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Setting
 class Evaluation:
     """Results of all trials in the folder `out`. calibration: the cameras as placed in the rig, with its notes; doubts:
     lines that the user should read; friction: a surface and speed each; gauges: None where volts cannot become moments;
-    recordings: hash of each trial's files, by name; soft: pairs of distances that tell how soft an object is."""
+    recordings: hash of each trial's files, by name; soft: pairs of distances that tell how soft an object is; shapes:
+    how each whisk's object is curved."""
 
     session: Session
     out: Path
@@ -51,3 +53,4 @@ class Evaluation:
     doubts: tuple[str, ...]
     recordings: Mapping[str, str]
     soft: tuple[Soft, ...] = ()
+    shapes: tuple[tuple[TrialResult, FeltWhisk, Curved], ...] = ()

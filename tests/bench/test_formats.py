@@ -11,7 +11,7 @@ import pytest
 from bench import tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import error_map, explained, soft, tables
+from bench.friction import curved, error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
 from bench.report import against_theta, assembly, compare, figure_8
 from bench.report.run import BoardFacts, CameraFacts
@@ -47,6 +47,7 @@ CSV = {
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
     "compliance.csv": soft.COLUMNS,
+    "curvature.csv": curved.COLUMNS,
     "against_theta.csv": against_theta.COLUMNS,
     "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
 from bench.report.against_theta import AtTheta, theta_lines
@@ -18,7 +19,7 @@ from bench.trials.compare import Judged, judge
 
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance"),
+    *("against_theta", "compliance", "curvature"),
 )
 
 
@@ -67,7 +68,7 @@ def _sections(
     yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
     friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]
     yield _titled("Friction angle α (± one sigma)", friction)
-    yield _titled("Stiffness of the object", soft_lines(evaluation.soft))
+    yield _titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)])
     yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
     yield _titled("Cameras", evaluation.calibration.notes)
     yield _titled("Light from one side", light_lines(results))
