@@ -18,7 +18,7 @@ from vision.geometry.board import Board
 LEAST_CHANCE = 1e-4
 _EXPLAINED = 0.001  # of the chance that a cause must leave: its trace is that of an ideal fault
 _PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
-_BAR_SIGMA = 0.025  # of how thick a trial's bar looks, by a coarse look
+_BAR_SIGMA = 0.025  # of how thick a trial's bar looks, in the middle of 35 path-traced scenes; 8 scatter by 0.1 to 0.5
 
 
 @dataclass(frozen=True)

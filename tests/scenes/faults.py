@@ -237,6 +237,8 @@ FAULTS: dict[str, Fault] = {
     "frame twice": _frame_twice,
     "frame lost silently": _lost_silently,
     "frame dropped": _dropped,
+    "bar 6.8 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 6.8"),
+    "bar 5.2 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 5.2"),
     "bar 4 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 4.0"),
     "wire 1.5 mm for 1": _manifest("diameter_mm = 1.0", "diameter_mm = 1.5"),
     "board 10 % too large": _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 16.5\nmarker_mm = 12.1"),
