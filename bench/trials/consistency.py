@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from bench.session.trial import Trial
 from vision.fit.turns import Turns
@@ -48,7 +48,7 @@ class Difference:
     @property
     def is_chance(self) -> bool:
         """Whether both agree."""
-        return chi2.sf(self.chi2, self.freedom) >= LEAST_CHANCE
+        return chdtrc(self.freedom, self.chi2) >= LEAST_CHANCE
 
     def without(self, cause: Cause) -> tuple[float, float]:
         """χ² that is left when the cause's trace is taken away, and the trace's size."""
@@ -63,7 +63,7 @@ class Difference:
     def likeliest(self, causes: Sequence[Cause]) -> str:
         """The cause that leaves the least χ², two for each number that it may choose; of those that explain all."""
         left = [self.without(cause) for cause in causes]
-        explains = [chi2.sf(x2, max(self.freedom - c.free, 1)) > _EXPLAINED for (x2, _), c in zip(left, causes)]
+        explains = [chdtrc(max(self.freedom - c.free, 1), x2) > _EXPLAINED for (x2, _), c in zip(left, causes)]
         costs = [x2 + _PER_PARAMETER * c.free if ok else np.inf for (x2, _), c, ok in zip(left, causes, explains)]
         best = int(np.argmin(costs)) if costs else -1
         return causes[best].said(left[best][1]) if costs and np.isfinite(costs[best]) else "no single cause explains it"
