@@ -210,9 +210,9 @@ def _add_check(verbs) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from bench.session.check import report_doubts
+    from bench.check import check
 
-    return report_doubts(options.session, progress=sys.stderr.isatty())
+    return check(options.session, progress=sys.stderr.isatty())
 
 
 _MAPS = {
