@@ -35,8 +35,10 @@ from bench.report.paper import session_figures
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run import RunRecord
+from bench.trials.seeing import STANDARD, by_preset
 
 TABLES = ("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map")
+TABLES += ("against_theta", "compliance")
 Folder = Path | str
 
 
@@ -107,6 +109,10 @@ def evaluate(
     clock_sigma_s: float | None = None,
     gauges_from_all: bool = False,
     estimators: Sequence[str] = (),
+    trials: str = "*",
+    figures: bool = True,
+    preset: str = STANDARD,
+    accuracy_mm: float | None = None,
     workers: int = 1,
     figure_formats: Sequence[str] = (),
 ) -> Run:
@@ -114,8 +120,20 @@ def evaluate(
 
     The options are those of the command line. Raises BadInput, Refused.
     """
-    numbers = theta_deg, alpha_est_deg, cutoff_Hz, tuple(estimators), clock_sigma_s, alpha_est_sigma_deg
-    return evaluate_with(Path(session), Path(out), Settings(*numbers, gauges_from_all), workers, figure_formats)
+    settings = Settings(
+        theta_deg=theta_deg,
+        alpha_est_deg=alpha_est_deg,
+        alpha_est_sigma_deg=alpha_est_sigma_deg,
+        cutoff_Hz=cutoff_Hz,
+        clock_sigma_s=clock_sigma_s,
+        gauges_from_all=gauges_from_all,
+        estimators=tuple(estimators),
+        trials=trials,
+        figures=figures,
+        seeing=by_preset(preset),
+        accuracy_mm=accuracy_mm,
+    )
+    return evaluate_with(Path(session), Path(out), settings, workers, figure_formats)
 
 
 def evaluate_with(

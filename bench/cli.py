@@ -17,6 +17,7 @@ from bench.options import add_out as _add_out
 from bench.options import add_session as _add_session
 from bench.options import add_verb as _add
 from bench.options import add_workers as _add_workers
+from bench.options import count as _count
 from vision.geometry.errors import Refused
 
 
@@ -26,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, format="%(message)s")
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        return options.run(options)
+        return _in_sound_environment(options)
     except (BadInput, Refused) as bad:
         return _complain(str(bad), BAD_INPUT)
     except KeyboardInterrupt:
@@ -40,6 +41,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         logging.getLogger(__name__).info("", exc_info=fault)
         found = f"{type(fault).__name__}: {fault}"
         return _complain(f"a fault of ours, please report it ({found}); -v shows where", FAULT_OF_OURS)
+
+
+def _in_sound_environment(options: argparse.Namespace) -> int:
+    """Run the verb where results can be trusted. `info` tells its versions first. Raises BadInput elsewhere."""
+    from bench.base.environment import check_environment
+
+    if options.run is _info:
+        _info(options)
+        check_environment()
+        return DONE
+    check_environment()
+    return options.run(options)
 
 
 def _interrupt(*_) -> None:
@@ -63,7 +76,8 @@ def make_parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     first = (add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
-    for add_verb in (*first, add_report, add_compare, add_view, _add_figures, _add_simulate, _add_info):
+    looking = (add_report, add_compare, add_view)
+    for add_verb in (*first, *looking, _add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 
@@ -96,6 +110,7 @@ def _add_evaluate(verbs) -> None:
         help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
         "else to half a frame)",
     )
+    _add_seeing(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -109,8 +124,26 @@ def _add_evaluate(verbs) -> None:
         metavar="MODULE:FUNCTION",
         help="one of your own, importable from here; may be given several times",
     )
+    verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
+    verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
     add_figure_format(verb)
     _add_workers(verb)
+
+
+def _add_seeing(verb: argparse.ArgumentParser) -> None:
+    how = verb.add_mutually_exclusive_group()
+    how.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
+    )
+    how.add_argument(
+        "--accuracy-mm",
+        type=float,
+        metavar="X",
+        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
+    )
+    how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
 def _evaluate(options: argparse.Namespace) -> int:
@@ -118,20 +151,52 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     single_thread()
     from bench.api import evaluate_with
-    from bench.base.environment import check_environment
     from bench.base.settings import Settings
 
-    check_environment()
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s")
-    names = (*numbers, "estimators", "gauges_from_all")
+    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given["seeing"] = _seeing(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
     told = {"progress": sys.stderr.isatty(), "announce": print}
     formats = options.figure_format
     run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)
     return DOUBTFUL if run.doubtful else DONE
+
+
+def _seeing(options: argparse.Namespace):
+    """The settings of `--preset` or `--settings`."""
+    from bench.trials.seeing import STANDARD, by_preset, from_file
+
+    return from_file(options.settings) if options.settings else by_preset(options.preset or STANDARD)
+
+
+def _add_tradeoff(verbs) -> None:
+    verb = _add(
+        verbs,
+        "tradeoff",
+        _tradeoff,
+        "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
+        "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
+    )
+    _add_session(verb)
+    _add_out(verb, "OUT", "folder for the table, the plot and the settings files")
+    verb.add_argument("--trials", default="*", metavar="PATTERN", help="only trials of such names (default: all)")
+    verb.add_argument("--repeats", type=_count, default=2, metavar="N", help="how often each is timed (default 2)")
+
+
+def _tradeoff(options: argparse.Namespace) -> int:
+    from bench.base.workers import single_thread
+
+    single_thread()
+    from bench.base.environment import check_environment
+    from bench.tradeoff import tradeoff
+
+    check_environment()
+    progress = sys.stderr.isatty()
+    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, progress=progress)
 
 
 def _add_calibrate(verbs) -> None:
@@ -166,10 +231,8 @@ def _add_calibrate(verbs) -> None:
 
 
 def _calibrate_gauges(options: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment
     from bench.calibrate_gauges import calibrate_gauges_command
 
-    check_environment()
     return calibrate_gauges_command(
         options.session,
         options.out,
@@ -180,10 +243,8 @@ def _calibrate_gauges(options: argparse.Namespace) -> int:
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment
     from bench.cameras.calibrate import calibrate_cameras_command
 
-    check_environment()
     return calibrate_cameras_command(options.session, options.out, options.lenses)
 
 
@@ -298,11 +359,10 @@ def _add_info(verbs) -> None:
 
 
 def _info(_: argparse.Namespace) -> int:
-    from bench.base.environment import check_environment, versions
+    from bench.base.environment import versions
 
     for name, version in versions().items():
         print(f"{name} {version}")
-    check_environment()
     return DONE
 
 

@@ -53,15 +53,8 @@ def steel_signals() -> Path:
 
 @pytest.fixture
 def small_copy(small_session, tmp_path) -> Path:
-    """A small session to spoil: text files are copies, pictures are links (replace them, never write)."""
-    return Path(shutil.copytree(small_session, tmp_path / "session", copy_function=_copy_or_link))
-
-
-def _copy_or_link(source: str, target: str) -> str:
-    if Path(source).suffix in {".jpg", ".png"}:
-        Path(target).symlink_to(source)
-        return target
-    return shutil.copyfile(source, target)
+    """A small session to spoil."""
+    return Path(shutil.copytree(small_session, tmp_path / "session", copy_function=shutil.copyfile))
 
 
 @pytest.fixture

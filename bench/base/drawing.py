@@ -15,6 +15,7 @@ COLOURS = {
     "no_slip": "#b2182b",
     "with_friction": "#2166ac",
     "frictionless": "#e08214",
+    "corrected": "#542788",
     "with_friction_fitted": "#67a9cf",
     "with_friction_seen": "#35978f",
 }
@@ -23,6 +24,7 @@ LABELS = {
     "no_slip": "(2) no slip",
     "with_friction": "(10) with friction",
     "frictionless": "(12) frictionless",
+    "corrected": "(10) corrected",
     "with_friction_fitted": "(10), α fitted",
     "with_friction_seen": "(10), α seen",
     "estimator.builtin:printed_17": "(17) as printed",

@@ -55,11 +55,14 @@ def _check_opencv_distributions() -> None:
 
 
 def _check_opencv() -> None:
-    cv2 = importlib.import_module("cv2")
+    try:
+        cv2 = importlib.import_module("cv2")
+    except ImportError as problem:
+        raise BadInput(f"cv2 cannot be imported ({problem}); {_cure([OPENCV])}") from None
     version = getattr(cv2, "__version__", None)
     if version is None or not hasattr(getattr(cv2, "aruco", None), "CharucoDetector"):
         raise BadInput(f"cv2 is broken (no cv2.aruco.CharucoDetector); {_cure([OPENCV])}")
-    if tuple(int(part) for part in version.split(".")[:2]) < OLDEST_OPENCV:
+    if tuple(int(part) for part in re.findall(r"\d+", version)[:2]) < OLDEST_OPENCV:
         needed = ".".join(str(part) for part in OLDEST_OPENCV)
         raise BadInput(f"OpenCV is {version}, {needed} or newer is needed; {_cure([OPENCV])}")
 

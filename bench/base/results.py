@@ -50,7 +50,8 @@ def hash_of_files(paths: Iterable[Path]) -> str:
         for file in [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file()):
             if file.name not in _TRUTH_FILES and not file.name.startswith("."):
                 digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
-                digest.update(hashlib.blake2b(file.read_bytes()).digest())
+                with file.open("rb") as content:  # a video may be larger than the memory
+                    digest.update(hashlib.file_digest(content, hashlib.blake2b).digest())
     return digest.hexdigest()
 
 

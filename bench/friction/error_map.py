@@ -41,12 +41,17 @@ class Cell:
 
 
 def write_error_map(
-    out: Path, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
+    out: Path,
+    results: Sequence[TrialResult],
+    friction: Sequence[SurfaceFriction],
+    alpha_est_rad: float,
+    *,
+    drawn: bool = True,
 ) -> list[str]:
-    """error_map.csv, and error_map.png where there is a cell. Names of the pictures."""
+    """error_map.csv, and error_map.png where there is a cell and it is to be `drawn`. Names of the pictures."""
     cells = measured_cells(results, friction, alpha_est_rad)
     write_table(out / f"{NAME}.csv", COLUMNS, map(_row, cells))
-    if not cells:
+    if not cells or not drawn:
         return []
     path, stamp = out / f"{NAME}.png", hash_of([vars(cell) for cell in cells], alpha_est_rad, COLUMNS)
     if not is_drawn(path, stamp):

@@ -7,6 +7,7 @@ from pathlib import Path
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.friction.runs import with_runs
+from bench.friction.soft import Soft
 from bench.friction.tables import SurfaceFriction, friction_of
 from bench.gauges.matrix import Gauges
 from bench.records.trial import TrialResult
@@ -38,7 +39,7 @@ def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Setting
 class Evaluation:
     """Results of all trials in the folder `out`. calibration: the cameras as placed in the rig, with its notes; doubts:
     lines that the user should read; friction: a surface and speed each; gauges: None where volts cannot become moments;
-    recordings: hash of each trial's files, by name."""
+    recordings: hash of each trial's files, by name; soft: pairs of distances that tell how soft an object is."""
 
     session: Session
     out: Path
@@ -49,3 +50,4 @@ class Evaluation:
     calibration: SessionCalibration
     doubts: tuple[str, ...]
     recordings: Mapping[str, str]
+    soft: tuple[Soft, ...] = ()

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
-from PIL import Image, UnidentifiedImageError
 from tqdm import tqdm
 
 from bench.base.doubts import Doubts
@@ -15,7 +14,7 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.errors import Refused
-from vision.pictures.files import VIDEO_SUFFIXES, Frames, pictures_in
+from vision.pictures.files import VIDEO_SUFFIXES, Frames, picture_size, pictures_in
 
 Size = tuple[int, int]
 
@@ -136,12 +135,11 @@ def _files(source: Path) -> list[Path]:
 
 def _size(file: Path) -> Size | None:
     """(width, height) from the header alone; None where it cannot be read (a damaged picture is no size)."""
+    if file.suffix.lower() not in VIDEO_SUFFIXES:
+        return picture_size(file)
     try:
-        if file.suffix.lower() in VIDEO_SUFFIXES:
-            return Frames.open(file).size_px
-        with Image.open(file) as picture:
-            return picture.size
-    except (Refused, UnidentifiedImageError, OSError):
+        return Frames.open(file).size_px
+    except Refused:
         return None
 
 

@@ -10,6 +10,7 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.session import manifest
 from bench.session.footage import camera_sources, single_pictures, visible
+from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
 from bench.session.strict_toml import as_keys, read_toml, values
 from bench.session.trial import Trial, load_trial
@@ -114,6 +115,7 @@ def _read_manifest(path: Path, doubts: Doubts) -> manifest.SessionKeys:
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
     if not (path / MANIFEST).is_file():
         raise BadInput(f"there is no {MANIFEST} in this folder, so it is not a session", file=str(path))
+    check_inside(path, doubts)
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)

@@ -13,6 +13,8 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.session import plausible
 
+_MOST_BYTES = 1 << 22  # a thousand times what people write
+
 
 class Keys(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """One table of a file. `windows`: what is plausible for its keys; `tables`: the tables within it, by name."""
@@ -23,6 +25,8 @@ class Keys(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 def read_toml(path: Path, shown: str) -> dict[str, Any]:
     """The tables of a TOML file. Raises BadInput, naming the file as `shown`, where it is not one."""
+    if path.stat().st_size > _MOST_BYTES:
+        raise BadInput(f"has more than {_MOST_BYTES >> 20} MB; a few lines are expected", file=shown)
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except OSError as problem:
@@ -33,6 +37,8 @@ def read_toml(path: Path, shown: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
         raise _bad_toml(str(problem), text, shown) from None
+    except RecursionError:
+        raise BadInput("is not TOML: brackets within brackets without end", file=shown) from None
 
 
 def _bad_toml(problem: str, text: str, shown: str) -> BadInput:

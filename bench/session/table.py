@@ -10,6 +10,8 @@ import numpy as np
 
 from bench.base.errors import BadInput
 
+_MOST_BYTES = 1 << 29  # two hours at 2 kHz, which as text and numbers fill 4 GB of memory
+
 
 @dataclass(frozen=True)
 class Table:
@@ -72,6 +74,8 @@ def require_columns(table: Table, names: tuple[str, ...], shown: str) -> None:
 
 
 def _lines(path: Path, shown: str) -> list[str]:
+    if path.stat().st_size > _MOST_BYTES:
+        raise BadInput(f"has more than {_MOST_BYTES >> 20} MB; record in several trials", file=shown)
     try:
         lines = path.read_bytes().decode("utf-8-sig").splitlines()
     except OSError as problem:

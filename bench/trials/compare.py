@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.records.trial import EstimateRow, SeenWhisk, TrialResult, whisks
+from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.trials.seen import NO_PICTURES
+
+NO_DOUBTS = ("", NO_PICTURES)  # what the status of a whisk may say that makes nothing doubtful
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,7 @@ class Judged:
     """One estimate beside the truth. Truth is NaN where there is none; slope is the seen one, else the nominal one.
 
     one_factor: made with one gauge factor a channel. status: what the estimator or the bench says of the estimate.
+    doubtful: something is, of the whisk itself.
     """
 
     trial: str
@@ -28,6 +32,7 @@ class Judged:
     d_x_est_sigma_mm: float
     one_factor: bool = False
     status: str = ""
+    doubtful: bool = False
 
     @property
     def error_mm(self) -> float:
@@ -45,6 +50,11 @@ class Judged:
         return 100.0 * float(np.hypot(self.d_x_est_sigma_mm, self.d_x_sigma_mm)) / self.d_x_mm
 
 
+def is_sound(seen: SeenWhisk, felt: FeltWhisk) -> bool:
+    """Is nothing doubtful of the whisk, in what was seen and what was felt? No verdict takes doubtful ones."""
+    return not ({seen.status, felt.status} - set(NO_DOUBTS))
+
+
 def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
     """β as seen; the nominal one where the session has no pictures of it."""
     beta_rad = seen.beta_rad.value
@@ -54,14 +64,14 @@ def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
 def judge(results: Iterable[TrialResult]) -> list[Judged]:
     """Every estimate of every whisk."""
     return [
-        _judged(result, seen, answer, one_factor)
+        _judged(result, seen, answer, one_factor, not is_sound(seen, felt))
         for result, seen, felt in whisks(results)
         for one_factor, answers in ((False, felt.estimates), (True, felt.one_factor))
         for answer in answers
     ]
 
 
-def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool) -> Judged:
+def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool, doubtful: bool) -> Judged:
     trial = result.trial
     return Judged(
         trial.name,
@@ -77,4 +87,5 @@ def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_facto
         float(answer.d_x_est_mm.sigma),
         one_factor,
         answer.status,
+        doubtful,
     )

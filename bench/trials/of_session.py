@@ -23,7 +23,7 @@ from bench.gauges.readings import Pairs, pairs_of
 from bench.records.plain import from_plain
 from bench.records.trial import TrialResult
 from bench.session.session import Session
-from bench.session.signals import read_signals
+from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, evaluate_unit, see_unit
@@ -33,10 +33,13 @@ _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 
 
 def judged(session: Session) -> list[Trial]:
-    """The trials with whisks: all but those with a weight. Raises BadInput where there is none."""
+    """The trials with whisks: all but those with a weight. Raises BadInput where there is none, or no whisk in any."""
     trials = [trial for trial in session.trials if trial.purpose != "weight"]
     if not trials:
         raise BadInput("there is no trial to evaluate", file="trials")
+    if not any(forward_strokes(read_signals(trial)) for trial in trials):
+        found = "the motor goes forward in none of them; motor_deg grows as the whisker goes towards the bar"
+        raise BadInput(f"there is no whisk: {found}", file="trials")
     return trials
 
 

@@ -1,23 +1,26 @@
 """The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import fields
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.cameras.calibration import SessionCalibration, moved_cameras
+from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
+from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
+from bench.trials.scene import still_scene
+from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
-from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
-from vision.truth.records import WhiskTruth
+from vision.truth.records import TrialTruth, WhiskTruth
 
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12
@@ -51,31 +54,49 @@ def _see(
 ) -> SeenTrial:
     times = frame_times(trial)
     frames = read_trial(trial, times)
-    moved = moved_cameras(session, calibration, frames)
+    scene = still_scene(session, calibration, frames)
     wire = session.whisker.wire
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     places = [times.frames_in(signals, stroke) for stroke in strokes]
     back = _backwards(signals, times)
-    truth = observe_trial(
-        {name: pictures for name, pictures in frames.items() if name not in moved},
+    observe = partial(
+        observe_trial,
+        {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
-        [*places, *back],
-        calibration.cameras,
-        wire,
-        Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
-        calibration.background,
-        VisionSettings(clock_sigma_s=clock_sigma_s),
+        cameras=calibration.cameras,
+        wire=wire,
+        bar=Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
+        background=calibration.background,
     )
+    first, *harder = [(one.name, replace(one.vision, clock_sigma_s=clock_sigma_s)) for one in rungs(settings)]
+    truth = observe(whisks=[*places, *back], settings=first[1])
+    looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]
+    for rung in harder:
+        looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
+    thick, left_out = width_doubt(truth.bar_looks, trial, session.board), scene.left_out.values()
+    odd = [[thick, slope_doubt(one.beta_rad, trial)] for _, one in looked]
+    whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
-        tuple(whisk_record(whisk, settings, moved.values()) for whisk in truth.whisks[: len(places)]),
-        (*truth.notes, *_lost(frames, times)),
+        tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),
+        (*truth.notes, *_lost(frames, times), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
         0.5 * wire.diameter_mm,
         Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
+        truth.bar_looks,
         _touch_alone(truth.whisks[-1]) if back else None,
     )
+
+
+def _looked_harder(observe: Callable[..., TrialTruth], places, looked, rung, accuracy_mm: float) -> list:
+    """Whisks with the name of what they were looked at by, those that are not known so well by another rung. What that
+    does not see stays."""
+    name, vision = rung
+    left = [k for k, (_, whisk) in enumerate(looked) if not whisk.d_x_mm.sigma <= accuracy_mm]
+    again = observe(whisks=[places[k] for k in left], settings=vision).whisks if left else ()
+    better = {k: (name, replace(whisk, whisk=k)) for k, whisk in zip(left, again) if np.isfinite(whisk.d_x_mm.value)}
+    return [better.get(k, one) for k, one in enumerate(looked)]
 
 
 def _backwards(signals: Signals, times: FrameTimes) -> list[slice]:
@@ -107,13 +128,19 @@ def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
             yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
 
 
-def whisk_record(truth: WhiskTruth, settings: Settings, doubts: Iterable[str] = ()) -> SeenWhisk:
+def whisk_record(
+    truth: WhiskTruth, settings: Settings, doubts: Iterable[str] = (), contradictions: Iterable[str] = ()
+) -> SeenWhisk:
     """One whisk: at first touch, at the wanted angle, a row a frame, and lines to draw."""
     at = truth.at(settings.theta_rad)
-    status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *doubts])))
+    contradictions = [*contradictions, turns_doubt(truth.turns, motor_speed(truth.frames)) if truth.frames else ""]
+    status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *contradictions, *doubts])))
     drawn = _overlay(truth, at.theta_rad)
     same = {name: getattr(truth, name) for name in _SAME}
-    return SeenWhisk(**same, status=status, at=at, deflection=_deflection(truth), overlay=drawn)
+    odd = any(contradictions)
+    return SeenWhisk(
+        **same, status=status, at=at, deflection=_deflection(truth), overlay=drawn, contradicted=odd
+    )
 
 
 def _deflection(truth: WhiskTruth) -> Deflection | None:

@@ -6,6 +6,7 @@ look at the pictures.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
-from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
@@ -87,7 +88,7 @@ class Unit:
     @property
     def hash(self) -> str:
         """Hash of all that the result depends on."""
-        made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
+        made_from = self.drift_rate, self.gauges, self.settings.estimated(), self.settings.own_code()
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
     def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":
@@ -134,7 +135,8 @@ def trial_result(unit: Unit) -> TrialResult:
 
 
 def _described(trial: Trial) -> TrialFacts:
-    nominal = (NAN if value is None else float(value) for value in (trial.d_x_mm, trial.beta_deg))
+    given = trial.d_x_mm, trial.beta_deg, trial.bar_diameter_mm
+    nominal = (NAN if value is None else float(value) for value in given)
     return TrialFacts(trial.name, trial.purpose, trial.surface, trial.speed_deg_s, *nominal)
 
 
@@ -164,18 +166,22 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     if usable is None:
         return felt
     felt = _against_pictures(felt, unit, stroke, readout, seen)
+    asked, radii_mm = estimators(unit.settings.estimators), _radii_mm(unit)
+    answered = partial(answers, asked=asked, settings=unit.settings, radii_mm=radii_mm)
     return replace(
         felt,
         phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
-        estimates=answers(usable, estimators(unit.settings.estimators), unit.settings),
+        estimates=answered(usable),
+        by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         one_factor=_one_factor(unit, kind, stroke),
     )
 
 
 def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:
-    """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status."""
-    if seen.deflection is None:
-        return felt
+    """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status. Where
+    pictures contradict encoder or lengths, they tell nothing of gauges."""
+    if seen.deflection is None or seen.contradicted:
+        return replace(felt, apart=seen.contradicted)
     whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
@@ -219,5 +225,11 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...
         return ()
     readout, beam = Readout.of(unit.trial, plain_gauges), unit.session.whisker.beam
     _, whisk = felt_whisk(stroke, readout, unit.drift_rate, beam, unit.settings.theta_rad)
-    return answers(whisk, estimators(()), unit.settings)
+    return answers(whisk, estimators(()), unit.settings, _radii_mm(unit))
+
+
+def _radii_mm(unit: Unit) -> tuple[float, float]:
+    """Of the bar, NaN where the manifest does not say, and of the whisker's base."""
+    bar = unit.trial.bar_diameter_mm
+    return (NAN if bar is None else 0.5 * bar), 0.5 * unit.session.whisker.diameter_mm
 

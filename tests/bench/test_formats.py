@@ -8,15 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from bench import tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import error_map, explained, tables
+from bench.friction import error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
-from bench.report import assembly, compare, figure_8
+from bench.report import against_theta, assembly, compare, figure_8
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
 from bench.theory import model_error_maps
+from bench.trials import seeing
 from tests.scenes.formats import DOCUMENT, documented, keys
 from tests.scenes.rig_sessions import protocol_file
 
@@ -31,6 +33,7 @@ TOML = {
     "[gauges]": manifest.GaugeKeys,
     "[trial]": manifest.TrialKeys,
     "gauges.toml": FileKeys,
+    "[seeing]": seeing.SeeingKeys,
 }
 CSV = {
     "whisks.csv": assembly.WHISK_COLUMNS,
@@ -44,7 +47,10 @@ CSV = {
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
     "comparison": compare.COLUMNS,
+    "compliance.csv": soft.COLUMNS,
+    "against_theta.csv": against_theta.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
+    "tradeoff.csv": tradeoff.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 

@@ -55,6 +55,18 @@ def measure_edges(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: S
     return _edges(pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4])
 
 
+def coarse_share(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+                 settings: VisionSettings) -> float | None:
+    """How wide the bar looks over how wide it should, to some hundredths, as `measure_edges` begins with it; None where
+    too little of the bar is clear, or where that lies far from where it was expected."""
+    pieces = bar_pieces(view, grey, axis, radius_mm, wires_px, settings)
+    if len(pieces) < FEWEST_PIECES:
+        return None
+    found = _sweep(pieces, bar_knots(settings))
+    widened = 1.0 + found[2] / float(np.median(pieces.radius_px))
+    return widened if abs(found[0]) < 0.5 * _SWEEP_MOST_PX[0] else np.inf
+
+
 def _misfit(rims: Pieces, knots: Knots, q) -> float:
     """Of rims placed by q[:4] under a lens blur of exp(q[4]) px."""
     return fit_shading(_placed(rims, q), float(np.exp(q[4])), RIMS, knots)[1]

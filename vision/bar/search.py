@@ -35,14 +35,14 @@ class SeenBar:
 
     @property
     def seen_by(self) -> list[str]:
-        """The cameras that see a bar there."""
-        return [name for name, line in self.lines.items() if line.is_bar]
+        """The cameras that see a bar there, and its edges."""
+        return [name for name, line in self.lines.items() if line.has_edges]
 
     @property
     def clearness(self) -> float:
         """How clearly all cameras see a bar there. Not by the evidence: each hypothesis has its own pixels, and a wrong
         one along something bright in one camera has more evidence there than the bar has in both."""
-        return sum(max(line.clearness, 0.0) for line in self.lines.values())
+        return sum(max(line.clearness, 0.0) for line in self.lines.values() if line.has_edges)
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:

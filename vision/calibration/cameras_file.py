@@ -2,6 +2,7 @@
 
 import hashlib
 import tomllib
+import zipfile
 from io import BytesIO
 from pathlib import Path
 
@@ -98,7 +99,9 @@ def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) ->
     name = document.get("covariance")
     if name is None:
         return None, None
-    companion = path.with_name(str(name))
+    if not isinstance(name, str) or Path(name).name != name or not name:
+        raise Refused(f"names {name!r} for its covariance; a plain file name beside it is allowed")
+    companion = path.parent / name
     if not companion.is_file():
         raise Refused(f"names {name} for its covariance, but there is no such file beside it: copy both")
     packed = companion.read_bytes()
@@ -106,8 +109,13 @@ def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) ->
         raise Refused(
             f"{name} is not the covariance this file was written with: copy both, or calibrate again"
         )
-    stored = np.load(BytesIO(packed))
-    return _in_order(stored, cameras), stored.get("placement")
+    try:
+        with np.load(BytesIO(packed), allow_pickle=False) as stored:
+            return _in_order(stored, cameras), stored.get("placement")
+    except Refused:
+        raise
+    except (ValueError, KeyError, EOFError, OSError, IndexError, zipfile.BadZipFile) as error:
+        raise Refused(f"{name} is no covariance of these cameras: {error}") from None
 
 
 def _in_order(stored: "np.lib.npyio.NpzFile", cameras: tuple[Camera, ...]) -> np.ndarray:

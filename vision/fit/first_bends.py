@@ -14,7 +14,7 @@ from vision.geometry.centreline import REST_POWERS, Curves, one_curve
 from vision.geometry.contact import BarAxis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
 from vision.geometry.newton import cauchy_weights
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Rods, Wire
 from vision.lines.bands import strongest_shift
 from vision.lines.points import LinePoints, Observed
 from vision.lines.trace import clear_of_bar, wire_pieces
@@ -29,8 +29,8 @@ _BESIDE_BAR_PX = 8.0
 _SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
 
 
-def _bars_px(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float) -> list:
-    return [outline_of_bar(view.camera, axis, reach_mm - wire.diameter_mm / 2) for view in views]
+def _bars_px(views: Sequence[View], rods: Rods, axis: BarAxis) -> list:
+    return [outline_of_bar(view.camera, axis, rods.bar.radius_mm) for view in views]
 
 
 def coarse_points(view: View, curves: Mapping[int, Curves], wire: Wire, bar_px) -> tuple[LinePoints, np.ndarray]:
@@ -44,15 +44,15 @@ def coarse_points(view: View, curves: Mapping[int, Curves], wire: Wire, bar_px) 
     return points.select(good), pieces.source[good]
 
 
-def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis, reach_mm: float,
+def find_rest(views: Sequence[View], cameras: Cameras, rods: Rods, axis: BarAxis,
               motor_rad: Mapping[int, float]) -> np.ndarray:
     """Rest shape (2, 4) in mm from frames {index: motor angle} in which nothing touches.
 
     Raises Refused where no whisker is seen to swing.
     """
-    motor = np.array(list(motor_rad.values()))
+    motor, wire = np.array(list(motor_rad.values())), rods.wire
     rest = np.zeros((2, REST_POWERS))
-    bars_px = _bars_px(views, wire, axis, reach_mm)
+    bars_px = _bars_px(views, rods, axis)
     for _ in range(2):
         curves = {f: one_curve(rest, np.zeros(2), wire.length_mm, m, wire) for f, m in motor_rad.items()}
         seen = []
@@ -62,17 +62,18 @@ def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis
         if sum(len(s.points) for s in seen) < 8 * len(motor_rad):
             raise Refused("no whisker is seen where the motor angle says it should be")
         nothing = np.zeros(len(motor), dtype=bool)
-        problem = Problem(cameras, wire, reach_mm, 0.0, axis, motor, nothing, nothing, seen)
+        problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
         state, _ = solve(problem, start(problem, wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
         rest = state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
     return rest
 
 
-def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float, rest_mm,
+def follow_bends(views: Sequence[View], rods: Rods, axis: BarAxis, rest_mm,
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
     found: dict[int, np.ndarray] = {}
-    pull, bars_px = _pull(axis, len(views)), _bars_px(views, wire, axis, reach_mm)
+    wire = rods.wire
+    pull, bars_px = _pull(axis, len(views)), _bars_px(views, rods, axis)
     last, before = np.zeros(2), np.zeros(2)
     for frame, motor in motor_rad.items():
         guess = 2 * last - before

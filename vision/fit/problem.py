@@ -9,7 +9,7 @@ from vision.fit.onset import Onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, axis_frame, closest_arc, shifted_axis
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Rods, Wire
 from vision.lines.points import SHARED, Observed
 
 BAR, REST = 4, 2 * REST_POWERS
@@ -47,9 +47,7 @@ class Problem:
     """
 
     cameras: Cameras
-    wire: Wire
-    reach_mm: float
-    reach_sigma_mm: float
+    rods: Rods
     axis: BarAxis
     motor_rad: np.ndarray
     touching: np.ndarray
@@ -57,6 +55,11 @@ class Problem:
     seen: Sequence[Observed]
     onset: Onset | None = None
     alike: Sequence[float] = ()
+
+    @property
+    def wire(self) -> Wire:
+        """The whisker."""
+        return self.rods.wire
 
     @property
     def size(self) -> int:

@@ -131,6 +131,6 @@ def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> l
     axis, camera = bar_axis(problem, state.vector), problem.cameras.cameras[seen.camera]
     points = axis.point_mm + seen.points.place[:, None] * axis.direction
     edges = grazed(camera, points, np.broadcast_to(axis.direction, points.shape),
-                   problem.reach_mm - problem.wire.diameter_mm / 2)
+                   problem.rods.bar.radius_mm)
     beside = [np.sum((camera.project(edge) - camera.project(points)) * seen.points.normal) for edge in edges]
     return [edges[int(np.argmax(seen.side * np.array(beside)))]] if seen.side else list(edges)

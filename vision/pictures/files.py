@@ -8,14 +8,18 @@ never shift. Grey is what the file holds at full depth; of a colour video it is 
 
 import os
 import re
+import struct
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image, UnidentifiedImageError
 
 from vision.geometry.errors import Refused
 
@@ -25,11 +29,19 @@ VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv"})
 # FFmpeg would write about a truncated file to stderr; the caller says it in one line of its own.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
+# Pillow warns of damaged headers, which is said in one line as well.
+warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
+
 # Stored orientation and depth: a camera's pixels, not a viewer's idea of which side is up.
 _AS_STORED = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
+# What Pillow raises on headers that are damaged or absurd.
+_NO_HEADER = (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError, struct.error)
+
 # Pixel formats whose first plane is the grey picture, as OpenCV names them when asked not to convert.
 _PLANAR_GREY = frozenset({b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"})
+
+_MOST_BYTES = 1 << 30  # a colour picture of 16 bit with as many pixels as Pillow takes for sound
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 _JPEG_TAIL_BYTES = 1024  # cameras pad the file after the end marker
@@ -125,6 +137,8 @@ class Video(Frames):
 
     @contextmanager
     def _opened(self) -> Iterator[cv2.VideoCapture]:
+        if not self.path.is_file():
+            raise Refused(f"{self.path.name} is no regular file")
         with _quiet_opencv():
             capture = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG)
             try:
@@ -169,13 +183,41 @@ def natural_order(path: Path) -> list[tuple[int, int | str]]:
 
 
 def read_picture(path: Path) -> np.ndarray | None:
-    """One picture as grey, (height, width), uint8 or uint16; None where it is damaged or cut short."""
-    data = np.fromfile(path, dtype=np.uint8)
-    if data.size == 0 or _is_cut_jpeg(data):
+    """One picture as grey, (height, width), uint8 or uint16; None where it is damaged or cut short, no regular file, or
+    of a size that no camera has."""
+    if not path.is_file() or not 0 < path.stat().st_size <= _MOST_BYTES:
         return None
-    with _quiet_opencv():
-        grey = cv2.imdecode(data, _AS_STORED)
+    data = np.fromfile(path, dtype=np.uint8)
+    if _is_cut_jpeg(data) or _is_too_large(data):
+        return None
+    try:
+        with _quiet_opencv():
+            grey = cv2.imdecode(data, _AS_STORED)
+    except cv2.error:  # a header that OpenCV takes for absurd
+        return None
     return grey if grey is not None and grey.dtype in (np.uint8, np.uint16) else None
+
+
+def picture_size(path: Path) -> tuple[int, int] | None:
+    """(width, height) from the header alone; None where it cannot be read, or is no camera's."""
+    try:
+        if not path.is_file():  # a pipe would be waited for
+            return None
+        with Image.open(path) as picture:
+            return picture.size
+    except _NO_HEADER:
+        return None
+
+
+def _is_too_large(data: np.ndarray) -> bool:
+    """Whether the header tells of more pixels than Pillow takes for sound: to decode them would fill the memory."""
+    try:
+        Image.open(BytesIO(data)).close()
+    except Image.DecompressionBombError:
+        return True
+    except _NO_HEADER:
+        return False  # OpenCV may know it
+    return False
 
 
 def _is_cut_jpeg(data: np.ndarray) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vision.fit.beam_check import BeamCheck
+from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
 from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
@@ -34,7 +35,8 @@ class WhiskTruth:
 
     d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
     overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
-    the frames before touch. beam: the same by a curve that is no beam.
+    the frames before touch. beam: the same by a curve that is no beam. turns: the whisker's turn in each frame of the
+    fit beyond the motor's.
     """
 
     whisk: int
@@ -52,6 +54,7 @@ class WhiskTruth:
     budget: dict[str, float] = field(default_factory=dict)
     base: BaseLines | None = None
     beam: BeamCheck | None = None
+    turns: Turns | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""
@@ -60,9 +63,11 @@ class WhiskTruth:
 
 @dataclass(frozen=True)
 class TrialTruth:
-    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, and its direction (3,)."""
+    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, its direction (3,), and by camera
+    how thick it looks over how thick it is said to be."""
 
     bar_point_mm: np.ndarray
     bar_direction: np.ndarray
     whisks: tuple[WhiskTruth, ...]
     notes: tuple[str, ...] = ()
+    bar_looks: dict[str, float] = field(default_factory=dict)

@@ -8,6 +8,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import normals, outline
+from vision.pictures.scale import full_px
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
 from vision.truth.value import FIELDS, Value
@@ -144,14 +145,15 @@ def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, d
     for k, f in enumerate(fitted.frames):
         one = Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k])
         contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
-        drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm)
-                         for view in whisk.views}
+        drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm,
+                                                  whisk.settings.picture_scale) for view in whisk.views}
     return drawn
 
 
-def _drawn(camera: Camera, curve: Curves, along, axis: BarAxis, contact,
-           bar_radius_mm: float) -> dict[str, np.ndarray]:
+def _drawn(camera: Camera, curve: Curves, along, axis: BarAxis, contact, bar_radius_mm: float,
+           scale: int) -> dict[str, np.ndarray]:
     middle, half = outline(camera, along, np.broadcast_to(axis.direction, along.shape), bar_radius_mm)
     aside = half[:, None] * normals(middle)
-    return {"wire": camera.project(curve.points_mm), "bar_left": middle - aside, "bar_right": middle + aside,
-            "contact": camera.project(contact)[0]}
+    lines = {"wire": camera.project(curve.points_mm), "bar_left": middle - aside, "bar_right": middle + aside,
+             "contact": camera.project(contact)[0]}
+    return {name: full_px(px, scale) for name, px in lines.items()}

@@ -102,8 +102,8 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
                 by_onset: bool) -> tuple[Mapping[int, float], _Look]:
     """The frames to fit, and what coarse points tell of them."""
     early = _early(motor)
-    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
-    coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
+    rest = find_rest(views, cameras, rods, axis, early)
+    coarse = follow_bends(views, rods, axis, rest, motor)
     motor = motor if by_onset else _near_touch(motor, coarse)
     angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
     touching, free = frames_that_touch(angles, bend)
@@ -122,7 +122,7 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
 def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float],
          by_onset: bool) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
-    problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
+    problem = Problem(cameras, rods, look.axis, np.array(list(motor.values())),
                       look.touching, ~look.free, seen)
     state, covariance = solve(problem, _begin(problem, look))
     if by_onset:

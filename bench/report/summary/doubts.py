@@ -31,10 +31,20 @@ def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """A line a camera that saw the wire lit from one side: the first trial's, and in how many it was so."""
     notes_of: dict[str, list[str]] = {}
     for result in results:
-        for note in result.seen.notes:
+        for note in filter(_of_light, result.seen.notes):
             notes_of.setdefault(note.split(" sees ")[0], []).append(f"{result.trial.name}: {note}")
     for notes in notes_of.values():
         yield notes[0] + (f" (and so in {len(notes) - 1} more trials)" if len(notes) > 1 else "")
+
+
+def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:
+    """A line for frames that were dropped, damaged, made good or left out."""
+    for result in results:
+        yield from (f"{result.trial.name}: {note}" for note in result.seen.notes if not _of_light(note))
+
+
+def _of_light(note: str) -> bool:
+    return " sees " in note
 
 
 def taken_as_exact(session: Session) -> Iterator[str]:

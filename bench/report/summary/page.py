@@ -3,18 +3,23 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
+from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
 from bench.report.run import Section
-from bench.report.summary.doubts import light_lines, taken_as_exact, whisk_doubts
-from bench.report.summary.errors import error_lines
+from bench.report.summary.doubts import frame_lines, light_lines, taken_as_exact, whisk_doubts
+from bench.report.summary.errors import contact_lines, error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import gauges_of_all, run_lines, verdict
+from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, verdict
 from bench.trials.compare import Judged, judge
 
-_TABLES = ("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map")
+_TABLES = (
+    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
+    *("against_theta", "compliance"),
+)
 
 
 @dataclass(frozen=True)
@@ -32,13 +37,17 @@ class Summary:
         return "\n".join([*self.verdict, "", *titled]).rstrip() + "\n"
 
 
-def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str]) -> Summary:
-    """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures."""
+def summary_of(
+    evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str], by_theta: Sequence[AtTheta] = ()
+) -> Summary:
+    """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta:
+    errors against θ."""
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
     judged = judge(evaluation.results)
     said = verdict(evaluation.session, evaluation.results, judged, evaluation.settings, len(doubtful))
-    sections = _sections(evaluation, judged, doubtful, scores, figures)
-    return Summary((*said, *gauges_of_all(evaluation.gauges)), tuple(doubtful), tuple(s for s in sections if s.lines))
+    said = (*said, *gauges_of_all(evaluation.gauges), *looked_at(evaluation.results, evaluation.settings))
+    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta)
+    return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))
 
 
 def _sections(
@@ -47,18 +56,22 @@ def _sections(
     doubtful: Sequence[str],
     scores: Sequence[str],
     figures: Sequence[str],
+    by_theta: Sequence[AtTheta],
 ) -> Iterator[Section]:
     results, settings = evaluation.results, evaluation.settings
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
     truth = [*truth_lines(results), *budget_lines(results), *shared_lines(results), *beam_lines(results)]
     yield _titled("Truth, from the pictures (± one sigma)", truth)
     yield _titled("Clocks", clock_lines(results))
-    yield _titled(errors, error_lines(judged))
+    yield _titled(errors, [*error_lines(judged), *contact_lines(results)])
+    yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
     friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]
     yield _titled("Friction angle α (± one sigma)", friction)
+    yield _titled("Stiffness of the object", soft_lines(evaluation.soft))
     yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
     yield _titled("Cameras", evaluation.calibration.notes)
     yield _titled("Light from one side", light_lines(results))
+    yield _titled("Frames", frame_lines(results))
     yield _titled("Doubtful", doubtful)
     yield _titled("Score against the truth files of this synthetic session (no result knows them)", scores)
     yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))

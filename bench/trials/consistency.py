@@ -1,0 +1,163 @@
+"""What a recording says twice, and what is likely wrong where both do not agree.
+
+A difference of two records of one thing has a covariance: χ² tells whether it is more than chance. Each cause leaves a
+trace of its own; the one that leaves the least χ² when its trace is taken away is named.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from bench.session.trial import Trial
+from vision.fit.turns import Turns
+from vision.geometry.board import Board
+from vision.truth.value import Value
+
+# Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
+LEAST_CHANCE = 1e-4
+_EXPLAINED = 0.001  # of the chance that a cause must leave: its trace is that of an ideal fault
+_PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
+# Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
+_NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
+_BAR_SIGMA = 0.025  # of how thick a trial's bar looks, by a coarse look
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A trace (n,) of known size, one of free size or None, how many numbers are free to choose, and what to say, given
+    the size found."""
+
+    said: Callable[[float], str]
+    fixed: np.ndarray
+    trace: np.ndarray | None
+    free: int
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """Of two records: values (n,), their information (inverse covariance) (n, n), and degrees of freedom."""
+
+    values: np.ndarray
+    information: np.ndarray
+    freedom: int
+
+    @property
+    def chi2(self) -> float:
+        """Of no difference."""
+        return float(self.values @ self.information @ self.values)
+
+    @property
+    def is_chance(self) -> bool:
+        """Whether both agree."""
+        return chi2.sf(self.chi2, self.freedom) >= LEAST_CHANCE
+
+    def without(self, cause: Cause) -> tuple[float, float]:
+        """χ² that is left when the cause's trace is taken away, and the trace's size."""
+        left = self.values - cause.fixed
+        if cause.trace is None:
+            return float(left @ self.information @ left), 0.0
+        weighed = self.information @ cause.trace
+        size = float(weighed @ left) / max(float(weighed @ cause.trace), 1e-300)
+        left = left - size * cause.trace
+        return float(left @ self.information @ left), size
+
+    def likeliest(self, causes: Sequence[Cause]) -> str:
+        """The cause that leaves the least χ², two for each number that it may choose; of those that explain all."""
+        left = [self.without(cause) for cause in causes]
+        explains = [chi2.sf(x2, max(self.freedom - c.free, 1)) > _EXPLAINED for (x2, _), c in zip(left, causes)]
+        costs = [x2 + _PER_PARAMETER * c.free if ok else np.inf for (x2, _), c, ok in zip(left, causes, explains)]
+        best = int(np.argmin(costs)) if costs else -1
+        return causes[best].said(left[best][1]) if costs and np.isfinite(costs[best]) else "no single cause explains it"
+
+
+def turns_doubt(turns: Turns | None, speed_rad_s: float) -> str:
+    """The encoder against the pictures: a sentence where the whisker does not turn from frame to frame as the motor
+    does, '' where it does. speed_rad_s: of the motor."""
+    if turns is None or len(turns.index) < 3:
+        return ""
+    difference = Difference(turns.turn_rad, _without_mean(turns.covariance), len(turns.index) - 1)
+    if difference.is_chance:
+        return ""
+    found = f"(χ² {difference.chi2:.0f}, {difference.freedom} degrees of freedom)"
+    cause = difference.likeliest(list(_turn_causes(turns, speed_rad_s)))
+    return f"the whisker is not seen to turn as the motor does {found}: {cause}"
+
+
+def _without_mean(covariance: np.ndarray) -> np.ndarray:
+    """Information on all but a common shift, (n, n): the whisker's clamp, which nothing tells."""
+    whole = np.linalg.inv(covariance)
+    common = whole.sum(axis=1)
+    return whole - np.outer(common, common) / common.sum()
+
+
+def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
+    motor, index, n = turns.motor_rad, turns.index, len(turns.index)
+    none, ahead = np.zeros(n), np.diff(motor, append=2.0 * motor[-1] - motor[-2])
+    behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])
+
+    def scale(size: float) -> str:
+        return (
+            f"it turns {1.0 + size:.3f} times as far; check the encoder's scale and the rate of the frames' times, one "
+            "of them looks to need that factor"
+        )
+
+    yield Cause(scale, none, motor - motor.mean(), 1)
+    for k in range(1, n):
+        later, alone = np.arange(n) >= k, np.arange(n) == k
+        frame = int(index[k])
+        yield Cause(_words(f"a frame before frame {frame} looks lost; pictures after it have the times of the one "
+                           "before"), ahead * later, None, 1)  # fmt: skip
+        yield Cause(_words(f"a frame too many before frame {frame}; pictures after it have the times of the next"),
+                    behind * later, None, 1)  # fmt: skip
+        yield Cause(_words(f"frame {frame} looks the same as the one before it"), behind * alone, None, 1)
+        yield Cause(_jump(motor[k]), none, later.astype(float), 2)
+        yield Cause(_another_time(frame, speed_rad_s), none, alone.astype(float), 2)
+
+
+def _words(text: str) -> Callable[[float], str]:
+    return lambda size: text
+
+
+def _jump(at_rad: float) -> Callable[[float], str]:
+    where = f"before {np.degrees(at_rad):.2f}°, the whisker does not"
+    return lambda size: f"motor_deg jumps by {-np.degrees(size):+.2f}° {where}"
+
+
+def _another_time(frame: int, speed_rad_s: float) -> Callable[[float], str]:
+    return lambda size: f"frame {frame} looks taken {1e3 * size / speed_rad_s:+.1f} ms from its time"
+
+
+def width_doubt(bar_looks: Mapping[str, float], trial: Trial, board: Board | None) -> str:
+    """The bar against its diameter: a sentence where it looks thicker or thinner than said, '' where it does not, or
+    where no camera tells. bar_looks: how thick over how thick it is said to be, by camera."""
+    if not bar_looks:
+        return ""
+    looks = np.log(list(bar_looks.values()))
+    scatter = float(np.std(looks, ddof=1) / np.sqrt(len(looks))) if len(looks) > 1 else 0.0
+    sigma = np.sqrt(_BAR_SIGMA**2 + (trial.bar_diameter_sigma_mm / trial.bar_diameter_mm) ** 2 + scatter**2)
+    difference = Difference(np.array([np.median(looks)]), np.array([[sigma**-2.0]]), 1)
+    if difference.is_chance:
+        return ""
+    factor = float(np.exp(difference.values[0]))
+    scale = f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}" if board else "the cameras' scale"
+    bar = f"some {trial.bar_diameter_mm * factor:.3g} for {trial.bar_diameter_mm:g}"
+    found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
+    return f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
+
+
+def slope_doubt(beta: Value, trial: Trial) -> str:
+    """The bar's slope as seen against trial.toml's: a sentence where they are apart, '' where they are not, or where
+    one of them is not known."""
+    if trial.beta_deg is None or not np.isfinite(beta.value):
+        return ""
+    nominal_sigma = np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD
+    apart = beta.value - np.radians(trial.beta_deg)
+    difference = Difference(np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal_sigma**2)]]), 1)
+    if difference.is_chance:
+        return ""
+    seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
+    mirrored = replace(difference, values=np.array([beta.value + np.radians(trial.beta_deg)]))
+    cause = "its sign looks turned" if mirrored.is_chance else "check it, or something else is taken for the bar"
+    return f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}"

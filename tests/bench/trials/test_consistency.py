@@ -1,0 +1,129 @@
+"""The encoder and the frames' times against the pictures, and the bar against its diameter: each fault by its cause."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.records.trial import FeltWhisk
+from bench.session.session import load_session
+from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
+from bench.trials.unit import _against_pictures
+from tests.scenes.model_scenes import begun, scene, with_points
+from vision.fit.scatter import inflated_by_residuals
+from vision.fit.solve import solve
+from vision.fit.turns import frame_turns
+from vision.geometry.board import Board
+from vision.truth.value import UNKNOWN, Value
+
+SPEED = np.radians(18.0)  # rad/s: 0.9° a frame, 20 frames a second
+FRAMES = 9
+
+
+def doubt(rng, spoil=None, kept=None) -> str:
+    """What is said of a whisk whose motor angles are not those at which its pictures (noise 0.05 px) were taken.
+
+    spoil: of the true motor angles (f,) those recorded; kept: by frame, which picture it shows.
+    """
+    problem, truth = scene(frames=FRAMES)
+    true = problem.motor_rad
+    problem = with_points(problem, truth, rng)
+    if kept is not None:
+        shown = {f: [one for one in problem.seen if one.frame == f] for f in range(FRAMES)}
+        wire = [replace(one, frame=f) for f in range(FRAMES) for one in shown[kept[f]]]
+        problem = replace(problem, seen=[*wire, *(one for one in problem.seen if one.frame < 0)])
+    problem = replace(problem, motor_rad=true if spoil is None else spoil(true))
+    state, _ = solve(problem, begun(problem, truth))
+    problem = inflated_by_residuals(problem, state)
+    state, _ = solve(problem, state)
+    return turns_doubt(frame_turns(problem, state, np.arange(FRAMES)), SPEED)
+
+
+@pytest.mark.parametrize("draw", range(4))
+def test_a_sound_whisk_is_not_doubted(draw):
+    assert doubt(np.random.default_rng(draw)) == ""
+
+
+def test_a_clamp_at_another_angle_is_no_fault(rng):
+    assert doubt(rng, lambda motor: motor + np.radians(0.8)) == ""
+
+
+@pytest.mark.parametrize("factor", [1.1, 0.9, 1.03])
+def test_encoder_scale_or_frame_rate(rng, factor):
+    said = doubt(rng, lambda motor: factor * motor)
+    found = float(said.split("it turns ")[1].split(" times")[0])
+    assert found == pytest.approx(1.0 / factor, abs=0.01)
+
+
+@pytest.mark.parametrize("before", [3, 6])
+def test_an_encoder_jump(rng, before):
+    said = doubt(rng, lambda motor: motor + np.radians(0.4) * (np.arange(FRAMES) >= before))
+    size = float(said.split("motor_deg jumps by ")[1].split("°")[0])
+    assert size == pytest.approx(0.4, abs=0.06)
+
+
+def test_a_frame_that_shows_the_one_before_it(rng):
+    assert "frame 5 looks the same as the one before it" in doubt(rng, kept=[0, 1, 2, 3, 4, 4, 6, 7, 8])
+
+
+def test_a_frame_lost_whose_time_stayed(rng):
+    def recorded(motor):
+        """Pictures 4 and later are the next ones: their true angle is a frame's more than what is recorded."""
+        return motor - 0.9 * np.radians(np.arange(FRAMES) >= 4)
+
+    assert "a frame before frame 4 looks lost" in doubt(rng, recorded)
+
+
+def test_a_frame_at_another_time(rng):
+    said = doubt(rng, lambda motor: motor - np.radians(0.36) * (np.arange(FRAMES) == 3))
+    late_ms = float(said.split("frame 3 looks taken ")[1].split(" ms")[0])
+    assert late_ms == pytest.approx(20.0, abs=4.0)  # 0.36° at 18°/s
+
+
+@pytest.fixture
+def trial(small_session):
+    return load_session(small_session).trial("b60_4")
+
+
+BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+
+
+def test_a_bar_as_thick_as_said_is_not_doubted(trial):
+    assert width_doubt({"low": 0.97, "high": 1.0}, trial, BOARD) == ""
+    assert width_doubt({}, trial, BOARD) == ""
+
+
+def test_a_bar_that_looks_thicker_names_both_lengths_with_what_they_would_need(trial):
+    said = width_doubt({"low": 1.45, "high": 1.52}, trial, BOARD)
+    assert said.startswith("the bar looks 1.48 ± 0.05 times as thick as said")
+    assert "diameter_mm would have to be some 8.91 for 6, or square_mm some 10.1 for 15" in said
+
+
+def test_a_diameter_known_badly_is_not_contradicted(trial):
+    assert width_doubt({"low": 1.2}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD) == ""
+
+
+def test_a_contradicted_whisk_is_apart_and_names_no_gauge(exact_record, trial):
+    seen = exact_record(trial)
+    assert not seen.contradicted
+    felt = _against_pictures(FeltWhisk(status=""), None, None, None, replace(seen, contradicted=True))
+    assert felt.apart
+    assert felt.status == ""
+
+
+@pytest.mark.parametrize(
+    ("beta_deg", "sigma_deg", "nominal", "said"),
+    [
+        (26.0, 0.8, 0.0, "seen as 26.0 ± 0.8°, beta_deg says 0: check it"),
+        (-31.0, 0.2, 30.0, "its sign looks turned"),
+        (33.0, 0.2, 30.0, None),  # as a protractor is read
+        (26.0, 9.0, 0.0, None),  # a slope that is hardly known
+        (26.0, 0.8, None, None),
+    ],
+)
+def test_a_slope_is_held_to_its_nominal_one(beta_deg, sigma_deg, nominal, said, trial):
+    beta = Value(np.radians(beta_deg), np.radians(sigma_deg))
+    trial = replace(trial, beta_deg=nominal)
+    found = slope_doubt(beta, trial)
+    assert said in found if said else found == ""
+    assert slope_doubt(UNKNOWN, trial) == ""

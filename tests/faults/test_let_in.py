@@ -1,0 +1,135 @@
+"""What is not let in: what would hang a reader, fill the memory, or lead out of the session. One line, exit code 2."""
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+from bench import cli
+from bench.base import environment
+from bench.base.errors import BadInput
+from bench.session.check import checked_session
+from tests.scenes.faults import FAULTS, TRIAL
+from vision.calibration.cameras_file import read_cameras
+from vision.geometry.errors import Refused
+from vision.pictures.files import picture_size, read_picture
+
+
+def refusal(session) -> str:
+    with pytest.raises(BadInput) as bad:
+        checked_session(session)
+    return str(bad.value)
+
+
+def test_a_pipe_in_place_of_a_picture(session):
+    FAULTS["FIFO for a picture"](session)
+    assert refusal(session) == f"trials/{TRIAL}/low/000003.jpg: is no regular file (a pipe, socket or device)"
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "0.png")
+    assert read_picture(tmp_path / "0.png") is None
+    assert picture_size(tmp_path / "0.png") is None
+
+
+def test_a_link_out_of_the_session(session):
+    FAULTS["folder is a link out"](session)
+    assert refusal(session).startswith(f"trials/{TRIAL}/low: is a link that leads out of the session")
+
+
+def test_a_link_to_nowhere_and_one_in_a_circle(session):
+    (session / "trials" / "a").symlink_to("nowhere")
+    (session / "trials" / "b").symlink_to("b")
+    (session / "trials" / "c").symlink_to(session / "trials")
+    said = refusal(session)
+    assert said.count("leads nowhere") == 2
+    assert "trials/c: is a link to a folder that holds it" in said
+
+
+def test_a_link_within_the_session_and_a_linked_session_are_taken(session, tmp_path):
+    low = session / "trials" / TRIAL / "low"
+    shutil.move(low, session / "pictures")
+    low.symlink_to(session / "pictures")
+    (tmp_path / "link").symlink_to(session)
+    assert len(checked_session(tmp_path / "link").trials) == 4
+
+
+def test_a_picture_of_absurd_size_is_damaged(session):
+    FAULTS["PNG of 60000 x 60000"](session)
+    file = session / "trials" / TRIAL / "low" / "000003.png"
+    assert read_picture(file) is None
+    assert picture_size(file) is None
+    checked_session(session)
+
+
+@pytest.mark.parametrize("name", ["../cameras.npz", "..", "/etc/passwd", "", 3])
+def test_the_covariance_is_beside_its_file(tmp_path, name):
+    lens = "size_px = [9, 9]\nmatrix = [[9.0, 0, 4], [0, 9.0, 4], [0, 0, 1]]\ndistortion = [0, 0, 0, 0, 0]\n"
+    pose = "T_camera_rig = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 9]]\nrms_px = 0.1\n"
+    file = tmp_path / "cameras.toml"
+    file.write_text(f"covariance = {name!r}\n[cameras.a]\n{lens}{pose}")
+    with pytest.raises(Refused, match=r"a plain file name beside it|no such file beside it"):
+        read_cameras(file)
+
+
+@pytest.mark.parametrize("inside", ["out", "trials/out", "boards", "."])
+def test_results_are_not_written_into_the_session(session, inside, capsys):
+    before = sorted(session.rglob("*"))
+    assert cli.main(["evaluate", str(session), "--out", str(session / inside)]) == 2
+    assert "lies in the session, which is never written to" in capsys.readouterr().err
+    assert sorted(session.rglob("*")) == before
+
+
+def test_no_forward_stroke_in_any_trial(session, tmp_path, capsys):
+    for trial in list((session / "trials").iterdir()):
+        if trial.name != TRIAL:
+            shutil.rmtree(trial)
+    FAULTS["encoder reversed"](session)
+    assert cli.main(["evaluate", str(session), "--out", str(tmp_path / "out")]) == 2
+    assert "there is no whisk: the motor goes forward in none of them" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+VERBS = ["check SESSION", "evaluate SESSION --out out", "calibrate cameras SESSION --out x", "info"]
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_tells_of_another_opencv(small_session, verb, monkeypatch, capsys):
+    def broken():
+        raise BadInput("cv2 is broken; cure: pip install")
+
+    monkeypatch.setattr(environment, "_check_opencv", broken)
+    assert cli.main(verb.replace("SESSION", str(small_session)).split()) == 2
+    assert "cv2 is broken; cure: pip install" in capsys.readouterr().err
+
+
+def test_a_cv2_that_cannot_be_imported(monkeypatch):
+    def none(name):
+        raise ImportError("libGL.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(environment.importlib, "import_module", none)
+    with pytest.raises(BadInput, match=r"cv2 cannot be imported \(libGL.so.1.*cure: "):
+        environment.check_environment()
+
+
+def test_tables_and_manifests_of_absurd_size(session, monkeypatch):
+    monkeypatch.setattr("bench.session.table._MOST_BYTES", 1000)
+    assert "signals.csv: has more than" in refusal(session)
+    monkeypatch.setattr("bench.session.strict_toml._MOST_BYTES", 10)
+    assert "session.toml: has more than" in refusal(session)
+
+
+def test_brackets_without_end(session):
+    file = session / "session.toml"
+    file.write_text(file.read_text() + "\nx = " + "[" * 100000 + "\n")
+    assert "session.toml" in refusal(session)
+
+
+def test_a_sound_picture_of_another_depth_is_still_read(tmp_path):
+    import cv2
+
+    grey = np.arange(12, dtype=np.uint16).reshape(3, 4) * 5000
+    cv2.imwrite(str(tmp_path / "0.png"), grey)
+    np.testing.assert_array_equal(read_picture(tmp_path / "0.png"), grey)
+    assert picture_size(tmp_path / "0.png") == (4, 3)

@@ -1,0 +1,263 @@
+"""Faults of a lab, each made on a copy of a session: what `docs/reliability.md` lists and tests and studies make.
+
+A fault is a function of the session's folder; those of a recording spoil its trial TRIAL alone.
+"""
+
+import csv
+import os
+import shutil
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+TRIAL = "b60_4"
+Fault = Callable[[Path], None]
+
+
+def copy_of(session: Path, target: Path) -> Path:
+    """A session to spoil."""
+    return Path(shutil.copytree(session, target, copy_function=shutil.copyfile))
+
+
+def alone(session: Path, target: Path, made: Path, gauges: Path) -> Path:
+    """A copy with TRIAL alone, cameras and gauges brought along: a fifth of the whole session's time.
+
+    made: folder with cameras.toml and cameras.npz; gauges: a gauges.toml.
+    """
+    copy_of(session, target)
+    for trial in (target / "trials").iterdir():
+        if trial.name != TRIAL:
+            shutil.rmtree(trial)
+    for file in (made / "cameras.toml", made / "cameras.npz", gauges):
+        shutil.copyfile(file, target / file.name)
+    return target
+
+
+def _trial(session: Path) -> Path:
+    return session / "trials" / TRIAL
+
+
+def change_table(path: Path, change: Callable[[dict[str, np.ndarray]], None], digits: int = 5) -> None:
+    """Columns of a CSV file, by name, changed in place."""
+    with path.open(newline="") as file:
+        names, *rows = csv.reader(file)
+    columns = dict(zip(names, np.array(rows, dtype=float).T))
+    change(columns)
+    rows = zip(*columns.values())
+    lines = [",".join(columns), *(",".join(f"{value:.{digits}f}" for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def _signals(change: Callable[[dict[str, np.ndarray]], None]) -> Fault:
+    return lambda session: change_table(_trial(session) / "signals.csv", change)
+
+
+def _times(change: Callable[[dict[str, np.ndarray]], None]) -> Fault:
+    return lambda session: change_table(_trial(session) / "frames.csv", change)
+
+
+def _manifest(old: str, new: str) -> Fault:
+    def spoil(session: Path) -> None:
+        file = session / "session.toml"
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new))
+
+    return spoil
+
+
+def scaled(name: str, factor: float) -> Callable[[dict[str, np.ndarray]], None]:
+    """A change of one column by a factor."""
+
+    def change(columns: dict[str, np.ndarray]) -> None:
+        columns[name] = columns[name] * factor
+
+    return change
+
+
+def shifted(name: str, by: float) -> Callable[[dict[str, np.ndarray]], None]:
+    """A change of one column by a constant."""
+
+    def change(columns: dict[str, np.ndarray]) -> None:
+        columns[name] = columns[name] + by
+
+    return change
+
+
+def _exchanged(columns) -> None:
+    columns["y_V"], columns["z_V"] = columns["z_V"], columns["y_V"]
+
+
+def _encoder_jump(columns) -> None:
+    late = columns["time_s"] > np.mean(columns["time_s"][[0, -1]])
+    columns["motor_deg"] = columns["motor_deg"] + 0.4 * late
+
+
+def _encoder_reversed(columns) -> None:
+    columns["motor_deg"] = columns["motor_deg"][::-1].copy()
+
+
+def _drift_at_touch(columns) -> None:
+    columns["y_V"] = columns["y_V"] + 0.17 * np.maximum(columns["time_s"] - 0.1, 0.0)
+
+
+def _saturated(columns) -> None:
+    for name in ("y_V", "z_V"):
+        columns[name] = np.clip(columns[name], -0.1, 0.1)
+
+
+def _dead(columns) -> None:
+    columns["z_V"] = np.zeros_like(columns["z_V"])
+
+
+def _another_trials_signals(session: Path) -> None:
+    other = Path(__file__).resolve().parents[2] / "fixtures" / "small-session" / "trials" / "b30_3" / "signals.csv"
+    shutil.copyfile(other, _trial(session) / "signals.csv")
+
+
+def pictures(session: Path, camera: str) -> list[Path]:
+    """One camera's pictures of the trial, in order."""
+    return sorted((_trial(session) / camera).iterdir())
+
+
+def change_picture(path: Path, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    """A grey picture replaced by a changed one, as fine as it was (JPEG 97)."""
+    grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    path.unlink()
+    assert cv2.imwrite(str(path), np.ascontiguousarray(change(grey)), [cv2.IMWRITE_JPEG_QUALITY, 97])
+
+
+def _camera(change: Callable[[np.ndarray], np.ndarray], camera: str = "low", first: int = 0) -> Fault:
+    def spoil(session: Path) -> None:
+        for path in pictures(session, camera)[first:]:
+            change_picture(path, change)
+
+    return spoil
+
+
+def _knocked(grey: np.ndarray) -> np.ndarray:
+    return np.roll(grey, (4, 6), axis=(0, 1))
+
+
+def brighter(factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    """A change of exposure; what is too bright is clipped."""
+    return lambda grey: np.clip(np.rint(factor * grey), 0, 255).astype(np.uint8)
+
+
+def _exchanged_cameras(session: Path) -> None:
+    low, high = (_trial(session) / camera for camera in ("low", "high"))
+    low.rename(low.with_name("aside"))
+    high.rename(low)
+    low.with_name("aside").rename(high)
+
+
+def _frame_twice(session: Path) -> None:
+    for camera in ("low", "high"):
+        files = pictures(session, camera)
+        files[5].unlink()
+        shutil.copyfile(files[4], files[5])
+
+
+def _lost_silently(session: Path) -> None:
+    """A frame dropped at touch, pictures numbered on, the row of the last one gone: times do not tell."""
+    for camera in ("low", "high"):
+        pictures(session, camera)[4].unlink()
+    file = _trial(session) / "frames.csv"
+    file.write_text("\n".join(file.read_text().splitlines()[:-1]) + "\n")
+
+
+def _dropped(session: Path) -> None:
+    """A frame dropped at touch, its row too."""
+    for camera in ("low", "high"):
+        pictures(session, camera)[4].unlink()
+    file = _trial(session) / "frames.csv"
+    lines = file.read_text().splitlines()
+    kept = [line.split(",")[1] for line in lines[1:5] + lines[6:]]
+    file.write_text("\n".join(["frame,time_s", *(f"{k},{time}" for k, time in enumerate(kept))]) + "\n")
+
+
+def _huge_png(session: Path) -> None:
+    """A PNG whose header tells of 60000 × 60000 pixels."""
+    path = pictures(session, "low")[3]
+    path.unlink()
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", 60000, 60000, 8, 0, 0, 0, 0)
+    body = zlib.compress(bytes(60001))
+    packed = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+    path.with_suffix(".png").write_bytes(packed)
+
+
+def _fifo(session: Path) -> None:
+    path = pictures(session, "low")[3]
+    path.unlink()
+    os.mkfifo(path)
+
+
+def _link_out(session: Path) -> None:
+    """A camera's folder that is a link to pictures elsewhere."""
+    folder = _trial(session) / "low"
+    outside = session.parent / "elsewhere"
+    shutil.move(folder, outside)
+    folder.symlink_to(outside)
+
+
+def _covariance_elsewhere(session: Path) -> None:
+    file = session / "cameras.toml"
+    text = file.read_text()
+    (session.parent / "cameras.npz").write_bytes((session / "cameras.npz").read_bytes())
+    file.write_text(text.replace('"cameras.npz"', '"../cameras.npz"'))
+
+
+def _covariance_is_a_folder(session: Path) -> None:
+    file = session / "cameras.toml"
+    file.write_text(file.read_text().replace('"cameras.npz"', '".."'))
+
+
+FAULTS: dict[str, Fault] = {
+    "sound": lambda session: None,
+    "channels exchanged": _signals(_exchanged),
+    "y reversed": _signals(scaled("y_V", -1.0)),
+    "encoder scale 1.1": _signals(scaled("motor_deg", 1.1)),
+    "encoder offset 1": _signals(shifted("motor_deg", 1.0)),
+    "encoder jump 0.4": _signals(_encoder_jump),
+    "encoder reversed": _signals(_encoder_reversed),
+    "another trial's signals": _another_trials_signals,
+    "drift begins near touch": _signals(_drift_at_touch),
+    "saturated gauges": _signals(_saturated),
+    "dead gauge": _signals(_dead),
+    "frame times 1.1": _times(scaled("time_s", 1.1)),
+    "frame times +20 ms": _times(shifted("time_s", 0.02)),
+    "frame twice": _frame_twice,
+    "frame lost silently": _lost_silently,
+    "frame dropped": _dropped,
+    "bar 4 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 4.0"),
+    "wire 1.5 mm for 1": _manifest("diameter_mm = 1.0", "diameter_mm = 1.5"),
+    "board 10 % too large": _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 16.5\nmarker_mm = 12.1"),
+    "wrong dictionary": _manifest("DICT_5X5_100", "DICT_4X4_100"),
+    "wrong squares": _manifest("squares = [8, 6]", "squares = [7, 5]"),
+    "whisker 90 mm for 100": _manifest("length_mm = 100.0", "length_mm = 90.0"),
+    "whisker 150 mm for 100": _manifest("length_mm = 100.0", "length_mm = 150.0"),
+    "exposure 1.5 from frame 6": _camera(brighter(1.5), first=6),
+    "exposure 1.1 from frame 6": _camera(brighter(1.1), first=6),
+    "exposure 1.02 from frame 6": _camera(brighter(1.02), first=6),
+    "exposure 0.8 from frame 6": _camera(brighter(0.8), first=6),
+    "camera knocked 6,4 px": _camera(_knocked),
+    "camera mirrored": _camera(lambda grey: grey[:, ::-1]),
+    "cameras exchanged": _exchanged_cameras,
+    "camera black": _camera(np.zeros_like),
+    "camera white": _camera(lambda grey: np.full_like(grey, 255)),
+    "PNG of 60000 x 60000": _huge_png,
+    "FIFO for a picture": _fifo,
+    "folder is a link out": _link_out,
+    "covariance elsewhere": _covariance_elsewhere,
+    "covariance is a folder": _covariance_is_a_folder,
+}
+# These need the board views: they are made on the whole session, without cameras brought along.
+WHOLE = ("board 10 % too large", "wrong dictionary", "wrong squares")
