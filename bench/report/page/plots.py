@@ -26,6 +26,7 @@ _OWN = {"no_slip": "e0", "with_friction": "e1", "frictionless": "e2"}
 _OWN |= {"with_friction_fitted": "e3", "with_friction_seen": "e4"}
 _ASSUMED = {"frictionless": 0.0, "no_slip": 0.0}
 _DASHES = ("", "6 4", "2 3", "8 3 2 3")
+_ASIDE_PX = 5.0  # between the points of two estimators
 _EVERY = 8  # slopes of a drawn curve: a step of 2°
 
 
@@ -78,8 +79,8 @@ def error_by_slope(judged: Sequence[Judged], keys: dict, fitted: Sequence[Surfac
     entries = [(label_of(name), *series_of(name, names)) for name in names]
     caption = (
         f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in per cent of the truth, ± one sigma. "
-        "Lines: as (13), (14) predict with the α that fits each surface. A point leads to its whisk; a "
-        "hollow one is in doubt and not in the verdict."
+        "Lines: as (13), (14) predict with the α that fits each surface. Points of "
+        "one whisk are set apart sideways; a point leads to its whisk; a hollow one is in doubt and not in the verdict."
     )
     return Figure("Error against slope", caption, tuple(panels), legend(entries))
 
@@ -100,7 +101,9 @@ def _error_mark(j: Judged, names: Sequence[str], keys: dict, x: float) -> Mark:
     title = f"{j.trial}, whisk {j.whisk}: {label_of(j.estimator)} {error} %, β = {number(j.beta_deg, 1)}°"
     title += " (in doubt)" if j.doubtful else ""
     place = x, j.error_percent, j.error_sigma_percent
-    return Mark(*place, series + " doubt" * j.doubtful, shape, keys[j.trial, j.whisk], j.trial, j.whisk, title)
+    aside_px = _ASIDE_PX * (names.index(j.estimator) - 0.5 * (len(names) - 1))
+    which = keys[j.trial, j.whisk], j.trial, j.whisk
+    return Mark(*place, series + " doubt" * j.doubtful, shape, *which, title, aside_px)
 
 
 def _predicted(panel: Panel, name: str, names, fitted: Sequence[Surface], settings: Settings) -> Iterator[Markup]:

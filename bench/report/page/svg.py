@@ -35,6 +35,7 @@ class Mark:
     trial: str
     whisk: int
     title: str
+    aside_px: float = 0.0  # to the right of its place, so that points of one whisk do not hide each other
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Panel:
         if not (math.isfinite(mark.x) and math.isfinite(mark.y)):
             return Markup("")
         x, y = self.at(mark.x, mark.y)
+        x += mark.aside_px
         bar = ""
         if math.isfinite(mark.sigma) and mark.sigma > 0:
             (_, low), (_, high) = (self.at(mark.x, mark.y + side * mark.sigma) for side in (-1, 1))
