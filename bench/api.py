@@ -122,8 +122,19 @@ def evaluate(
 
     The options are those of the command line. Raises BadInput, Refused.
     """
-    numbers = theta_deg, alpha_est_deg, cutoff_Hz, tuple(estimators), clock_sigma_s, alpha_est_sigma_deg
-    settings = Settings(*numbers, gauges_from_all, trials, figures, by_preset(preset), accuracy_mm)
+    settings = Settings(
+        theta_deg=theta_deg,
+        alpha_est_deg=alpha_est_deg,
+        alpha_est_sigma_deg=alpha_est_sigma_deg,
+        cutoff_Hz=cutoff_Hz,
+        clock_sigma_s=clock_sigma_s,
+        gauges_from_all=gauges_from_all,
+        estimators=tuple(estimators),
+        trials=trials,
+        figures=figures,
+        seeing=by_preset(preset),
+        accuracy_mm=accuracy_mm,
+    )
     return evaluate_with(Path(session), Path(out), settings, workers, figure_formats)
 
 

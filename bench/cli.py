@@ -18,6 +18,7 @@ from bench.options import add_out as _add_out
 from bench.options import add_session as _add_session
 from bench.options import add_verb as _add
 from bench.options import add_workers as _add_workers
+from bench.options import count as _count
 from vision.geometry.errors import Refused
 
 
@@ -76,7 +77,8 @@ def make_parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     first = (add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
-    for add_verb in (*first, add_report, add_compare, add_view, add_tradeoff, _add_figures, _add_simulate, _add_info):
+    looking = (add_report, add_compare, add_view)
+    for add_verb in (*first, *looking, add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 

@@ -55,5 +55,5 @@ def test_a_damaged_table_is_one_line(tmp_path):
 
 def test_figures_are_matplotlibs(exact_run):
     figures = api.read(exact_run).figures()
-    assert set(figures) == {"fig8", "error_against_slope", "explained", "error_map"}
+    assert set(figures) == {"fig8", "error_against_slope", "explained", "error_map", "against_theta"}
     assert all(figure.axes for figure in figures.values())

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
+from bench.base.settings import Seeing
 from bench.friction.explained import SHARES
 from bench.friction.tables import SurfaceFriction
 from bench.records.trial import TrialResult
@@ -132,6 +133,8 @@ def _extent(bar: Bar) -> float:
 
 def _setting(value: object) -> str:
     """A setting as a reader takes it."""
+    if isinstance(value, Seeing):
+        return value.name
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, tuple):

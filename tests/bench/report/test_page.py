@@ -145,7 +145,7 @@ def test_figures_for_a_paper_hold_their_fonts_and_are_as_wide_as_columns(exact_r
     out = shutil.copytree(exact_run, tmp_path / "out")
     assert main(["report", str(out), "--figure-format", "pdf"]) == 0
     pages = {path.stem: path.read_bytes() for path in (out / "figures").glob("*.pdf")}
-    assert set(pages) == {"fig8", "error_against_slope", "explained", "error_map"}
+    assert set(pages) == {"fig8", "error_against_slope", "explained", "error_map", "against_theta"}
     for page in pages.values():
         width = float(re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", page)[1])
         assert width == pytest.approx(72 * 3.5, abs=0.1) or width == pytest.approx(72 * 7.16, abs=0.1)
