@@ -18,7 +18,6 @@ from bench.options import add_out as _add_out
 from bench.options import add_session as _add_session
 from bench.options import add_verb as _add
 from bench.options import add_workers as _add_workers
-from bench.options import count as _count
 from vision.geometry.errors import Refused
 
 
