@@ -7,12 +7,11 @@ taken for it, the posterior is wide or has several peaks, and the line's sigma i
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.bar.evidence import FULL_SCALE, SATURATED, Evidence, Profile, evidence, profiles
+from vision.bar.evidence import FULL_SCALE, SATURATED, Evidence, Profiles, evidence, profiles
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
@@ -24,9 +23,12 @@ FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the change
 # Lines are looked for as far off, at least, then once more close by if they are known so well.
 _WIDE_PX, _CLOSE_PX, _WITHIN_SIGMAS = 2.0, 1.0, 4.0
 _STRETCHES = 6
-_FAR_STEP_PX = 0.75
-_STEPS, _GRID = 25, 121  # shifts at which the evidence is taken, and lines between, by shift and by tilt
-_FAR_BLUR_PX, _BLURS_PX = 1.6, (0.6, 0.8, 1.0, 1.25, 1.6)
+_LEVER = 1.6
+_PARTS = (1, 1, 2)
+_LEAST_PX, _BLUR_REACH = 0.25, (0.12, 0.5)
+_SPLINE_BLURS = 0.25
+_BLUR_GRID, _GRID = 13, 33  # shifts at which the evidence is taken, and lines between, by shift and by tilt
+_FAR_BLUR_PX, _BLURS_PX = 1.6, (0.6, 0.85, 1.2, 1.7)
 _GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded for a screen
 # Of minus twice the log evidence: neighbouring bins err alike, by compression and by what no model has. With this the
 # RMS of z over path-traced bars is 1.1 (tests/ladder/bar_scenes.py).
@@ -65,24 +67,55 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}
     line = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
     reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
-    wide = {name: [_posterior(_moved(some, line[name]), reach_px, gamma) for gamma in _GAMMAS]
-            for name, some in pieces.items()}
-    chances = _chances(wide.values()) if wide else None
-    return {name: _bar_line(some, line[name], wide[name], chances) for name, some in pieces.items()}
+    lines = {}
+    if not pieces:
+        return lines
+    window = {name: _Window.around(reach_px) for name in pieces}
+    for parts in _PARTS:
+        looks = {name: [_posterior(_moved(some, line[name]), window[name], gamma, parts) for gamma in _GAMMAS]
+                 for name, some in pieces.items()}
+        chances = _chances(looks.values())
+        mixed = {name: _mixed(looks[name], chances) for name in pieces}
+        line = {name: line[name] + mixed[name].line for name in pieces}
+        window = {name: _Window.after(mixed[name]) for name in pieces}
+    for name, some in pieces.items():
+        lines[name] = BarLine(_two_points(some, line[name], mixed[name].covariance), float(np.sum(np.abs(line[name]))),
+                              mixed[name].for_bar, mixed[name].clearness)
+    return lines
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Where a line is looked for: as far off (2,), px, at its middle and over ARM_MM; under lens blurs (n,), px."""
+
+    most_px: np.ndarray
+    blurs_px: np.ndarray
+
+    @classmethod
+    def around(cls, reach_px: float) -> "_Window":
+        return cls(np.full(2, reach_px), np.array(_BLURS_PX))
+
+    @classmethod
+    def after(cls, wide: "_Posterior") -> "_Window":
+        """About a posterior."""
+        sigma = np.sqrt(np.diag(wide.covariance))
+        wide_by = np.clip(_WITHIN_SIGMAS * np.hypot(wide.log_blur_sigma, wide.log_blur_step / np.sqrt(12.0)), *_BLUR_REACH)
+        return cls(np.clip(_WITHIN_SIGMAS * sigma, _LEAST_PX, _WIDE_PX), wide.blur_px * np.exp(np.linspace(-wide_by, wide_by, 4)))
 
 
 @dataclass(frozen=True)
 class _Posterior:
-    """Of shift and tilt over ARM_MM (2,), px, with one transfer curve and one blur: mean, covariance, minus twice the
-    log evidence, how much more probable a bar is than none, and by how much its misfit is less."""
+    """Of shift and tilt over ARM_MM (2,), px, all lens blurs mixed: mean, covariance, minus twice the log evidence, how
+    much more probable a bar is than none, and by how much its misfit is less; and the blur, px."""
 
     line: np.ndarray
     covariance: np.ndarray
     evidence: float
     for_bar: float
     clearness: float
-    gamma: float
     blur_px: float
+    log_blur_sigma: float
+    log_blur_step: float
 
 
 def _chances(cameras: Iterable[Sequence[_Posterior]]) -> np.ndarray:
@@ -92,26 +125,18 @@ def _chances(cameras: Iterable[Sequence[_Posterior]]) -> np.ndarray:
     return chance / chance.sum()
 
 
-def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances) -> BarLine:
-    """The line by all transfer curves, each by its chance; looked for once more close by if it is known so well."""
-    mean, covariance = _mixed(wide, chances)
-    line, for_bar = line + mean, float(chances @ [one.for_bar for one in wide])
-    clearness = float(chances @ [one.clearness for one in wide])
-    if np.sqrt(np.max(np.diag(covariance))) < _CLOSE_PX / _WITHIN_SIGMAS:
-        likely = chances > _LEAST_CHANCE
-        again = [_posterior(_moved(pieces, line), _CLOSE_PX, one.gamma, one.blur_px)
-                 for one, is_likely in zip(wide, likely) if is_likely]
-        mean, covariance = _mixed(again, chances[likely] / chances[likely].sum())
-        line = line + mean
-    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar, clearness)
-
-
-def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (2,) and covariance (2, 2) of a mixture."""
-    lines = np.array([one.line for one in posteriors])
+def _mixed(posteriors: Sequence[_Posterior], chances=None) -> _Posterior:
+    """The mixture, each with its chance."""
+    chances = _chances([posteriors]) if chances is None else chances
+    lines = np.array([[*one.line, np.log(one.blur_px)] for one in posteriors])
     mean = chances @ lines
+    away = lines - mean
     own = np.array([one.covariance for one in posteriors])
-    return mean, np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - mean, lines - mean))
+    of_blur = chances @ (np.array([one.log_blur_sigma for one in posteriors]) ** 2 + away[:, 2] ** 2)
+    return _Posterior(mean[:2], np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", away[:, :2], away[:, :2])),
+                      float(chances @ [one.evidence for one in posteriors]),
+                      *(float(chances @ [getattr(one, what) for one in posteriors]) for what in ("for_bar", "clearness")),
+                      float(np.exp(mean[2])), float(np.sqrt(of_blur)), posteriors[0].log_blur_step)
 
 
 def _shows(pieces: Pieces) -> bool:
@@ -134,42 +159,28 @@ def _moved(pieces: Pieces, line) -> Pieces:
 
 def _far(pieces: Pieces, off_px: float) -> np.ndarray:
     """The most probable line (2,) by blurred pictures, on a coarse grid."""
-    shifts = np.arange(-off_px, off_px + 0.5 * _FAR_STEP_PX, _FAR_STEP_PX)
     seen = profiles(pieces, _STRETCHES, off_px, 1.0)
-    misfit, lines = _over_lines(evidence(seen, shifts, _FAR_BLUR_PX), seen, off_px)
-    return lines[np.unravel_index(np.argmin(misfit), misfit.shape)]
+    found = [evidence(seen, off_px, _FAR_BLUR_PX)]
+    misfit, lines, _ = _over_lines(found, seen, _Window(np.full(2, off_px), np.array([_FAR_BLUR_PX])))
+    return lines[np.argmin(misfit.min(axis=(1, 2)))]
 
 
-def _posterior(pieces: Pieces, reach_px: float, gamma: float, blur_px: float | None = None) -> _Posterior:
-    """Over lines within reach_px, under the lens blur that explains the pieces best where it is not given."""
-    shifts = np.linspace(-reach_px, reach_px, _STEPS)
+def _posterior(pieces: Pieces, window: _Window, gamma: float, parts: int = 1) -> _Posterior:
+    """Over lines within a window, the lens blur mixed over as all that is not known."""
+    reach_px = min(float(window.most_px @ [1.0, _LEVER]), 3.0)
     seen = profiles(pieces, _STRETCHES, reach_px, gamma)
-    blur_px = _best_blur(seen, shifts[::3]) if blur_px is None else blur_px
-    found = evidence(seen, shifts, blur_px)
-    misfit, lines = _over_lines(found, seen, reach_px)
+    found = [evidence(seen, reach_px, blur_px, parts) for blur_px in window.blurs_px]
+    misfit, lines, log_blurs = _over_lines(found, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()
-    mean = np.einsum("ab,abi->i", chance, lines) / total
+    of_line, of_blur = chance.sum(axis=(1, 2)) / total, chance.sum(axis=(0, 1)) / total
+    mean, log_blur = of_line @ lines, of_blur @ log_blurs
     away = lines - mean
-    for_bar = float(np.sum((found.of_none - found.of_bar.min(axis=1)) / _temper(found)))
-    return _Posterior(mean, np.einsum("ab,abi,abj->ij", chance, away, away) / total,
-                      float(misfit.min() - 2.0 * np.log(total)), for_bar, _clearness(found), gamma, blur_px)
-
-
-def _best_blur(seen: Sequence[Profile], shifts) -> float:
-    """The lens blur, px, with the most evidence: of a few, downhill from the middle one, then between them by a
-    parabola of their logarithms."""
-    least = cache(lambda k: float(np.sum(evidence(seen, shifts, _BLURS_PX[k]).of_bar.min(axis=1))))
-    lowest, middle = len(_BLURS_PX) // 2, 0
-    while middle != min(max(lowest, 1), len(_BLURS_PX) - 2):
-        middle = min(max(lowest, 1), len(_BLURS_PX) - 2)
-        near = range(middle - 1, middle + 2)
-        lowest = min(near, key=least)
-    blurs = [_BLURS_PX[k] for k in near]
-    square, slope, _ = np.polyfit(np.log(blurs), [least(k) for k in near], 2)
-    if square <= 0.0:
-        return _BLURS_PX[lowest]
-    return float(np.clip(np.exp(-0.5 * slope / square), blurs[0], blurs[-1]))
+    best = min(found, key=lambda one: one.of_bar.min(axis=(1, 2)).sum())
+    for_bar = float(np.sum((best.of_none - best.of_bar.min(axis=(1, 2))) / _temper(best, seen)))
+    return _Posterior(mean, (of_line * away.T) @ away, float(misfit.min() - 2.0 * np.log(total / chance.size)), for_bar,
+                      _clearness(best), float(np.exp(log_blur)), float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)),
+                      float(np.max(np.diff(log_blurs), initial=0.0)))
 
 
 def _clearness(found: Evidence) -> float:
@@ -177,26 +188,40 @@ def _clearness(found: Evidence) -> float:
     return float(np.median(np.log(np.maximum(found.misfit_of_none, 1.0) / np.maximum(found.misfit, 1.0))))
 
 
-def _temper(found: Evidence) -> np.ndarray:
+def _temper(found: Evidence, seen: Profiles) -> np.ndarray:
     """By how much (k,) each stretch's evidence is overstated."""
-    return _TEMPER * np.maximum(found.misfit, 1.0)
+    return TEMPER(seen) * np.maximum(found.misfit, 1.0)
 
 
-def _over_lines(found: Evidence, seen: Sequence[Profile], reach_px: float) -> tuple[np.ndarray, np.ndarray]:
-    """Minus twice the log probability (n, n) of lines (n, n, 2), shift and tilt in px, all within reach_px.
+def TEMPER(seen):
+    import os
+    return float(os.environ.get('TT',1.0))*seen.alike
+
+
+def _over_lines(found: Sequence[Evidence], seen: Profiles, window: _Window) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Minus twice the log probability (n, b) of lines (n, 2), shift and tilt in px, and logarithms of blurs (b,).
 
     Where the stretches' own middles lie on no line to their sigmas, these are taken to be as much larger.
     """
-    grid = np.linspace(-reach_px, reach_px, _GRID)
-    lines = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1)
-    own = found.of_bar / _temper(found)[:, None]
-    least = own.min(axis=1, keepdims=True)
-    total = np.zeros(lines.shape[:2])
-    for one, curve in zip(seen, np.minimum(own - least, _MOST)):
-        there = np.clip(lines @ [1.0, one.place_mm / ARM_MM], -reach_px, reach_px)
-        total += np.clip(CubicSpline(found.shift_px, curve)(there), 0.0, _MOST)
+    ends = [np.linspace(-most, most, _GRID) for most in window.most_px]
+    lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
+    shift, logs = found[0].shift_px, np.log(window.blurs_px)
+    fine = np.max(np.diff(logs), initial=0.0) < _SPLINE_BLURS
+    log_blurs = np.linspace(logs[0], logs[-1], _BLUR_GRID) if fine else logs
+    best = min(found, key=lambda one: one.of_bar.min(axis=(1, 2)).sum())
+    own = np.stack([one.of_bar for one in found], axis=-1) / _temper(best, seen)[:, None, None, None]
+    if fine:
+        own = CubicSpline(logs, own, axis=-1)(log_blurs)
+    own = own.reshape(len(seen), len(shift), -1)
+    least = own.min(axis=1)
+    total = np.zeros((len(lines), own.shape[-1]))
+    for place_mm, curve, low in zip(seen.place_mm, own, least):
+        there = np.clip(lines @ [1.0, place_mm / ARM_MM], shift[0], shift[-1])
+        against = np.maximum(CubicSpline(shift, curve - low)(there), 0.0)
+        total += -2.0 * np.logaddexp(-0.5 * against, -0.5 * _MOST)
     scatter = max(1.0, total.min() / max(len(seen) - 2, 1))
-    return float(np.sum(least)) + total / scatter, lines
+    total = np.sum(least, axis=0) + total / scatter
+    return total.reshape(len(lines), -1, len(log_blurs)), lines, log_blurs
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:
