@@ -39,6 +39,7 @@ _SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside 
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
 _ALIKE_PX = 1.0  # a lens blur: how far the errors of neighbours go together
 _SMOOTHED = 5  # steps of the grid, about as much: over which texture is averaged
+_AS_ROUGH = 50  # pixels of the grid for which a stretch is taken to be as rough as the others
 _SIDES = 4  # columns of level and slope beyond both edges; the picture without rods has two more
 
 
@@ -193,19 +194,21 @@ def _profiles(added, stretches, offset_px, place_mm, radius_px: float) -> Profil
     total = of_stretch @ own
     seen = total > 0
     light, behind, by_grey = ((of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:])
-    texture, alike = _texture(own, *(np.where(own > 0, part / np.where(own > 0, own, 1.0), np.nan) for part in added[1:3]))
+    each = (np.where(own > 0, part / np.where(own > 0, own, 1.0), np.nan) for part in added[1:3])
+    texture, alike = _texture(of_stretch[:, 1:-1], own, *each)
     number = np.maximum(of_stretch @ (own > 0), 1)
     sigma = np.where(seen, np.sqrt(1.0 / np.where(seen, total, 1.0) + texture / number), np.inf)
     behind = behind - np.array([np.median(row[some]) for row, some in zip(behind, seen)])[:, None]
     return Profiles(offset_px, light, sigma, behind, by_grey, place_mm, radius_px, alike)
 
 
-def _texture(weight, light, behind) -> tuple[np.ndarray, float]:
-    """Variance (b,) of what pieces differ by beyond noise: texture of the bench, compression; and how alike neighbours
-    across are, see `Profiles`. weight, light, behind (s, b): of each piece, NaN where it shows nothing.
+def _texture(of_stretch, weight, light, behind) -> tuple[np.ndarray, float]:
+    """Variance (k, b) of what pieces of each stretch differ by beyond noise: texture of the bench, compression; and how
+    alike neighbours across are, see `Profiles`. of_stretch (k, s - 2): 1 for its pieces, the first and last left out;
+    weight, light, behind (s, b): of each piece, NaN where it shows nothing.
 
     By a piece and the mean of the two beside it, so that what changes steadily along the bar does not count, nor what
-    follows the picture without rods, by the share that is seen.
+    follows the picture without rods, by the share that is seen. A product of one figure a stretch and one across.
     """
     noise = 1.0 / np.maximum(weight[1:-1], 1e-300)
     light, behind = (one[1:-1] - 0.5 * (one[:-2] + one[2:]) for one in (light, behind))
@@ -216,9 +219,11 @@ def _texture(weight, light, behind) -> tuple[np.ndarray, float]:
     spread = np.sum(left**2, axis=1) / (1.5 * number)
     best = np.argmin(spread, axis=0)
     spread = uniform_filter1d(spread[best, np.arange(spread.shape[1])], _SMOOTHED)
-    left = np.take_along_axis(left, best[None, None], axis=0)[0] / np.sqrt(np.maximum(spread, 1e-300))
-    noise = np.sum(np.where(there, noise, 0.0), axis=0) / number
-    return np.maximum(spread - uniform_filter1d(noise, _SMOOTHED), 0.0), _alike(left)
+    left = np.take_along_axis(left, best[None, None], axis=0)[0] / np.sqrt(np.maximum(1.5 * spread, 1e-300))
+    noise = uniform_filter1d(np.sum(np.where(there, noise, 0.0), axis=0) / number, _SMOOTHED)
+    shown = np.sum(of_stretch @ there, axis=1)
+    rougher = (np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH) / (shown + _AS_ROUGH)
+    return np.maximum(rougher[:, None] * spread - noise, 0.0), _alike(left)
 
 
 def _alike(left) -> float:

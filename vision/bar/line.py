@@ -25,7 +25,7 @@ _WIDE_PX, _CLOSE_PX, _WITHIN_SIGMAS = 2.0, 1.0, 4.0
 _STRETCHES = 6
 _LEVER = 1.6
 _PARTS = (1, 1, 2)
-_LEAST_PX, _BLUR_REACH = 0.25, (0.12, 0.5)
+_LEAST_PX, _BLUR_REACH = 0.25, (0.1, 0.5)
 _SPLINE_BLURS = 0.25
 _BLUR_GRID, _GRID = 13, 33  # shifts at which the evidence is taken, and lines between, by shift and by tilt
 _FAR_BLUR_PX, _BLURS_PX = 1.6, (0.6, 0.85, 1.2, 1.7)
@@ -65,23 +65,23 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     pieces = {view.camera.name: _pieces(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings)
               for view in views}
     pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}
-    line = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
-    reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
-    lines = {}
     if not pieces:
-        return lines
-    window = {name: _Window.around(reach_px) for name in pieces}
+        return {}
+    reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
+    first = {name: _far(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
+    found = {name: [_settled(some, first[name], reach_px, gamma) for gamma in _GAMMAS] for name, some in pieces.items()}
+    chances = _chances(found.values())
+    return {name: _bar_line(some, found[name], chances) for name, some in pieces.items()}
+
+
+def _settled(pieces: Pieces, line, reach_px: float, gamma: float) -> "_Posterior":
+    """From a line (2,) that may be reach_px off, look by look closer by."""
+    window = _Window.around(reach_px)
     for parts in _PARTS:
-        looks = {name: [_posterior(_moved(some, line[name]), window[name], gamma, parts) for gamma in _GAMMAS]
-                 for name, some in pieces.items()}
-        chances = _chances(looks.values())
-        mixed = {name: _mixed(looks[name], chances) for name in pieces}
-        line = {name: line[name] + mixed[name].line for name in pieces}
-        window = {name: _Window.after(mixed[name]) for name in pieces}
-    for name, some in pieces.items():
-        lines[name] = BarLine(_two_points(some, line[name], mixed[name].covariance), float(np.sum(np.abs(line[name]))),
-                              mixed[name].for_bar, mixed[name].clearness)
-    return lines
+        found = _posterior(_moved(pieces, line), window, gamma, parts)
+        line = line + found.line
+        window = _Window.after(found)
+    return replace(found, line=line)
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class _Window:
     def after(cls, wide: "_Posterior") -> "_Window":
         """About a posterior."""
         sigma = np.sqrt(np.diag(wide.covariance))
-        wide_by = np.clip(_WITHIN_SIGMAS * np.hypot(wide.log_blur_sigma, wide.log_blur_step / np.sqrt(12.0)), *_BLUR_REACH)
+        wide_by = np.clip(np.hypot(_WITHIN_SIGMAS * wide.log_blur_sigma, wide.log_blur_step), *_BLUR_REACH)
         return cls(np.clip(_WITHIN_SIGMAS * sigma, _LEAST_PX, _WIDE_PX), wide.blur_px * np.exp(np.linspace(-wide_by, wide_by, 4)))
 
 
@@ -125,18 +125,14 @@ def _chances(cameras: Iterable[Sequence[_Posterior]]) -> np.ndarray:
     return chance / chance.sum()
 
 
-def _mixed(posteriors: Sequence[_Posterior], chances=None) -> _Posterior:
-    """The mixture, each with its chance."""
-    chances = _chances([posteriors]) if chances is None else chances
-    lines = np.array([[*one.line, np.log(one.blur_px)] for one in posteriors])
-    mean = chances @ lines
-    away = lines - mean
-    own = np.array([one.covariance for one in posteriors])
-    of_blur = chances @ (np.array([one.log_blur_sigma for one in posteriors]) ** 2 + away[:, 2] ** 2)
-    return _Posterior(mean[:2], np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", away[:, :2], away[:, :2])),
-                      float(chances @ [one.evidence for one in posteriors]),
-                      *(float(chances @ [getattr(one, what) for one in posteriors]) for what in ("for_bar", "clearness")),
-                      float(np.exp(mean[2])), float(np.sqrt(of_blur)), posteriors[0].log_blur_step)
+def _bar_line(pieces: Pieces, found: Sequence[_Posterior], chances) -> BarLine:
+    """The line by all transfer curves, each by its chance."""
+    lines = np.array([one.line for one in found])
+    line = chances @ lines
+    own = np.array([one.covariance for one in found])
+    covariance = np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - line, lines - line))
+    for_bar, clearness = (float(chances @ [getattr(one, what) for one in found]) for what in ("for_bar", "clearness"))
+    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar, clearness)
 
 
 def _shows(pieces: Pieces) -> bool:
