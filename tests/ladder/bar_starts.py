@@ -2,10 +2,11 @@
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/ladder/bar_starts.py FOLDER [PATTERN]
 
-FOLDER is one of bar_scenes.py. A bar is looked for from its true axis, and from axes off by each of STARTS_PX: half of it at the
-middle, in a random direction, and half over 20 mm, in another. A row a camera: how far off the line is at 20 mm to either side
-(px) and the stated sigma; then how far each start moves it, in stated sigmas. Last: z with the error that the fit takes
-every line to have besides (BAR_OFFSET_PX), and of the moves, start by start, the RMS, and the share over 0.2.
+FOLDER is one of bar_scenes.py. A bar is looked for from its true axis, and from axes off by each of STARTS_PX: half of
+it at the middle, in a random direction, and half over 20 mm, in another. A row a camera: how far off the line is at
+20 mm to either side (px) and the stated sigma; then how far each start moves it, in stated sigmas. Last: z with the
+error that the fit takes every line to have besides (BAR_OFFSET_PX), and of the moves, start by start, the RMS, the
+median, and the share over 0.2.
 """
 
 import sys
@@ -72,11 +73,11 @@ def summary(table) -> str:
     """Of all cameras."""
     error, sigma, moved = (np.array(column) for column in zip(*table))
     z = np.abs(error / np.hypot(sigma, BAR_OFFSET_PX)).ravel()
-    moves_rms = "  ".join(f"{px:g} px {np.sqrt(np.mean(one**2)):.2f} ({np.mean(one > ALLOWED):.0%} over)"
-                          for px, one in zip(STARTS_PX, moved.T))
+    parts = [f"{px:g} px {np.sqrt(np.mean(one**2)):.2f}, {np.median(one):.2f} ({np.mean(one > ALLOWED):.0%} over)"
+             for px, one in zip(STARTS_PX, moved.T)]
     return (f"{len(z)} points: median error {np.median(np.abs(error)):.3f} px, sigma {np.median(sigma):.3f}; z RMS "
             f"{np.sqrt(np.mean(z**2)):.2f}, median {np.median(z):.2f}, within 1.96 {np.mean(z < 1.96):.1%}, over 3 "
-            f"{np.mean(z > 3):.1%}, largest {z.max():.1f}\nmoved, in sigmas, RMS: {moves_rms}")
+            f"{np.mean(z > 3):.1%}, largest {z.max():.1f}\nmoved, in sigmas, RMS and median: {'  '.join(parts)}")
 
 
 def main() -> None:

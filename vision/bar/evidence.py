@@ -39,7 +39,7 @@ _SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside 
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
 _ALIKE_PX = 1.0  # a lens blur: how far the errors of neighbours go together
 _SMOOTHED = 5  # steps of the grid, about as much: over which texture is averaged
-_AS_ROUGH = 50  # pixels of the grid for which a stretch is taken to be as rough as the others
+_AS_ROUGH = 50  # steps of the grid for which a stretch counts as rough as the others
 _SIDES = 4  # columns of level and slope beyond both edges; the picture without rods has two more
 
 
@@ -86,7 +86,7 @@ class Profiles:
 
     @cached_property
     def in_grey(self) -> np.ndarray:
-        """What makes minus twice the log evidence (k,) that of a density of grey levels, whatever the transfer curve."""
+        """What makes minus twice the log evidence (k,) that of grey levels."""
         root = np.where(self.seen, np.sqrt(self.weight) * self.by_grey, 1.0)
         return -2.0 * np.sum(np.log(root), axis=1)
 
@@ -145,7 +145,7 @@ class Profiles:
         chi2 = root[..., -1] ** 2 - 1.0
         widths = 2.0 * np.sum(np.log(root[..., :-1]), axis=-1)
         value = chi2 + widths - np.linalg.slogdet(prior)[1] + self.in_grey[:, None]
-        return value, chi2 / np.sum(self.seen, axis=1)[:, None]
+        return value, chi2 / np.maximum(np.sum(self.seen, axis=1), 1)[:, None]
 
 
 def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profiles:
@@ -162,9 +162,8 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profi
     order = np.argsort(pieces.place)
     added = _shared(weight, [np.ones_like(light), light, behind, slope], place, 2 * half + 1)[:, order]
     stretches = np.array_split(np.arange(len(pieces)), max(1, min(count, len(pieces) // 2)))
-    stretches = [some for some in stretches if np.any(added[0][some])]
-    offset = STEP_PX * np.arange(-half, half + 1)
-    return _profiles(added, stretches, offset, np.array([pieces.place[order[some]].mean() for some in stretches]), radius)
+    offset, place_mm = STEP_PX * np.arange(-half, half + 1), pieces.place[order]
+    return _profiles(added, stretches, offset, np.array([place_mm[some].mean() for some in stretches]), radius)
 
 
 def _shared(weight, values, place, size: int) -> np.ndarray:
@@ -198,7 +197,8 @@ def _profiles(added, stretches, offset_px, place_mm, radius_px: float) -> Profil
     texture, alike = _texture(of_stretch[:, 1:-1], own, *each)
     number = np.maximum(of_stretch @ (own > 0), 1)
     sigma = np.where(seen, np.sqrt(1.0 / np.where(seen, total, 1.0) + texture / number), np.inf)
-    behind = behind - np.array([np.median(row[some]) for row, some in zip(behind, seen)])[:, None]
+    middle = [np.median(row[some]) if np.any(some) else 0.0 for row, some in zip(behind, seen)]
+    behind = behind - np.array(middle)[:, None]
     return Profiles(offset_px, light, sigma, behind, by_grey, place_mm, radius_px, alike)
 
 
@@ -235,8 +235,8 @@ def _alike(left) -> float:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior, the misfit (k,) per bin at its best,
-    and both, (k,) each, of there being no bar."""
+    """Minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior, the misfit (k,)
+    per bin at its best, and both, (k,) each, of there being no bar."""
 
     shift_px: np.ndarray
     of_bar: np.ndarray
@@ -244,18 +244,32 @@ class Evidence:
     of_none: np.ndarray
     misfit_of_none: np.ndarray
 
+    @property
+    def least(self) -> np.ndarray:
+        """That (k,) of each stretch's best."""
+        return self.of_bar.min(axis=(1, 2))
 
-def evidence(seen: Profiles, reach_px: float, blur_px: float, parts: int = 1) -> Evidence:
-    """Evidence of the bar's middle up to reach_px off, so many positions for each step of the grid, in each stretch."""
+    @property
+    def clearness(self) -> float:
+        """The log of how many times worse the light is explained without a bar: of the median stretch."""
+        return float(np.median(np.log(np.maximum(self.misfit_of_none, 1.0) / np.maximum(self.misfit, 1.0))))
+
+
+def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1,
+             all_light: bool = True) -> Evidence:
+    """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, in each stretch;
+    under all of `priors`, or the roughest only."""
     whole = np.arange(-int(np.ceil(reach_px / STEP_PX)), 1 + int(np.ceil(reach_px / STEP_PX)))
-    more_px = STEP_PX / parts * np.arange(parts)
+    more_px = STEP_PX / positions * np.arange(positions)
     shift = (STEP_PX * whole[:, None] + more_px).ravel()
     normal = np.stack([_normal(seen, whole, more, blur_px) for more in more_px], axis=2)
     normal = normal.reshape(len(seen), len(shift), *normal.shape[-2:])
-    value, misfit = (np.stack(one, axis=-1) for one in zip(*(seen.marginal(normal, prior) for prior in seen.priors)))
-    each, best = np.arange(len(seen)), np.unravel_index(np.argmin(value.reshape(len(seen), -1), axis=1), value.shape[1:])
+    under = [seen.marginal(normal, prior) for prior in (seen.priors if all_light else seen.priors[-1:])]
+    value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
+    best = np.argmin(value.reshape(len(seen), -1), axis=1)
     none, misfit_of_none = seen.of_none
-    return Evidence(shift, value, misfit[each, *best], none[:, 0], misfit_of_none[:, 0])
+    return Evidence(shift, value, misfit.reshape(len(seen), -1)[np.arange(len(seen)), best], none[:, 0],
+                    misfit_of_none[:, 0])
 
 
 def _normal(seen: Profiles, shifts, more_px: float, blur_px: float) -> np.ndarray:
@@ -292,7 +306,7 @@ def _layout() -> np.ndarray:
 
 def _range(light) -> float:
     """From dark to bright, but for the outermost twentieths; a grey level at least."""
-    return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))), 1.0 / FULL_SCALE)
+    return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))) if len(light) else 0.0, 1.0 / FULL_SCALE)
 
 
 def _columns(offset_px, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray]:
