@@ -46,8 +46,9 @@ _SIDES = 4  # columns of level and slope beyond both edges; the picture without 
 @dataclass(frozen=True)
 class Profiles:
     """Stretches of the bar, seen across. offset_px (b,): the grid, from where the middle is expected; in each stretch
-    light, sigma, behind, by_grey (k, b): light in parts of full scale, its sigma (infinite where nothing is seen), the
-    light of the picture without rods, about its median, and the light's derivative by grey; place_mm (k,): along the
+    light, sigma, behind, steep, by_grey (k, b): light in parts of full scale, its sigma (infinite where nothing is
+    seen), the light of the picture without rods, about its median, and its slope per px, and the light's derivative by
+    grey; place_mm (k,): along the
     bar; radius_px: half its width; alike: by how much errors that neighbours share make a mean's variance larger.
     """
 
@@ -55,6 +56,7 @@ class Profiles:
     light: np.ndarray
     sigma: np.ndarray
     behind: np.ndarray
+    steep: np.ndarray
     by_grey: np.ndarray
     place_mm: np.ndarray
     radius_px: float
@@ -80,9 +82,10 @@ class Profiles:
 
     @cached_property
     def moments(self) -> np.ndarray:
-        """Weights (5, k, b) of what light is made of: alone, by the background, by its square, by the light, by both."""
-        behind = self.weight * self.behind
-        return np.stack([self.weight, behind, behind * self.behind, self.weight * self.light, behind * self.light])
+        """Weighted products (9, k, b) of what light is made of, in the order of `_normal`'s tables."""
+        behind, steep = self.weight * self.behind, self.weight * self.steep
+        return np.stack([self.weight, behind, steep, behind * self.behind, behind * self.steep, steep * self.steep,
+                         self.weight * self.light, behind * self.light, steep * self.light])
 
     @cached_property
     def in_grey(self) -> np.ndarray:
@@ -158,9 +161,9 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profi
     seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
     light, slope = _light(pieces.grey, gamma)
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
-    behind, _ = _light(pieces.background, gamma)
+    behind, by_background = _light(pieces.background, gamma)
     order = np.argsort(pieces.place)
-    added = _shared(weight, [np.ones_like(light), light, behind, slope], place, 2 * half + 1)[:, order]
+    added = _shared(weight, [np.ones_like(light), light, behind, by_background * pieces.slope, slope], place, 2 * half + 1)[:, order]
     stretches = np.array_split(np.arange(len(pieces)), max(1, min(count, len(pieces) // 2)))
     offset, place_mm = STEP_PX * np.arange(-half, half + 1), pieces.place[order]
     return _profiles(added, stretches, offset, np.array([place_mm[some].mean() for some in stretches]), radius)
@@ -184,22 +187,22 @@ def _light(grey, gamma: float):
 
 
 def _profiles(added, stretches, offset_px, place_mm, radius_px: float) -> Profiles:
-    """Of sums (4, s, b) over the pieces, in their order along the bar: weights, and weighted light, light behind and
-    slope."""
+    """Of sums (5, s, b) over the pieces, in their order along the bar: weights, and weighted light, light behind, its
+    slope across, and the light's derivative by grey."""
     own = added[0]
     of_stretch = np.zeros((len(stretches), len(own)))
     for row, some in zip(of_stretch, stretches):
         row[some] = 1.0
     total = of_stretch @ own
     seen = total > 0
-    light, behind, by_grey = ((of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:])
+    light, behind, steep, by_grey = ((of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:])
     each = (np.where(own > 0, part / np.where(own > 0, own, 1.0), np.nan) for part in added[1:3])
     texture, alike = _texture(of_stretch[:, 1:-1], own, *each)
     number = np.maximum(of_stretch @ (own > 0), 1)
     sigma = np.where(seen, np.sqrt(1.0 / np.where(seen, total, 1.0) + texture / number), np.inf)
     middle = [np.median(row[some]) if np.any(some) else 0.0 for row, some in zip(behind, seen)]
     behind = behind - np.array(middle)[:, None]
-    return Profiles(offset_px, light, sigma, behind, by_grey, place_mm, radius_px, alike)
+    return Profiles(offset_px, light, sigma, behind, steep, by_grey, place_mm, radius_px, alike)
 
 
 def _texture(of_stretch, weight, light, behind) -> tuple[np.ndarray, float]:
@@ -279,15 +282,18 @@ def _normal(seen: Profiles, shifts, more_px: float, blur_px: float) -> np.ndarra
     size = len(seen.offset_px) + 2 * most
     offset = STEP_PX * (np.arange(size) - 0.5 * (size - 1)) - more_px
     used = np.convolve(np.any(seen.seen, axis=0), np.ones(2 * most + 1)) > 0
-    rod, beyond = _columns(offset[used], seen.radius_px, blur_px)
-    own, cover = np.concatenate([rod, beyond[:, :_SIDES]], axis=1), beyond[:, _SIDES:]
+    own, cover, leak = _columns(offset[used], seen.radius_px, blur_px)
     row, column = np.tril_indices(own.shape[1])
-    tables = (own[:, row] * own[:, column], (own[:, None] * cover[:, :, None]).reshape(len(own), -1),
-              cover[:, [0, 0, 1]] * cover[:, [0, 1, 1]], own, cover)
+    one, other = [0, 0, 1], [0, 1, 1]
+    tables = (own[:, row] * own[:, column], *((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak)),
+              cover[:, one] * cover[:, other], cover[:, one] * leak[:, other] + leak[:, one] * cover[:, other],
+              leak[:, one] * leak[:, other], own, cover, leak)
     windows = sliding_window_view(np.pad(seen.moments, ((0, 0), (0, 0), (2 * most, 2 * most))), size, axis=2)
     windows = windows[:, :, most + shifts][..., used].reshape(len(tables), -1, len(own))
     power = np.repeat(np.sum(seen.weight * seen.light**2, axis=1), len(shifts))[:, None]
-    sums = np.concatenate([*map(np.matmul, windows, tables), power], axis=1)
+    alone, *parts = map(np.matmul, windows, tables)
+    sums = [alone, parts[0] + parts[1], parts[2] + parts[3] + parts[4], parts[5], parts[6] + parts[7], power]
+    sums = np.concatenate(sums, axis=1)
     return sums[:, _layout()].reshape(len(seen), len(shifts), _SPLINES + 7, _SPLINES + 7)
 
 
@@ -309,16 +315,20 @@ def _range(light) -> float:
     return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))) if len(light) else 0.0, 1.0 / FULL_SCALE)
 
 
-def _columns(offset_px, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray]:
-    """Blurred pictures of a rod whose radiance is each spline of the angle round it (n, splines), and of what is beyond
-    its edges (n, 6): level and slope of each side, and how much of the background each side shows."""
+def _columns(offset_px, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Blurred pictures of a rod whose radiance is each spline of the angle round it, and of level and slope beyond each
+    edge (n, splines + 4); how much of the background each side shows (n, 2); and what to take of its slope besides
+    (n, 2), for the picture without rods was blurred whole: a product of two pictures, blurred, is that of the blurred
+    ones and blur² times that of their slopes.
+    """
     z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
     area = radius_px * np.cos(_ANGLES) * (_ANGLES[1] - _ANGLES[0]) / (blur_px * np.sqrt(2.0 * np.pi))
     rod = (np.exp(-0.5 * z * z) * area) @ _splines()
-    beyond = np.stack([-offset_px, offset_px]) - radius_px
-    share = ndtr(beyond / blur_px)
-    one, other = np.stack([share, share * beyond / _OUTSIDE_PX], axis=-1)
-    return rod, np.concatenate([one, other, share.T], axis=1)
+    beyond = np.stack([-offset_px, offset_px], axis=1) - radius_px
+    cover = ndtr(beyond / blur_px)
+    bell = np.exp(-0.5 * (beyond / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
+    sides = np.stack([cover, cover * beyond / _OUTSIDE_PX], axis=2).reshape(len(offset_px), _SIDES)
+    return np.concatenate([rod, sides], axis=1), cover, blur_px * np.array([-1.0, 1.0]) * bell
 
 
 @lru_cache(maxsize=1)

@@ -94,7 +94,7 @@ def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: Vis
     pieces = bar_pieces(quiet, view.mean, axis, radius_mm, wires_px, settings)
     scale = FULL_SCALE / view.full_scale
     return replace(pieces, grey=pieces.grey * scale, background=pieces.background * scale,
-                   weight=pieces.weight / scale)
+                   slope=pieces.slope * scale, weight=pieces.weight / scale)
 
 
 def _two_points(pieces: Pieces, line, covariance) -> LinePoints:
