@@ -163,7 +163,8 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profi
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
     behind, by_background = _light(pieces.background, gamma)
     order = np.argsort(pieces.place)
-    added = _shared(weight, [np.ones_like(light), light, behind, by_background * pieces.slope, slope], place, 2 * half + 1)[:, order]
+    values = [np.ones_like(light), light, behind, by_background * pieces.slope, slope]
+    added = _shared(weight, values, place, 2 * half + 1)[:, order]
     stretches = np.array_split(np.arange(len(pieces)), max(1, min(count, len(pieces) // 2)))
     offset, place_mm = STEP_PX * np.arange(-half, half + 1), pieces.place[order]
     return _profiles(added, stretches, offset, np.array([place_mm[some].mean() for some in stretches]), radius)
@@ -285,7 +286,8 @@ def _normal(seen: Profiles, shifts, more_px: float, blur_px: float) -> np.ndarra
     own, cover, leak = _columns(offset[used], seen.radius_px, blur_px)
     row, column = np.tril_indices(own.shape[1])
     one, other = [0, 0, 1], [0, 1, 1]
-    tables = (own[:, row] * own[:, column], *((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak)),
+    mixed = ((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak))
+    tables = (own[:, row] * own[:, column], *mixed,
               cover[:, one] * cover[:, other], cover[:, one] * leak[:, other] + leak[:, one] * cover[:, other],
               leak[:, one] * leak[:, other], own, cover, leak)
     windows = sliding_window_view(np.pad(seen.moments, ((0, 0), (0, 0), (2 * most, 2 * most))), size, axis=2)

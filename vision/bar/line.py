@@ -12,7 +12,7 @@ import numpy as np
 
 from vision.bar.evidence import FULL_SCALE, SATURATED
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
-from vision.bar.posterior import Posterior, most_probable, roughly, settled
+from vision.bar.posterior import Posterior, closer_look, first_look, most_probable, roughly
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces
@@ -22,6 +22,8 @@ from vision.pictures.view import View
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 _WIDE_PX = 2.0  # lines are looked for as far off, at least
 _GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded for a screen
+_POSITIONS = (1, 2)  # of the closer looks, for each step across
+_LEAST_CHANCE = 0.001  # of a transfer curve that is still looked at
 _MOST = 10.0  # chi²: what one stretch may say against a transfer curve
 _LEAST_SHOWN = 0.5
 _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
@@ -56,19 +58,33 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     pieces = {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}
     first = {name: most_probable(some, off_px) if off_px > NEAR_PX else np.zeros(2) for name, some in pieces.items()}
     reach_px = max(_WIDE_PX, min(off_px, NEAR_PX))
-    by_gamma = {name: [roughly(some, first[name], reach_px)] if rough else
-                [settled(some, first[name], reach_px, gamma) for gamma in _GAMMAS] for name, some in pieces.items()}
-    chances = _chances(by_gamma.values()) if pieces else None
-    return {name: _bar_line(some, by_gamma[name], chances) for name, some in pieces.items()}
+    if rough:
+        sure = np.ones(1)
+        return {name: _bar_line(some, [roughly(some, first[name], reach_px)], sure) for name, some in pieces.items()}
+    return _settled(pieces, first, reach_px) if pieces else {}
+
+
+def _settled(pieces: Mapping[str, Pieces], first: Mapping[str, np.ndarray], reach_px: float) -> dict[str, BarLine]:
+    """The lines after looks ever closer by, under each transfer curve and then the likely ones alone."""
+    gammas = np.array(_GAMMAS)
+    seen = {name: [first_look(some, first[name], reach_px, gamma) for gamma in gammas] for name, some in pieces.items()}
+    likely = np.ones(len(gammas), dtype=bool)
+    for positions in _POSITIONS:
+        seen = {name: [closer_look(pieces[name], before, gamma, positions)
+                       for before, gamma, is_likely in zip(by_gamma, gammas, likely) if is_likely]
+                for name, by_gamma in seen.items()}
+        chances, gammas = _chances(seen.values()), gammas[likely]
+        likely = chances > _LEAST_CHANCE
+    return {name: _bar_line(some, seen[name], chances) for name, some in pieces.items()}
 
 
 def _chances(cameras: Iterable[Sequence[Posterior]]) -> np.ndarray:
     """Of each transfer curve: the cameras of a bench are of one kind. A stretch that no curve explains says little."""
-    total = np.zeros(len(_GAMMAS))
+    total = 0.0
     for by_gamma in cameras:
         least = np.array([one.least / np.max([other.temper for other in by_gamma], axis=0) for one in by_gamma])
         against = -2.0 * np.logaddexp(-0.5 * (least - least.min(axis=0)), -0.5 * _MOST)
-        total = against.sum(axis=1) + [one.room for one in by_gamma] + total[:len(by_gamma)]
+        total = total + against.sum(axis=1) + [one.room for one in by_gamma]
     chance = np.exp(-0.5 * (total - total.min()))
     return chance / chance.sum()
 

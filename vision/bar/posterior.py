@@ -22,7 +22,7 @@ _BLURS_PX, _ROUGH_BLURS_PX = (0.6, 0.85, 1.2, 1.7), (0.85, 1.3)  # of a first lo
 _FAR_BLUR_PX = 1.6
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
 _LINES, _BLURS = 33, 13  # of the grid, by shift and by tilt, and by blur
-_POSITIONS = (1, 1, 2)  # look by look, for each step across
+_NEXT_BLURS = 4  # of a next look
 _LONGEST_PX = 3.0
 _STRETCH_ARM = 1.5  # the outermost stretch's place, over ARM_MM
 _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hole in the bench says anything
@@ -42,7 +42,7 @@ class Window:
         """The next, about a posterior."""
         most = np.clip(_WITHIN_SIGMAS * np.sqrt(np.diag(one.covariance)), *_LINE_PX)
         wide = np.clip(np.hypot(_WITHIN_SIGMAS * one.log_blur_sigma, one.log_blur_step), *_LOG_BLUR)
-        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, len(_BLURS_PX))))
+        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)))
 
 
 @dataclass(frozen=True)
@@ -64,13 +64,14 @@ class Posterior:
     log_blur_step: float
 
 
-def settled(pieces: Pieces, line, reach_px: float, gamma: float) -> Posterior:
-    """The posterior after looks ever closer by, from a line (2,) that may be reach_px off."""
-    window = Window(np.full(2, reach_px), np.array(_BLURS_PX))
-    for positions in _POSITIONS:
-        one = _look(pieces, line, window, gamma, positions)
-        line, window = one.line, Window.after(one)
-    return one
+def first_look(pieces: Pieces, line, reach_px: float, gamma: float) -> Posterior:
+    """The posterior about a line (2,) that may be reach_px off, under coarse blurs."""
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), all_light=False), gamma, 1)
+
+
+def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
+    """The posterior about another one, at so many positions for each step across."""
+    return _look(pieces, before.line, Window.after(before), gamma, positions)
 
 
 def roughly(pieces: Pieces, line, reach_px: float) -> Posterior:

@@ -207,7 +207,7 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
     `_told_by_edges`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
              for view in views}
-    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges)
+    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
     seen = []
     for number, view in enumerate(views):
         seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
@@ -219,8 +219,8 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
     return seen
 
 
-def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
-               edges: Collection[str]) -> list[dict[int, LinePoints]]:
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
+               last: bool) -> list[dict[int, LinePoints]]:
     """Per camera the points of the bar's middle (side 0), or of its two edges where these are seen and are to tell how
     far away it is."""
     if edges:
@@ -229,7 +229,7 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings
                                                  wires[view.camera.name], settings) for view in views_told}
     else:
         views_told, found = views, {}
-    lines = measure_bars(views_told, axis, rods.bar.radius_mm, wires, settings)
+    lines = measure_bars(views_told, axis, rods.bar.radius_mm, wires, settings, rough=not last)
     middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
