@@ -239,9 +239,10 @@ def _alike(left) -> float:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior, the misfit (k,)
-    per bin at its best, and both, (k,) each, of there being no bar."""
+    """Under a lens blur, minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior;
+    the misfit (k,) per bin at its best; and both, (k,) each, of there being no bar."""
 
+    blur_px: float
     shift_px: np.ndarray
     of_bar: np.ndarray
     misfit: np.ndarray
@@ -272,7 +273,7 @@ def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
     best = np.argmin(value.reshape(len(seen), -1), axis=1)
     none, misfit_of_none = seen.of_none
-    return Evidence(shift, value, misfit.reshape(len(seen), -1)[np.arange(len(seen)), best], none[:, 0],
+    return Evidence(blur_px, shift, value, misfit.reshape(len(seen), -1)[np.arange(len(seen)), best], none[:, 0],
                     misfit_of_none[:, 0])
 
 

@@ -89,6 +89,6 @@ def rims_of(pieces: Pieces, placed: Pieces) -> Pieces:
 def at_arms(pieces: Pieces) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half-width (2,), by parabolas."""
     order, place = np.argsort(pieces.place), np.array([-ARM_MM, ARM_MM])
-    known = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order]
-    there = np.stack([np.polyval(np.polyfit(pieces.place[order], column, 2), place) for column in known.T], axis=1)
+    columns = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order].T
+    there = np.stack([np.polyval(np.polyfit(pieces.place[order], column, 2), place) for column in columns], axis=1)
     return place, there[:, :2], there[:, 2:4], there[:, 4]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.bar.evidence import Evidence, Profiles, evidence, profiles
+from vision.bar.evidence import STEP_PX, Evidence, Profiles, evidence, profiles
 from vision.bar.pieces import ARM_MM
 from vision.lines.bands import Pieces
 
@@ -115,17 +115,25 @@ def _best(under: Sequence[Evidence]) -> Evidence:
     return min(under, key=lambda one: one.least.sum())
 
 
+def _overstated(one: Evidence, seen: Profiles) -> np.ndarray:
+    """By how much (k,) the evidence of each stretch is: noise goes together as far as pieces show it; what is left beyond
+    noise is light that no such model has, and goes together as far as the lens blurs it: exp(-x² / 4 blur²).
+    """
+    smeared = 2.0 * np.sqrt(np.pi) * one.blur_px / STEP_PX
+    return seen.alike + max(seen.alike, smeared) * np.maximum(one.misfit - 1.0, 0.0)
+
+
 def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
     """Lines (n, 2), shift and tilt in px; logarithms of blurs (b,); minus twice the log probability (n, r, b) of each
     under each kind of light and blur; minus twice the log evidence (k,) at the best of these, as it stands; and by how
-    much (k,) that is overstated: errors are alike, and beyond noise there is what no such model has.
+    much (k,) that is overstated.
 
     Where the stretches' own middles lie on no line to their sigmas, these are taken to be as much larger.
     """
     ends = [np.linspace(-most, most, _LINES) for most in window.most_px]
     lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
     logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
-    temper = seen.alike * np.maximum(_best(under).misfit, 1.0)
+    temper = _overstated(_best(under), seen)
     own = np.stack([one.of_bar for one in under], axis=-1) / temper[:, None, None, None]
     if len(logs) > 2 and np.max(np.diff(logs)) < _SPLINE:
         log_blurs = np.linspace(logs[0], logs[-1], _BLURS)
