@@ -24,7 +24,7 @@ _WIDE_PX = 2.0  # lines are looked for as far off, at least
 _GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded for a screen
 _POSITIONS = (1, 2)  # of the closer looks, for each step across
 _LEAST_CHANCE = 0.001  # of a transfer curve that is still looked at
-_MOST = 10.0  # chi²: what one stretch may say against a transfer curve
+_MOST = 20.0  # chi²: what one stretch may say against a transfer curve
 _LEAST_SHOWN = 0.5
 _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 
@@ -79,12 +79,13 @@ def _settled(pieces: Mapping[str, Pieces], first: Mapping[str, np.ndarray], reac
 
 
 def _chances(cameras: Iterable[Sequence[Posterior]]) -> np.ndarray:
-    """Of each transfer curve: the cameras of a bench are of one kind. A stretch that no curve explains says little."""
+    """Of each transfer curve: the cameras of a bench are of one kind. All stretches of a bar are lit nearly alike, so
+    that what they say of a curve by their light counts once a camera; one that no curve explains says little."""
     total = 0.0
     for by_gamma in cameras:
         least = np.array([one.least / np.max([other.temper for other in by_gamma], axis=0) for one in by_gamma])
         against = -2.0 * np.logaddexp(-0.5 * (least - least.min(axis=0)), -0.5 * _MOST)
-        total = total + against.sum(axis=1) + [one.room for one in by_gamma]
+        total = total + against.mean(axis=1) + [one.room for one in by_gamma]
     chance = np.exp(-0.5 * (total - total.min()))
     return chance / chance.sum()
 

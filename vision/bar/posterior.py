@@ -116,8 +116,8 @@ def _best(under: Sequence[Evidence]) -> Evidence:
 
 
 def _overstated(one: Evidence, seen: Profiles) -> np.ndarray:
-    """By how much (k,) the evidence of each stretch is: noise goes together as far as pieces show it; what is left beyond
-    noise is light that no such model has, and goes together as far as the lens blurs it: exp(-x² / 4 blur²).
+    """By how much (k,) the evidence of each stretch is: noise goes together as far as pieces show it; what is left
+    beyond noise is light that no such model has, and goes together as far as the lens blurs it: exp(-x² / 4 blur²).
     """
     smeared = 2.0 * np.sqrt(np.pi) * one.blur_px / STEP_PX
     return seen.alike + max(seen.alike, smeared) * np.maximum(one.misfit - 1.0, 0.0)
