@@ -8,6 +8,7 @@ lines tell (see `vision.bar.search`).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -71,16 +72,21 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
     values: of each of their numbers; axis_of: the axes (n, 3) of hypotheses (n, k).
     """
     grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
-    steps, found = 0.5 * np.array([one[1] - one[0] for one in values]), None
+    steps, best = 0.5 * np.array([one[1] - one[0] for one in values]), grid
     for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)):
         near = [replace(one, field=gaussian_filter(one.field, (0.0, *[spread * one.half_px] * 2))) for one in seen]
         counts = _COUNTS if spread == _SPREADS[-1] else np.maximum(_COUNTS, 0.0)
-        score = lambda each, along=_ALONG_MM: np.mean(  # noqa: E731
-            [both_edges(axis_of(each), one, radius_mm, counts, along) for one in near], axis=0)  # noqa: B023
-        if found is None:
-            found = _apart(grid, score(grid, _ALONG_MM[::2]), 4.0 * steps, _STARTS)
-        found = _apart(*climb(found, steps * (spread / _SPREADS[0]), score), steps, kept)
-    return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(found)).values())]
+        score = partial(_clear_in_all, near, axis_of, radius_mm, counts)
+        if best is grid:
+            best = _apart(grid, score(grid, _ALONG_MM[::2]), 4.0 * steps, _STARTS)
+        best = _apart(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
+    return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(best)).values())]
+
+
+def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, counts, each,
+                  along_mm=_ALONG_MM) -> np.ndarray:
+    """How clear both edges of hypotheses (n, k) are, mean (n,) over the cameras; see `likely` and `both_edges`."""
+    return np.mean([both_edges(axis_of(each), one, radius_mm, counts, along_mm) for one in seen], axis=0)
 
 
 def _apart(each, score, apart, most: int) -> np.ndarray:
@@ -100,10 +106,10 @@ def edges_px(grey, background, blur_px: float) -> np.ndarray:
     From 0 to 1: beside the noise, and more than the light changes a little aside.
     """
     pictures = (np.asarray(picture, dtype=np.float32) for picture in (grey, background))
-    seen, known = (np.stack([gaussian_filter(picture, blur_px, order=order) for order in ((0, 1), (1, 0))])
+    seen, behind = (np.stack([gaussian_filter(picture, blur_px, order=order) for order in ((0, 1), (1, 0))])
                    for picture in pictures)
-    light = np.sum(seen * known, axis=0) / np.maximum(np.sum(known**2, axis=0), 1e-12)
-    left = seen - np.clip(light, 0.0, _MOST_LIGHT) * known
+    light = np.sum(seen * behind, axis=0) / np.maximum(np.sum(behind**2, axis=0), 1e-12)
+    left = seen - np.clip(light, 0.0, _MOST_LIGHT) * behind
     size = np.linalg.norm(left, axis=0)
     clear = np.maximum(size - gaussian_filter(size, _ASIDE_BLURS * blur_px), 0.0)
     x, y = left / np.maximum(size, 1e-12)

@@ -62,7 +62,7 @@ def fit_whisk(views: Sequence[View], cameras: Cameras, rods: Rods, bar: SeenBar,
 
     light: filled with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    edges, one_side = _told_by_edges(cameras, bar), seen_from_one_side(cameras, bar.axis)
+    edges, one_side = _resolved_by_edges(cameras, bar), seen_from_one_side(cameras, bar.axis)
     fitted = partial(_fitted_to, views, cameras, rods, bar, motor, light, settings, edges)
     try:
         return fitted(by_onset=one_side)
@@ -89,13 +89,13 @@ def _fitted_to(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping
     return *_fit(seen, cameras, rods, look, motor, by_onset), list(motor)
 
 
-def _told_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
-    """Cameras whose edges of the bar tell how far away it is: where all stand on one side, or a single one sees it.
+def _resolved_by_edges(cameras: Cameras, bar: SeenBar) -> list[str]:
+    """Cameras whose edges of the bar resolve how far away it is: where all stand on one side, or a single one sees it.
     None where two see it from different sides."""
-    told = [name for name in cameras.names if name in bar.seen_by]
+    seeing = [name for name in cameras.names if name in bar.seen_by]
     if seen_from_one_side(cameras, bar.axis):
-        return told or list(cameras.names)
-    return told if len(told) == 1 else []
+        return seeing or list(cameras.names)
+    return seeing if len(seeing) == 1 else []
 
 
 def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, float],
@@ -205,10 +205,10 @@ def _begin(problem: Problem, look: _Look) -> State:
 def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *,
                edges: Collection[str], last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. edges: see
-    `_told_by_edges`."""
+    `_resolved_by_edges`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
              for view in views}
-    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges)
+    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
     seen = []
     for number, view in enumerate(views):
         seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
@@ -220,17 +220,17 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
     return seen
 
 
-def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *,
-               edges: Collection[str]) -> list[dict[int, LinePoints]]:
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
+               last: bool) -> list[dict[int, LinePoints]]:
     """Per camera the points of the bar's middle (side 0), or of its two edges where these are seen and are to tell how
     far away it is."""
     if edges:
-        views_told = [view for view in views if view.camera.name in edges]
+        asked = [view for view in views if view.camera.name in edges]
         found = {view.camera.name: measure_edges(of_mean(view), view.mean, axis, rods.bar.radius_mm,
-                                                 wires[view.camera.name], settings) for view in views_told}
+                                                 wires[view.camera.name], settings) for view in asked}
     else:
-        views_told, found = views, {}
-    lines = measure_bars(views_told, axis, rods.bar.radius_mm, wires, settings)
+        asked, found = views, {}
+    lines = measure_bars(asked, axis, rods.bar.radius_mm, wires, settings, rough=not last)
     middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
