@@ -39,6 +39,7 @@ _SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside 
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
 _ALIKE_PX = 1.0  # a lens blur: how far the errors of neighbours go together
 _SMOOTHED = 5  # steps of the grid, about as much: over which texture is averaged
+_MEDIAN_SQUARED, _FEW_DIFFER = 0.455, 3.0  # of a Gaussian; times the usual variance: more is no texture
 _AS_ROUGH = 50  # steps of the grid for which a stretch counts as rough as the others
 _SIDES = 4  # columns of level and slope beyond both edges; the picture without rods has two more
 
@@ -222,8 +223,11 @@ def _texture(of_stretch, weight, light, behind) -> tuple[np.ndarray, float]:
     number = np.maximum(np.sum(there, axis=0), 1)
     spread = np.sum(left**2, axis=1) / (1.5 * number)
     best = np.argmin(spread, axis=0)
-    spread = uniform_filter1d(spread[best, np.arange(spread.shape[1])], _SMOOTHED)
-    left = np.take_along_axis(left, best[None, None], axis=0)[0] / np.sqrt(np.maximum(1.5 * spread, 1e-300))
+    left = np.take_along_axis(left, best[None, None], axis=0)[0]
+    usual = np.median(left**2, axis=0) / (1.5 * _MEDIAN_SQUARED)  # where a tilted bar's edge passes a few pieces differ
+    spread = np.minimum(spread[best, np.arange(spread.shape[1])], _FEW_DIFFER * usual)
+    spread = np.maximum(uniform_filter1d(spread, _SMOOTHED), 1e-300)
+    left = left / np.sqrt(1.5 * spread)
     noise = uniform_filter1d(np.sum(np.where(there, noise, 0.0), axis=0) / number, _SMOOTHED)
     shown = np.sum(of_stretch @ there, axis=1)
     rougher = (np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH) / (shown + _AS_ROUGH)

@@ -18,10 +18,11 @@ STRETCHES = 6
 _WITHIN_SIGMAS = 4.0  # a next look reaches as far
 # Of a next look: least and most that it reaches, px; and in the logarithm of the blur.
 _LINE_PX, _LOG_BLUR = (0.25, 2.0), (0.1, 0.5)
-_BLURS_PX, _ROUGH_BLURS_PX = (0.6, 0.85, 1.2, 1.7), (0.85, 1.3)  # of a first look, and of one that only ranks
+_BLURS_PX = 0.6, 0.85, 1.2, 1.7  # of a first look
 _FAR_BLUR_PX = 1.6
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
-_LINES, _BLURS = 33, 13  # of the grid, by shift and by tilt, and by blur
+_LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by blur
+_APART_PX = 0.1  # lines of a wide window: farther apart they step over a peak
 _NEXT_BLURS = 4  # of a next look
 _LONGEST_PX = 3.0
 _STRETCH_ARM = 1.5  # the outermost stretch's place, over ARM_MM
@@ -36,6 +37,11 @@ class Window:
     most_px: np.ndarray
     blurs_px: np.ndarray
     all_light: bool = True
+
+    @property
+    def lines(self) -> int:
+        """How many lines are tried, by shift and by tilt."""
+        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / _APART_PX)))
 
     @classmethod
     def after(cls, one: "Posterior") -> "Window":
@@ -76,7 +82,7 @@ def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int)
 
 def roughly(pieces: Pieces, line, reach_px: float) -> Posterior:
     """The posterior of one quick look, good enough to tell a bar from what is none."""
-    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_ROUGH_BLURS_PX), all_light=False), 1.0, 1)
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), all_light=False), 1.0, 1)
 
 
 def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
@@ -103,7 +109,7 @@ def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) ->
     of_line, of_blur = chance.sum(axis=(1, 2)) / total, chance.sum(axis=(0, 1)) / total
     mean, log_blur = of_line @ lines, float(of_blur @ log_blurs)
     away, step = lines - mean, float(np.max(np.diff(log_blurs), initial=0.0))
-    cell = float(np.prod(2.0 * window.most_px / (_LINES - 1))) * max(step, 1e-300)
+    cell = float(np.prod(2.0 * window.most_px / (window.lines - 1))) * max(step, 1e-300)
     best = _best(under)
     return Posterior(line + mean, (of_line * away.T) @ away, least, temper,
                      -2.0 * np.log(total * cell), float(np.sum((best.of_none - best.least) / temper)), best.clearness,
@@ -130,7 +136,7 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
 
     Where the stretches' own middles lie on no line to their sigmas, these are taken to be as much larger.
     """
-    ends = [np.linspace(-most, most, _LINES) for most in window.most_px]
+    ends = [np.linspace(-most, most, window.lines) for most in window.most_px]
     lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
     logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
     temper = _overstated(_best(under), seen)
