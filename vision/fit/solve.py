@@ -196,9 +196,9 @@ def solve(problem: Problem, state: State, *,
 
     Returns the state and its covariance (size, size) from noise and priors alone.
     """
-    known, geometry = None, np.r_[:BAR + REST, problem.first_bend:problem.size]
+    near_jacobian, geometry = None, np.r_[:BAR + REST, problem.first_bend:problem.size]
     for scale in scales:
-        linear, state = linearise(problem, state, known)
+        linear, state = linearise(problem, state, near_jacobian)
         root = np.sqrt(robust_weights(linear, scale))
         jacobian = linear.jacobian * root[:, None]
         step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
@@ -206,9 +206,9 @@ def solve(problem: Problem, state: State, *,
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
-        known = linear.jacobian if np.all(np.abs(step[geometry]) < _ALIKE * steps(problem)[geometry]) else None
+        near_jacobian = linear.jacobian if np.all(np.abs(step[geometry]) < _ALIKE * steps(problem)[geometry]) else None
     else:
-        jacobian = weighted_jacobian(problem, state, scales[-1], known)
+        jacobian = weighted_jacobian(problem, state, scales[-1], near_jacobian)
     return state, np.linalg.inv(jacobian.T @ jacobian)
 
 

@@ -21,16 +21,16 @@ def touch_by_onset(problem: Problem, state: State, covariance: np.ndarray) -> tu
     seen, spread = seen_bend(bend[bent], covariance[problem.first_bend:, problem.first_bend:])
     values, whole = np.zeros(len(bend)), np.eye(len(bend)) * np.median(np.diag(spread))
     values[bent], whole[np.ix_(bent, bent)] = seen, spread
-    found = onset(problem.motor_rad, values, whole)
-    if found is None:
+    begins = onset(problem.motor_rad, values, whole)
+    if begins is None:
         raise Refused("no bend of the whisker is seen: it never touches, or bends along the sight of all cameras")
-    if found.sigma_rad > _MOST_ONSET_RAD:
-        raise Refused(f"when the whisker begins to bend is told to {np.degrees(found.sigma_rad):.1f} deg only, "
+    if begins.sigma_rad > _MOST_ONSET_RAD:
+        raise Refused(f"when the whisker begins to bend is known to {np.degrees(begins.sigma_rad):.1f} deg only, "
                       f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known")
-    touching, free = frames_by_touch(problem.motor_rad, found.motor_rad, 0.5 * found.sigma_rad)
+    touching, free = frames_by_touch(problem.motor_rad, begins.motor_rad, 0.5 * begins.sigma_rad)
     if np.sum(free) < FEWEST_FREE:
-        at_deg, sigma_deg = np.degrees([found.motor_rad, found.sigma_rad])
+        at_deg, sigma_deg = np.degrees([begins.motor_rad, begins.sigma_rad])
         raise Refused(f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: fewer than "
                       "two frames of free stroke")
     vector = np.concatenate([state.vector[:problem.first_bend], bend[~free].ravel()])
-    return replace(problem, onset=found, touching=touching, bent=~free), replace(state, vector=vector)
+    return replace(problem, onset=begins, touching=touching, bent=~free), replace(state, vector=vector)

@@ -67,7 +67,7 @@ def _by_lens(problem: Problem, state: State, answer) -> np.ndarray:
     return -answer @ (linear.jacobian[linear.is_point].T @ (weights * camera_rows(problem, state)))
 
 
-def variance_by_cause(problem: Problem, state: State, known: Uncertainty, gradient: np.ndarray) -> dict[str, float]:
+def variance_by_cause(problem: Problem, state: State, fitted: Uncertainty, gradient: np.ndarray) -> dict[str, float]:
     """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
 
     wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their sigmas; light: lines
@@ -77,7 +77,7 @@ def variance_by_cause(problem: Problem, state: State, known: Uncertainty, gradie
     observation's part is its own. The placement errs apart from corners and lenses, so that there are no cross-terms.
     """
     weighed = weighted_jacobian(problem, state)
-    by_row = weighed @ (known.answer @ gradient)
+    by_row = weighed @ (fitted.answer @ gradient)
     parts = by_row * _alike(problem, by_row[None])[0]
     on_wire = np.concatenate([np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen])
     touch = len(on_wire) + int(np.sum(problem.touching))
@@ -86,8 +86,8 @@ def variance_by_cause(problem: Problem, state: State, known: Uncertainty, gradie
     causes = {"wire": parts[:len(on_wire)][on_wire], "bar": parts[:len(on_wire)][~on_wire],
               "touch": parts[len(on_wire):touch], "diameters": parts[reach], "light": parts[light],
               "beliefs": [parts[touch:reach].sum(), parts[touch + problem.first_bend:].sum()]}
-    whole = float(gradient @ known.lens @ gradient)
-    placement = _by_placement(problem, state, known.answer, gradient)
+    whole = float(gradient @ fitted.lens @ gradient)
+    placement = _by_placement(problem, state, fitted.answer, gradient)
     own = whole if np.isnan(placement) else max(whole - placement, 0.0)  # rounding may leave less than nothing
     parts = {name: float(np.sum(part)) for name, part in causes.items()}
     return parts | {"cameras": own, "placement": placement}

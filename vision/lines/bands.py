@@ -129,9 +129,9 @@ def _cut(band: Band, length_px: int, noise: Noise, number: int):
     used = count * length_px
     flat = [a[:used].reshape(count, -1)
             for a in (band.offset_px, band.grey, band.background, *_changes(band))]
-    known = np.isfinite(flat[1]) & np.isfinite(flat[2])
-    weight = np.where(known, 1.0 / noise.sigma(np.where(known, flat[1], 0.0)), 0.0)
-    flat[1:] = [np.where(known, values, 0.0) for values in flat[1:]]
+    in_picture = np.isfinite(flat[1]) & np.isfinite(flat[2])
+    weight = np.where(in_picture, 1.0 / noise.sigma(np.where(in_picture, flat[1], 0.0)), 0.0)
+    flat[1:] = [np.where(in_picture, values, 0.0) for values in flat[1:]]
     means = [a[:used].reshape(count, length_px, -1).mean(axis=1)
              for a in (band.foot_px, band.normal)]
     singles = [a[:used].reshape(count, length_px).mean(axis=1) for a in (band.place, band.radius_px)]
@@ -146,6 +146,6 @@ _SECOND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0
 def _changes(band: Band) -> list[np.ndarray]:
     """Slope and curvature (n, k) each of the background across the rod, per px and per px²; 0 at the band's rims."""
     pitch = (band.offset_px[:, 1:2] - band.offset_px[:, :1])
-    known = np.where(np.isfinite(band.background), band.background, 0.0)
-    return [correlate1d(known, share, axis=1, mode="nearest") / pitch**order
+    background = np.where(np.isfinite(band.background), band.background, 0.0)
+    return [correlate1d(background, share, axis=1, mode="nearest") / pitch**order
             for order, share in ((1, _FIRST), (2, _SECOND))]

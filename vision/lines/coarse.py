@@ -20,7 +20,7 @@ from vision.lines.points import LinePoints
 
 _NEAR_PX = 4  # a wire bends no farther than this out of the curves that are tried
 _SIGMA_PX = 1.0  # of a point with a whole vote: pieces are placed to a pixel
-_LEAST_VOTE = 1e-3
+_LEAST_VOTE = 1e-9
 _SURE_SIGMAS = 8.0  # the best of all curves through noise has 3.4, one in 100 has 6, one in ten less each sigma on
 _SHADE_WIDTHS = 3  # of the rod: shade on what is behind changes over more
 _PLAIN_GAIN = 0.5  # a background scaled by more than this from 1 is none: the piece shows something else
@@ -60,10 +60,13 @@ class Votes:
 
 def likely_curve(seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[np.ndarray]) -> tuple[np.ndarray, bool]:
     """Coefficients (k,) from the grids with which the sum of shapes (s, k) has most votes of all pieces (s in all), and
-    whether it surely has more than curves through noise would."""
+    whether it surely has more than curves through noise would. Of equal ones that nearest to the predicted curve."""
     mesh = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
     share = np.concatenate([one.share for one in seen])
-    padded, reach, total = np.pad(share, ((0, 0), (1, 1))), seen[0].reach_px, np.zeros(len(mesh))
+    if len(share) == 0:
+        return np.zeros(len(grids)), False
+    padded, reach = np.pad(share, ((0, 0), (1, 1))), seen[0].reach_px
+    total = -_LEAST_VOTE * np.sum((mesh / [max(grid[-1], 1e-12) for grid in grids]) ** 2, axis=1)
     for row, shape in zip(padded, shapes_px):
         total += row.take(np.rint(mesh @ shape).astype(int) + reach + 1, mode="clip")
     best, expected = int(np.argmax(total)), len(share) * np.mean(share)

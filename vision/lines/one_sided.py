@@ -40,8 +40,8 @@ class SeenWidth:
 
 def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
     """How wide the rod is seen over pieces that lie where they were found, from their difference to the background."""
-    known = 2.0 * float(np.median(pieces.radius_px))
-    reach = 0.5 * known + 3.0 * blur_px
+    width_px = 2.0 * float(np.median(pieces.radius_px))
+    reach = 0.5 * width_px + 3.0 * blur_px
     use = (pieces.weight > 0) & (np.abs(pieces.offset_px) < reach)
     bins = np.floor((pieces.offset_px[use] + reach) * _BINS_PER_PX).astype(int)
     size = int(np.ceil(2 * reach * _BINS_PER_PX)) + 1
@@ -52,9 +52,9 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
     strength = np.sqrt(np.maximum(power, 0.0))
     plain = np.flatnonzero((power > _SIGMAS * noise) & (strength > _LEAST * strength.max()))
     if len(plain) == 0:
-        return SeenWidth(0.0, known, 0.0)
+        return SeenWidth(0.0, width_px, 0.0)
     low, high = plain[0] / _BINS_PER_PX - reach, (plain[-1] + 1) / _BINS_PER_PX - reach
-    return SeenWidth(max(float(high - low) - 2 * _REACHES * blur_px, 0.0), known, 0.5 * float(low + high))
+    return SeenWidth(max(float(high - low) - 2 * _REACHES * blur_px, 0.0), width_px, 0.5 * float(low + high))
 
 
 @dataclass(frozen=True)

@@ -69,10 +69,7 @@ class WhiskPictures:
 
 @dataclass(frozen=True, eq=False)
 class FittedWhisk:
-    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for.
-
-    exposure: slip while the shutter was open, which the uncertainty has in it.
-    """
+    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for."""
 
     problem: Problem
     state: State
@@ -80,21 +77,22 @@ class FittedWhisk:
     uncertainty: Uncertainty
     measured: Measured
     by_parameter: Jacobians
-    exposure: Exposure
 
     @classmethod
     def of(cls, problem: Problem, state: State, answer: np.ndarray, frames: list[int]) -> "FittedWhisk":
         """answer (size, size): how the parameters answer the observations (see `Uncertainty`)."""
         measured, by_parameter = jacobians(problem, state)
-        exposure = slip_in_exposure(problem, state, by_parameter.frame["slip"])
-        known = uncertainty(problem, state, answer)
-        return cls(problem, state, frames, replace(known, noise=known.noise + exposure.covariance), measured,
-                   by_parameter, exposure)
+        return cls(problem, state, frames, uncertainty(problem, state, answer), measured, by_parameter)
+
+    @cached_property
+    def exposure(self) -> Exposure:
+        """Slip while the shutter was open."""
+        return slip_in_exposure(self.problem, self.state, self.by_parameter.frame["slip"])
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(size, size), of the parameters."""
-        return self.uncertainty.covariance
+        """(size, size), of the parameters, slip within the exposure included."""
+        return self.uncertainty.covariance + self.exposure.covariance
 
     def of_whisk(self, name: str) -> Value:
         """A quantity of the whole whisk by its name."""
