@@ -149,7 +149,7 @@ def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual, radius_mm: floa
     axes.annotate("d$_y$", 0.5 * (virtual + corner) + [0, -0.32], ha="center", fontsize=9, color="0.25")
     if abs(contact[1] - virtual[1]) > 0.4:
         beside = 0.5 * (corner + contact) + [-0.35, 0]
-        below = corner + [0.15, -0.35 * np.sign(contact[1] - virtual[1])]  # where the whisker's circle hides the leg
+        below = corner + np.array([0.15, -0.35 * np.sign(contact[1] - virtual[1])])  # where a circle hides the leg
         place = beside if abs(contact[1] - virtual[1]) > 2.6 * radius_mm else below
         axes.annotate("d$_z$", place, ha="center", va="center", fontsize=9, color="0.25")
     if abs(phi) > 3.0:
