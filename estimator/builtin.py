@@ -115,8 +115,8 @@ def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
     """Estimate from a cylinder's distance and gradient: sigma, interval, taper, clamp at the tip, reason for a NaN.
 
     m_y: the moment along the surface that the equation takes; (2) takes none. share: what the equation itself may be
-    off by (`_model_share`). A tapering whisker's distance bends over what α_est may be off by: its sigma is no less than
-    the two sides of the interval, in the mean of their squares.
+    off by (`_model_share`). A tapering whisker's distance bends over what α_est may be off by: its sigma is no less
+    than the two sides of the interval, in the mean of their squares.
     """
     theta, m_z, beam = whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam
     knows = {
