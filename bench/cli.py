@@ -5,17 +5,20 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from bench.cli_results import add_compare, add_report, add_view
+from bench.cli_seeing import add_seeing, add_tradeoff, seeing_of
+from bench.cli_setup import add_board, add_new
+from bench.options import BAD_INPUT, DONE, DOUBTFUL, FAULT_OF_OURS, INTERRUPTED, add_figure_format
+from bench.options import add_out as _add_out
+from bench.options import add_session as _add_session
+from bench.options import add_verb as _add
+from bench.options import add_workers as _add_workers
 from vision.geometry.errors import Refused
-
-DONE, DOUBTFUL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
-
-Run = Callable[[argparse.Namespace], int]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,113 +75,11 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    first = (_add_new, _add_board, _add_check, _add_calibrate, _add_evaluate)
-    for add_verb in (*first, _add_report, _add_tradeoff, _add_figures, _add_simulate, _add_info):
+    first = (add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
+    looking = (add_report, add_compare, add_view)
+    for add_verb in (*first, *looking, add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
-
-
-def _add(verbs, name: str, run: Run, summary: str, example: str) -> argparse.ArgumentParser:
-    verb = verbs.add_parser(
-        name,
-        help=summary,
-        description=summary[0].upper() + summary[1:] + ".",
-        epilog=f"example:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    verb.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
-    verb.set_defaults(run=run)
-    return verb
-
-
-def _add_session(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("session", type=Path, metavar="SESSION", help="folder of the recorded session")
-
-
-def _add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
-    verb.add_argument("--out", type=Path, required=True, metavar=metavar, help=what)
-
-
-def _add_workers(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("--workers", type=_count, default=1, metavar="N", help="processes to use (default 1)")
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
-    return int(text)
-
-
-def _squares(text: str) -> tuple[int, int]:
-    counts = text.lower().split("x")
-    if len(counts) != 2 or not all(count.isdecimal() and int(count) > 1 for count in counts):
-        raise argparse.ArgumentTypeError(f"{text!r} is not two counts of squares, such as 8x6")
-    return int(counts[0]), int(counts[1])
-
-
-def _add_new(verbs) -> None:
-    verb = _add(
-        verbs,
-        "new",
-        _new,
-        "the folders of a session and an annotated session.toml; asks in a terminal for what no option gives",
-        "whisker-bench new my-session --whisker-length-mm 100 --whisker-diameter-mm 1 --bar-diameter-mm 6",
-    )
-    _add_session(verb)
-    verb.add_argument("--name", default="", help="shown in reports (default: the folder's name)")
-    for option, what in _NUMBERS_OF_A_SESSION.items():
-        verb.add_argument(option, type=float, metavar="X", help=what)
-    verb.add_argument("--squares", type=_squares, default=(8, 6), metavar="NxM", help="of the board (default 8x6)")
-    verb.add_argument("--dictionary", default="DICT_5X5_100", metavar="NAME", help="of its markers, as OpenCV names it")
-
-
-_NUMBERS_OF_A_SESSION = {
-    "--whisker-length-mm": "from base to tip",
-    "--whisker-diameter-mm": "at the base",
-    "--youngs-modulus-GPa": "of the whisker",
-    "--bar-diameter-mm": "of the round bar that is touched",
-    "--square-mm": "side of a square of the board, as measured",
-    "--marker-mm": "side of one of its markers",
-}
-
-
-def _new(options: argparse.Namespace) -> int:
-    from bench.setup.new_session import new_session
-
-    names = [option.removeprefix("--").replace("-", "_") for option in _NUMBERS_OF_A_SESSION]
-    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    ask = input if sys.stdin.isatty() else None
-    print(*new_session(options.session, options.name, given, options.squares, options.dictionary, ask), sep="\n")
-    return DONE
-
-
-def _add_board(verbs) -> None:
-    verb = _add(
-        verbs,
-        "board",
-        _board,
-        "a ChArUco board as a PDF at exact scale with rulers, and its lines for session.toml",
-        "whisker-bench board --out board.pdf --squares 8x6 --square-mm 15",
-    )
-    _add_out(verb, "FILE", "PDF to write")
-    verb.add_argument("--squares", type=_squares, default=(8, 6), metavar="NxM", help="along x and y (default 8x6)")
-    verb.add_argument("--square-mm", type=float, default=15.0, metavar="X", help="side of a square (default 15)")
-    verb.add_argument("--marker-mm", type=float, metavar="X", help="side of a marker (default 11/15 of a square)")
-    verb.add_argument("--dictionary", default="DICT_5X5_100", metavar="NAME", help="as OpenCV names it")
-    verb.add_argument("--legacy", action="store_true", help="OpenCV's pattern from before 4.6")
-    verb.add_argument("--inverted", action="store_true", help="white on black")
-
-
-def _board(options: argparse.Namespace) -> int:
-    from bench.setup.board_pdf import MARKER_SHARE, toml_block, write_board
-    from vision.geometry.board import Board
-
-    marker_mm = options.marker_mm or round(MARKER_SHARE * options.square_mm, 2)
-    kind = options.dictionary, options.legacy, options.inverted
-    board = Board(options.squares, options.square_mm, marker_mm, *kind)
-    paper = write_board(options.out, board)
-    print(*toml_block(board), "", f"written: {options.out}, {paper.name}; print it at 100 %, then measure it", sep="\n")
-    return DONE
 
 
 def _add_evaluate(verbs) -> None:
@@ -209,7 +110,7 @@ def _add_evaluate(verbs) -> None:
         help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
         "else to half a frame)",
     )
-    _add_seeing(verb)
+    add_seeing(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -225,115 +126,28 @@ def _add_evaluate(verbs) -> None:
     )
     verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
     verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
-    _add_figure_format(verb)
+    add_figure_format(verb)
     _add_workers(verb)
-
-
-def _add_figure_format(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument(
-        "--figure-format",
-        action="append",
-        default=[],
-        choices=("png", "pdf", "svg"),
-        help="figures for a paper too, as wide as a journal's column, in OUT/figures; may be given several times",
-    )
-
-
-def _add_seeing(verb: argparse.ArgumentParser) -> None:
-    how = verb.add_mutually_exclusive_group()
-    how.add_argument(
-        "--preset",
-        metavar="NAME",
-        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
-    )
-    how.add_argument(
-        "--accuracy-mm",
-        type=float,
-        metavar="X",
-        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
-    )
-    how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
 def _evaluate(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
+    from bench.api import evaluate_with
     from bench.base.settings import Settings
-    from bench.evaluate import evaluate
 
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
     names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    given["seeing"] = _seeing(options)
+    given["seeing"] = seeing_of(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
-    progress = sys.stderr.isatty()
-    return evaluate(
-        options.session,
-        options.out,
-        Settings(**given),
-        workers=options.workers,
-        progress=progress,
-        figure_formats=options.figure_format,
-    )
-
-
-def _add_report(verbs) -> None:
-    verb = _add(
-        verbs,
-        "report",
-        _report,
-        "report.html, methods.md and results.bib of an evaluated run again, from its results alone",
-        "whisker-bench report demo-out --figure-format pdf",
-    )
-    _add_run(verb)
-    _add_figure_format(verb)
-
-
-def _add_run(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("run_folder", type=Path, metavar="OUT", help="folder that `evaluate --out` wrote")
-
-
-def _report(options: argparse.Namespace) -> int:
-    from bench.report.page.write import report_again
-
-    print(*report_again(options.run_folder, options.figure_format), sep="\n")
-    return DONE
-
-
-def _seeing(options: argparse.Namespace):
-    """The settings of `--preset` or `--settings`."""
-    from bench.trials.seeing import STANDARD, by_preset, from_file
-
-    return from_file(options.settings) if options.settings else by_preset(options.preset or STANDARD)
-
-
-def _add_tradeoff(verbs) -> None:
-    verb = _add(
-        verbs,
-        "tradeoff",
-        _tradeoff,
-        "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
-        "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
-    )
-    _add_session(verb)
-    _add_out(verb, "OUT", "folder for the table, the plot and the settings files")
-    verb.add_argument("--trials", default="*", metavar="PATTERN", help="only trials of such names (default: all)")
-    verb.add_argument("--repeats", type=_count, default=2, metavar="N", help="how often each is timed (default 2)")
-
-
-def _tradeoff(options: argparse.Namespace) -> int:
-    from bench.base.workers import single_thread
-
-    single_thread()
-    from bench.base.environment import check_environment
-    from bench.tradeoff import tradeoff
-
-    check_environment()
-    progress = sys.stderr.isatty()
-    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, progress=progress)
+    told = {"progress": sys.stderr.isatty(), "announce": print}
+    formats = options.figure_format
+    run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)
+    return DOUBTFUL if run.doubtful else DONE
 
 
 def _add_calibrate(verbs) -> None:
@@ -397,9 +211,9 @@ def _add_check(verbs) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from bench.session.check import report_doubts
+    from bench.check import check
 
-    return report_doubts(options.session, progress=sys.stderr.isatty())
+    return check(options.session, progress=sys.stderr.isatty())
 
 
 _MAPS = {

@@ -1,10 +1,10 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
-from bench.base.atomic import lock_output
+from bench.base.atomic import lock_output, write_whole
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
@@ -17,12 +17,14 @@ from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import write_friction
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation, finished
+from bench.report.summary.page import Summary
 from bench.session.check import checked_session
 from bench.session.inside import check_outside
 from bench.session.trial import Trial
 from bench.trials.estimates import estimators
 from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
 
+DONE, DOUBTFUL = 0, 1
 _MOST_NAMED = 8
 
 
@@ -34,10 +36,11 @@ def evaluate(
     workers: int = 1,
     progress: bool = False,
     figure_formats: Sequence[str] = (),
+    announce: Callable[[str], object] = print,
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
-    figure_formats: of figures for a paper, beside the others.
+    figure_formats: of figures for a paper, beside the others; announce: is given the summary.
     """
     estimators(settings.estimators)
     check_outside(out, session_path)
@@ -60,7 +63,9 @@ def evaluate(
         write_curvature(out, shapes)
         recordings = {unit.trial.name: unit.files for unit in chosen}
         found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
-        return report(Evaluation(session, out, settings, *found), pool, figure_formats)
+        summary = report(Evaluation(session, out, settings, *found), pool, figure_formats)
+    announce(summary.text.rstrip())
+    return DOUBTFUL if summary.doubtful else DONE
 
 
 def _require_some(trials: Sequence[Trial], settings: Settings) -> None:
@@ -79,8 +84,8 @@ def _some(names: Iterable[str]) -> str:
     return ", ".join([*first[:_MOST_NAMED], *["…"] * (len(first) > _MOST_NAMED)])
 
 
-def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> int:
-    """Figures where they are wanted, report and summary; returns the exit code. Results of a synthetic session are
+def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> Summary:
+    """Figures where they are wanted, report and summary, which is returned. Results of a synthetic session are
     scored."""
     from bench.report.against_theta import write_against_theta
     from bench.report.figures import write_figures
@@ -88,7 +93,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     from bench.report.paper import write_paper_figures
     from bench.report.record import record_of, write_record
     from bench.report.score import score
-    from bench.report.summary.page import summary_of, write_summary
+    from bench.report.summary.page import summary_of
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     drawn = evaluation.settings.figures
@@ -103,4 +108,5 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
     write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
-    return write_summary(out, summary)
+    write_whole(out / "summary.txt", summary.text)
+    return summary

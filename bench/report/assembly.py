@@ -165,19 +165,23 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         truth = seen.d_x_mm.value
         for answer in felt.estimates:
             error = answer.d_x_est_mm.value - truth
-            yield _whisk_of(result, seen) | {
-                "estimator": answer.estimator,
-                "alpha_est_deg": math.degrees(answer.alpha_est_rad),
-                "d_x_est_mm": answer.d_x_est_mm.value,
-                "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
-                "d_x_est_sigma_alpha_exact_mm": answer.d_x_est_sigma_alpha_exact_mm,
-                "d_x_est_low_mm": answer.d_x_est_low_mm,
-                "d_x_est_high_mm": answer.d_x_est_high_mm,
-                "beta_est_deg": math.degrees(answer.beta_est_rad),
-                "error_mm": error,
-                "error_percent": 100.0 * error / truth,
-                "status": answer.status,
-            } | _contact_cells(seen, felt, answer)
+            yield (
+                _whisk_of(result, seen)
+                | {
+                    "estimator": answer.estimator,
+                    "alpha_est_deg": math.degrees(answer.alpha_est_rad),
+                    "d_x_est_mm": answer.d_x_est_mm.value,
+                    "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
+                    "d_x_est_sigma_alpha_exact_mm": answer.d_x_est_sigma_alpha_exact_mm,
+                    "d_x_est_low_mm": answer.d_x_est_low_mm,
+                    "d_x_est_high_mm": answer.d_x_est_high_mm,
+                    "beta_est_deg": math.degrees(answer.beta_est_rad),
+                    "error_mm": error,
+                    "error_percent": 100.0 * error / truth,
+                    "status": answer.status,
+                }
+                | _contact_cells(seen, felt, answer)
+            )
 
 
 def _contact_cells(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> dict[str, float]:

@@ -12,6 +12,7 @@ from bench.friction.error_map import draw_error_map, measured_cells, typical_tap
 from bench.friction.explained import draw_explained, explained_rows, mean_row
 from bench.friction.tables import SurfaceFriction
 from bench.records.trial import TrialResult
+from bench.report.against_theta import against_theta, figure
 from bench.report.figure_8 import figure_8
 from bench.report.figures import error_against_slope
 from bench.session.whisker import Whisker
@@ -40,6 +41,9 @@ def session_figures(
     cells = measured_cells(results, friction, settings.alpha_est_rad)
     if cells:
         found["error_map"] = draw_error_map(cells, settings.alpha_est_rad, typical_taper(friction))
+    by_theta = against_theta(results)
+    if any(row.whisks for row in by_theta):
+        found["against_theta"] = figure(by_theta)
     return found
 
 

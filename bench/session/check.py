@@ -1,10 +1,7 @@
 """What can be checked of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from pathlib import Path
-
-from tqdm import tqdm
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
@@ -30,21 +27,6 @@ def checked_session(path: Path | str, doubts: Doubts | None = None) -> Session:
         check_recording(trial, doubts)
     check_sizes(session, doubts)
     return session
-
-
-def report_doubts(path: Path, progress: bool) -> int:
-    """Print refusals and notes. Returns the exit code: 2 where there is a refusal, 1 where a note, else 0."""
-    doubts = Doubts(stop_at_first=False)
-    with doubts.guard():
-        session = checked_session(path, doubts)
-        find_damage(session, doubts, each=partial(tqdm, desc="pictures", disable=not progress, leave=False))
-    for line in doubts.refusals:
-        print(f"bad: {line}")
-    for line in doubts.notes:
-        print(f"doubtful: {line}")
-    if not (doubts.refusals or doubts.notes):
-        print(f"{session.name}: {len(session.trials)} trials, nothing wrong or doubtful")
-    return 2 if doubts.refusals else 1 if doubts.notes else 0
 
 
 def check_recording(trial: Trial, doubts: Doubts) -> None:

@@ -46,6 +46,17 @@ class FrameTimes:
         first, last = signals.time_s[stroke][[0, -1]]
         return slice(*np.searchsorted(self.time_s, [first - half_s, last + half_s]).tolist())
 
+    def lost_in(self, frames: slice) -> list[tuple[float, int]]:
+        """Of a stroke's frames: after which time, s, how many were dropped, by gaps of more than `_DROPPED_STEPS` usual
+        steps."""
+        time_s = self.time_s[frames]
+        steps = np.diff(time_s)
+        if len(steps) < 2:
+            return []
+        usual = float(np.median(steps))
+        gaps = np.flatnonzero(steps > _DROPPED_STEPS * usual)
+        return [(float(time_s[k]), max(1, round(float(steps[k]) / usual) - 1)) for k in gaps]
+
 
 def frame_times(trial: Trial) -> FrameTimes:
     """The frame times of a trial, from the first source that there is.

@@ -43,7 +43,7 @@ def still_scene(
     """A trial's frames, held to the pictures of the scene without rods."""
     kept, left_out, notes = {}, {}, []
     for name, pictures in frames.items():
-        doubt = _other_scene(name, pictures, calibration.background) if pictures else ""
+        doubt = other_scene(name, pictures, calibration.background) if pictures else ""
         if doubt:
             left_out[name] = f"camera {name} was left out: {doubt}"
         else:
@@ -52,7 +52,7 @@ def still_scene(
     return StillScene(kept, left_out | moved_cameras(session, calibration, kept), tuple(notes))
 
 
-def _other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarray | None]) -> str:
+def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarray | None]) -> str:
     """What the frame in the middle shows in place of the rig picture's scene; '' where it is that scene, or where
     nothing tells."""
     picture = pictures[sorted(pictures)[len(pictures) // 2]]

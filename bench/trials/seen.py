@@ -79,7 +79,7 @@ def _see(
     whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
         tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),
-        (*truth.notes, *_lost(frames, times), *scene.notes),
+        (*truth.notes, *_lost(frames, times), *dropped(times, places), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
         0.5 * wire.diameter_mm,
@@ -126,6 +126,15 @@ def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
             yield f"camera {name} dropped {dropped} of {len(times)} frames"
         if damaged:
             yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
+
+
+def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
+    """A line for each whisk with gaps between its frames' times."""
+    for number, place in enumerate(places):
+        lost = times.lost_in(place)
+        if lost:
+            at = ", ".join(f"{time_s:.3f}" for time_s, _ in lost[:_MOST_NAMED])
+            yield f"whisk {number}: {sum(count for _, count in lost)} frames were dropped by all cameras (after {at} s)"
 
 
 def whisk_record(

@@ -40,11 +40,12 @@ from bench.trials.gate import kinetic_end
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
-from estimator.signal import Touch
+from estimator.signal import NOT_REACHED, Touch
 from estimator.whisk import Whisk
 from vision.truth.value import NAN, UNKNOWN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
+SATURATED = "the gauges are at their rail at the pushing angle: raise their range, or ask for a smaller --theta-deg"
 OWN_GAUGES = "not judged: without this trial the gauges are not known"
 
 
@@ -161,6 +162,8 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
+    if status == NOT_REACHED and stroke.motor_rad.max() >= touch.motor_rad + theta_rad:
+        status = SATURATED
     usable = None if status else whisk
     if usable is not None and readout.is_gauged:
         status = unit.gauges.beyond(readout.in_follicle(usable))

@@ -180,6 +180,10 @@ def _dropped(session: Path) -> None:
     file.write_text("\n".join(["frame,time_s", *(f"{k},{time}" for k, time in enumerate(kept))]) + "\n")
 
 
+def _rig_board_hidden(session: Path) -> None:
+    change_picture(session / "boards" / "rig" / "low.png", lambda grey: np.full_like(grey, 90))
+
+
 def _huge_png(session: Path) -> None:
     """A PNG whose header tells of 60000 × 60000 pixels."""
     path = pictures(session, "low")[3]
@@ -237,6 +241,8 @@ FAULTS: dict[str, Fault] = {
     "frame twice": _frame_twice,
     "frame lost silently": _lost_silently,
     "frame dropped": _dropped,
+    "bar 6.8 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 6.8"),
+    "bar 5.2 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 5.2"),
     "bar 4 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 4.0"),
     "wire 1.5 mm for 1": _manifest("diameter_mm = 1.0", "diameter_mm = 1.5"),
     "board 10 % too large": _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 16.5\nmarker_mm = 12.1"),
@@ -253,6 +259,7 @@ FAULTS: dict[str, Fault] = {
     "cameras exchanged": _exchanged_cameras,
     "camera black": _camera(np.zeros_like),
     "camera white": _camera(lambda grey: np.full_like(grey, 255)),
+    "rig board hidden": _rig_board_hidden,
     "PNG of 60000 x 60000": _huge_png,
     "FIFO for a picture": _fifo,
     "folder is a link out": _link_out,
@@ -260,4 +267,4 @@ FAULTS: dict[str, Fault] = {
     "covariance is a folder": _covariance_is_a_folder,
 }
 # These need the board views: they are made on the whole session, without cameras brought along.
-WHOLE = ("board 10 % too large", "wrong dictionary", "wrong squares")
+WHOLE = ("board 10 % too large", "rig board hidden", "wrong dictionary", "wrong squares")

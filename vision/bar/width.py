@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vision.bar.edges import coarse_share, measure_edges
-from vision.bar.search import of_mean, see_bar
+from vision.bar.search import SeenBar, of_mean, see_bar
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
-from vision.geometry.contact import BarAxis
+from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import outline
@@ -19,6 +19,7 @@ from vision.pictures.view import View
 SIGMA_SHARE = 0.015
 _FEWEST_PICTURES = 3
 _COARSE_ENOUGH = 0.05  # a coarse look errs by 0.02 and looks no farther than 0.2
+_WORTH_A_LOOK = 0.09  # less is no contradiction, whatever draws the edges (bench/trials/consistency.py)
 
 
 def bar_diameter_mm(
@@ -60,18 +61,31 @@ def _share(view: View, axis, wire: Wire, bar: Bar, motor_rad, settings: VisionSe
     return float(seen_px / (2.0 * np.mean(half_px)))
 
 
-def seen_over_given(views: Sequence[View], axis: BarAxis, wire: Wire, bar: Bar, motor_rad: tuple[float, float],
+def seen_over_given(views: Sequence[View], cameras: Cameras, seen: SeenBar, rods: Rods, motor_rad: np.ndarray,
                     settings: VisionSettings) -> dict[str, float]:
-    """How wide the bar looks over how wide it should, by camera, of those that show both its edges. motor_rad: lowest
-    and highest motor angle.
+    """How wide the bar looks over how wide it should, by camera, of those that show both its edges; none where light
+    and shade draw the edges: a bar as wide as these say is then not seen more clearly than the one that was given.
 
-    A coarse look is enough where it finds the width that it should; elsewhere the edges are measured.
+    motor_rad (n,): at each frame. A coarse look is enough where it finds the width that it should; elsewhere the edges
+    are measured.
     """
-    found = {}
-    for view in views:
-        wires = resting_lines(view.camera, wire, np.linspace(*motor_rad, 8))
-        share = coarse_share(of_mean(view), view.mean, axis, bar.radius_mm, wires, settings)
+    span, found = (float(np.min(motor_rad)), float(np.max(motor_rad))), {}
+    for view in (view for view in views if view.camera.name in seen.seen_by):
+        wires = resting_lines(view.camera, rods.wire, np.linspace(*span, 8))
+        share = coarse_share(of_mean(view), view.mean, seen.axis, rods.bar.radius_mm, wires, settings)
         if share is not None and abs(share - 1.0) > _COARSE_ENOUGH:
-            share = _share(view, axis, wire, bar, motor_rad, settings)
+            share = _share(view, seen.axis, rods.wire, rods.bar, span, settings)
         found |= {} if share is None else {view.camera.name: share}
-    return found
+    share = float(np.median(list(found.values()))) if found else 1.0
+    if abs(np.log(share)) < _WORTH_A_LOOK or _sees(views, cameras, rods, share, motor_rad, settings) > seen.clearness:
+        return found
+    return {}
+
+
+def _sees(views, cameras: Cameras, rods: Rods, share: float, motor_rad, settings: VisionSettings) -> float:
+    """How clearly a bar is seen that is so many times as wide."""
+    wider = Rods(rods.wire, Bar(rods.bar.diameter_mm * share))
+    try:
+        return see_bar(views, cameras, wider, motor_rad, settings).clearness
+    except Refused:
+        return 0.0

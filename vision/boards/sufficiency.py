@@ -25,6 +25,7 @@ _STRAY_SHARE, _STRAY_PX = 0.04, 3.0
 _LEAST_TILT_DEG = 10.0
 _LEAST_DEPTH_RATIO = 1.15
 _MOST_FOCAL_SIGMA = 0.02
+_MOST_REACH = 20.0  # focal lengths from the middle of a picture to its corner: 87 degrees, more than any lens here has
 _MOST_ASPECT = 0.03
 # Decentring of a lens shifts the picture's rim by p r² f, some 1e-3 f at most.
 _MOST_DECENTRING = 0.05
@@ -138,6 +139,9 @@ def check_lens(camera: Camera, covered: float | None = None) -> None:
     if np.abs(camera.distortion[2:4]).max() > _MOST_DECENTRING:
         raise Refused(_over_fitted(camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"))
     radius = _LEAST_REACH * _picture_radius(camera) if covered is None else covered
+    if not radius < _MOST_REACH:
+        found = f"the picture's farthest corner is {radius:.3g} focal lengths from its middle"
+        raise Refused(f"camera {camera.name}: {found}; check matrix and size_px")
     if fold_radius(camera.distortion) < radius:
         raise Refused(_over_fitted(camera, "the distortion folds the picture onto itself"))
     if _stretch(camera.distortion, radius) > _MOST_STRETCH:

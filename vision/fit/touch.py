@@ -24,7 +24,7 @@ class FirstTouch:
     arc_mm: np.ndarray
 
 
-def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
+def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
     """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
     axis = bar_axis(problem, vector)
     wider = vector[..., REACH]
@@ -41,7 +41,7 @@ def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
     return FirstTouch(high, point, arc)
 
 
-def touch_and_sigma(problem: Problem, vector, answer) -> tuple[float, float]:
+def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) -> tuple[float, float]:
     """Motor angle of first touch and its sigma, rad, by noise and priors alone: what it takes to part the frames.
 
     answer (size, size): covariance that the fit gives.
@@ -61,7 +61,7 @@ def _gap(rest_mm, motor_rad, axis: BarAxis, wider_mm, rods: Rods):
     return distance - rods.reach_mm(arc) - wider_mm, arc, point
 
 
-def frames_that_touch(motor_rad, bend_rad) -> tuple[np.ndarray, np.ndarray]:
+def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From coarse bends (f, 2): which frames surely touch, and which surely do not; (f,) bool each.
 
     The bend is nothing up to touch and then grows with the motor's angle, towards where it ends: the touch that
@@ -86,7 +86,7 @@ def _hinge(motor_rad, bend_rad) -> float:
     return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
 
 
-def frames_by_touch(motor_rad, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
+def frames_by_touch(motor_rad: np.ndarray, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
     """The same once touch is known to sigma: frames within three sigma of it are left undecided, but for the first two:
     they are free if touch comes after them."""
     margin = max(3.0 * sigma_rad, np.radians(0.02))

@@ -70,8 +70,7 @@ def observe_trial(
                           left_out=tuple(behind)) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
-    there = [view for view in views if view.camera.name in bar_seen.seen_by]
-    bars = seen_over_given(there, axis, wire, bar, (float(motor_rad.min()), float(motor_rad.max())), settings)
+    bars = seen_over_given(views, used, bar_seen, rods, motor_rad, settings)
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 
 

@@ -122,10 +122,13 @@ def _column(values, rows, touching) -> np.ndarray:
 
 
 def _statuses(whisk: WhiskPictures, fitted: FittedWhisk, rows) -> tuple[str, ...]:
-    """Why a frame has no values; empty where it touches, or surely does not."""
+    """Why a frame has no values, or what is doubtful of them; empty where it touches, or surely does not."""
     at_touch = fitted.problem.bent & ~fitted.problem.touching
-    return tuple(("at touch" if at_touch[row] else "") if row >= 0 else
-                 "long before touch" if f in whisk.motor else "no picture" for f, row in zip(whisk.indices, rows))
+    slipped = [f"slipped during the exposure, by {rms:.3f} mm RMS" if rms else ""
+               for rms in np.sqrt(fitted.exposure.variance_mm2)]
+    seen = ["at touch" if near else moved for near, moved in zip(at_touch, slipped)]
+    return tuple(seen[row] if row >= 0 else "long before touch" if f in whisk.motor else "no picture"
+                 for f, row in zip(whisk.indices, rows))
 
 
 def _budget(fitted: FittedWhisk) -> dict[str, float]:

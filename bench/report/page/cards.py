@@ -20,8 +20,10 @@ from bench.report.page.plane import (
     slip_over_stroke,
 )
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
+from bench.report.summary.doubts import SILENT
 from bench.session.whisker import Whisker
 
+SOUND = "sound"
 _DEGREES = math.degrees(1.0)
 
 
@@ -66,7 +68,7 @@ def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
         tuple(_estimate(row, answer) for answer in row.felt.estimates),
         (alt, source) if source else None,
         tuple(filter(None, plots)),
-        tuple((part, cure_of(part)) for part in filter(None, status.split("; "))),
+        tuple((part, cure_of(part)) for part in status.split("; ") if part not in SILENT),
     )
 
 
@@ -148,7 +150,7 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
         _cell(told(late, degrees=True), _DEGREES * late.value, wide=True),
         _cell(with_sigma(_DEGREES * alpha, _DEGREES * alpha_sigma), _DEGREES * alpha, wide=True),
     ]
-    return [*fixed, *(_error(row, name) for name in estimators), Cell(status_of(seen, row.felt) or "sound")]
+    return [*fixed, *(_error(row, name) for name in estimators), Cell(status_of(seen, row.felt) or SOUND)]
 
 
 def _error(row: Row, estimator: str) -> Cell:

@@ -31,7 +31,7 @@ def shrunk(path: Path) -> bytes:
         scale = min(1.0, width / whole.width)
         small = whole.resize((round(scale * whole.width), round(scale * whole.height)), Image.Resampling.LANCZOS)
         buffer = io.BytesIO()
-        small.save(buffer, "WEBP", quality=_QUALITY, method=4)
+        small.save(buffer, "WEBP", quality=_QUALITY, method=2)
         if buffer.tell() <= MOST_BYTES:
             break
     return buffer.getvalue()

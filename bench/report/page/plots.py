@@ -9,9 +9,11 @@ from markupsafe import Markup
 
 from bench.base.drawing import SLOPES_DEG, label_of
 from bench.base.settings import Settings
+from bench.friction.alphas import seen_friction
 from bench.friction.explained import SHARES, explained_rows
 from bench.friction.surfaces import Felt, Surface
 from bench.friction.tables import SurfaceFriction
+from bench.report.against_theta import AtTheta, against_theta
 from bench.report.page.svg import Mark, Panel, legend, limits
 from bench.report.page.words import Row, number, with_sigma
 from bench.report.run import RunRecord
@@ -24,6 +26,7 @@ _OWN = {"no_slip": "e0", "with_friction": "e1", "frictionless": "e2"}
 _OWN |= {"with_friction_fitted": "e3", "with_friction_seen": "e4"}
 _ASSUMED = {"frictionless": 0.0, "no_slip": 0.0}
 _DASHES = ("", "6 4", "2 3", "8 3 2 3")
+_ASIDE_PX = 5.0  # between the points of two estimators
 _EVERY = 8  # slopes of a drawn curve: a step of 2°
 
 
@@ -45,6 +48,7 @@ def figures(record: RunRecord, rows: Sequence[Row], friction: Sequence[SurfaceFr
     if judged:
         yield error_by_slope(judged, keys, fitted, record.settings)
         yield from error_by_friction(judged, keys, rows)
+    yield from error_by_theta(against_theta([row.result for row in unique(rows)]))
     yield from (figure_8(surface, keys) for surface in fitted)
 
 
@@ -75,7 +79,8 @@ def error_by_slope(judged: Sequence[Judged], keys: dict, fitted: Sequence[Surfac
     entries = [(label_of(name), *series_of(name, names)) for name in names]
     caption = (
         f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in per cent of the truth, ± one sigma. "
-        "Lines: as (13), (14) predict with the α that fits each surface. A point leads to its whisk."
+        "Lines: as (13), (14) predict with the α that fits each surface. Points of "
+        "one whisk are set apart sideways; a point leads to its whisk; a hollow one is in doubt and not in the verdict."
     )
     return Figure("Error against slope", caption, tuple(panels), legend(entries))
 
@@ -94,8 +99,11 @@ def _error_mark(j: Judged, names: Sequence[str], keys: dict, x: float) -> Mark:
     series, shape = series_of(j.estimator, names)
     error = with_sigma(j.error_percent, j.error_sigma_percent, sign=True)
     title = f"{j.trial}, whisk {j.whisk}: {label_of(j.estimator)} {error} %, β = {number(j.beta_deg, 1)}°"
+    title += " (in doubt)" if j.doubtful else ""
     place = x, j.error_percent, j.error_sigma_percent
-    return Mark(*place, series, shape, keys[j.trial, j.whisk], j.trial, j.whisk, title)
+    aside_px = _ASIDE_PX * (names.index(j.estimator) - 0.5 * (len(names) - 1))
+    which = keys[j.trial, j.whisk], j.trial, j.whisk
+    return Mark(*place, series + " doubt" * j.doubtful, shape, *which, title, aside_px)
 
 
 def _predicted(panel: Panel, name: str, names, fitted: Sequence[Surface], settings: Settings) -> Iterator[Markup]:
@@ -113,7 +121,7 @@ def _predicted(panel: Panel, name: str, names, fitted: Sequence[Surface], settin
 
 def error_by_friction(judged: Sequence[Judged], keys: dict, rows: Sequence[Row]) -> Iterator[Figure]:
     """Error of (10) against the friction angle that the pictures show; nothing where none shows it."""
-    alpha = {row.key: math.degrees(row.seen.at.alpha_rad.value) for row in rows if row.seen.at is not None}
+    alpha = {row.key: math.degrees(seen_friction(row.seen)[0]) for row in rows if row.seen.deflection is not None}
     mine = [j for j in judged if j.estimator == "with_friction"]
     mine = [j for j in mine if math.isfinite(alpha.get(keys[j.trial, j.whisk], math.nan))]
     if len(mine) < 2:
@@ -124,8 +132,28 @@ def error_by_friction(judged: Sequence[Judged], keys: dict, rows: Sequence[Row])
     marks = [panel.mark(_error_mark(j, ["with_friction"], keys, x)) for j, x in zip(mine, places)]
     alt = f"Error of (10) in per cent against the friction angle seen: {len(mine)} points"
     drawn = panel.drawing(marks, ("friction angle α seen  [°]", "error of d_x  [%]"), "(10) with friction", alt)
-    said = "Error of (10) against the friction angle that the pictures show at θ: where α_est is not α, it errs."
+    said = "Against the friction angle that the pictures show, of whisks that slip: where α_est is not α, (10) errs."
     yield Figure("Error against friction", said, (drawn,))
+
+
+def error_by_theta(found: Sequence[AtTheta]) -> Iterator[Figure]:
+    """RMS error of each estimator and its stated sigma over the pushing angle; nothing of fewer than two angles."""
+    known = [at for at in found if at.whisks and at.error_rms_percent > 0]
+    if len({at.theta_deg for at in known}) < 2:
+        return
+    names = list(dict.fromkeys(at.estimator for at in known))
+    values = [math.log10(v) for at in known for v in (at.error_rms_percent, at.error_sigma_percent) if v > 0]
+    panel = Panel(limits(math.log10(at.theta_deg) for at in known), limits(values), log=(True, True))
+    drawn = []
+    for name in names:
+        mine, (series, _) = [at for at in known if at.estimator == name], series_of(name, names)
+        theta, rms, sigma = np.log10([(at.theta_deg, at.error_rms_percent, at.error_sigma_percent) for at in mine]).T
+        drawn += [panel.line(theta, rms, series), panel.line(theta, sigma, series, "4 3")]
+    alt = f"RMS error and stated sigma of {len(names)} estimators against the pushing angle"
+    drawing = panel.drawing(drawn, ("pushing angle θ  [°]", "RMS error of d_x  [%]"), "error and sigma", alt)
+    said = "RMS over the sound whisks: solid the error, dashed the stated sigma. Small θ: noise; large: bending."
+    entries = [(label_of(name), series_of(name, names)[0], None) for name in names]
+    yield Figure("Error and sigma against θ", said, (drawing,), legend(entries))
 
 
 def figure_8(surface: Surface, keys: dict) -> Figure:

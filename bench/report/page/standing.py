@@ -13,8 +13,10 @@ from bench.trials.compare import Judged, judge
 
 @dataclass(frozen=True)
 class Standing:
-    """One estimator over the measured whisks. asked: whisks with a truth, or felt; n: those with an error; bias, RMS
-    and worst error, per cent of d_x; where the worst is; held: of `stated` 95 % intervals, how many hold the truth."""
+    """One estimator over the measured whisks. asked: whisks with a truth; n: those with an error that nothing speaks
+    against, of which all else is; bias, RMS and worst error, per cent of d_x; where the worst is; held: of `stated`
+    95 % intervals, how many hold the truth; doubtful: whisks with an error that are left out, for what was seen or felt
+    of them is in doubt."""
 
     estimator: str
     asked: int
@@ -25,6 +27,7 @@ class Standing:
     worst_at: tuple[str, int]
     held: int
     stated: int
+    doubtful: int
 
     @property
     def label(self) -> str:
@@ -51,15 +54,16 @@ def _intervals(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, int,
 
 
 def _standing(name: str, asked: list[Judged], intervals: dict) -> Standing:
-    known = [j for j in asked if math.isfinite(j.error_percent)]
-    stated = [(j, intervals[j.trial, j.whisk, name]) for j in asked if (j.trial, j.whisk, name) in intervals]
+    known = [j for j in asked if math.isfinite(j.error_percent) and not j.doubtful]
+    doubtful = sum(j.doubtful and math.isfinite(j.error_percent) for j in asked)
+    stated = [(j, intervals[key]) for j in asked if (key := (j.trial, j.whisk, name)) in intervals and not j.doubtful]
     held = sum(low <= j.d_x_mm <= high for j, (low, high) in stated)
     if not known:
-        return Standing(name, len(asked), 0, math.nan, math.nan, math.nan, ("", 0), held, len(stated))
+        return Standing(name, len(asked), 0, math.nan, math.nan, math.nan, ("", 0), held, len(stated), doubtful)
     errors = np.array([j.error_percent for j in known])
     worst = known[int(np.argmax(np.abs(errors)))]
     numbers = float(errors.mean()), float(np.sqrt(np.mean(errors**2))), worst.error_percent
-    return Standing(name, len(asked), len(known), *numbers, (worst.trial, worst.whisk), held, len(stated))
+    return Standing(name, len(asked), len(known), *numbers, (worst.trial, worst.whisk), held, len(stated), doubtful)
 
 
 @dataclass(frozen=True)

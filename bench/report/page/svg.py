@@ -35,6 +35,7 @@ class Mark:
     trial: str
     whisk: int
     title: str
+    aside_px: float = 0.0  # to the right of its place, so that points of one whisk do not hide each other
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class Panel:
     y: tuple[float, float]
     width: int = WIDTH
     height: int = HEIGHT
+    log: tuple[bool, bool] = (False, False)  # x, y: the data are logarithms to base 10
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         """Where a point of the data lies."""
@@ -76,6 +78,7 @@ class Panel:
         if not (math.isfinite(mark.x) and math.isfinite(mark.y)):
             return Markup("")
         x, y = self.at(mark.x, mark.y)
+        x += mark.aside_px
         bar = ""
         if math.isfinite(mark.sigma) and mark.sigma > 0:
             (_, low), (_, high) = (self.at(mark.x, mark.y + side * mark.sigma) for side in (-1, 1))
@@ -95,16 +98,16 @@ class Panel:
 
     def _axes(self, x_label: str, y_label: str) -> Iterator[Markup]:
         bottom, right = self.height - _BOTTOM, self.width - _RIGHT
-        for value in ticks(*self.x):
+        for value, said in _ticks(self.x, self.log[0]):
             x, _ = self.at(value, self.y[0])
             yield Markup('<path class="grid" d="M{:.1f},{}V{}"/><text class="tick" x="{:.1f}" y="{}">{}</text>').format(
-                x, _TOP, bottom, x, bottom + 15, _tick(value)
+                x, _TOP, bottom, x, bottom + 15, said
             )
-        for value in ticks(*self.y):
+        for value, said in _ticks(self.y, self.log[1]):
             _, y = self.at(self.x[0], value)
-            kind = "grid zero" if abs(value) < 1e-12 else "grid"
+            kind = "grid zero" if abs(value) < 1e-12 and not self.log[1] else "grid"
             yield Markup('<path class="{}" d="M{},{:.1f}H{}"/><text class="tick y" x="{}" y="{:.1f}">{}</text>').format(
-                kind, _LEFT, y, right, _LEFT - 6, y + 4, _tick(value)
+                kind, _LEFT, y, right, _LEFT - 6, y + 4, said
             )
         middle = 0.5 * (_LEFT + right), 0.5 * (_TOP + bottom)
         yield Markup('<text class="label" x="{}" y="{}">{}</text>').format(middle[0], self.height - 8, x_label)
@@ -149,6 +152,15 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
     step = power * next((m for m in (1, 2, 5) if m * power >= 0.8 * step), 10)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [round(k * step, 10) for k in range(first, last + 1)]
+
+
+def _ticks(span: tuple[float, float], log: bool) -> list[tuple[float, str]]:
+    """Where grid lines stand, and what is written there."""
+    if not log:
+        return [(value, _tick(value)) for value in ticks(*span)]
+    decades = range(math.floor(span[0]), math.ceil(span[1]) + 1)
+    round_ones = [m * 10.0**decade for decade in decades for m in (1, 2, 5)]
+    return [(math.log10(v), _tick(v)) for v in round_ones if span[0] <= math.log10(v) <= span[1]]
 
 
 def _tick(value: float) -> str:

@@ -10,11 +10,12 @@ from markupsafe import Markup
 
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
+from bench.base.settings import Seeing
 from bench.friction.explained import SHARES
 from bench.friction.tables import SurfaceFriction
 from bench.records.trial import TrialResult
 from bench.report.evaluation import finished
-from bench.report.page.cards import card, cells, columns
+from bench.report.page.cards import SOUND, card, cells, columns
 from bench.report.page.cures import cure_of
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
@@ -25,6 +26,7 @@ from bench.report.paper import write_paper_figures
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run import CameraFacts, RunRecord
+from bench.report.summary.doubts import SILENT
 from vision.fit.uncertainty import CAUSES
 
 REPORT, METHODS, BIBLIOGRAPHY = "report.html", "methods.md", "results.bib"
@@ -89,6 +91,7 @@ def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction:
         others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
         citation=bibliography(record),
         number=number,
+        silent=(SOUND, *SILENT),
     ) + "\n"  # fmt: skip
 
 
@@ -130,6 +133,8 @@ def _extent(bar: Bar) -> float:
 
 def _setting(value: object) -> str:
     """A setting as a reader takes it."""
+    if isinstance(value, Seeing):
+        return value.name
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, tuple):

@@ -2,9 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from bench.base.atomic import write_whole
 from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
@@ -19,7 +17,6 @@ from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, tr
 from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, verdict
 from bench.trials.compare import Judged, judge
 
-DONE, DOUBTFUL = 0, 1
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
     *("against_theta", "compliance", "curvature"),
@@ -39,13 +36,6 @@ class Summary:
         """As summary.txt has it."""
         titled = (line for s in self.sections for line in (s.title, *(f"  {line}" for line in s.lines), ""))
         return "\n".join([*self.verdict, "", *titled]).rstrip() + "\n"
-
-
-def write_summary(out: Path, summary: Summary) -> int:
-    """Write and print the summary. Returns 0, or 1 where something is doubtful."""
-    write_whole(out / "summary.txt", summary.text)
-    print(summary.text, end="")
-    return DOUBTFUL if summary.doubtful else DONE
 
 
 def summary_of(

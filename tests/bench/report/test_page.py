@@ -4,8 +4,11 @@ import csv
 import io
 import re
 import shutil
+import tomllib
 from base64 import b64decode
+from fnmatch import fnmatch
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -142,7 +145,7 @@ def test_figures_for_a_paper_hold_their_fonts_and_are_as_wide_as_columns(exact_r
     out = shutil.copytree(exact_run, tmp_path / "out")
     assert main(["report", str(out), "--figure-format", "pdf"]) == 0
     pages = {path.stem: path.read_bytes() for path in (out / "figures").glob("*.pdf")}
-    assert set(pages) == {"fig8", "error_against_slope", "explained", "error_map"}
+    assert set(pages) == {"fig8", "error_against_slope", "explained", "error_map", "against_theta"}
     for page in pages.values():
         width = float(re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", page)[1])
         assert width == pytest.approx(72 * 3.5, abs=0.1) or width == pytest.approx(72 * 7.16, abs=0.1)
@@ -228,3 +231,14 @@ def test_a_small_picture_keeps_its_size(tmp_path):
     Image.new("RGB", (40, 30)).save(tmp_path / "p.png")
     data = picture_source(tmp_path, "p.png", 1).split(",")[1]
     assert Image.open(io.BytesIO(b64decode(data))).size == (40, 30)
+
+
+def test_what_is_no_code_is_package_data():
+    """What an installed program needs of these folders is named in pyproject.toml."""
+    root = Path(__file__).resolve().parents[3]
+    patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["*"]
+    for package in ("bench", "vision", "estimator"):
+        for path in (root / package).rglob("*"):
+            if path.is_file() and path.suffix not in (".py", ".pyc"):
+                below = {path.name, f"{path.parent.name}/{path.name}"}
+                assert any(fnmatch(name, pattern) for name in below for pattern in patterns), path

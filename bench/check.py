@@ -1,0 +1,127 @@
+"""`whisker-bench check`: everything that `evaluate` would refuse or doubt and that a look of some seconds finds."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.threads import in_threads
+from bench.gauges.checks import check_alive
+from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.gauges_file import given_gauges
+from bench.session.check import checked_session, find_damage
+from bench.session.footage import frame_count, read_frames
+from bench.session.frame_times import frame_times, read_trial
+from bench.session.session import Session
+from bench.session.signals import Signals, forward_strokes, read_signals
+from bench.session.trial import Trial
+from bench.trials.scene import evenly_exposed, other_scene
+from bench.trials.seen import dropped
+from vision.boards.corners import MIN_CORNERS, find_corners
+from vision.boards.diagnosis import why_not_found
+from vision.boards.sufficiency import fixes_pose
+from vision.fit.touch import FEWEST_FREE
+from vision.pictures.files import read_picture
+
+_BOARD_LOOKS = 2  # pictures of a series: a board that is in none of them is in few
+_FRAME_LOOKS = 5  # of a trial: exposure and scene
+_MOST_SATURATED = 0.1  # of a channel's samples in a stroke
+
+
+def check(path: Path, progress: bool) -> int:
+    """Print refusals and notes. Returns the exit code: 2 where there is a refusal, 1 where a note, else 0."""
+    doubts = Doubts(stop_at_first=False)
+    with doubts.guard():
+        session = checked_session(path, doubts)
+        find_damage(session, doubts, each=partial(tqdm, desc="pictures", disable=not progress, leave=False))
+        look_ahead(session, doubts)
+    for line in doubts.refusals:
+        print(f"bad: {line}")
+    for line in doubts.notes:
+        print(f"doubtful: {line}")
+    if not (doubts.refusals or doubts.notes):
+        print(f"{session.name}: {len(session.trials)} trials, nothing wrong or doubtful")
+    return 2 if doubts.refusals else 1 if doubts.notes else 0
+
+
+def look_ahead(session: Session, doubts: Doubts) -> None:
+    """Boards, gauges, strokes, frames and scene of a session whose files are sound, each by a quick look."""
+    if session.cameras_toml is None and session.board is not None:
+        with doubts.guard():  # one board for all cameras: what is wrong with it is looked for once
+            for name in session.board_sources:
+                _check_boards(session, name)
+    with doubts.guard():
+        given_gauges(session)
+    rig = {name: read_picture(picture) for name, picture in session.rig_pictures.items()}
+    for trial in (trial for trial in session.trials if trial.purpose != "weight"):
+        with doubts.guard():
+            signals = read_signals(trial)
+            strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
+            for line in [*_of_gauges(signals, strokes), *_of_strokes(trial, signals, strokes), *_of_scene(trial, rig)]:
+                doubts.note(f"trials/{trial.name}: {line}")
+
+
+def _check_boards(session: Session, name: str) -> None:
+    """Raises BadInput where a camera's board is not found as entered, or not on the rig."""
+    source = session.board_sources[name]
+    chosen = np.unique(np.linspace(0, frame_count(source) - 1, _BOARD_LOOKS).astype(int)).tolist()
+    greys = [grey for grey in read_frames(source, chosen).values() if grey is not None]
+    found = list(in_threads(lambda grey: fixes_pose(find_corners(grey, session.board), session.board), greys))
+    if not any(found):
+        reason = why_not_found(greys, session.board)
+        raise BadInput(reason or f"the board is found in none of {len(greys)} pictures", file=f"boards/{name}")
+    picture = session.rig_pictures.get(name)
+    grey = None if picture is None else read_picture(picture)
+    if grey is not None and len(find_corners(grey, session.board)) < MIN_CORNERS:
+        hint = "the board must stand in view of every camera"
+        raise BadInput(f"the board on the rig is not seen; {hint}", file=f"boards/rig/{picture.name}")
+
+
+def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
+    """Channels that stand still or are at their rail."""
+    try:
+        check_alive(strokes)
+    except BadInput as bad:
+        yield bad.reason
+        return
+    for name, column in zip("yz", range(2)):
+        saturated = [np.isnan(stroke.channels[:, column]).mean() for stroke in strokes]
+        if saturated and max(saturated) > _MOST_SATURATED:
+            share = f"{100 * max(saturated):.0f} % of a stroke"
+            yield f"channel {name} is at its rail for {share}: raise the amplifier's range"
+
+
+def _of_strokes(trial: Trial, signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
+    """Whether each stroke has a free part, a touch that is felt, and reaches the usual pushing angle."""
+    times = frame_times(trial)
+    yield from dropped(times, [times.frames_in(signals, where) for where in forward_strokes(signals)])
+    for number, stroke in enumerate(strokes):
+        touch = stroke.touch()
+        if touch.status:
+            yield f"whisk {number}: {touch.status}"
+            continue
+        theta_deg, usual_deg = float(np.degrees(stroke.motor_rad.max() - touch.motor_rad)), Settings().theta_deg
+        if theta_deg < usual_deg:
+            yield f"whisk {number} goes {theta_deg:.1f}° past touch, {usual_deg:g}° is the usual --theta-deg"
+        motor = signals.motor_at(times.time_s[times.frames_in(signals, forward_strokes(signals)[number])])
+        if len(motor) and np.sum(motor < touch.motor_rad) < FEWEST_FREE:
+            yield f"whisk {number} has {np.sum(motor < touch.motor_rad)} frames before touch, {FEWEST_FREE} are needed"
+
+
+def _of_scene(trial: Trial, rig: dict[str, np.ndarray | None]) -> Iterator[str]:
+    """Cameras that show another scene than the rig picture, and exposure that changes."""
+    times = frame_times(trial)
+    if not len(times):
+        return
+    looks = np.unique(np.linspace(0, len(times) - 1, _FRAME_LOOKS).astype(int)).tolist()
+    for name, pictures in read_trial(trial, times, looks).items():
+        said = other_scene(name, pictures, rig) if pictures else "none of its frames can be read"
+        if said:
+            yield f"camera {name}: {said}"
+        else:
+            yield from evenly_exposed(name, pictures)[1]

@@ -1,0 +1,75 @@
+"""`check` finds in seconds what `evaluate` would refuse or doubt after a minute."""
+
+import numpy as np
+import pytest
+
+from bench.base.doubts import Doubts
+from bench.check import look_ahead
+from bench.session.check import checked_session
+from bench.session.frame_times import FrameTimes
+from tests.scenes.faults import FAULTS, TRIAL
+
+
+def found(folder, *, boards=False) -> Doubts:
+    """What a look ahead says of a session; boards only where asked, which takes a second."""
+    doubts = Doubts(stop_at_first=False)
+    session = checked_session(folder, doubts)
+    if not boards:
+        session.board_sources.clear()
+    look_ahead(session, doubts)
+    return doubts
+
+
+def test_a_sound_session(small_session):
+    doubts = found(small_session, boards=True)
+    assert (doubts.refusals, doubts.notes) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ("dead gauge", "channel z reads 0 V throughout: at its rail, or not connected"),
+        ("saturated gauges", "channel y is at its rail for 50 % of a stroke"),
+        ("frame dropped", "whisk 0: 1 frames were dropped by all cameras (after 0.150 s)"),
+        ("camera knocked 6,4 px", "camera low: the scene lies +6, +4 px from where the rig picture has it"),
+        ("camera mirrored", "camera low: its frames are mirrored left to right"),
+        ("cameras exchanged", "camera high: its frames are those of camera low"),
+        ("camera black", "camera low: its frames show nothing"),
+        ("exposure 1.5 from frame 6", "times as bright as most, left out"),
+    ],
+)
+def test_a_fault_of_a_trial(small_copy, fault, expected):
+    FAULTS[fault](small_copy)
+    notes = found(small_copy).notes
+    assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
+
+
+DICTIONARY = 'is not found, but one with dictionary = "DICT_5X5_50" is'
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        pytest.param("wrong dictionary", DICTIONARY, marks=pytest.mark.slow),
+        ("wrong squares", "not laid out as on a board of 7 x 5 squares"),
+    ],
+)
+def test_a_board_that_is_not_the_one_entered(small_copy, fault, expected):
+    FAULTS[fault](small_copy)
+    refusals = found(small_copy, boards=True).refusals
+    assert len(refusals) == 1
+    assert refusals[0].startswith("boards/high: ") and expected in refusals[0]
+
+
+def test_a_rig_board_that_is_hidden(small_copy):
+    FAULTS["rig board hidden"](small_copy)
+    assert found(small_copy, boards=True).refusals == [
+        "boards/rig/low.png: the board on the rig is not seen; the board must stand in view of every camera"
+    ]
+
+
+@pytest.mark.parametrize("lost", [[], [4], [4, 5], [2, 7]])
+def test_frames_between_the_times_are_counted(lost):
+    time_s = np.delete(0.05 * np.arange(12), lost)
+    found = FrameTimes(time_s, "frames.csv", {}).lost_in(slice(None))
+    assert sum(count for _, count in found) == len(lost)

@@ -1,0 +1,31 @@
+"""Mutated files end in one line and an exit code of ours: no traceback, no hang, no memory without end."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "tests" / "faults" / "fuzz.py"
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="each mutation runs in a forked process")
+
+
+def fuzzed(first: int, count: int) -> subprocess.CompletedProcess:
+    """In a process of its own: forks of one with many threads may hang."""
+    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1") | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(SCRIPT), str(first), str(count)]
+    return subprocess.run(command, capture_output=True, text=True, env=os.environ | one)
+
+
+def test_a_few_mutations():
+    done = fuzzed(0, 60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "'exit 2'" in done.stdout and "'exit 1'" in done.stdout
+
+
+@pytest.mark.slow
+def test_many_mutations():
+    done = fuzzed(1000, 20000)
+    assert done.returncode == 0, done.stdout + done.stderr
