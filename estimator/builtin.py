@@ -115,7 +115,8 @@ def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
     """Estimate from a cylinder's distance and gradient: sigma, interval, taper, clamp at the tip, reason for a NaN.
 
     m_y: the moment along the surface that the equation takes; (2) takes none. share: what the equation itself may be
-    off by (`_model_share`).
+    off by (`_model_share`). A tapering whisker's distance bends over what α_est may be off by: its sigma is no less
+    than the two sides of the interval, in the mean of their squares.
     """
     theta, m_z, beam = whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam
     knows = {
@@ -134,6 +135,8 @@ def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
     if d_x != d_x:
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
     sigma, gradient = hypot(uncertainty.sigma(gradient, **knows) * left**2, model * tapered), gradient * left**2
+    if beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
+        sigma = max(sigma, hypot(tapered - low, high - tapered) / (sqrt(2) * uncertainty.Z_95))
     clamped, at_tip = distance.clamp_to_length(tapered, beam.length_mm)
     if at_tip and not clamp:
         return Estimate(tapered, sigma, BEYOND, gradient=gradient)

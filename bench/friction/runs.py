@@ -9,7 +9,7 @@ is known.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from bench.session.whisker import Whisker
 from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
+from estimator.uncertainty import Z_95
 from estimator.whisk import Whisk
+from vision.truth.value import Value
 
 GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
 KINETIC = "with_friction_kinetic"
@@ -43,33 +45,46 @@ def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """What α_est may be off by in the session, rad, one sigma, and that over what whisks were asked with one by one."""
+
+    sigma_rad: float
+    part: float
+
+
+def _doubt(sigma_rad: float, settings: Settings) -> Doubt:
+    first = np.radians(settings.first_alpha_est_sigma_deg)
+    return Doubt(sigma_rad, sigma_rad / first if first else 1.0)
+
+
 def with_runs(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> list[TrialResult]:
     """The results, (10) with the session's sigma of α_est, and each whisk's estimates followed by those of (10) with α
     fitted and with α seen, where known."""
     results = list(results)
     found = surfaces(results, whisker.beam)
-    by_panel, sigma_rad = {s.panel: s for s in found}, alpha_est_sigma(found, settings)
-    return [_with_runs(result, by_panel, whisker.beam, sigma_rad) for result in results]
+    by_panel, doubt = {s.panel: s for s in found}, _doubt(alpha_est_sigma(found, settings), settings)
+    return [_with_runs(result, by_panel, whisker.beam, doubt) for result in results]
 
 
-def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, sigma_rad: float) -> TrialResult:
+def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, doubt: Doubt) -> TrialResult:
     surface = by_panel.get(result.trial.panel)
     felt = tuple(
-        _by_theta(result, replace(felt, estimates=answers), beam, sigma_rad)
+        _by_theta(result, replace(felt, estimates=answers), beam, doubt)
         for _, seen, felt in whisks([result])
-        for answers in [_answers(result, seen, felt, surface, beam, sigma_rad)]
+        for answers in [_answers(result, seen, felt, surface, beam, doubt)]
     )
     return replace(result, felt=replace(result.felt, whisks=felt))
 
 
-def _by_theta(result: TrialResult, felt: FeltWhisk, beam: Beam, sigma_rad: float) -> FeltWhisk:
+def _by_theta(result: TrialResult, felt: FeltWhisk, beam: Beam, doubt: Doubt) -> FeltWhisk:
     """The whisk with the session's sigma of α_est at all pushing angles."""
-    asked = (replace(at, estimates=_given(result, at, at.theta_rad, beam, sigma_rad)) for at in felt.by_theta)
+    asked = (replace(at, estimates=_given(result, at, at.theta_rad, beam, doubt)) for at in felt.by_theta)
     return replace(felt, by_theta=tuple(asked))
 
 
 def _answers(
-    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, surface: Surface | None, beam: Beam, sigma_rad: float
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, surface: Surface | None, beam: Beam, doubt: Doubt
 ) -> tuple[EstimateRow, ...]:
     """The whisk's estimates with the new ones."""
     if not felt.estimates:
@@ -80,24 +95,36 @@ def _answers(
     whisk = _whisk(felt, theta_rad, beam)
     angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
     runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma) for name, (a, sigma) in angles if np.isfinite(a)]
-    given = _given(result, felt, theta_rad, beam, sigma_rad)
+    given = _given(result, felt, theta_rad, beam, doubt)
     if felt.kinetic is not None:
         alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
-        runs.append(answer(KINETIC, with_friction, _whisk(felt.kinetic, theta_rad, beam), alpha, sigma_rad))
+        runs.append(answer(KINETIC, with_friction, _whisk(felt.kinetic, theta_rad, beam), alpha, doubt.sigma_rad))
     return (*given, *runs)
 
 
 def _given(
-    result: TrialResult, felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam, sigma_rad: float
+    result: TrialResult, felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam, doubt: Doubt
 ) -> tuple[EstimateRow, ...]:
     """The estimates, those with α_est as given asked again with the session's sigma of it."""
     whisk = _whisk(felt, theta_rad, beam)
     radii_mm = 0.5 * result.trial.bar_diameter_mm, 0.5 * result.whisker.diameter_mm
 
     def again(a: EstimateRow) -> EstimateRow:
-        return answer(a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, sigma_rad, radii_mm)
+        return answer(a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, doubt.sigma_rad, radii_mm)
 
-    return tuple(again(a) if a.estimator in ASSUMING else a for a in felt.estimates)
+    return tuple(again(a) if a.estimator in ASSUMING else _rescaled(a, doubt.part) for a in felt.estimates)
+
+
+def _rescaled(row: EstimateRow, part: float) -> EstimateRow:
+    """One's own estimate, which was asked with the first sigma of α_est, with this part of it: to first order, what the
+    sigma holds beyond that of an exact α_est goes with it. An interval of its own stays."""
+    own, value = row.d_x_est_sigma_alpha_exact_mm, row.d_x_est_mm
+    if not value.sigma > own:
+        return row
+    sigma = float(np.sqrt(own**2 + part**2 * (value.sigma**2 - own**2)))
+    ends = {"d_x_est_low_mm": value.value - Z_95 * sigma, "d_x_est_high_mm": value.value + Z_95 * sigma}
+    symmetric = np.isclose(row.d_x_est_high_mm - value.value, Z_95 * value.sigma)
+    return replace(row, d_x_est_mm=Value(value.value, sigma), **(ends if symmetric else {}))
 
 
 def _whisk(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:

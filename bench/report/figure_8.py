@@ -88,7 +88,9 @@ def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
     """|m| above, φ below; negative slopes are drawn at their mirror image's place."""
     points, EI = surface.points(), surface.beam.rigidity_Nmm2
     beta = [abs(p.beta_deg) for p in points]
-    look = {"fmt": "o", "ms": 4, "color": "black", "capsize": 2.5, "elinewidth": 1.0, "lw": 0, "zorder": 3}
+    # Hollow points no larger than caps: bars of half a degree are seen.
+    look = {"fmt": "o", "ms": 3, "mfc": "white", "mew": 0.7, "color": "black", "capsize": 3.5, "elinewidth": 1.0,
+            "lw": 0, "zorder": 3}  # fmt: skip
     top.errorbar(
         beta,
         [moment_in_EI_per_metre(p.m_Nmm, EI) for p in points],

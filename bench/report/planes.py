@@ -42,8 +42,8 @@ def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: t
     virtual = contact + np.array([at.d_y_mm.value, -at.d_z_mm.value])
     _draw_bar(axes, result.seen, along, normal)
     _draw_cone(axes, contact, normal, friction, float(np.linalg.norm(virtual - contact)))
-    _draw_whisker(axes, result.seen, contact, virtual, path)
-    _draw_angles(axes, whisk, contact, virtual)
+    _draw_whisker(axes, result.seen, contact, virtual, path, along - 0.4 * normal)
+    _draw_angles(axes, whisk, contact, virtual, result.seen.wire_radius_mm)
     _draw_slip(axes, contact, normal)
     points = np.array([np.zeros(2), contact, virtual])
     low, high = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
@@ -102,7 +102,8 @@ def _draw_cone(axes: Axes, contact, normal, friction: tuple[float, str], size: f
     axes.plot(*zip(contact, contact + reach * normal), color="0.4", lw=0.8, ls="--", zorder=2)
 
 
-def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path) -> None:
+def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path, beside) -> None:
+    """beside (2,): where P stands from the contact, in the bar, where no cone and no slip are."""
     radius = seen.wire_radius_mm
     for place, fill in ((np.zeros(2), "white"), (contact, _WIRE)):
         axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
@@ -119,7 +120,7 @@ def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path) -> None:
     axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force on the whisker")
     for place, name, shift in (
         (np.zeros(2), "P$_0$", (-0.5, -0.75)),
-        (contact, "P", (-0.6, 0.55)),
+        (contact, "P", beside),
         (virtual, "V", (0.55, -0.55)),
     ):
         axes.annotate(name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6)
@@ -140,15 +141,17 @@ def _draw_slip(axes: Axes, contact, normal) -> None:
     axes.annotate("σ", 0.5 * contact + 1.25 * normal, ha="center", va="center", color=_PATH, fontsize=10)
 
 
-def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual) -> None:
+def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual, radius_mm: float) -> None:
     """β between z and the bar at P0, φ between −y and the deflection at V, and the two legs of the deflection."""
     beta, phi = np.degrees(whisk.beta_rad.value), np.degrees(whisk.at.phi_rad.value)
     corner = np.array([contact[0], virtual[1]])
     axes.plot(*zip(virtual, corner, contact), color="0.35", lw=0.8, ls=":", zorder=2)
     axes.annotate("d$_y$", 0.5 * (virtual + corner) + [0, -0.32], ha="center", fontsize=9, color="0.25")
     if abs(contact[1] - virtual[1]) > 0.4:
-        middle = 0.5 * (corner + contact) + [-0.35, 0]
-        axes.annotate("d$_z$", middle, ha="center", va="center", fontsize=9, color="0.25")
+        beside = 0.5 * (corner + contact) + [-0.35, 0]
+        below = corner + np.array([0.15, -0.35 * np.sign(contact[1] - virtual[1])])  # where a circle hides the leg
+        place = beside if abs(contact[1] - virtual[1]) > 2.6 * radius_mm else below
+        axes.annotate("d$_z$", place, ha="center", va="center", fontsize=9, color="0.25")
     if abs(phi) > 3.0:
         size = min(1.6, 0.9 * abs(virtual[0] - contact[0]))
         low, high = sorted((180.0, 180.0 - phi))

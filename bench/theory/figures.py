@@ -17,7 +17,10 @@ from estimator.curvature import slope_threshold
 NUMBERS = (5, 6)
 ERRORS_PERCENT = (1.0, 5.0, 10.0)
 ALPHA_EST_DEG = (0.0, 10.0, 20.0)
-ALPHA_DEG = np.linspace(0.0, 40.0, 321)
+# Denser towards each α_est, where the curves rise to a cusp at 90°.
+_NEAR_DEG = np.geomspace(1e-5, 0.1, 33)
+ALPHA_DEG = np.unique(np.concatenate([np.linspace(0.0, 40.0, 321), *(
+    alpha + side * _NEAR_DEG for alpha in ALPHA_EST_DEG for side in (-1.0, 1.0) if alpha + side > 0)]))  # fmt: skip
 EQUATIONS = {"(10)": "with_friction", "(2)": "no_slip"}
 THETA_DEG = (1.0, 3.0, 5.0)
 FRICTION_DEG = (0.0, 20.0)
@@ -106,7 +109,7 @@ def _table(number, curves) -> str:
     for curve in curves:
         for x, beta in zip(curve.x, curve.beta_thresh_deg):
             shown = "" if np.isnan(beta) else f"{beta:.4f}"
-            writer.writerow([curve.panel, *curve.parameters.values(), f"{x:.6g}", shown])
+            writer.writerow([curve.panel, *curve.parameters.values(), f"{x:.9g}", shown])
     return text.getvalue()
 
 
@@ -116,24 +119,27 @@ def _figure(number, curves):
     grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
     for axes, row in zip(grid, rows):
         for ax, panel in zip(axes, "abc"):
-            _panel(ax, number, panel, [c for c in curves if (c.panel, c.row) == (panel, row)])
+            _panel(ax, number, [c for c in curves if (c.panel, c.row) == (panel, row)])
+    for ax, letter in zip(grid.flat, "abcdef"):
+        ax.set_title(f"({letter}) {ax.get_title()}")
     entries = {label: handle for ax in grid.flat for handle, label in zip(*ax.get_legend_handles_labels())}
     figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=7, frameon=False)
     for ax in grid[:, 0]:
-        ax.set_ylabel("β_thresh [°]")
+        ax.set_ylabel("β$_{thresh}$  [°]")
     for ax in grid[-1]:
-        ax.set_xlabel("true friction cone angle α [°]" if number == 5 else "normalized radius of curvature r_n")
+        ax.set_xlabel("true friction cone angle α  [°]" if number == 5 else "normalized radius of curvature r$_n$")
     return figure
 
 
-def _panel(ax, number, panel, curves) -> None:
+def _panel(ax, number, curves) -> None:
+    """Curves and what the text reads off them. A slope that no error limits is drawn at 90°."""
     for curve in curves:
-        style = "--" if curve.dashed else "-"
-        ax.plot(curve.x, curve.beta_thresh_deg, style, color=curve.colour, lw=1.2, label=curve.label)
-    points = np.array(PRINTED_POINTS[number].get(panel, ()))
+        beta = np.nan_to_num(curve.beta_thresh_deg, nan=90.0)
+        ax.plot(curve.x, beta, "--" if curve.dashed else "-", color=curve.colour, lw=1.2, label=curve.label)
+    points = np.array(PRINTED_POINTS[number].get(curves[0].panel, ()))
     if points.size and curves[0].row != "exact":
         ax.plot(*points.T, "ko", ms=4, mfc="none", label="printed in the text")
-    ax.set(ylim=(0, 90), title=f"({panel}) {_title(number, curves[0])}")
+    ax.set(ylim=(0, 90), title=_title(number, curves[0]))
     ax.grid(alpha=0.3)
     if number == 6:
         ax.set_xscale("log")
@@ -141,6 +147,6 @@ def _panel(ax, number, panel, curves) -> None:
 
 def _title(number, curve) -> str:
     if number == 5:
-        return f"α_est = {curve.parameters['alpha_est_deg']:g}°"
+        return f"α$_{{est}}$ = {curve.parameters['alpha_est_deg']:g}°"
     form = "as printed" if curve.row == "printed" else "exact slip angle"
     return f"{curve.parameters['error_percent']:g} % error, {form}"

@@ -9,6 +9,7 @@ from estimator import builtin, slip
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
 from estimator.signal import felt_touch, moment_at
+from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -294,3 +295,14 @@ def test_corrected_says_what_10_says_where_that_has_no_distance(beta_deg):
     plain, better = (f(whisk, steep) for f in (builtin.with_friction, builtin.corrected))
     assert plain.status == better.status
     assert (plain.high_mm > 0) == (better.high_mm > 0)
+
+
+def test_sigma_of_a_steep_cone_is_no_less_than_its_interval():
+    """φ = 53° and 75 mm of 100: linear in α_est it was 3.2 mm, where the interval reaches 8.8 mm down and 5 mm up."""
+    cone = dataclasses.replace(BEAM, shape="cone")
+    m_y, m_z = slip.moments(300.0, THETA, np.radians(65.0), np.radians(12.0), BEAM.C_Nmm2)
+    doubtful = EstimatorSettings(np.radians(12.0), np.radians(5.0))
+    estimate = builtin.with_friction(whisk_of(m_y, m_z, beam=cone), doubtful)
+    down, up = estimate.d_x_mm - estimate.low_mm, estimate.high_mm - estimate.d_x_mm
+    assert down > 1.5 * up
+    assert estimate.sigma_mm == pytest.approx(np.sqrt((down**2 + up**2) / 2) / Z_95)

@@ -8,13 +8,16 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.friction.alphas import mean_alpha
-from bench.friction.runs import FITTED, SEEN, with_runs
+from bench.friction.runs import FITTED, SEEN, _rescaled, with_runs
 from bench.friction.section_vii import Contact, by_consistency, by_smoothness, by_tilting, weights
 from bench.friction.tables import alpha_lines, friction_of, write_friction
+from bench.records.trial import EstimateRow
 from bench.report.assembly import estimate_rows
 from bench.session.whisker import Whisker
 from estimator import slip
+from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import ALPHA, PHI_SIGMA, THETA, WHISKER, C, result
+from vision.truth.value import Value
 
 SLOPES = (30, 45, 60, 70)
 
@@ -148,3 +151,29 @@ def along(beta_deg: float, d_x: float, whisker: Whisker) -> Contact:
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(whisker.beam.as_cylinder_mm(d_x), THETA, beta, ALPHA, whisker.beam.C_Nmm2)
     return Contact(beta, d_x, THETA, m_y, m_z, np.arctan2(m_y, m_z), 1e-3, f"b{beta_deg:g}")
+
+
+def test_ones_own_estimate_takes_the_sessions_sigma_of_alpha():
+    """What its sigma holds beyond that of an exact α_est goes with it; without any, and with an interval of its own,
+    nothing changes."""
+    row = EstimateRow("own", Value(60.0, 0.5), d_x_est_sigma_alpha_exact_mm=0.3,
+                      d_x_est_low_mm=60.0 - Z_95 * 0.5, d_x_est_high_mm=60.0 + Z_95 * 0.5)  # fmt: skip
+    deaf, sided = replace(row, d_x_est_sigma_alpha_exact_mm=0.5), replace(row, d_x_est_high_mm=70.0)
+    found = [_rescaled(one, 0.5) for one in (row, deaf, sided)]
+    assert found[0].d_x_est_mm.sigma == pytest.approx(np.hypot(0.3, 0.5 * 0.4))
+    assert found[0].d_x_est_high_mm == pytest.approx(60.0 + Z_95 * found[0].d_x_est_mm.sigma)
+    assert found[1] == deaf and found[2].d_x_est_high_mm == 70.0
+
+
+def test_a_stated_sigma_of_alpha_is_not_rescaled():
+    results = [with_own(result(b)) for b in SLOPES]
+    for settings, part in ((Settings(alpha_est_sigma_deg=2.0), 1.0), (Settings(alpha_est_sigma_deg=0.0), 1.0)):
+        rows = [a for r in with_runs(results, WHISKER, settings) for a in r.felt.whisks[0].estimates]
+        assert {a.d_x_est_mm.sigma for a in rows if a.estimator == "own"} == {np.hypot(0.3, part * 0.4)}
+
+
+def with_own(whisk):
+    """The result with an estimate of one's own."""
+    own = EstimateRow("own", Value(60.0, float(np.hypot(0.3, 0.4))), d_x_est_sigma_alpha_exact_mm=0.3)
+    (felt,) = whisk.felt.whisks
+    return replace(whisk, felt=replace(whisk.felt, whisks=(replace(felt, estimates=(*felt.estimates, own)),)))
