@@ -74,7 +74,7 @@ def likely_curve(seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[n
 
 
 def votes(pieces: Pieces, still: np.ndarray, still_share: float, reach_px: int) -> Votes:
-    """Votes of pieces, at shifts up to reach_px.
+    """Votes of those pieces that have any, at shifts up to reach_px.
 
     still (s, p): the picture of what stands still at the same pixels; still_share: what part of one picture's
     variance it has. That without rods is as noisy as a frame: in a noise that is no difference a dim rod would drown.
@@ -86,7 +86,9 @@ def votes(pieces: Pieces, still: np.ndarray, still_share: float, reach_px: int) 
                      for background, share in ((pieces.background, 1.0), (still, still_share))])
     both -= uniform_filter1d(both, _SHADE_WIDTHS * wide, axis=2)
     alike = np.where(both[0] * both[1] > 0.0, np.min(both**2, axis=0), 0.0)
-    return Votes(pieces, _share(alike * pixels - 1.0, wide), _share(both[0] ** 2 * pixels - 1.0, wide))
+    share, changed = _share(alike * pixels - 1.0, wide), _share(both[0] ** 2 * pixels - 1.0, wide)
+    votes_at_all = np.any(share > 0.0, axis=1)
+    return Votes(pieces.select(votes_at_all), share[votes_at_all], changed[votes_at_all])
 
 
 def _share(energy, wide: int) -> np.ndarray:
