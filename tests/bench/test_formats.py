@@ -27,6 +27,7 @@ TOML = {
     "[rig]": manifest.RigKeys,
     "[[cameras]]": manifest.CameraKeys,
     "[gauges]": manifest.GaugeKeys,
+    "[signals]": manifest.SignalKeys,
     "[trial]": manifest.TrialKeys,
     "gauges.toml": FileKeys,
 }
