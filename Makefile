@@ -1,5 +1,6 @@
 # make demo       evaluates the small session in fixtures/ into ./demo-out (makes .venv first if need be)
 # make test       the default tests;  make test-slow: the long ones;  make lint: ruff
+# make test-browser: the report in a headless Chromium (apt install chromium)
 # PYTHON=python3.12 make demo   takes another Python (3.11 or newer)
 
 PYTHON ?= python3
@@ -10,18 +11,21 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --quiet --no-compile --disab
 # As many workers as there are processors.
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
 
-.PHONY: demo test test-slow lint clean
+.PHONY: demo test test-slow test-browser lint clean
 
 demo: $(VENV)/ready
 	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
 	if [ $$code -gt 1 ]; then exit $$code; fi; \
-	echo; echo "The figures, tables and this summary are in $(CURDIR)/demo-out"
+	echo; echo "Open $(CURDIR)/demo-out/report.html; figures, tables and this summary are beside it."
 
 test: $(VENV)/ready-for-tests
 	$(BIN)/python -m pytest -q
 
 test-slow: $(VENV)/ready-for-tests
 	$(BIN)/python -m pytest -q -m slow
+
+test-browser: $(VENV)/ready-for-tests
+	$(BIN)/python -m pytest -q -m browser
 
 lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff check .

@@ -5,17 +5,20 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from bench.cli_results import add_compare, add_report, add_view
+from bench.cli_seeing import add_seeing, add_tradeoff, seeing_of
+from bench.cli_setup import add_board, add_new
+from bench.options import BAD_INPUT, DONE, DOUBTFUL, FAULT_OF_OURS, INTERRUPTED, add_figure_format
+from bench.options import add_out as _add_out
+from bench.options import add_session as _add_session
+from bench.options import add_verb as _add
+from bench.options import add_workers as _add_workers
 from vision.geometry.errors import Refused
-
-DONE, DOUBTFUL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
-
-Run = Callable[[argparse.Namespace], int]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,40 +75,11 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add_verb in (_add_check, _add_calibrate, _add_evaluate, _add_figures, _add_simulate, _add_info):
+    first = (add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
+    looking = (add_report, add_compare, add_view)
+    for add_verb in (*first, *looking, add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
-
-
-def _add(verbs, name: str, run: Run, summary: str, example: str) -> argparse.ArgumentParser:
-    verb = verbs.add_parser(
-        name,
-        help=summary,
-        description=summary[0].upper() + summary[1:] + ".",
-        epilog=f"example:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    verb.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
-    verb.set_defaults(run=run)
-    return verb
-
-
-def _add_session(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("session", type=Path, metavar="SESSION", help="folder of the recorded session")
-
-
-def _add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
-    verb.add_argument("--out", type=Path, required=True, metavar=metavar, help=what)
-
-
-def _add_workers(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("--workers", type=_count, default=1, metavar="N", help="processes to use (default 1)")
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
-    return int(text)
 
 
 def _add_evaluate(verbs) -> None:
@@ -136,6 +110,7 @@ def _add_evaluate(verbs) -> None:
         help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
         "else to half a frame)",
     )
+    add_seeing(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -149,6 +124,9 @@ def _add_evaluate(verbs) -> None:
         metavar="MODULE:FUNCTION",
         help="one of your own, importable from here; may be given several times",
     )
+    verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
+    verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
+    add_figure_format(verb)
     _add_workers(verb)
 
 
@@ -156,17 +134,20 @@ def _evaluate(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
+    from bench.api import evaluate_with
     from bench.base.settings import Settings
-    from bench.evaluate import evaluate
 
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
-    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s")
-    names = (*numbers, "estimators", "gauges_from_all")
+    numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given["seeing"] = seeing_of(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
-    progress = sys.stderr.isatty()
-    return evaluate(options.session, options.out, Settings(**given), workers=options.workers, progress=progress)
+    told = {"progress": sys.stderr.isatty(), "announce": print}
+    formats = options.figure_format
+    run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)
+    return DOUBTFUL if run.doubtful else DONE
 
 
 def _add_calibrate(verbs) -> None:

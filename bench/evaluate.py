@@ -1,55 +1,112 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
+from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 
-from bench.base.atomic import lock_output
+from bench.base.atomic import lock_output, write_whole
 from bench.base.doubts import Doubts
+from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
+from bench.friction.curved import curved_whisks, write_curvature
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
-from bench.friction.runs import with_runs
-from bench.friction.tables import friction_of, write_friction
+from bench.friction.runs import alpha_est_sigma
+from bench.friction.soft import soft_objects, write_compliance
+from bench.friction.tables import write_friction
 from bench.report.assembly import write_tables
-from bench.report.evaluation import Evaluation
+from bench.report.evaluation import Evaluation, finished
+from bench.report.summary.page import Summary
 from bench.session.check import checked_session
 from bench.session.inside import check_outside
-from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
+from bench.session.trial import Trial
 from bench.trials.estimates import estimators
 from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
 
+DONE, DOUBTFUL = 0, 1
+_MOST_NAMED = 8
 
-def evaluate(session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False) -> int:
-    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput."""
+
+def evaluate(
+    session_path: Path,
+    out: Path,
+    settings: Settings,
+    *,
+    workers: int = 1,
+    progress: bool = False,
+    figure_formats: Sequence[str] = (),
+    announce: Callable[[str], object] = print,
+) -> int:
+    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
+
+    figure_formats: of figures for a paper, beside the others; announce: is given the summary.
+    """
     estimators(settings.estimators)
     check_outside(out, session_path)
     doubts = Doubts()
     session = checked_session(session_path, doubts)
     trials = judged(session)
+    _require_some(trials, settings)
     with lock_output(out), Workers(workers, progress) as pool:
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
-        results = tuple(with_runs(evaluated(units, pool), session.whisker, settings))
-        shared = shared_touch(results)
-        doubts.notes += filter(None, [shared_doubt(results, shared)])
-        results = with_shared_touch(results, shared)
-        friction = tuple(friction_of(results, session.whisker, settings.alpha_est_rad))
-        write_tables(out, results)
-        write_friction(out, results, friction, settings.alpha_est_rad)
-        notes = calibration.notes, tuple(doubts.notes)
-        return report(Evaluation(session, out, settings, results, friction, gauges, *notes), pool)
+        chosen = [unit for unit in units if settings.takes(unit.trial.name)]
+        whole = finished(evaluated(chosen, pool), session.whisker, settings)
+        doubts.notes += filter(None, [whole.doubt])
+        write_tables(out, whole.results)
+        write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
+        soft = tuple(soft_objects(session, whole.results, settings.alpha_est_rad))
+        write_compliance(out, soft)
+        alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)
+        shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
+        write_curvature(out, shapes)
+        recordings = {unit.trial.name: unit.files for unit in chosen}
+        found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
+        summary = report(Evaluation(session, out, settings, *found), pool, figure_formats)
+    announce(summary.text.rstrip())
+    return DOUBTFUL if summary.doubtful else DONE
 
 
-def report(evaluation: Evaluation, pool: Workers) -> int:
-    """Figures and summary; returns the exit code. A synthetic session's finished results are scored."""
+def _require_some(trials: Sequence[Trial], settings: Settings) -> None:
+    """Raises BadInput where the settings take none of the trials, or ask a camera that has no pictures of any."""
+    if not any(settings.takes(trial.name) for trial in trials):
+        names = _some(trial.name for trial in trials)
+        raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
+    there = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
+    for name in settings.seeing.cameras:
+        if name not in there:
+            raise BadInput(f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some(there)}")
+
+
+def _some(names: Iterable[str]) -> str:
+    first = list(islice(names, _MOST_NAMED + 1))
+    return ", ".join([*first[:_MOST_NAMED], *["…"] * (len(first) > _MOST_NAMED)])
+
+
+def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> Summary:
+    """Figures where they are wanted, report and summary, which is returned. Results of a synthetic session are
+    scored."""
+    from bench.report.against_theta import write_against_theta
     from bench.report.figures import write_figures
+    from bench.report.page.write import write_report
+    from bench.report.paper import write_paper_figures
+    from bench.report.record import record_of, write_record
     from bench.report.score import score
-    from bench.report.summary.page import write_summary
+    from bench.report.summary.page import summary_of
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
+    drawn = evaluation.settings.figures
+    by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
     figures = [
-        *write_figures(evaluation, pool),
-        *write_explained(out, results, evaluation.session.whisker),
-        *write_error_map(out, results, evaluation.friction, alpha_est_rad),
+        *(write_figures(evaluation, pool) if drawn else []),
+        *of_theta,
+        *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
+        *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
-    return write_summary(evaluation, score(evaluation.session, out, evaluation.gauges), figures)
+    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta)
+    record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
+    write_report(out, record, results, evaluation.friction)
+    write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
+    write_whole(out / "summary.txt", summary.text)
+    return summary

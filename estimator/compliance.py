@@ -52,20 +52,48 @@ def _positive_root(square, linear, constant):
 
 
 @elementwise
-def two_distances_sigma(
-    d_x: ArrayLike, stiffness: ArrayLike, shift: ArrayLike, C: ArrayLike, near_sigma: ArrayLike, far_sigma: ArrayLike
-):
-    """(sigma of d_x in mm, sigma of k in N/mm) of `two_distances` from those of the two compliances.
+def give(d_x: ArrayLike, compliance: ArrayLike, C: ArrayLike):
+    """1/k, mm/N, of an object at d_x whose compliance k_θ was felt: k_θ d² − d³/C; below zero by noise.
 
-    With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg.
+    >>> round(give(50.0, compliance_on_soft_object(50.0, 0.5, 9000.0), 9000.0), 9)
+    2.0
+    """
+    require_positive("C", C, "N·mm²")
+    return np.where(d_x > 0, d_x * d_x * (compliance - d_x / C), np.nan)
+
+
+@elementwise
+def two_distances_spread(
+    d_x: ArrayLike,
+    give: ArrayLike,
+    shift: ArrayLike,
+    C: ArrayLike,
+    near_sigma: ArrayLike,
+    far_sigma: ArrayLike,
+    shift_sigma: ArrayLike = 0.0,
+):
+    """(sigma of d_x in mm, sigma of 1/k in mm/N) of `two_distances` by those of both compliances and of the shift.
+
+    With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg. The shift
+    moves the farther place alone.
     """
     require_positive("C", C, "N·mm²")
     require_sigma("near_sigma", near_sigma)
     require_sigma("far_sigma", far_sigma)
-    give, far = 1 / stiffness, d_x + shift
+    require_sigma("shift_sigma", shift_sigma)
+    far = d_x + shift
     near_by_d, near_by_give = 1 / C - 2 * give / d_x**3, 1 / d_x**2
     far_by_d, far_by_give = 1 / C - 2 * give / far**3, 1 / far**2
+    far_sigma = np.hypot(far_sigma, far_by_d * shift_sigma)
     determinant = near_by_d * far_by_give - far_by_d * near_by_give
     d_sigma = np.hypot(far_by_give * near_sigma, near_by_give * far_sigma) / np.abs(determinant)
-    give_sigma = np.hypot(far_by_d * near_sigma, near_by_d * far_sigma) / np.abs(determinant)
-    return d_sigma, give_sigma * stiffness**2
+    return d_sigma, np.hypot(far_by_d * near_sigma, near_by_d * far_sigma) / np.abs(determinant)
+
+
+def two_distances_sigma(
+    d_x: ArrayLike, stiffness: ArrayLike, shift: ArrayLike, C: ArrayLike, near_sigma: ArrayLike, far_sigma: ArrayLike
+):
+    """(sigma of d_x in mm, sigma of k in N/mm) of `two_distances`, see `two_distances_spread`."""
+    stiffness = np.asarray(stiffness, dtype=float)
+    d_sigma, give_sigma = two_distances_spread(d_x, 1 / stiffness, shift, C, near_sigma, far_sigma)
+    return d_sigma, (give_sigma * stiffness**2)[()]

@@ -28,7 +28,8 @@ class Contacts:
 
     theta [rad], m_y, m_z [N·mm] at the pushing angle, C = 3EI [N·mm²], touch [rad] the motor angle of first touch,
     z_c [mm] the height of the plane of rotation, poses (n, 3, 4) from each whisker's rig frame to the object's frame
-    (none: all alike), weights. Raises ValueError where shapes disagree or a row is no push against an object.
+    (none: all alike), weights, taper_per_mm: share of its diameter that the whisker loses a mm. Raises ValueError where
+    shapes disagree or a row is no push against an object.
     """
 
     theta: np.ndarray
@@ -39,6 +40,7 @@ class Contacts:
     z_c: np.ndarray
     poses: np.ndarray | None = None
     weights: np.ndarray | None = field(default=None)
+    taper_per_mm: float = 0.0
 
     def __post_init__(self):
         require_positive("C", self.C, "N·mm²")
@@ -69,7 +71,7 @@ class Contacts:
 
     def distances(self, alpha: float) -> np.ndarray:
         """d_x (n,) in mm for an assumed friction angle."""
-        return distance.with_friction(self.theta, self.m_y, self.m_z, alpha, self.C)
+        return 1 / (1 / distance.with_friction(self.theta, self.m_y, self.m_z, alpha, self.C) + self.taper_per_mm)
 
     def points(self, alpha: float) -> np.ndarray:
         """Contact points (n, 3) in mm, in the object's frame."""

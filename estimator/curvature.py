@@ -20,10 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import circle
-from estimator.domain import elementwise, first_failure, require_friction_angle
+from estimator.domain import RIGHT_ANGLE, elementwise, first_failure, require_friction_angle
 from estimator.threshold import distance_error, slope_threshold
 
 __all__ = [
+    "curvature_of_slip",
+    "curvature_of_slip_printed",
     "deflection",
     "deflection_printed",
     "distance_error",
@@ -107,6 +109,25 @@ def moments_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: 
     """(m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.printed(r_n, theta, beta_0, alpha))
+
+
+@elementwise
+def curvature_of_slip(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLike):
+    """κ_n from how φ grows with the push from φ_0 on, dφ/dθ at θ = 0: (23) with the exact φ, rate cos α / sin φ_0.
+
+    Below zero the surface curves towards the whisker. NaN where nothing slips (φ_0 = 0).
+    """
+    require_friction_angle("alpha", alpha)
+    slipping = (np.abs(phi_0) > 0) & (np.abs(phi_0) + alpha < RIGHT_ANGLE)
+    return np.where(slipping, rate * np.cos(alpha) / np.sin(phi_0), np.nan)
+
+
+@elementwise
+def curvature_of_slip_printed(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLike):
+    """κ_n by (24) and (25) as printed, φ = ζ − α: rate / sin β_0 with β_0 = φ_0 + α."""
+    require_friction_angle("alpha", alpha)
+    slipping = (np.abs(phi_0) > 0) & (np.abs(phi_0) + alpha < RIGHT_ANGLE)
+    return np.where(slipping, rate / np.sin(phi_0 + np.copysign(alpha, phi_0)), np.nan)
 
 
 def why_not(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0):

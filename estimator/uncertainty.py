@@ -9,7 +9,7 @@ C = 3EI has no place in the sum: where the gauge factors were found with the sam
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator import distance
+from estimator import distance, first_order
 from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive, require_sigma
 
 Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
@@ -145,17 +145,17 @@ def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0
     return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(push, np.maximum(high, 0.0), np.nan)[()]
 
 
-def model_share(theta, phi, alpha, d_x, *, reach=0.0, tilt_sigma=0.0, left=1.0):
+def model_share(theta, phi, alpha, d_x, *, reach=0.0, tilt_sigma=0.0, left=1.0, held_spread=1.0):
     """How far (10) may be off by itself, as a share of d_x: leading terms in θ, derived in docs/maps.md.
 
     reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left: share of the base's
     diameter that is left at d_x. A held contact drags along the whisker by up to tan α; where it slips, that is far
-    less than what α_est does.
+    less than what α_est does. held_spread: the part of that which is not known.
     """
-    leaning = 0.5 * theta * np.tan(tilt_sigma) * np.sin(np.abs(phi)) / np.cos(alpha)
-    slope = np.cos(np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE))
-    rolling = theta * reach / np.asarray(d_x) * slope * (0.5 / left - 0.125)
-    return np.sqrt(leaning**2 + rolling**2 + (0.2 * theta * np.tan(alpha)) ** 2 + (theta**2 / (6 * left)) ** 2)
+    leaning = first_order.leaning(theta, tilt_sigma, phi, alpha)
+    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
+    dragging = held_spread * first_order.dragging(theta, alpha)
+    return np.sqrt(leaning**2 + rolling**2 + dragging**2 + (theta**2 / (6 * left)) ** 2)
 
 
 @elementwise

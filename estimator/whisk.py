@@ -56,13 +56,16 @@ class EstimatorSettings:
     """What an estimator is told beforehand: the assumed friction cone angle, and how far it is trusted.
 
     Nobody knows the object: object_reach_mm is how thick it may be (radii of object and whisker together), and
-    tilt_sigma_rad how far it may lean along the whisker. Both enter the sigma alone.
+    tilt_sigma_rad how far it may lean along the whisker. Both enter the sigma alone. Who is told its radius has it in
+    object_radius_mm, NaN else; whisker_radius_mm is the whisker's own at its base.
     """
 
     alpha_est_rad: float
     alpha_est_sigma_rad: float = 0.0
     object_reach_mm: float = 0.0
     tilt_sigma_rad: float = 0.0
+    object_radius_mm: float = nan
+    whisker_radius_mm: float = 0.0
 
     def __post_init__(self):
         require_friction_angle("alpha_est_rad", self.alpha_est_rad)
@@ -76,7 +79,8 @@ class Estimate:
 
     low_mm, high_mm: its 95 % interval, NaN where that is 1.96 sigma to either side; a low end of 0 and a high one at
     the whisker's length are open. alpha_est_rad, beta_rad: the friction angle that was assumed and the slope that came
-    of it, NaN where the estimator knows of none.
+    of it, NaN where the estimator knows of none. gradient (4,): of the distance by θ, m_y, m_z and alpha_est, where the
+    estimator knows it: so the contact point's errors hang together.
     """
 
     d_x_mm: float
@@ -86,3 +90,4 @@ class Estimate:
     high_mm: float = nan
     alpha_est_rad: float = nan
     beta_rad: float = nan
+    gradient: np.ndarray | None = field(default=None, compare=False)

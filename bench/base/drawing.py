@@ -1,5 +1,6 @@
 """What all figures share: look, colours, and files that are written whole with the hash of what they show."""
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -14,16 +15,20 @@ COLOURS = {
     "no_slip": "#b2182b",
     "with_friction": "#2166ac",
     "frictionless": "#e08214",
+    "corrected": "#542788",
     "with_friction_fitted": "#67a9cf",
     "with_friction_seen": "#35978f",
+    "with_friction_kinetic": "#999999",
 }
 OTHER_COLOURS = ("#1b7837", "#762a83", "#8c510a", "#01665e")
 LABELS = {
     "no_slip": "(2) no slip",
     "with_friction": "(10) with friction",
     "frictionless": "(12) frictionless",
+    "corrected": "(10) corrected",
     "with_friction_fitted": "(10), α fitted",
     "with_friction_seen": "(10), α seen",
+    "with_friction_kinetic": "(10) at kinetic ends",
     "estimator.builtin:printed_17": "(17) as printed",
 }
 _STYLE = {
@@ -35,6 +40,17 @@ _STYLE = {
     "legend.fontsize": 8,
     "axes.linewidth": 0.8,
 }
+_PAPER = {
+    **{"font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "legend.fontsize": 7},
+    **{"xtick.labelsize": 7, "ytick.labelsize": 7, "lines.markersize": 4},
+    **{"pdf.fonttype": 42, "svg.fonttype": "path"},  # fonts stand in the file, whole or as outlines
+}
+FORMATS = ("png", "pdf", "svg")
+_UNDATED = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+    "svg": {"Date": None},
+}
 _STAMP = "Source"
 SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
 
@@ -42,6 +58,11 @@ SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are d
 def style() -> AbstractContextManager[None]:
     """Context in which figures are made."""
     return matplotlib.rc_context(_STYLE)
+
+
+def paper_style() -> AbstractContextManager[None]:
+    """Context in which figures of a journal's column are made."""
+    return matplotlib.rc_context(_STYLE | _PAPER)
 
 
 def colour_of(estimator: str, number: int = 0) -> str:
@@ -60,13 +81,14 @@ def save(figure: Figure, path: Path, stamp: str, dpi: int = 160) -> None:
         figure.savefig(temporary, dpi=dpi, metadata={"Software": None, _STAMP: stamp})
 
 
-def publish(figure: Figure, stem: Path) -> list[Path]:
-    """Write <stem>.png and <stem>.svg, each whole; the same figure gives the same bytes. The paths written."""
-    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+def publish(figure: Figure, stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150) -> list[Path]:
+    """Write <stem>.<format> of each of FORMATS that is asked for, whole; the same figure gives the same bytes. The
+    paths written."""
+    paths = [stem.with_name(f"{stem.name}.{name}") for name in formats]
     with matplotlib.rc_context({"svg.hashsalt": stem.name}):
-        for path, metadata in zip(paths, ({"Software": None}, {"Date": None})):
+        for path, name in zip(paths, formats):
             with whole_file(path) as temporary:
-                figure.savefig(temporary, dpi=150, metadata=metadata)
+                figure.savefig(temporary, dpi=dpi, metadata=_UNDATED[name])
     return paths
 
 

@@ -2,15 +2,31 @@
 
 import importlib.util
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from vision.geometry.settings import VisionSettings
 
 # The paper's 5 Hz at 10 deg/s and 45 Hz at 90 deg/s: half a hertz for each deg/s.
 CUTOFF_HZ_PER_DEG_S = 0.5
 # How far α_est may be off where nothing tells: steel's 10.5° to sandpaper's 23.3° (Fig. 8) about an assumed 10° or 15°.
 ALPHA_EST_SIGMA_DEG = 5.0
+
+
+@dataclass(frozen=True)
+class Seeing:
+    """How hard pictures are looked at: the settings' name, what they are, and which cameras are asked (none named:
+    all)."""
+
+    name: str = "standard"
+    vision: VisionSettings = field(default_factory=VisionSettings)
+    cameras: tuple[str, ...] = ()
+
+    def asks(self, camera: str) -> bool:
+        """Whether this camera's pictures are looked at."""
+        return not self.cameras or camera in self.cameras
 
 
 @dataclass(frozen=True)
@@ -20,8 +36,9 @@ class Settings:
     alpha_est_sigma_deg: how far that may be off, one sigma; None goes by the session's surfaces (`alpha_est_sigma`).
     cutoff_Hz: of the zero-phase low-pass; None goes by speed. estimators: "module:function" of one's own.
     clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
-    (`FrameTimes.clock_sigma_s`). gauges_from_all: every trial that can, calibrates the gauges. Raises BadInput out of
-    range.
+    (`FrameTimes.clock_sigma_s`). gauges_from_all: every trial that can, calibrates the gauges. trials: pattern of the
+    names of those that are evaluated. figures: whether any is drawn. seeing: how hard pictures are looked at; with
+    accuracy_mm each whisk by the first preset by which d_x's stated sigma is no more. Raises BadInput out of range.
     """
 
     theta_deg: float = 3.0
@@ -31,6 +48,10 @@ class Settings:
     clock_sigma_s: float | None = None
     alpha_est_sigma_deg: float | None = None
     gauges_from_all: bool = False
+    trials: str = "*"
+    figures: bool = True
+    seeing: Seeing = field(default_factory=Seeing)
+    accuracy_mm: float | None = None
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)
@@ -39,6 +60,8 @@ class Settings:
             _require("--alpha-est-sigma-deg", self.alpha_est_sigma_deg, 0.0, 45.0)
         if self.cutoff_Hz is not None:
             _require("--cutoff-Hz", self.cutoff_Hz, 0.0, 1e5, above=True)
+        if self.accuracy_mm is not None:
+            _require("--accuracy-mm", self.accuracy_mm, 0.0, 100.0, above=True)
         if self.clock_sigma_s is not None:
             _require("--clock-sigma-s", self.clock_sigma_s, 0.0, 10.0)
 
@@ -63,7 +86,16 @@ class Settings:
 
     def seen(self) -> list:
         """The settings that what is seen depends on."""
-        return [self.theta_deg, self.clock_sigma_s]
+        return [self.theta_deg, self.clock_sigma_s, self.seeing.vision, self.seeing.cameras, self.accuracy_mm]
+
+    def estimated(self) -> list:
+        """The settings that a trial's whole result depends on."""
+        own = self.alpha_est_deg, self.alpha_est_sigma_deg, self.cutoff_Hz, self.estimators, self.gauges_from_all
+        return [*self.seen(), *own]
+
+    def takes(self, trial: str) -> bool:
+        """Whether a trial of this name is evaluated."""
+        return fnmatchcase(trial, self.trials)
 
     def own_code(self) -> list[str]:
         """Sources of one's own estimators, so that a change in one is a change of the result."""

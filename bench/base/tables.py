@@ -6,7 +6,10 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from bench.base.atomic import write_whole
+from bench.base.errors import BadInput
 
 
 def sigma_name(name: str) -> str:
@@ -22,6 +25,33 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> Non
     writer.writerow(columns)
     writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
     write_whole(path, text.getvalue())
+
+
+# Columns that hold text, and whole numbers that are never missing; all others are numbers.
+TEXT = ("trial", "surface", "estimator", "beta_from", "record", "kind", "notes", "status")
+WHOLE = ("whisk", "whisks", "frame", "touching", "cameras", "frames_used")
+WHOLE += ("rests_seen", "jumps_seen", "rests_felt", "jumps_felt")
+
+
+def read_table(path: Path) -> np.ndarray:
+    """A CSV file of ours as a structured array (rows,): NaN where a number is missing. Rows that sum up others, without
+    a whisk, are left out. Raises BadInput where it is damaged."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            columns, *rows = csv.reader(file)
+        kinds = [(name, str if name in TEXT else int if name in WHOLE else float) for name in columns]
+        whole = [row for row in rows if dict(zip(columns, row, strict=True)).get("whisk", "one")]
+        cells = {
+            name: [kind(cell) if cell or kind is str else math.nan for cell in column]
+            for (name, kind), column in zip(kinds, zip(*whole))
+        }
+    except (OSError, ValueError, csv.Error) as problem:
+        raise BadInput(f"cannot be read ({problem}); evaluate the session again into this folder", file=path) from None
+    longest = {name: max((len(c) for c in cells.get(name, ())), default=1) or 1 for name, kind in kinds if kind is str}
+    table = np.zeros(len(whole), [(name, f"U{longest[name]}" if kind is str else kind) for name, kind in kinds])
+    for name, values in cells.items():
+        table[name] = values
+    return table
 
 
 def _cell(value) -> str:

@@ -41,17 +41,22 @@ class Cell:
 
 
 def write_error_map(
-    out: Path, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
+    out: Path,
+    results: Sequence[TrialResult],
+    friction: Sequence[SurfaceFriction],
+    alpha_est_rad: float,
+    *,
+    drawn: bool = True,
 ) -> list[str]:
-    """error_map.csv, and error_map.png where there is a cell. Names of the pictures."""
+    """error_map.csv, and error_map.png where there is a cell and it is to be `drawn`. Names of the pictures."""
     cells = measured_cells(results, friction, alpha_est_rad)
     write_table(out / f"{NAME}.csv", COLUMNS, map(_row, cells))
-    if not cells:
+    if not cells or not drawn:
         return []
     path, stamp = out / f"{NAME}.png", hash_of([vars(cell) for cell in cells], alpha_est_rad, COLUMNS)
     if not is_drawn(path, stamp):
         with style():
-            save(draw_error_map(cells, alpha_est_rad, _typical_taper(friction)), path, stamp)
+            save(draw_error_map(cells, alpha_est_rad, typical_taper(friction)), path, stamp)
     return [path.name]
 
 
@@ -99,7 +104,7 @@ def _row(cell: Cell) -> dict:
     }
 
 
-def _typical_taper(found: Sequence[SurfaceFriction]) -> Callable:
+def typical_taper(found: Sequence[SurfaceFriction]) -> Callable:
     """How the whisker's taper changes a relative error at the session's median distance."""
     surfaces = [s.surface for s in found]
     return partial(surfaces[0].beam.error_share, float(np.median([s.common_d_x_mm for s in surfaces])))
@@ -120,7 +125,7 @@ def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float, of_taper: Callab
     _tell(left, cells, most)
     slopes, angles = np.meshgrid(np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121))
     predicted = 100.0 * of_taper(distance_error(np.radians(slopes), np.radians(angles), alpha_est_rad))
-    right.pcolormesh(slopes, angles, np.clip(predicted, -most, most), shading="nearest", **look)
+    right.pcolormesh(slopes, angles, np.clip(predicted, -most, most), shading="nearest", rasterized=True, **look)
     for axes, title in ((left, "measured"), (right, "predicted by (13), (14)")):
         axes.set(xlabel="slope β  [°]", title=title, xlim=(-2.5, _STEEPEST_DEG), ylim=(0.0, top))
         axes.axhline(np.degrees(alpha_est_rad), color="black", lw=0.8, ls=":")

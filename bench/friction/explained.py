@@ -32,15 +32,14 @@ _LOOK = {
 _MOST_NAMED = 40  # whisks; more bars than that have no room for a name each
 
 
-def write_explained(out: Path, results: Iterable[TrialResult], whisker: Whisker) -> list[str]:
-    """explained.csv: a row for each whisk that has a truth and an estimate by (10), and their mean; its bar chart.
-
-    Names of the pictures.
+def write_explained(out: Path, results: Iterable[TrialResult], whisker: Whisker, *, drawn: bool = True) -> list[str]:
+    """explained.csv: a row for each whisk that has a truth and an estimate by (10), and their mean; its bar chart,
+    where it is to be `drawn`. Names of the pictures.
     """
     rows = list(explained_rows(results, whisker))
     total = [mean_row(rows)] if rows else []
     write_table(out / "explained.csv", COLUMNS, [*rows, *total])
-    if not rows:
+    if not rows or not drawn:
         return []
     path, stamp = out / "explained.png", hash_of(rows, _LOOK)
     if not is_drawn(path, stamp):

@@ -1,4 +1,7 @@
-"""(10) run again with what is known of the friction: α fitted per surface, and α as seen.
+"""(10) run again with what is known of the friction: α fitted per surface, α as seen, and on the kinetic cone.
+
+Of a whisk whose moments alone show that it sticks and slips (`bench.trials.gate`), (10) with α_est as given is asked
+once more at the kinetic ends of its teeth.
 
 α_est as given needs nothing and stands in each whisk's own result. The fit of Fig. 8 leaves out the whisk that it
 judges. The run with α as seen is no estimate that a robot could make: it shows what is left of the error when friction
@@ -13,15 +16,17 @@ import numpy as np
 from bench.base.settings import Settings
 from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
-from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial import EstimateRow, FeltAt, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.estimates import answer
 from estimator.beam import Beam
-from estimator.builtin import with_friction
+from estimator.builtin import corrected, with_friction
 from estimator.whisk import Whisk
 
 GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
-RUNS = (FITTED, SEEN)
+KINETIC = "with_friction_kinetic"
+RUNS = (FITTED, SEEN, KINETIC)
+ASSUMING = {GIVEN: with_friction, "corrected": corrected}  # take α_est as given
 
 
 def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
@@ -50,10 +55,17 @@ def with_runs(results: Iterable[TrialResult], whisker: Whisker, settings: Settin
 def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, sigma_rad: float) -> TrialResult:
     surface = by_panel.get(result.trial.panel)
     felt = tuple(
-        replace(felt, estimates=_answers(result, seen, felt, surface, beam, sigma_rad))
+        _by_theta(result, replace(felt, estimates=answers), beam, sigma_rad)
         for _, seen, felt in whisks([result])
+        for answers in [_answers(result, seen, felt, surface, beam, sigma_rad)]
     )
     return replace(result, felt=replace(result.felt, whisks=felt))
+
+
+def _by_theta(result: TrialResult, felt: FeltWhisk, beam: Beam, sigma_rad: float) -> FeltWhisk:
+    """The whisk with the session's sigma of α_est at all pushing angles."""
+    asked = (replace(at, estimates=_given(result, at, at.theta_rad, beam, sigma_rad)) for at in felt.by_theta)
+    return replace(felt, by_theta=tuple(asked))
 
 
 def _answers(
@@ -64,17 +76,31 @@ def _answers(
         return ()
     fit = surface and surface.fit_without(result.trial.name, seen.whisk)
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
-    whisk = _whisk(felt, np.radians(result.theta_deg), beam)
+    theta_rad = np.radians(result.theta_deg)
+    whisk = _whisk(felt, theta_rad, beam)
     angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
     runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma) for name, (a, sigma) in angles if np.isfinite(a)]
-    given = [
-        answer(a.estimator, with_friction, whisk, a.alpha_est_rad, sigma_rad) if a.estimator == GIVEN else a
-        for a in felt.estimates
-    ]
+    given = _given(result, felt, theta_rad, beam, sigma_rad)
+    if felt.kinetic is not None:
+        alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
+        runs.append(answer(KINETIC, with_friction, _whisk(felt.kinetic, theta_rad, beam), alpha, sigma_rad))
     return (*given, *runs)
 
 
-def _whisk(felt: FeltWhisk, theta_rad: float, beam: Beam) -> Whisk:
+def _given(
+    result: TrialResult, felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam, sigma_rad: float
+) -> tuple[EstimateRow, ...]:
+    """The estimates, those with α_est as given asked again with the session's sigma of it."""
+    whisk = _whisk(felt, theta_rad, beam)
+    radii_mm = 0.5 * result.trial.bar_diameter_mm, 0.5 * result.whisker.diameter_mm
+
+    def again(a: EstimateRow) -> EstimateRow:
+        return answer(a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, sigma_rad, radii_mm)
+
+    return tuple(again(a) if a.estimator in ASSUMING else a for a in felt.estimates)
+
+
+def _whisk(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
     """The whisk at the wanted angle: all that (10) looks at."""
     no_samples = (np.zeros(0),) * 4
     moments = felt.m_y_Nmm.value, felt.m_z_Nmm.value

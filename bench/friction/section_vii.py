@@ -2,7 +2,8 @@
 
 1. Tilting the array about the whisker's axis: bars of slopes of both signs, on one surface, are such tilts.
 2. The α under which the contacts agree best: bars at one nominal distance stand for one upright edge that a tilted
-   array touches at one place; the α whose distances scatter least is taken.
+   array touches at one place; the α whose distances scatter least is taken. At several nominal distances they stand for
+   a straight edge that leans, and the α is taken whose contacts lie best on a line.
 3. Confidence: contacts with a large slip angle count for less.
 Ways 1 and 2 see no picture: the slopes are the nominal ones, set by hand.
 """
@@ -18,7 +19,7 @@ from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.friction.explained import by_10
 from bench.records.trial import TrialResult, whisks
 from bench.session.whisker import Whisker
-from estimator.friction import alpha_from_tilts, confidence
+from estimator.friction import Contacts, alpha_from_tilts, confidence, most_consistent_alpha
 from estimator.uncertainty import Z_95
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
@@ -103,6 +104,29 @@ def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return Way("consistency", np.nan, np.nan, "a whisk is no push against an object")
     return _by_recordings("consistency", lambda some: _least_scatter(some, whisker), of_surface)
+
+
+def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
+    """Way 2 of an object that is no edge at one distance: the α whose contacts lie best on a straight one.
+
+    Bars at several nominal distances stand for one straight edge that leans along the whisker, touched at heights that
+    are these distances (`estimator.consistency`).
+    """
+    nominal = {c.d_x_nominal_mm for c in of_surface}
+    if len(nominal) < 2 or not np.isfinite(list(nominal)).all():
+        return Way("smoothness", np.nan, np.nan, "needs whisks at two nominal distances (d_x_mm) or more")
+    if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
+        return Way("smoothness", np.nan, np.nan, "a whisk is no push against an object")
+    return _by_recordings("smoothness", lambda some: _smoothest(some, whisker), of_surface)
+
+
+def _smoothest(some: Sequence[Contact], whisker: Whisker) -> tuple[float, str]:
+    felt = (np.array([getattr(c, name) for c in some]) for name in ("theta_rad", "m_y_Nmm", "m_z_Nmm"))
+    heights = np.array([c.d_x_nominal_mm for c in some])
+    beam = whisker.beam
+    at = Contacts(*felt, beam.C_Nmm2, np.zeros(len(some)), heights, taper_per_mm=beam.taper / beam.length_mm)
+    found = most_consistent_alpha(at)
+    return found.alpha_rad, found.status
 
 
 def _by_recordings(name: str, found: Callable[[Sequence[Contact]], tuple[float, str]], known: Sequence[Contact]) -> Way:

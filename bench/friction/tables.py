@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.base.tables import sigma_name, write_table
 from bench.friction.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
-from bench.friction.section_vii import Way, by_consistency, by_tilting, contacts, weights
+from bench.friction.section_vii import Way, by_consistency, by_smoothness, by_tilting, contacts, weights
 from bench.friction.surfaces import Surface, surfaces
 from bench.records.phases import KINETIC, STATIC
 from bench.records.trial import TrialResult
@@ -16,6 +16,7 @@ from bench.session.whisker import Whisker
 from bench.trials.compare import Judged, judge
 
 RECORDS = ("seen", "felt")
+WAYS = ("tilting", "consistency", "smoothness")
 _APART = tuple((kind, record) for kind in (STATIC, KINETIC) for record in RECORDS)
 
 
@@ -32,7 +33,7 @@ WHISK_COLUMNS = (
 PHASE_COLUMNS = ("trial", "whisk", "record", "kind", "theta_deg", "alpha_deg", "alpha_sigma_deg")
 SURFACE_COLUMNS = (
     *("surface", "speed_deg_s", "whisks"),
-    *_angle_columns((*_OF_WHISK, "least_squares", "tilting", "consistency")),
+    *_angle_columns((*_OF_WHISK, "least_squares", *WAYS)),
     *("error_rms_percent", "error_rms_weighted_percent", "notes"),
 )
 
@@ -79,7 +80,7 @@ def _friction(
 ) -> SurfaceFriction:
     mine = tuple(a for a in alphas if a.purpose == "measure" and a.panel == surface.panel)
     felt = contacts(results, surface.panel)
-    ways = (by_tilting(felt), by_consistency(felt, whisker))
+    ways = by_tilting(felt), by_consistency(felt, whisker), by_smoothness(felt, whisker)
     errors = {(j.trial, j.whisk): j.error_percent for j in judge(results) if _is_given(j)}
     phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for f in surface.felt}
     known = [k for k in phi if np.isfinite(errors.get(k, np.nan))]
@@ -128,7 +129,7 @@ def _phase_rows(a: WhiskAlphas) -> Iterator[dict]:
 
 def _surface_row(s: SurfaceFriction) -> dict:
     row = {"surface": s.surface.name, "speed_deg_s": s.surface.speed_deg_s, "whisks": len(s.whisks)}
-    for name in (*_OF_WHISK, "least_squares", "tilting", "consistency"):
+    for name in (*_OF_WHISK, "least_squares", *WAYS):
         row |= _cells(name, s.alpha(name))
     notes = [f"{way.name}: {way.status}" for way in s.ways if way.status]
     row |= {"error_rms_percent": s.error_rms_percent, "error_rms_weighted_percent": s.error_rms_weighted_percent}

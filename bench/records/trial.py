@@ -24,6 +24,7 @@ class TrialFacts:
     speed_deg_s: float | None
     d_x_nominal_mm: float = NAN
     beta_nominal_deg: float = NAN
+    bar_diameter_mm: float = NAN
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -70,7 +71,8 @@ class SeenWhisk:
 
     The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
     moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
-    (`bench.trials.clocks`). contradicted: what the recording says twice does not agree (`bench.trials.consistency`).
+    (`bench.trials.clocks`). looked: preset or settings file by which the pictures were looked at. contradicted: what
+    the recording says twice does not agree (`bench.trials.consistency`).
     """
 
     whisk: int
@@ -91,6 +93,7 @@ class SeenWhisk:
     deflection: Deflection | None = None
     overlay: dict[str, Drawing] = field(default_factory=dict)
     touch_shared_rad: float = 0.0
+    looked: str = ""
     contradicted: bool = False
 
     @property
@@ -147,7 +150,8 @@ class EstimateRow:
     """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
 
     d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm, d_x_est_high_mm: the 95 %
-    interval.
+    interval. d_y_est_mm, d_z_est_mm, slip_est_mm: of the contact at the pushing angle; touch_covariance_mm_rad: of the
+    distance with the angle of touch, NaN where unknown.
     """
 
     estimator: str
@@ -158,6 +162,23 @@ class EstimateRow:
     d_x_est_sigma_alpha_exact_mm: float = NAN
     d_x_est_low_mm: float = NAN
     d_x_est_high_mm: float = NAN
+    d_y_est_mm: Value = UNKNOWN
+    d_z_est_mm: Value = UNKNOWN
+    slip_est_mm: Value = UNKNOWN
+    touch_covariance_mm_rad: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class FeltAt:
+    """What is felt at one pushing angle, and the estimates of it; the fields are those of `FeltWhisk`."""
+
+    theta_rad: float
+    m_y_Nmm: Value
+    m_z_Nmm: Value
+    theta_sigma_rad: float
+    covariance_at: np.ndarray
+    theta_moment_covariance_at: np.ndarray
+    estimates: tuple[EstimateRow, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +188,9 @@ class FeltWhisk:
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
     (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
     those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
-    elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel.
+    elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
+    moments and estimates at other pushing angles, up to the stroke's end. kinetic: as on the kinetic cone, where the
+    moments alone show that the contact sticks and slips.
     """
 
     whisk: int = 0
@@ -185,6 +208,8 @@ class FeltWhisk:
     phases: Phases = NO_PHASES
     estimates: tuple[EstimateRow, ...] = ()
     one_factor: tuple[EstimateRow, ...] = ()
+    by_theta: tuple[FeltAt, ...] = ()
+    kinetic: FeltAt | None = None
 
     @property
     def has_moments(self) -> bool:

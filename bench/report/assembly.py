@@ -4,8 +4,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from bench.base.tables import sigma_name, write_table
-from bench.records.trial import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from estimator.distance import cartesian, contact_point
 from vision.fit.uncertainty import CAUSES
 from vision.truth.value import NAN, UNKNOWN, Value
 
@@ -31,6 +34,10 @@ _FELT = (
     ("phi_felt_deg", "phi_felt_rad"),
 )
 _PLACE = ("x_mm", "y_mm", "z_mm")
+_AT_CONTACT = ("d_y", "d_z", "slip")
+# A robot takes its whiskers to turn in the plane in which they were mounted. Off it is what sag and set of a wire make:
+# 0.1 mm, and as much again by its clamp, of the paper's wire at 60 mm.
+Z_C_MM = Value(0.0, 0.2)
 
 
 def _with_sigmas(names: Iterable[str]) -> tuple[str, ...]:
@@ -41,7 +48,7 @@ WHISK_COLUMNS = (
     *("trial", "whisk", "surface", "speed_deg_s", "beta_nominal_deg", "theta_deg"),
     *_with_sigmas(["touch_deg", "touch_felt_deg", *(name for name, _ in (*_SEEN[1:], *_AT_ANGLE, *_FELT[1:]))]),
     *_with_sigmas(_PLACE),
-    *("cameras", "frames_used", "status"),
+    *("cameras", "frames_used", "looked", "status"),
 )
 ESTIMATE_COLUMNS = (
     "trial",
@@ -56,6 +63,8 @@ ESTIMATE_COLUMNS = (
     "beta_est_deg",
     "error_mm",
     "error_percent",
+    *("theta_c_deg", "theta_c_sigma_deg", "z_c_mm", "z_c_sigma_mm", "r_theta_correlation", "point_error_mm"),
+    *(column for name in _AT_CONTACT for column in (f"{name}_est_mm", f"{name}_est_sigma_mm", f"{name}_error_mm")),
     "status",
 )
 TRACK_COLUMNS = (
@@ -104,7 +113,8 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
             for column, key in names:
                 row |= _cells(column, key, getattr(source, key, UNKNOWN))
         row |= _place(seen.point_mm.value, seen.point_mm.sigma)
-        yield row | _whisk_of(result, seen) | {"cameras": seen.cameras, "frames_used": seen.frames_used}
+        row |= {name: getattr(seen, name) for name in ("cameras", "frames_used", "looked")}
+        yield row | _whisk_of(result, seen)
 
 
 def budget_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
@@ -155,19 +165,41 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         truth = seen.d_x_mm.value
         for answer in felt.estimates:
             error = answer.d_x_est_mm.value - truth
-            yield _whisk_of(result, seen) | {
-                "estimator": answer.estimator,
-                "alpha_est_deg": math.degrees(answer.alpha_est_rad),
-                "d_x_est_mm": answer.d_x_est_mm.value,
-                "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
-                "d_x_est_sigma_alpha_exact_mm": answer.d_x_est_sigma_alpha_exact_mm,
-                "d_x_est_low_mm": answer.d_x_est_low_mm,
-                "d_x_est_high_mm": answer.d_x_est_high_mm,
-                "beta_est_deg": math.degrees(answer.beta_est_rad),
-                "error_mm": error,
-                "error_percent": 100.0 * error / truth,
-                "status": answer.status,
-            }
+            yield (
+                _whisk_of(result, seen)
+                | {
+                    "estimator": answer.estimator,
+                    "alpha_est_deg": math.degrees(answer.alpha_est_rad),
+                    "d_x_est_mm": answer.d_x_est_mm.value,
+                    "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
+                    "d_x_est_sigma_alpha_exact_mm": answer.d_x_est_sigma_alpha_exact_mm,
+                    "d_x_est_low_mm": answer.d_x_est_low_mm,
+                    "d_x_est_high_mm": answer.d_x_est_high_mm,
+                    "beta_est_deg": math.degrees(answer.beta_est_rad),
+                    "error_mm": error,
+                    "error_percent": 100.0 * error / truth,
+                    "status": answer.status,
+                }
+                | _contact_cells(seen, felt, answer)
+            )
+
+
+def _contact_cells(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> dict[str, float]:
+    """The contact (r_c, θ_c, z_c) felt, its distance from the one seen, deflection and slip there with their errors."""
+    touch, r_c = felt.touch_felt_rad, answer.d_x_est_mm
+    cells = _cells("theta_c_deg", "touch_rad", touch) | _cells("z_c_mm", "z_c_mm", Z_C_MM)
+    cells["r_theta_correlation"] = answer.touch_covariance_mm_rad / (r_c.sigma * touch.sigma)
+    cells["point_error_mm"] = point_error_mm(seen, felt, answer)
+    for name in _AT_CONTACT:
+        found, truth = getattr(answer, f"{name}_est_mm"), getattr(seen.at, f"{name}_mm", UNKNOWN)
+        cells |= _cells(f"{name}_est_mm", f"{name}_mm", found) | {f"{name}_error_mm": found.value - truth.value}
+    return cells
+
+
+def point_error_mm(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> float:
+    """How far the contact felt lies from where it was seen at first touch; NaN without one of them."""
+    point = contact_point(answer.d_x_est_mm.value, felt.touch_felt_rad.value, Z_C_MM.value)
+    return float(np.linalg.norm(np.array(cartesian(*point)) - seen.point_mm.value))
 
 
 def track_rows(result: TrialResult) -> Iterator[dict]:

@@ -1,19 +1,47 @@
-"""An evaluated session: what figures and summary are made from."""
+"""An evaluated session: what figures, summary and report are made from."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench.base.settings import Settings
-from bench.friction.tables import SurfaceFriction
+from bench.cameras.calibration import SessionCalibration
+from bench.friction.curved import Curved
+from bench.friction.runs import with_runs
+from bench.friction.soft import Soft
+from bench.friction.tables import SurfaceFriction, friction_of
 from bench.gauges.matrix import Gauges
-from bench.records.trial import TrialResult
+from bench.records.trial import FeltWhisk, TrialResult
 from bench.session.session import Session
+from bench.session.whisker import Whisker
+from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """Results of all trials with what only all of them tell: (10) by the session's friction, the error of touch that
+    all share and what is doubtful of it ('' for nothing), friction of each surface and speed."""
+
+    results: tuple[TrialResult, ...]
+    friction: tuple[SurfaceFriction, ...]
+    doubt: str
+
+
+def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> Finished:
+    """The results as they stand in trials/, brought together."""
+    results = tuple(with_runs(results, whisker, settings))
+    shared = shared_touch(results)
+    doubt = shared_doubt(results, shared)
+    results = with_shared_touch(results, shared)
+    return Finished(results, tuple(friction_of(results, whisker, settings.alpha_est_rad)), doubt)
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Results of all trials in the folder `out`. camera_notes: lines on calibration and placing; doubts: lines that the
-    user should read; friction: a surface and speed each; gauges: None where volts cannot become moments."""
+    """Results of all trials in the folder `out`. calibration: the cameras as placed in the rig, with its notes; doubts:
+    lines that the user should read; friction: a surface and speed each; gauges: None where volts cannot become moments;
+    recordings: hash of each trial's files, by name; soft: pairs of distances that tell how soft an object is; shapes:
+    how each whisk's object is curved."""
 
     session: Session
     out: Path
@@ -21,5 +49,8 @@ class Evaluation:
     results: tuple[TrialResult, ...]
     friction: tuple[SurfaceFriction, ...]
     gauges: Gauges | None
-    camera_notes: tuple[str, ...]
+    calibration: SessionCalibration
     doubts: tuple[str, ...]
+    recordings: Mapping[str, str]
+    soft: tuple[Soft, ...] = ()
+    shapes: tuple[tuple[TrialResult, FeltWhisk, Curved], ...] = ()

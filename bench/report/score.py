@@ -61,7 +61,7 @@ def score(session: Session, out: Path, gauges: Gauges | None = None) -> list[str
 
 def _scores(session: Session, out: Path) -> Iterator[Score]:
     rows = _read(out / "whisks.csv")
-    paired = [(row, truth) for row in rows if (truth := _truth_of(session, row)) is not None]
+    paired = [(row, truth) for row in rows if (truth := _truth(session, row)) is not None]
     for column, key in _AT_TOUCH:
         yield from _compared(column, [(row, truth.get(key)) for row, truth in paired])
     at_3 = [(row, truth.get("slip_at_3deg_mm")) for row, truth in paired if float(row["theta_deg"]) == _SLIP_THETA_DEG]
@@ -80,7 +80,7 @@ def _scores(session: Session, out: Path) -> Iterator[Score]:
 def _friction(session: Session, out: Path) -> Iterator[Score]:
     """Friction angles: one where the coefficient at rest is that in motion, else the two apart."""
     path = out / "friction.csv"
-    rows = [(row, _truth_of(session, row)) for row in (_read(path) if path.is_file() else ())]
+    rows = [(row, _truth(session, row)) for row in (_read(path) if path.is_file() else ())]
     known = [(row, truth) for row, truth in rows if truth is not None and "mu_kinetic" in truth]
     alike = {True: [], False: []}
     for row, truth in known:
@@ -105,12 +105,16 @@ def _compared(column: str, pairs, name: str = "") -> Iterator[Score]:
         yield Score(name or column, column.rpartition("_")[2], values - truths, sigmas)
 
 
-def _truth_of(session: Session, row: dict) -> dict | None:
-    """truth.toml of the row's whisk; where a recording holds several, each value is a list in their order."""
-    path = session.trial(row["trial"]).folder / "truth.toml"
+def _truth(session: Session, row: dict) -> dict | None:
+    return truth_of(session, row["trial"], int(row["whisk"]))
+
+
+def truth_of(session: Session, trial: str, number: int) -> dict | None:
+    """truth.toml of a whisk; where a recording holds several, each value is a list in their order. None where the
+    session is no synthetic one."""
+    path = session.trial(trial).folder / "truth.toml"
     if not path.is_file():
         return None
-    number = int(row["whisk"])
     values = tomllib.loads(path.read_text())
     return {
         key: value[number] if isinstance(value, list) else value

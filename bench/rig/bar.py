@@ -22,11 +22,13 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Bar:
-    """A round bar in the rig frame: a point of its axis, the axis' unit direction (its z positive), its radius."""
+    """A round bar in the rig frame: a point of its axis, the axis' unit direction (its z positive), its radius, and how
+    stiff its surface is: it gives way by force over stiffness, along its normal, where the whisker presses."""
 
     point_mm: np.ndarray
     axis: np.ndarray
     radius_mm: float
+    stiffness_N_mm: float = math.inf
 
     @classmethod
     def placed(
@@ -38,13 +40,14 @@ class Bar:
         touch_rad: float,
         radius_mm: float,
         whisker_radius_mm: float,
+        stiffness_N_mm: float = math.inf,
     ) -> "Bar":
         """The bar that a straight whisker at motor angle `touch_rad` would just touch at `d_x_mm`."""
         axis = np.array([math.sin(psi_rad), math.cos(psi_rad) * math.sin(beta_rad),
                          math.cos(psi_rad) * math.cos(beta_rad)])
         towards_whisker = np.array([0.0, -math.cos(beta_rad), math.sin(beta_rad)])
         point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
-        return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm)
+        return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm, stiffness_N_mm)
 
     def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
         """The axis' point nearest to a point."""

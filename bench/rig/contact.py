@@ -193,11 +193,12 @@ class _Problem:
         laws, laws_by = self.law(press, press_by, shear, shear_by, motion, motion_by, unknowns[4:])
         jacobian = np.zeros((len(unknowns), len(unknowns)))
         nearest, jacobian[0, :4] = self._nearest(unknowns[3], pose, flat, apart)
-        jacobian[1, :4] = normal @ pose.point_by
+        jacobian[1, :4] = normal @ pose.point_by + press_by / bar.stiffness_N_mm
         jacobian[1, 3] -= self.contact.rod.taper
         jacobian[2:] = laws_by
         reach = bar.radius_mm + float(self.contact.rod.radius_mm(unknowns[3]))
-        return _Here(pose, np.array([nearest, distance - reach, *laws]), jacobian, press, shear, motion)
+        apart_mm = distance + press / bar.stiffness_N_mm - reach
+        return _Here(pose, np.array([nearest, apart_mm, *laws]), jacobian, press, shear, motion)
 
     def _nearest(self, arc, pose, flat, apart):
         """Zero where the contact is the nearest point (or the tip)."""

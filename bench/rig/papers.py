@@ -122,6 +122,7 @@ def _whisk_truth(whisk):
         "beta_deg": math.degrees(beta), "psi_deg": math.degrees(psi),
         "slip_at_3deg_mm": float(whisk.slip_at(math.radians(3))), "slip_jump_mm": _largest_jump_mm(whisk),
         "mu_static": whisk.friction.static, "mu_kinetic": whisk.friction.kinetic,
+        "stiffness_N_mm": whisk.bar.stiffness_N_mm,
     }
 
 

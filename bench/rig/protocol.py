@@ -188,6 +188,7 @@ class TrialTable(Table):
     after_deg: Positive | None = None
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
+    stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
     purpose: Literal["measure", "gauge"] = "measure"
     follicle_roll_deg: float = 0.0
     name: str = ""

@@ -66,7 +66,8 @@ def _placed(protocol, run, rod, rng):
     beta, psi, d_x, touch = np.array(wanted) + np.array(scatter) * rng.standard_normal(4)
     whisker = float(rod.radius_mm(min(d_x, rod.length_mm)))
     bar = Bar.placed(d_x_mm=d_x, beta_rad=math.radians(beta), psi_rad=math.radians(psi), touch_rad=math.radians(touch),
-                     radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2, whisker_radius_mm=whisker)
+                     radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2, whisker_radius_mm=whisker,
+                     stiffness_N_mm=table.stiffness_N_mm or math.inf)
     return bar, first_touch(rod, bar, math.radians(touch), d_x)
 
 

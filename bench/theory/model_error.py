@@ -14,11 +14,15 @@ from bench.rig.bar import Bar, first_touch
 from bench.rig.contact import moments_Nmm
 from bench.rig.friction import Friction, March
 from bench.rig.rod import Rod
-from estimator.distance import with_friction
+from estimator.beam import Beam
+from estimator.builtin import corrected, with_friction
+from estimator.whisk import EstimatorSettings, Whisk
 
 # The paper's wire. Its stiffness cancels in d_x; its length only has to reach.
 ROD = Rod("cylinder", length_mm=120.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
-_C_NMM2 = 3.0 * ROD.rigidity_Nmm2
+_BEAM = Beam(3.0 * ROD.rigidity_Nmm2, ROD.length_mm)
+_NOISE_NMM = 0.01  # of m_y, by which a robot tells whether the contact slips sideways; a 250th of its moments here
+_NO_HOLD = (float("nan"), float("nan"))
 BETA_DEG, PSI_DEG = np.arange(0.0, 80.1, 2.5), np.arange(-60.0, 61.0, 10.0)
 D_X_MM = np.arange(15.0, 101.0, 5.0)
 BAR_RADIUS_MM = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0, 20.0, 25.0, 30.0])
@@ -41,7 +45,7 @@ class Push:
 class Panel:
     """A map of errors [% of d_x], (rows, columns), over values of two fields of Push; NaN where there is no contact.
 
-    predicted_percent: the same cells to first order, NaN where that is not known.
+    predicted_percent: the same cells to first order, NaN where that is not known; corrected_percent: of (10) corrected.
     """
 
     title: str
@@ -50,10 +54,16 @@ class Panel:
     pushes: tuple[tuple[Push, ...], ...]
     error_percent: np.ndarray
     predicted_percent: np.ndarray
+    corrected_percent: np.ndarray
 
 
 def error_percent(push: Push) -> float:
     """Error of (10) with the true α, in percent of the true d_x; NaN where the whisker finds no hold on the bar."""
+    return errors_percent(push)[0]
+
+
+def errors_percent(push: Push) -> tuple[float, float]:
+    """The error of (10), and that of (10) corrected, which is told the bar's radius; as `error_percent`."""
     theta, alpha = np.radians([push.theta_deg, push.alpha_deg])
     bar = Bar.placed(
         d_x_mm=push.d_x_mm,
@@ -68,10 +78,12 @@ def error_percent(push: Push) -> float:
         march = March(ROD, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
         *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
     except ArithmeticError:
-        return float("nan")
+        return _NO_HOLD
     if state is None:
-        return float("nan")
-    return float(100.0 * (with_friction(theta, *moments_Nmm(state), alpha, _C_NMM2) / touch.d_x_mm - 1.0))
+        return _NO_HOLD
+    felt = Whisk(*(np.zeros(0),) * 4, theta, *moments_Nmm(state), _NOISE_NMM**2 * np.eye(2), 0.0, _BEAM)
+    told = EstimatorSettings(alpha, object_radius_mm=push.bar_radius_mm, whisker_radius_mm=ROD.diameter_mm / 2)
+    return tuple(100.0 * (f(felt, told).d_x_mm / touch.d_x_mm - 1.0) for f in (with_friction, corrected))
 
 
 def predicted_percent(push: Push) -> float:
@@ -117,10 +129,10 @@ def radius_map(
 def _panel(pool: Workers, title: str, push: Push, columns, rows) -> Panel:
     (x, across), (y, up) = columns, rows
     pushes = tuple(tuple(replace(push, **{x: float(a), y: float(b)}) for a in across) for b in up)
-    errors = pool.run(_row, pushes, title)
+    plain, better = np.moveaxis(np.array(pool.run(_row, pushes, title)), -1, 0)
     predicted = [[predicted_percent(push) for push in row] for row in pushes]
-    return Panel(title, x, y, pushes, np.array(errors), np.array(predicted))
+    return Panel(title, x, y, pushes, plain, np.array(predicted), better)
 
 
-def _row(pushes) -> list[float]:
-    return [error_percent(push) for push in pushes]
+def _row(pushes) -> list[tuple[float, float]]:
+    return [errors_percent(push) for push in pushes]

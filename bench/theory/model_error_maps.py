@@ -5,15 +5,19 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from bench.base.drawing import publish, style
 from bench.base.tables import write_table
 from bench.base.workers import Workers
 from bench.theory.model_error import Panel, Push, radius_map, tilt_map
 
-COLUMNS = (*(f.name for f in fields(Push)), "error_percent", "predicted_percent")
+COLUMNS = (*(f.name for f in fields(Push)), "error_percent", "predicted_percent", "corrected_percent")
 _LEVELS = np.array([-5.0, -2.0, -1.0, -0.5, -0.2, -0.1, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
+_LINES = {"levels": _LEVELS, "linewidths": 0.8}
 _NAMES = {
     "beta_deg": "slope β  [°]",
     "psi_deg": "tilt ψ  [°], from the base where positive",
@@ -31,8 +35,8 @@ class Map:
 
 
 MAPS = {
-    "tilt": Map(tilt_map, "Error of (10), α known, d$_x$ = 60 mm, bar of 6 mm, θ = 3°"),
-    "radius": Map(radius_map, "Error of (10), α known, ψ = 0, θ = 3°"),
+    "tilt": Map(tilt_map, "Error at α known, d$_x$ = 60 mm, bar of 6 mm, θ = 3°"),
+    "radius": Map(radius_map, "Error at α known, ψ = 0, θ = 3°"),
 }
 
 
@@ -51,31 +55,43 @@ def write_map(name: str, out: Path, *, workers: int = 1, progress: bool = False)
 def rows(panels: Sequence[Panel]) -> Iterator[dict]:
     """A row a cell, by COLUMNS; errors that are not known are NaN."""
     for panel in panels:
-        for pushes, errors, predicted in zip(panel.pushes, panel.error_percent, panel.predicted_percent):
-            for push, error, foreseen in zip(pushes, errors, predicted):
-                yield asdict(push) | {"error_percent": float(error), "predicted_percent": float(foreseen)}
+        found = panel.error_percent, panel.predicted_percent, panel.corrected_percent
+        for pushes, *errors in zip(panel.pushes, *found):
+            for push, *each in zip(pushes, *errors):
+                yield asdict(push) | dict(zip(COLUMNS[-3:], map(float, each)))
 
 
 def draw(panels: Sequence[Panel], title: str) -> Figure:
-    """A panel each: exact errors in colour and solid lines, their first order in θ dashed."""
-    figure = Figure(figsize=(3.9 * len(panels) + 0.6, 3.9), layout="constrained")
-    grid = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
-    for axes, panel in zip(grid, panels):
-        x, y = (_values(panel, name) for name in (panel.x, panel.y))
-        drawn = axes.contourf(
-            x, y, np.ma.masked_invalid(panel.error_percent), levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both"
-        )
-        lines = axes.contour(x, y, panel.error_percent, levels=_LEVELS, colors="black", linewidths=0.8, linestyles="-")
-        axes.clabel(lines, fmt=lambda level: f"{level:+g} %" if level else "0", fontsize=7)
+    """A column a panel, (10) above, corrected below: exact errors in colour and solid lines, first order dashed."""
+    figure = Figure(figsize=(3.9 * len(panels) + 0.6, 7.2), layout="constrained")
+    grid = figure.subplots(2, len(panels), sharex=True, sharey=True, squeeze=False)
+    for (above, below), panel in zip(grid.T, panels):
+        drawn = _errors(above, panel, panel.error_percent)
+        _errors(below, panel, panel.corrected_percent)
         if np.isfinite(panel.predicted_percent).any():
-            axes.contour(
-                x, y, panel.predicted_percent, levels=_LEVELS, colors="0.35", linewidths=0.8, linestyles="--"
-            )
-        axes.set(title=panel.title, xlabel=_NAMES[panel.x])
-    grid[0].set_ylabel(_NAMES[panels[0].y])
-    figure.suptitle(f"{title}; solid: exact mechanics, dashed: to first order in θ", fontsize=9)
+            above.contour(*_axes(panel), panel.predicted_percent, **_LINES, colors="0.35", linestyles="--")
+        above.set_title(panel.title)
+        below.set_xlabel(_NAMES[panel.x])
+    for axes, name in zip(grid[:, 0], ("(10)", "(10) corrected")):
+        axes.set_ylabel(f"{name}\n{_NAMES[panels[0].y]}")
+    lines = [Line2D([], [], color=c, ls=ls, lw=0.8) for c, ls in (("black", "-"), ("0.35", "--"))]
+    figure.legend(lines, ["exact mechanics", "to first order in θ"], loc="outside lower center", ncols=2)
+    figure.suptitle(title, fontsize=9)
     figure.colorbar(drawn, ax=grid, label="error of d$_x$  [%]", ticks=_LEVELS)
     return figure
+
+
+def _errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:
+    """Errors in colour, and their lines with numbers."""
+    known = np.ma.masked_invalid(percent)
+    drawn = axes.contourf(*_axes(panel), known, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both")
+    lines = axes.contour(*_axes(panel), known, **_LINES, colors="black", linestyles="-")
+    axes.clabel(lines, fmt=lambda level: f"{level:+g} %" if level else "0", fontsize=7)
+    return drawn
+
+
+def _axes(panel: Panel) -> tuple[np.ndarray, np.ndarray]:
+    return _values(panel, panel.x), _values(panel, panel.y)
 
 
 def _norm():

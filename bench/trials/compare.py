@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.records.trial import EstimateRow, SeenWhisk, TrialResult, whisks
+from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.trials.seen import NO_PICTURES
+
+NO_DOUBTS = ("", NO_PICTURES)  # what the status of a whisk may say that makes nothing doubtful
 
 
 @dataclass(frozen=True)
@@ -13,7 +16,7 @@ class Judged:
     """One estimate beside the truth. Truth is NaN where there is none; slope is the seen one, else the nominal one.
 
     one_factor: made with one gauge factor a channel. status: what the estimator or the bench says of the estimate.
-    apart: what the whisk's recording says twice does not agree, so that nothing is concluded from it.
+    doubtful: something is, of the whisk itself.
     """
 
     trial: str
@@ -29,7 +32,7 @@ class Judged:
     d_x_est_sigma_mm: float
     one_factor: bool = False
     status: str = ""
-    apart: bool = False
+    doubtful: bool = False
 
     @property
     def error_mm(self) -> float:
@@ -47,6 +50,15 @@ class Judged:
         return 100.0 * float(np.hypot(self.d_x_est_sigma_mm, self.d_x_sigma_mm)) / self.d_x_mm
 
 
+def is_sound(seen: SeenWhisk, felt: FeltWhisk) -> bool:
+    """Is nothing doubtful of distance and moments, seen and felt? No verdict takes doubtful ones.
+
+    A slip that is seen to jump, or not up to the wanted angle, leaves the distance what it is.
+    """
+    of_slip = seen.at.status if seen.at is not None else ""
+    return not ({*seen.status.split("; "), felt.status} - {of_slip, *NO_DOUBTS})
+
+
 def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
     """β as seen; the nominal one where the session has no pictures of it."""
     beta_rad = seen.beta_rad.value
@@ -56,14 +68,14 @@ def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
 def judge(results: Iterable[TrialResult]) -> list[Judged]:
     """Every estimate of every whisk."""
     return [
-        _judged(result, seen, answer, one_factor, felt.apart)
+        _judged(result, seen, answer, one_factor, not is_sound(seen, felt))
         for result, seen, felt in whisks(results)
         for one_factor, answers in ((False, felt.estimates), (True, felt.one_factor))
         for answer in answers
     ]
 
 
-def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool, apart: bool) -> Judged:
+def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_factor: bool, doubtful: bool) -> Judged:
     trial = result.trial
     return Judged(
         trial.name,
@@ -79,5 +91,5 @@ def _judged(result: TrialResult, seen: SeenWhisk, answer: EstimateRow, one_facto
         float(answer.d_x_est_mm.sigma),
         one_factor,
         answer.status,
-        apart,
+        doubtful,
     )

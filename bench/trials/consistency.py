@@ -5,7 +5,7 @@ trace of its own; the one that leaves the least χ² when its trace is taken awa
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -13,11 +13,14 @@ from scipy.special import chdtrc
 from bench.session.trial import Trial
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
+from vision.truth.value import Value
 
 # Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
 LEAST_CHANCE = 1e-4
 _EXPLAINED = 0.001  # of the chance that a cause must leave: its trace is that of an ideal fault
 _PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
+# Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
+_NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 _BAR_SIGMA = 0.025  # of how thick a trial's bar looks, in the middle of 35 path-traced scenes; 8 scatter by 0.1 to 0.5
 
 
@@ -142,3 +145,19 @@ def width_doubt(bar_looks: Mapping[str, float], trial: Trial, board: Board | Non
     bar = f"some {trial.bar_diameter_mm * factor:.3g} for {trial.bar_diameter_mm:g}"
     found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
     return f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
+
+
+def slope_doubt(beta: Value, trial: Trial) -> str:
+    """The bar's slope as seen against trial.toml's: a sentence where they are apart, '' where they are not, or where
+    one of them is not known."""
+    if trial.beta_deg is None or not np.isfinite(beta.value):
+        return ""
+    nominal_sigma = np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD
+    apart = beta.value - np.radians(trial.beta_deg)
+    difference = Difference(np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal_sigma**2)]]), 1)
+    if difference.is_chance:
+        return ""
+    seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
+    mirrored = replace(difference, values=np.array([beta.value + np.radians(trial.beta_deg)]))
+    cause = "its sign looks turned" if mirrored.is_chance else "check it, or something else is taken for the bar"
+    return f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}"

@@ -12,10 +12,11 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import GAUGE_DELAY_S, Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
-from bench.records.trial import EstimateRow, FeltWhisk
+from bench.records.trial import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
+from estimator.contact import Contact, contact_of
 from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
 from estimator.uncertainty import Z_95
@@ -26,6 +27,9 @@ from vision.truth.value import Value
 # 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
 OBJECT_REACH_MM = 3.5
 TILT_SIGMA_RAD = np.radians(5.0)
+UNTOLD = (math.nan, 0.0)  # radii of bar and whisker where nobody says
+# Pushing angles at which a run says how error and sigma go with θ: steps of a half and less, where errors bend.
+THETAS_DEG = (0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0)
 
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
@@ -90,14 +94,17 @@ def felt_whisk(
 ) -> tuple[Touch, Whisk | str]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
-    if touch.status:
-        return touch, touch.status
+    return touch, touch.status or whisk_at(stroke, readout, touch, beam, theta_rad)
+
+
+def whisk_at(stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_rad: float) -> Whisk | str:
+    """`felt_whisk` of a touch that is known."""
     at = stroke.at(theta_rad, touch)
     if at.status:
-        return touch, at.status
+        return at.status
     moments = (stroke.filtered - touch.offset) @ readout.matrix.T
     m_y, m_z = readout.matrix @ at.values
-    return touch, Whisk(
+    return Whisk(
         stroke.time_s,
         stroke.motor_rad - touch.motor_rad,
         moments[:, 0],
@@ -122,15 +129,35 @@ def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float) 
     felt = FeltWhisk(number, Value(touch.motor_rad, late), theta_sigma_rad=touch.sigma_rad)
     if whisk is None:
         return felt
-    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
+    m_y, m_z = _moments(whisk)
     return replace(
         felt,
-        m_y_Nmm=Value(whisk.m_y_at_Nmm, sigma_y),
-        m_z_Nmm=Value(whisk.m_z_at_Nmm, sigma_z),
+        m_y_Nmm=m_y,
+        m_z_Nmm=m_z,
         phi_felt_rad=_slip_angle(whisk),
         covariance_at=whisk.covariance_at,
         theta_moment_covariance_at=whisk.theta_moment_covariance_at,
     )
+
+
+def _moments(whisk: Whisk) -> tuple[Value, Value]:
+    """m_y and m_z at the wanted angle, with their sigmas."""
+    sigma_y, sigma_z = np.sqrt(np.diag(whisk.covariance_at)).tolist()
+    return Value(whisk.m_y_at_Nmm, sigma_y), Value(whisk.m_z_at_Nmm, sigma_z)
+
+
+def felt_by_theta(
+    stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, answered: Callable[[Whisk], tuple[EstimateRow, ...]]
+) -> tuple[FeltAt, ...]:
+    """Moments and what estimators answer at THETAS_DEG, as far as the stroke goes."""
+    reached = (whisk_at(stroke, readout, touch, beam, theta) for theta in np.radians(THETAS_DEG).tolist())
+    return tuple(felt_at(whisk, answered(whisk)) for whisk in reached if isinstance(whisk, Whisk))
+
+
+def felt_at(whisk: Whisk, estimates: tuple[EstimateRow, ...] = ()) -> FeltAt:
+    """The record of a whisk at its pushing angle."""
+    covariances = whisk.theta_sigma_rad, whisk.covariance_at, whisk.theta_moment_covariance_at
+    return FeltAt(whisk.theta_at_rad, *_moments(whisk), *covariances, estimates)
 
 
 def _slip_angle(whisk: Whisk) -> Value:
@@ -140,25 +167,50 @@ def _slip_angle(whisk: Whisk) -> Value:
     return Value(felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0)))
 
 
-def answers(whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings) -> tuple[EstimateRow, ...]:
-    """What each estimator says, as rows of estimates.csv without truth."""
+def answers(
+    whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings, radii_mm: tuple[float, float] = UNTOLD
+) -> tuple[EstimateRow, ...]:
+    """What each estimator says, as rows of estimates.csv without truth. radii_mm: see `answer`."""
     alpha = settings.alpha_est_rad, float(np.radians(settings.first_alpha_est_sigma_deg))
-    return tuple(answer(name, estimator, whisk, *alpha) for name, estimator in asked.items())
+    return tuple(answer(name, estimator, whisk, *alpha, radii_mm) for name, estimator in asked.items())
 
 
-def answer(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> EstimateRow:
-    """What one estimator says under a friction angle with its sigma; its own sigma as if that angle were right, too."""
-    exact, doubted = (_asked(name, estimator, whisk, alpha_est_rad, sigma) for sigma in (0.0, float(sigma_rad)))
+def answer(
+    name: str,
+    estimator: Estimator,
+    whisk: Whisk,
+    alpha_est_rad: float,
+    sigma_rad: float,
+    radii_mm: tuple[float, float] = UNTOLD,
+) -> EstimateRow:
+    """What one estimator says under a friction angle with its sigma; its own sigma as if that angle were right, too.
+
+    radii_mm: of the bar, NaN where nobody says, and of the whisker's base.
+    """
+    told = EstimatorSettings(alpha_est_rad, float(sigma_rad), OBJECT_REACH_MM, TILT_SIGMA_RAD, *radii_mm)
+    exact, doubted = (
+        _asked(name, estimator, whisk, one) for one in (replace(told, alpha_est_sigma_rad=0.0), told)
+    )
     ends = (doubted.low_mm, doubted.high_mm)
     if math.isnan(doubted.low_mm) and math.isnan(doubted.high_mm):
         ends = (doubted.d_x_mm - Z_95 * doubted.sigma_mm, doubted.d_x_mm + Z_95 * doubted.sigma_mm)
     d_x = Value(doubted.d_x_mm, doubted.sigma_mm)
     angles = doubted.alpha_est_rad, float(doubted.beta_rad)
-    return EstimateRow(name, d_x, *angles, doubted.status, exact.sigma_mm, *map(float, ends))
+    row = EstimateRow(name, d_x, *angles, doubted.status, exact.sigma_mm, *map(float, ends))
+    return _with_contact(row, contact_of(whisk, doubted, told.alpha_est_sigma_rad if angles[0] else 0.0))
 
 
-def _asked(name: str, estimator: Estimator, whisk: Whisk, alpha_est_rad: float, sigma_rad: float) -> Estimate:
-    told = EstimatorSettings(alpha_est_rad, sigma_rad, OBJECT_REACH_MM, TILT_SIGMA_RAD)
+def _with_contact(row: EstimateRow, contact: Contact) -> EstimateRow:
+    return replace(
+        row,
+        d_y_est_mm=Value(contact.d_y_mm, contact.d_y_sigma_mm),
+        d_z_est_mm=Value(contact.d_z_mm, contact.d_z_sigma_mm),
+        slip_est_mm=Value(contact.slip_mm, contact.slip_sigma_mm),
+        touch_covariance_mm_rad=contact.touch_covariance_mm_rad,
+    )
+
+
+def _asked(name: str, estimator: Estimator, whisk: Whisk, told: EstimatorSettings) -> Estimate:
     try:
         estimate = estimator(whisk, told)
     except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do

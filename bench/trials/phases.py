@@ -6,6 +6,7 @@ the jump is the static angle. A jump ends where the force is back on the kinetic
 would show too large an angle, as nothing tells the two apart.
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -74,18 +75,49 @@ def felt_phases(
 
     Between two jumps both moments are lines, whose ends give the friction angles.
     """
+    jumps, found = rests_of(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, beam)
+    angles = tuple(angle for rest in found for angle in rest.angles(abs(beta_rad)))
+    return Phases(len(found), jumps, angles) if jumps else NO_PHASES
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A contact at rest between two jumps: from and to which θ (to: NaN where the record ends before the next jump).
+
+    lines (2, 2): |m_y| and m_z, value and slope about a middle; shape (2, 2) and variances (2,) of their covariance.
+    """
+
+    from_rad: float
+    to_rad: float
+    middle_rad: float
+    lines: np.ndarray
+    shape: np.ndarray
+    variances: np.ndarray
+
+    def moments_at(self, theta_rad: float) -> tuple[np.ndarray, np.ndarray]:
+        """|m_y| and m_z (2,) there, and their variances (2,)."""
+        row = np.array([1.0, theta_rad - self.middle_rad])
+        return row @ self.lines, row @ self.shape @ row * self.variances
+
+    def angles(self, slope: float) -> list[Angle]:
+        """|β| − |φ| at both ends."""
+        ends = ((KINETIC, self.from_rad), (STATIC, self.to_rad))
+        return [_angle(kind, at, *self.moments_at(at), slope) for kind, at in ends if np.isfinite(at)]
+
+
+def rests_of(
+    time_s: np.ndarray, theta_rad: np.ndarray, moments_Nmm: np.ndarray, beta_rad: float, d_x_mm: float, beam: Beam
+) -> tuple[int, list[Rest]]:
+    """How many jumps there are, and what lies between two of them where the contact rests there; as `felt_phases`."""
     good = np.isfinite(moments_Nmm).all(axis=1)
     time, theta, moments = time_s[good], theta_rad[good], moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slope = abs(beta_rad)
     mm_per_Nmm = d_x_mm / beam.moment_Nmm(1.0, d_x_mm)
     slip = mm_per_Nmm * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
     jumps = _jumps(time, theta, slip)
-    if not len(jumps):
-        return NO_PHASES
     ends = [(a, b, b < len(theta)) for a, b in zip(jumps, [*jumps[1:], len(theta)])]
-    found = [_rest(theta[a:b], moments[a:b], slip[a:b], slope, jumps_off) for a, b, jumps_off in ends]
-    rests = [angles for angles in found if angles is not None]
-    return Phases(len(rests), len(jumps), tuple(angle for angles in rests for angle in angles))
+    found = [_rest(theta[a:b], moments[a:b], slip[a:b], jumps_off) for a, b, jumps_off in ends]
+    return len(jumps), [rest for rest in found if rest is not None]
 
 
 def _jumps(time, theta, slip) -> list[int]:
@@ -118,8 +150,8 @@ def _without_ringing(jumps: list[int], theta, slip) -> list[int]:
     return jumps
 
 
-def _rest(theta, moments, slip, slope: float, jumps_off: bool) -> list[Angle] | None:
-    """Angles at both ends of what lies between two jumps; None where the contact does not rest there."""
+def _rest(theta, moments, slip, jumps_off: bool) -> Rest | None:
+    """What lies between two jumps; None where the contact does not rest there."""
     inner = slice(_GUARD, len(theta) - _GUARD)
     if len(theta[inner]) < 2 * _FEWEST:
         return None
@@ -130,18 +162,15 @@ def _rest(theta, moments, slip, slope: float, jumps_off: bool) -> list[Angle] | 
     if lines[1, 2] > _REST_SHARE * lines[0, 2] / middle:
         return None
     variances = np.sum((columns - design @ lines) ** 2, axis=0)[:2] / (len(design) - 2)
-    shape = np.linalg.inv(design.T @ design)
-    wanted = [(KINETIC, theta[0])] + ([(STATIC, theta[-1])] if jumps_off else [])
-    rows = [(kind, at, np.array([1.0, at - middle])) for kind, at in wanted]
-    return [_angle(*row, lines[:, :2], shape, variances, slope) for row in rows]
+    ends = float(theta[0]), float(theta[-1]) if jumps_off else np.nan
+    return Rest(*ends, float(middle), lines[:, :2], np.linalg.inv(design.T @ design), variances)
 
 
-def _angle(kind: str, at: float, row, lines, shape, variances, slope: float) -> Angle:
-    """|β| − |φ| at one end of the lines of m_y and m_z."""
-    m_y, m_z = row @ lines
-    share = row @ shape @ row
+def _angle(kind: str, at: float, moments, variances, slope: float) -> Angle:
+    """|β| − |φ| of the moments |m_y|, m_z with their variances."""
+    m_y, m_z = moments
     gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
-    return Angle(kind, at, slope - float(np.arctan2(m_y, m_z)), float(np.sqrt(share * gradient**2 @ variances)))
+    return Angle(kind, at, slope - float(np.arctan2(m_y, m_z)), float(np.sqrt(gradient**2 @ variances)))
 
 
 def slips(seen: SeenWhisk) -> bool:

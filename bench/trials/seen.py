@@ -1,7 +1,8 @@
 """The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import fields
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,13 +14,13 @@ from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
-from bench.trials.consistency import turns_doubt, width_doubt
+from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
 from bench.trials.scene import still_scene
+from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
-from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
-from vision.truth.records import WhiskTruth
+from vision.truth.records import TrialTruth, WhiskTruth
 
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12
@@ -58,20 +59,26 @@ def _see(
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     places = [times.frames_in(signals, stroke) for stroke in strokes]
     back = _backwards(signals, times)
-    truth = observe_trial(
-        {name: pictures for name, pictures in scene.frames.items() if name not in scene.left_out},
+    observe = partial(
+        observe_trial,
+        {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
-        [*places, *back],
-        calibration.cameras,
-        wire,
-        Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
-        calibration.background,
-        VisionSettings(clock_sigma_s=clock_sigma_s),
+        cameras=calibration.cameras,
+        wire=wire,
+        bar=Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
+        background=calibration.background,
     )
-    odd = width_doubt(truth.bar_looks, trial, session.board)
+    first, *harder = [(one.name, replace(one.vision, clock_sigma_s=clock_sigma_s)) for one in rungs(settings)]
+    truth = observe(whisks=[*places, *back], settings=first[1])
+    looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]
+    for rung in harder:
+        looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
+    thick, left_out = width_doubt(truth.bar_looks, trial, session.board), scene.left_out.values()
+    odd = [[thick, slope_doubt(one.beta_rad, trial)] for _, one in looked]
+    whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
-        tuple(whisk_record(whisk, settings, scene.left_out.values(), [odd]) for whisk in truth.whisks[: len(places)]),
+        tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),
         (*truth.notes, *_lost(frames, times), *dropped(times, places), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
@@ -80,6 +87,16 @@ def _see(
         truth.bar_looks,
         _touch_alone(truth.whisks[-1]) if back else None,
     )
+
+
+def _looked_harder(observe: Callable[..., TrialTruth], places, looked, rung, accuracy_mm: float) -> list:
+    """Whisks with the name of what they were looked at by, those that are not known so well by another rung. What that
+    does not see stays."""
+    name, vision = rung
+    left = [k for k, (_, whisk) in enumerate(looked) if not whisk.d_x_mm.sigma <= accuracy_mm]
+    again = observe(whisks=[places[k] for k in left], settings=vision).whisks if left else ()
+    better = {k: (name, replace(whisk, whisk=k)) for k, whisk in zip(left, again) if np.isfinite(whisk.d_x_mm.value)}
+    return [better.get(k, one) for k, one in enumerate(looked)]
 
 
 def _backwards(signals: Signals, times: FrameTimes) -> list[slice]:

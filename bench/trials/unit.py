@@ -6,6 +6,7 @@ look at the pictures.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial import (
     EstimateRow,
+    FeltAt,
     FeltTrial,
     FeltWhisk,
     SeenTrial,
@@ -33,11 +35,13 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
-from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
+from bench.trials.gate import kinetic_end
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
 from estimator.signal import NOT_REACHED, Touch
+from estimator.whisk import Whisk
 from vision.truth.value import NAN, UNKNOWN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
@@ -88,7 +92,7 @@ class Unit:
     @property
     def hash(self) -> str:
         """Hash of all that the result depends on."""
-        made_from = self.drift_rate, self.gauges, self.settings, self.settings.own_code()
+        made_from = self.drift_rate, self.gauges, self.settings.estimated(), self.settings.own_code()
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
 
     def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":
@@ -135,7 +139,8 @@ def trial_result(unit: Unit) -> TrialResult:
 
 
 def _described(trial: Trial) -> TrialFacts:
-    nominal = (NAN if value is None else float(value) for value in (trial.d_x_mm, trial.beta_deg))
+    given = trial.d_x_mm, trial.beta_deg, trial.bar_diameter_mm
+    nominal = (NAN if value is None else float(value) for value in given)
     return TrialFacts(trial.name, trial.purpose, trial.surface, trial.speed_deg_s, *nominal)
 
 
@@ -167,10 +172,15 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     if usable is None:
         return felt
     felt = _against_pictures(felt, unit, stroke, readout, seen)
+    asked, radii_mm = estimators(unit.settings.estimators), _radii_mm(unit)
+    answered = partial(answers, asked=asked, settings=unit.settings, radii_mm=radii_mm)
+    estimates = answered(usable)
     return replace(
         felt,
         phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
-        estimates=answers(usable, estimators(unit.settings.estimators), unit.settings),
+        estimates=estimates,
+        kinetic=_kinetic(stroke, touch, readout, usable, estimates),
+        by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         one_factor=_one_factor(unit, kind, stroke),
     )
 
@@ -203,6 +213,16 @@ def _phases(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: 
     return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
 
 
+def _kinetic(
+    stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, estimates: tuple[EstimateRow, ...]
+) -> FeltAt | None:
+    """The whisk on the kinetic cone, where its moments show teeth; no picture and no manifest has a part in it."""
+    given = next(row for row in estimates if row.estimator == "with_friction")
+    moments = (stroke.channels - touch.offset) @ readout.matrix.T
+    found = kinetic_end(stroke.time_s, stroke.motor_rad - touch.motor_rad, moments, whisk, given)
+    return None if found is None else felt_at(found)
+
+
 def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
     """How channels become moments, or why they cannot."""
     if kind == "Nmm":
@@ -223,5 +243,11 @@ def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...
         return ()
     readout, beam = Readout.of(unit.trial, plain_gauges), unit.session.whisker.beam
     _, whisk = felt_whisk(stroke, readout, unit.drift_rate, beam, unit.settings.theta_rad)
-    return answers(whisk, estimators(()), unit.settings)
+    return answers(whisk, estimators(()), unit.settings, _radii_mm(unit))
+
+
+def _radii_mm(unit: Unit) -> tuple[float, float]:
+    """Of the bar, NaN where the manifest does not say, and of the whisker's base."""
+    bar = unit.trial.bar_diameter_mm
+    return (NAN if bar is None else 0.5 * bar), 0.5 * unit.session.whisker.diameter_mm
 

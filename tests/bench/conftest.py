@@ -1,5 +1,6 @@
 """Sessions whose truth is known without looking at their pictures, so that the bench is tested apart from vision."""
 
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from bench.base.results import hash_of
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
+from bench.evaluate import evaluate
 from bench.records.trial import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes
@@ -124,6 +126,22 @@ def steel_trial(steel_sample):
 @pytest.fixture
 def exact_vision(monkeypatch):
     """Evaluations (with workers=0) see exactly, and count how many trials they looked at."""
+    return _see_exactly_in(monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def exact_run(steel_signals, tmp_path_factory) -> Path:
+    """A folder of results, seen exactly: of steel-signals, with a trial called `<script>`. Read only."""
+    session = Path(shutil.copytree(steel_signals, tmp_path_factory.mktemp("signals") / "session"))
+    (session / "trials" / "b30_3").rename(session / "trials" / "<script>")
+    out = tmp_path_factory.mktemp("run")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        _see_exactly_in(monkeypatch)
+        evaluate(session, out, Settings(), workers=0)
+    return out
+
+
+def _see_exactly_in(monkeypatch) -> list[str]:
     looks = []
 
     def see(session, trial, *rest):

@@ -10,7 +10,8 @@ import pytest
 from bench import cli
 from bench.base.errors import BadInput
 
-VERBS = ["check", "calibrate cameras", "calibrate gauges", "evaluate", "simulate", "info"]
+VERBS = ["new", "board", "check", "calibrate cameras", "calibrate gauges", "evaluate", "simulate", "info"]
+VERBS += ["report", "compare", "view"]
 VERBS += ["figures 5", "figures 6", "figures 8", "figures tilt", "figures radius"]
 
 

@@ -49,7 +49,7 @@ def test_tables_have_the_columns_of_the_format_in_their_order(steel):
     """Names are what other people's scripts rely on, so they stand here as in the format's description."""
     first = "trial,whisk,surface,speed_deg_s,beta_nominal_deg,theta_deg,touch_deg,touch_sigma_deg,touch_felt_deg"
     assert ",".join(WHISK_COLUMNS).startswith(first)
-    assert WHISK_COLUMNS[-9:] == (
+    assert WHISK_COLUMNS[-10:] == (
         "x_mm",
         "x_sigma_mm",
         "y_mm",
@@ -58,6 +58,7 @@ def test_tables_have_the_columns_of_the_format_in_their_order(steel):
         "z_sigma_mm",
         "cameras",
         "frames_used",
+        "looked",
         "status",
     )
     for name, columns in (("whisks", WHISK_COLUMNS), ("estimates", ESTIMATE_COLUMNS), ("track/b60_4", TRACK_COLUMNS)):

@@ -1,5 +1,6 @@
 """docs/formats.md names every key and column that there is, and none that there is not."""
 
+import dataclasses
 import json
 import re
 import tomllib
@@ -7,14 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from bench import tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import error_map, explained, tables
+from bench.friction import curved, error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
-from bench.report import assembly, figure_8
+from bench.report import against_theta, assembly, compare, figure_8
+from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
 from bench.theory import model_error_maps
+from bench.trials import seeing
 from tests.scenes.formats import DOCUMENT, documented, keys
 from tests.scenes.rig_sessions import protocol_file
 
@@ -30,6 +34,7 @@ TOML = {
     "[signals]": manifest.SignalKeys,
     "[trial]": manifest.TrialKeys,
     "gauges.toml": FileKeys,
+    "[seeing]": seeing.SeeingKeys,
 }
 CSV = {
     "whisks.csv": assembly.WHISK_COLUMNS,
@@ -42,7 +47,12 @@ CSV = {
     "surfaces.csv": tables.SURFACE_COLUMNS,
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
+    "compliance.csv": soft.COLUMNS,
+    "curvature.csv": curved.COLUMNS,
+    "against_theta.csv": against_theta.COLUMNS,
+    "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
+    "tradeoff.csv": tradeoff.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 
@@ -63,6 +73,21 @@ def test_keys_of_results(steel_signals, exact_vision, tmp_path):
     written = keys(json.loads((tmp_path / "trials" / "b60_4.json").read_text()))
     named = set(documented("trials/<trial>.json"))
     assert {path for path in named if not path.startswith("seen.")} == {p for p in written if not p.startswith("seen.")}
+
+
+def test_keys_of_the_run(exact_run):
+    record = json.loads((exact_run / "run.json").read_text())
+    named = set(documented("run.json"))
+    written = {re.sub(r"^(recordings|versions)\.(.*)$", _by_name, key) for key in keys(record)}
+    absent = {"board", "cameras"}  # without pictures
+    assert {n for n in named if n.split(".")[0].rstrip("[]") not in absent} == written - absent
+    fields = {f"cameras[].{f.name}" for f in dataclasses.fields(CameraFacts)}
+    fields |= {f"board.{f.name}" for f in dataclasses.fields(BoardFacts)}
+    assert {n for n in named if n.split(".")[0].rstrip("[]") in absent} == fields
+
+
+def _by_name(match: re.Match) -> str:
+    return f"{match[1]}.<{'trial' if match[1] == 'recordings' else 'distribution'}>"
 
 
 def test_truth_of_a_simulated_session(tmp_path):

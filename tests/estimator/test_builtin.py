@@ -16,6 +16,7 @@ pytestmark = pytest.mark.filterwarnings("error")
 BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
 THETA, ALPHA = np.radians(3.0), np.radians(10.5)
 SETTINGS = EstimatorSettings(ALPHA)
+PAPER = {name: function for name, function in ESTIMATORS.items() if name != "corrected"}
 
 
 def whisk_of(m_y, m_z, *, beam=BEAM, sigma=0.01, theta=THETA):
@@ -37,14 +38,14 @@ def test_with_friction_finds_the_distance(beta_deg):
 
 
 def test_without_slip_all_agree():
-    found = [function(whisk_at(60.0, 0.1), SETTINGS).d_x_mm for function in ESTIMATORS.values()]
+    found = [function(whisk_at(60.0, 0.1), SETTINGS).d_x_mm for function in PAPER.values()]
     np.testing.assert_allclose(found, 60.0, rtol=1e-14)
 
 
 def test_under_slip_no_slip_and_frictionless_are_too_long():
     """Section II: slip makes (2) overestimate; (12) with too little friction as well."""
     whisk = whisk_at(40.0, np.radians(45))
-    no_slip, with_friction, frictionless = (ESTIMATORS[n](whisk, SETTINGS).d_x_mm for n in ESTIMATORS)
+    no_slip, with_friction, frictionless = (ESTIMATORS[n](whisk, SETTINGS).d_x_mm for n in PAPER)
     assert no_slip > frictionless > with_friction == pytest.approx(40.0)
 
 
@@ -95,7 +96,7 @@ def test_friction_that_leaves_no_distance_is_told_by_the_one_that_assumes_it():
 def test_cone_is_the_cylinder_with_one_over_length_added():
     cone = dataclasses.replace(BEAM, shape="cone")
     moments = slip.moments(80.0, THETA, 0.9, ALPHA, BEAM.C_Nmm2)
-    for function in ESTIMATORS.values():
+    for function in PAPER.values():
         cylinder, tapered = (function(whisk_of(*moments, beam=beam), SETTINGS) for beam in (BEAM, cone))
         if not cylinder.status:
             assert 1 / tapered.d_x_mm == pytest.approx(1 / cylinder.d_x_mm + 1 / 100.0, rel=1e-14)
@@ -260,3 +261,36 @@ def test_whisks_are_checked(change, message):
 def test_answers_are_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Estimate(1.0, 0.1).d_x_mm = 2.0
+
+
+THICK = EstimatorSettings(ALPHA, 0.0, 3.5, np.radians(5.0), 3.0, 0.5)
+
+
+def test_corrected_takes_out_rolling_where_it_slips():
+    """docs/maps.md: 3/8 θ R/d_x cos β, R of bar and whisker together."""
+    plain, better = (f(whisk_at(60.0, np.radians(50)), THICK) for f in (builtin.with_friction, builtin.corrected))
+    assert better.d_x_mm - plain.d_x_mm == pytest.approx(0.375 * THETA * 3.5 * np.cos(np.radians(50)), rel=1e-9)
+    assert better.sigma_mm < plain.sigma_mm
+    assert better.low_mm - plain.low_mm == pytest.approx(better.d_x_mm - plain.d_x_mm, rel=0.3)
+
+
+def test_corrected_takes_out_friction_along_the_whisker_where_it_is_held():
+    plain, better = (f(whisk_at(60.0, 0.0), THICK) for f in (builtin.with_friction, builtin.corrected))
+    expected = THETA * (0.375 * 3.5 + 60.0 * np.pi / 4 * 0.2 * np.tan(ALPHA))
+    assert better.d_x_mm - plain.d_x_mm == pytest.approx(expected, rel=1e-9)
+
+
+def test_who_is_told_no_radius_allows_for_one():
+    """It corrects by what it has to allow for, and keeps all of that in its sigma."""
+    untold = dataclasses.replace(THICK, object_radius_mm=np.nan)
+    told, guessed = (builtin.corrected(whisk_at(60.0, np.radians(50)), s) for s in (THICK, untold))
+    assert guessed.d_x_mm == told.d_x_mm and guessed.sigma_mm > told.sigma_mm
+
+
+@pytest.mark.parametrize("beta_deg", [79, 85])
+def test_corrected_says_what_10_says_where_that_has_no_distance(beta_deg):
+    steep = EstimatorSettings(np.radians(16.0), np.radians(5.0), 3.5, 0.1, 3.0, 0.5)
+    whisk = whisk_at(60.0, np.radians(beta_deg), np.radians(10.0))
+    plain, better = (f(whisk, steep) for f in (builtin.with_friction, builtin.corrected))
+    assert plain.status == better.status
+    assert (plain.high_mm > 0) == (better.high_mm > 0)

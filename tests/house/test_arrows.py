@@ -10,7 +10,20 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = {
     "vision": ("geometry", "pictures", "boards", "calibration", "lines", "bar", "fit", "truth", ""),
     "estimator": ("",),
-    "bench": ("base", "session", "rig", "cameras", "records", "gauges", "trials", "friction", "report", "theory", ""),
+    "bench": (
+        "base",
+        "session",
+        "rig",
+        "setup",
+        "cameras",
+        "records",
+        "gauges",
+        "trials",
+        "friction",
+        "report",
+        "theory",
+        "",
+    ),
 }
 MAY_IMPORT = {"vision": {"vision"}, "estimator": {"estimator"}, "bench": {"bench", "vision", "estimator"}}
 # The rig makes sessions: it needs nothing of what reads them, nor a line of vision and estimator.

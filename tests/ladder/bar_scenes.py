@@ -47,7 +47,8 @@ def read_scene(folder: Path) -> tuple[list[View], list[Camera], Rods, np.ndarray
     truth = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
     angles = np.radians([truth[name] for name in ("touch_deg", "beta_deg", "psi_deg")])
     motor = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)["motor_deg"]
-    return views, cameras, rods, np.radians(motor), upward(axis_from_angles(truth["d_x_mm"], *angles, rods.reach_mm))
+    axis = axis_from_angles(truth["d_x_mm"], *angles, rods.reach_mm(truth["d_x_mm"]))
+    return views, cameras, rods, np.radians(motor), upward(axis)
 
 
 def off_px(camera: Camera, true: BarAxis, radius_mm: float, px, normal) -> np.ndarray:
@@ -99,7 +100,8 @@ def line_rows(camera: Camera, seen: SeenBar, true: BarAxis, radius_mm: float) ->
         return []
     error = off_px(camera, true, radius_mm, line.points.px, line.points.normal)
     parts = [f"{e:+.3f} ± {s:.3f}" for e, s in zip(error, line.points.sigma_px)]
-    print(f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.for_bar:.0f}", flush=True)
+    print(f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.for_bar:.0f}, left {line.unresolved:.3f}",
+          flush=True)
     return list(zip(error, line.points.sigma_px))
 
 

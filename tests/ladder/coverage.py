@@ -4,6 +4,8 @@
     python tests/ladder/coverage.py pictures FOLDER --count 300
     python tests/ladder/coverage.py alone FOLDER --count 100
     python tests/ladder/coverage.py hard FOLDER --count 100
+    python tests/ladder/coverage.py cone FOLDER --count 30
+    python tests/ladder/coverage.py tapered FOLDER --count 30
 
 Every scene is drawn anew (slope, distance, cameras, noise, friction, sag, tilt of the bar, light) and its cameras are
 calibrated anew from noisy corners. `points` fits line points with every error that the fit allows for; `pictures` has
@@ -24,6 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.rig.parts import Job, frames_of
+from bench.rig.protocol import WhiskerTable
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
 from tests.ladder.scenes import Scene, as_problem, begin, calibrated, draw_scene, given, hard_light, line_points
 from vision.bar.one_view import seen_from_one_side
@@ -41,6 +44,7 @@ QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.
 SLIP_AT_RAD = math.radians(3.0)
 # Line points start from no bend at all: first as plain least squares, then more and more robust.
 SCALES = (1e9,) * 4 + (10.0, 4.0, 4.0)
+WIRES = {"cone": WhiskerTable(shape="cone"), "tapered": WhiskerTable(shape="tapered", tip_diameter_mm=0.4)}
 COLUMNS = ("seed", "beta_true_deg", "d_x_true_mm", "cameras", "plane_angle_deg", "status",
            *(f"{name}_{what}" for name in QUANTITIES for what in ("error", "sigma")), "slip_rms_mm", "slip_worst_z")
 
@@ -101,9 +105,11 @@ def see_alone(scene: Scene) -> Seen:
     return see_pictures(scene, 1)
 
 
-def see_hard(scene: Scene) -> Seen:
-    """The same in light that hides edges."""
-    return see_pictures(draw_scene(scene.seed, light=hard_light(scene.seed)))
+def kept(what: str, seed: int) -> dict:
+    """The tables that a way's scenes keep, whatever else is drawn."""
+    if what == "hard":
+        return {"light": hard_light(seed)}
+    return {"whisker": WIRES[what]} if what in WIRES else {}
 
 
 def row_of(scene: Scene, seen: Seen) -> dict:
@@ -125,9 +131,9 @@ def row_of(scene: Scene, seen: Seen) -> dict:
     return row
 
 
-def scene_row(seed: int, see: Callable[[Scene], Seen]) -> dict:
-    """The row of a drawn scene."""
-    scene = draw_scene(seed)
+def scene_row(seed: int, see: Callable[[Scene], Seen], **fixed) -> dict:
+    """The row of a drawn scene; fixed: see `draw_scene`."""
+    scene = draw_scene(seed, **fixed)
     return row_of(scene, see(scene))
 
 
@@ -144,7 +150,9 @@ def summary(rows: list[dict]) -> Iterable[str]:
                f"{np.sqrt(np.mean(error**2)):.4f}, sigma median {np.median(sigma):.4f}")
 
 
-WAYS = {"points": see_points, "pictures": see_pictures, "alone": see_alone, "hard": see_hard}
+WAYS: Mapping[str, Callable[[Scene], Seen]] = {
+    "points": see_points, "pictures": see_pictures, "alone": see_alone, "hard": see_pictures, "cone": see_pictures,
+    "tapered": see_pictures}
 
 
 def main() -> None:
@@ -156,7 +164,9 @@ def main() -> None:
     options = parser.parse_args()
     table = options.folder / f"{options.what}.csv"
     seeds = range(options.first, options.first + options.count)
-    print(*summary(all_rows(table, COLUMNS, seeds, lambda seed: scene_row(seed, WAYS[options.what]))), sep="\n")
+    see = WAYS[options.what]
+    rows = all_rows(table, COLUMNS, seeds, lambda seed: scene_row(seed, see, **kept(options.what, seed)))
+    print(*summary(rows), sep="\n")
 
 
 if __name__ == "__main__":

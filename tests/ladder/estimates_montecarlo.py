@@ -75,10 +75,11 @@ def draw(shape: str, rng: np.random.Generator) -> Drawn | None:
     return Drawn(beta, alpha, touch.d_x_mm, whisk)
 
 
-def push(rod: Rod, beta: float, psi: float, d_x: float, radius: float, alpha: float, theta: float):
-    """First touch, and the exact moments at θ. Raises ArithmeticError where there is no contact."""
+def push(rod: Rod, beta: float, psi: float, d_x: float, radius: float, alpha: float, theta: float,
+         stiffness: float = np.inf):
+    """First touch, and the exact moments at θ; stiffness: of the bar, N/mm. Raises ArithmeticError without contact."""
     bar = Bar.placed(d_x_mm=d_x, beta_rad=beta, psi_rad=psi, touch_rad=0.0, radius_mm=radius,
-                     whisker_radius_mm=float(rod.radius_mm(d_x)))  # fmt: skip
+                     whisker_radius_mm=float(rod.radius_mm(d_x)), stiffness_N_mm=stiffness)  # fmt: skip
     touch = first_touch(rod, bar, 0.0, d_x)
     march = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, STEPS + 1) / STEPS)[1]

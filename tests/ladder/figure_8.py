@@ -28,6 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench import cli
 from bench.friction.surfaces import Surface
+from bench.options import DONE, DOUBTFUL
 from bench.records.trial import TrialResult
 from bench.report.pooled import pooled, read_run
 from bench.rig.protocol import FOLDER as PROTOCOLS
@@ -109,7 +110,7 @@ def record(folder: Path, tables: dict, seed: int, workers: int) -> tuple[float, 
 
 
 def _require(code: int) -> None:
-    if code not in (cli.DONE, cli.DOUBTFUL):
+    if code not in (DONE, DOUBTFUL):
         raise SystemExit(code)
 
 

@@ -21,10 +21,12 @@ from tests.ladder.bar_scenes import read_scene
 from tests.ladder.coverage import COLUMNS, QUANTITIES, Seen, row_of, summary
 from tests.ladder.rows import all_rows
 from vision.bar.one_view import widest_angle_rad
+from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
 
 ROOT = Path(__file__).resolve().parents[2]
 FAR_SIGMAS = 4.0
+_STANDARD = VisionSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +50,19 @@ class PathTraced:
     motor_rad: np.ndarray
 
 
-def see_scene(number: int, folder: Path) -> tuple[PathTraced, Seen]:
+def see_scene(number: int, folder: Path, settings: VisionSettings = _STANDARD) -> tuple[PathTraced, Seen]:
     """A scene with its truth, and what is seen of it."""
     views, cameras, rods, motor_rad, axis = read_scene(folder)
     told = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
     frames = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)
     slip = np.where(frames["contact"] > 0, frames["slip_mm"], np.nan)
-    truth = Truth(np.radians(told["touch_deg"]), told["d_x_mm"], np.radians(told["beta_deg"]), slip)
-    scene = PathTraced(number, truth, tuple(cameras), float(np.degrees(widest_angle_rad(cameras, axis))), motor_rad)
     (whisk,) = observe_trial({view.camera.name: view.frames for view in views}, frames["time_s"], motor_rad,
                              [slice(0, len(motor_rad))], cameras, rods.wire, rods.bar,
-                             {view.camera.name: view.background for view in views}).whisks
+                             {view.camera.name: view.background for view in views}, settings).whisks
+    seen = slice(None) if whisk.frames is None else whisk.frames.index
+    truth = Truth(np.radians(told["touch_deg"]), told["d_x_mm"], np.radians(told["beta_deg"]), slip[seen])
+    plane_angle_deg = float(np.degrees(widest_angle_rad(cameras, axis)))
+    scene = PathTraced(number, truth, tuple(cameras), plane_angle_deg, motor_rad[seen])
     if np.isnan(whisk.d_x_mm.value):
         return scene, Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}

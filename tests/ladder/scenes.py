@@ -27,7 +27,7 @@ from vision.fit import problem as model
 from vision.fit.problem import Problem, State
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis, outline_of_bar
-from vision.geometry.rods import Bar, Wire
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.silhouette import normals, outline
 from vision.lines.points import LinePoints, Observed
 
@@ -319,10 +319,7 @@ def _clear(px, middle_px, half_px) -> np.ndarray:
 def as_problem(scene: Scene, cameras: Cameras, wire: Wire, bar: Bar, seen: Sequence[Observed]) -> Problem:
     """Vision's problem, its bar counted from where a first look would have put it."""
     away = scene.motor_rad - scene.truth.touch
-    reach = bar.radius_mm + 0.5 * wire.diameter_mm
-    sigma = 0.5 * math.hypot(bar.diameter_sigma_mm, wire.diameter_sigma_mm)
-    return Problem(cameras, wire, reach, sigma, scene.axis, scene.motor_rad, away > math.radians(0.3),
-                   away > 0, seen)
+    return Problem(cameras, Rods(wire, bar), scene.axis, scene.motor_rad, away > math.radians(0.3), away > 0, seen)
 
 
 def begin(problem: Problem) -> State:

@@ -3,8 +3,9 @@
     python tests/ladder/section_vii.py [--count 200] [--seed 0]
 
 Each session is drawn anew: α, slopes of both signs in recordings of three whisks, each bar 0.4° and 0.4 mm (one sigma)
-off what was wanted, gauges with an error that all whisks share, noise. Printed for each way: bias, RMS, how often 95 %
-holds, the largest |z|, and how many sessions have no α and why.
+off what was wanted, gauges with an error that all whisks share, noise. For smoothness bars stand at two distances in
+turn. A soft object is pushed at two distances, known to 0.1 mm from each other. Printed for each way: bias, RMS, how
+often 95 % holds, the largest |z|, and how many sessions have no α and why.
 """
 
 import argparse
@@ -17,28 +18,56 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.friction.section_vii import Contact, by_consistency, by_tilting
+from bench.friction.section_vii import Contact, by_consistency, by_smoothness, by_tilting
+from bench.friction.soft import Place, Soft, softness
+from bench.records.trial import TrialFacts
 from bench.report.score import Score
 from bench.session.whisker import Whisker
 from tests.ladder.estimates_montecarlo import E_GPA, push, rod_and_beam
 
 SLOPES_DEG, D_X_MM, THETA_RAD = (-60, -45, -30, 0, 30, 45, 60), 60.0, np.radians(3.0)
 SCATTER_DEG, SCATTER_MM, GAUGE_SHARE, NOISE_NMM, WHISKS = 0.4, 0.4, 0.004, 0.02, 3
+SHIFT_MM, SHIFT_SIGMA_MM, ALPHA_EST_DEG = 20.0, 0.1, 12.0  # of the base, along the whisker; α as assumed
 WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=E_GPA)
 
 
-def session(alpha_deg: float, rng: np.random.Generator) -> Iterator[Contact]:
-    """The contacts of a session."""
+def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> Iterator[Contact]:
+    """The contacts of a session, at nominal distances that take turns."""
     rod, _ = rod_and_beam("cylinder")
     gauges = np.eye(2) + GAUGE_SHARE * rng.normal(size=(2, 2))
-    for beta_deg in SLOPES_DEG:
-        beta, d_x = np.radians(beta_deg + SCATTER_DEG * rng.normal()), D_X_MM + SCATTER_MM * rng.normal()
+    for k, beta_deg in enumerate(SLOPES_DEG):
+        nominal = places_mm[k % len(places_mm)]
+        beta, d_x = np.radians(beta_deg + SCATTER_DEG * rng.normal()), nominal + SCATTER_MM * rng.normal()
         _, exact = push(rod, beta, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD)
         for _ in range(WHISKS):
             m_y, m_z = gauges @ exact + NOISE_NMM * rng.normal(size=2)
             sigma = np.hypot(GAUGE_SHARE, NOISE_NMM / np.hypot(m_y, m_z))
             phi = float(np.arctan2(m_y, m_z))
-            yield Contact(np.radians(beta_deg), D_X_MM, THETA_RAD, m_y, m_z, phi, sigma, f"b{beta_deg}")
+            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, phi, sigma, f"b{beta_deg}")
+
+
+def two_places(stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Soft:
+    """What whisks against an object of that stiffness [N/mm] tell of it, at a distance and SHIFT_MM farther."""
+    rod, _ = rod_and_beam("cylinder")
+    near, gauge = rng.uniform(35.0, 55.0), 1.0 + GAUGE_SHARE * rng.normal()
+    places = []
+    for nominal in (near, near + SHIFT_MM):
+        d_x = nominal + SHIFT_SIGMA_MM / np.sqrt(2.0) * rng.normal()
+        _, (_, exact) = push(rod, 0.0, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD, stiffness)
+        m_z, sigma = gauge * exact + NOISE_NMM * rng.normal(), np.hypot(GAUGE_SHARE * exact, NOISE_NMM)
+        places.append(Place(nominal, SHIFT_SIGMA_MM / np.sqrt(2.0), THETA_RAD / m_z, THETA_RAD / m_z**2 * sigma, 1))
+    facts = TrialFacts("soft", "measure", "soft", 10.0, bar_diameter_mm=6.0)
+    return softness(WHISKER, facts, *places, THETA_RAD, np.radians(ALPHA_EST_DEG))
+
+
+def soft_study(count: int, seed: int) -> Score:
+    """Of 1/k, mm/N, over objects from 0.1 N/mm to rigid."""
+    rng, rows = np.random.default_rng(seed), []
+    for k in range(count):
+        stiffness = np.inf if k % 4 == 0 else 10.0 ** rng.uniform(-1.0, 1.0)
+        found = two_places(stiffness, rng.uniform(5.0, 24.0), rng)
+        rows.append((found.give_mm_N - 1.0 / stiffness, found.give_sigma_mm_N))
+    return Score("softness", "mm/N", *np.array(rows).T)
 
 
 def study(count: int, seed: int) -> dict[str, tuple[Score, Counter]]:
@@ -46,8 +75,9 @@ def study(count: int, seed: int) -> dict[str, tuple[Score, Counter]]:
     rng, found = np.random.default_rng(seed), {}
     for _ in range(count):
         alpha_deg = rng.uniform(5.0, 24.0)
-        felt = list(session(alpha_deg, rng))
-        for way in (by_tilting(felt), by_consistency([c for c in felt if c.beta_rad >= 0], WHISKER)):
+        felt, along = (list(session(alpha_deg, rng, places)) for places in ((D_X_MM,), (45.0, 60.0)))
+        upward = [c for c in felt if c.beta_rad >= 0]
+        for way in (by_tilting(felt), by_consistency(upward, WHISKER), by_smoothness(along, WHISKER)):
             found.setdefault(way.name, []).append((np.degrees(way.alpha_rad) - alpha_deg, way))
     return {name: (_score(name, rows), Counter(w.status for _, w in rows if w.status)) for name, rows in found.items()}
 
@@ -65,6 +95,7 @@ def main() -> None:
     print(f"{'':<28}{'n':>5}  {'bias':>9}  {'RMS':>8}     in 95 %  most |z|")
     for score, statuses in study(options.count, options.seed).values():
         print(score.line(), *(f"; {n} × {status}" for status, n in statuses.items()))
+    print(soft_study(options.count, options.seed).line())
 
 
 if __name__ == "__main__":

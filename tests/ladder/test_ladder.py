@@ -30,6 +30,15 @@ def test_rung_1_of_exact_mechanics_the_model_misses_two_micrometres_at_most():
     assert max(abs(e[name]) for e in errors for name in ("d_x_mm", "touch_mm", "slip_mm")) < 2e-3
 
 
+@pytest.mark.parametrize("whisker", [WhiskerTable(shape="cone"),
+                                     WhiskerTable(shape="tapered", tip_diameter_mm=0.4)], ids=lambda one: one.shape)
+def test_rung_1_of_a_taper_the_reach_is_that_of_its_contact(whisker):
+    """A soft tip bends far, so that the model misses more than of a cylinder. The base's radius misses by 0.010 mm."""
+    (scene,) = scenes(1, whisker=whisker)
+    errors = model_errors(scene)
+    assert max(abs(errors[name]) for name in ("d_x_mm", "touch_mm", "slip_mm")) < 3e-3
+
+
 def test_rung_2_gradients_are_finite_differences():
     case = off_solution(draw_scene(1, pictures=FEW))
     assert of_residuals(*case) < 1e-4
@@ -112,8 +121,14 @@ def test_intervals_of_10_hold_whatever_the_friction(shape):
     assert np.nanmean(np.abs(whisks.z(alpha_exact=True)) < 1.96) < 0.5
 
 
-def test_the_last_rung_is_a_path_traced_scene():
-    """The scene in fixtures, as tests/ladder/path_traced.py sees it; z of four quantities beyond 4 is one in 4000."""
-    row = row_of(*path_traced.see_scene(0, path_traced.ROOT / "fixtures" / "scenes" / "ring"))
+@pytest.mark.parametrize("name, most_mm", [("ring", 0.1), ("above", 0.15)])
+def test_the_last_rung_is_a_path_traced_scene(name, most_mm):
+    """Scenes in fixtures, as tests/ladder/path_traced.py sees them; z of four quantities beyond 4 is one in 4000.
+
+    Where one camera looks along an upright bar, the other tells d_x by the plane of its sight: to 0.15 mm, three of
+    the sigmas that such scenes have. The slope stays open to some degrees; a clamp's edge taken for the bar in the
+    camera above once made 10 degrees of it, at a stated 0.7.
+    """
+    row = row_of(*path_traced.see_scene(0, path_traced.ROOT / "fixtures" / "scenes" / name))
     assert not path_traced.odd(row)
-    assert abs(row["d_x_mm_error"]) < 0.1
+    assert abs(row["d_x_mm_error"]) < most_mm

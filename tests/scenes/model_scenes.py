@@ -9,12 +9,13 @@ from vision.fit.solve import bar_middle
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.silhouette import normals
 from vision.lines.points import LinePoints, Observed
 
 WIRE = Wire("cylinder", 100.0, 1.0)
 REACH = 3.5
+RODS = Rods(WIRE, Bar(2.0 * REACH - WIRE.diameter_mm))
 
 
 def camera(name, centre, target=(55.0, 5.0, 0.0), focal=2000.0):
@@ -39,7 +40,7 @@ def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7):
     axis = BarAxis(turn @ (np.array([d_x, 0, 0]) + REACH * np.array([0, np.cos(beta), -np.sin(beta)])),
                    turn @ np.array([0.0, np.sin(beta), np.cos(beta)]))
     touching = motor > touch
-    problem = Problem(CAMERAS, WIRE, REACH, 0.0, axis, motor, touching, touching, [])
+    problem = Problem(CAMERAS, RODS, axis, motor, touching, touching, [])
     vector = np.zeros(problem.size)
     vector[4:12] = [0.05, 0.1, -0.2, 0.0, -0.05, 0.1, -0.3, 0.0]
     state = State(vector, np.full(frames, d_x))

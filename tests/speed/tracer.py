@@ -103,7 +103,7 @@ def main() -> None:
     seen = see()
     whole = min(_timed(see) for _ in range(3))
     print(f"whisk of {FRAMES} frames x {seen.cameras} cameras ({trial}): {whole / 1000:.2f} s "
-          f"(bar: 1 s), d_x {seen.d_x_mm:.3f} ± {seen.d_x_sigma_mm:.3f} mm")
+          f"(bar: 1 s), d_x {seen.d_x_mm.value:.3f} ± {seen.d_x_mm.sigma:.3f} mm")
     if "--profile" in sys.argv:
         profile = cProfile.Profile()
         profile.runcall(see)

@@ -61,7 +61,8 @@ def find_bars(seen: Sequence[Clear], rods: Rods, motor_rad: tuple[float, float])
     x = np.arange(10.0, length, _X_STEP * radius)
     count = int(np.ceil(np.ptp(motor_rad) * 0.5 * length / (_TOUCH_STEP * radius)))
     touch = np.linspace(*motor_rad, max(3, count))
-    return likely(seen, (x, touch, _BETA_RAD, _PSI_RAD), lambda each: axis_from_angles(*each.T, rods.reach_mm), radius)
+    return likely(seen, (x, touch, _BETA_RAD, _PSI_RAD),
+                  lambda each: axis_from_angles(*each.T, rods.reach_mm(each[:, 0])), radius)
 
 
 def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callable, radius_mm: float) -> list[BarAxis]:
@@ -113,14 +114,14 @@ def edges_px(grey, background, blur_px: float) -> np.ndarray:
 def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
     """The bar that a straight whisker first touches at distance x, at motor angle touch, with these slopes.
 
-    All arguments (n,); reach_mm: bar radius + whisker radius.
+    All arguments (n,); reach_mm: between the axes of bar and whisker where they touch.
     """
     turn = rotation_z(np.asarray(touch_rad, dtype=float))
     zero = np.zeros_like(turn[..., 0, 0])
     a = np.stack(np.broadcast_arrays(np.sin(psi_rad) + zero, np.cos(psi_rad) * np.sin(beta_rad) + zero,
                                      np.cos(psi_rad) * np.cos(beta_rad) + zero), axis=-1)
     n = np.stack([zero, np.cos(beta_rad) + zero, -np.sin(beta_rad) + zero], axis=-1)
-    p = np.stack([x_mm + zero, zero, zero], axis=-1) + reach_mm * n
+    p = np.stack([x_mm + zero, zero, zero], axis=-1) + np.asarray(reach_mm)[..., None] * n
     return BarAxis(*(np.einsum("...ij,...j->...i", turn, v) for v in (p, a)))
 
 

@@ -35,23 +35,33 @@ _LEAST_CHANCE = 0.01  # of a transfer curve that is still looked at
 _LEAST_SHOWN = 0.5
 _MOST = 40.0  # of the same: what one stretch may say against a line; a clamp or a hole in the bench says anything
 _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
+# Of the area of lines that were possible: where nearly all of them still are, no edge is seen. Bars that are there
+# leave 0.13 at most, what is taken for one along a clamp or a shadow 0.2 to 1 (tests/ladder/bar_scenes.py).
+_MOST_UNRESOLVED = 1.0 / 6.0
 
 
 @dataclass(frozen=True)
 class BarLine:
     """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; how far from there; and
     how much more probable a bar is there than none: twice the log of the ratio; and how clearly it is one, whatever its
-    contrast: the log of how many times worse the light is explained without it."""
+    contrast: the log of how many times worse the light is explained without it; and what share of the lines that were
+    possible still are."""
 
     points: LinePoints
     moved_px: float
     for_bar: float
     clearness: float
+    unresolved: float
 
     @property
     def is_bar(self) -> bool:
         """Whether what is seen is a bar."""
         return self.for_bar > _LEAST_EVIDENCE
+
+    @property
+    def has_edges(self) -> bool:
+        """Whether that bar's edges are seen, too: it lies somewhere among the lines that were possible."""
+        return self.is_bar and self.unresolved < _MOST_UNRESOLVED
 
 
 def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
@@ -68,7 +78,7 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     wide = {name: [_posterior(_moved(some, line[name]), reach_px, gamma) for gamma in _GAMMAS]
             for name, some in pieces.items()}
     chances = _chances(wide.values()) if wide else None
-    return {name: _bar_line(some, line[name], wide[name], chances) for name, some in pieces.items()}
+    return {name: _bar_line(some, line[name], wide[name], chances, reach_px) for name, some in pieces.items()}
 
 
 @dataclass(frozen=True)
@@ -92,9 +102,10 @@ def _chances(cameras: Iterable[Sequence[_Posterior]]) -> np.ndarray:
     return chance / chance.sum()
 
 
-def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances) -> BarLine:
+def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances, reach_px: float) -> BarLine:
     """The line by all transfer curves, each by its chance; looked for once more close by if it is known so well."""
     mean, covariance = _mixed(wide, chances)
+    unresolved = float(3.0 * np.sqrt(np.linalg.det(covariance))) / reach_px**2  # a flat one's variance is reach² / 3
     line, for_bar = line + mean, float(chances @ [one.for_bar for one in wide])
     clearness = float(chances @ [one.clearness for one in wide])
     if np.sqrt(np.max(np.diag(covariance))) < _CLOSE_PX / _WITHIN_SIGMAS:
@@ -103,7 +114,8 @@ def _bar_line(pieces: Pieces, line, wide: Sequence[_Posterior], chances) -> BarL
                  for one, is_likely in zip(wide, likely) if is_likely]
         mean, covariance = _mixed(again, chances[likely] / chances[likely].sum())
         line = line + mean
-    return BarLine(_two_points(pieces, line, covariance), float(np.sum(np.abs(line))), for_bar, clearness)
+    points, moved_px = _two_points(pieces, line, covariance), float(np.sum(np.abs(line)))
+    return BarLine(points, moved_px, for_bar, clearness, unresolved)
 
 
 def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.ndarray]:

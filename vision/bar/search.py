@@ -17,7 +17,7 @@ from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
 from vision.pictures.change import HALF
-from vision.pictures.view import View
+from vision.pictures.view import View, median_of
 
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
@@ -35,14 +35,14 @@ class SeenBar:
 
     @property
     def seen_by(self) -> list[str]:
-        """The cameras that see a bar there."""
-        return [name for name, line in self.lines.items() if line.is_bar]
+        """The cameras that see a bar there, and its edges."""
+        return [name for name, line in self.lines.items() if line.has_edges]
 
     @property
     def clearness(self) -> float:
         """How clearly all cameras see a bar there. Not by the evidence: each hypothesis has its own pixels, and a wrong
         one along something bright in one camera has more evidence there than the bar has in both."""
-        return sum(max(line.clearness, 0.0) for line in self.lines.values())
+        return sum(max(line.clearness, 0.0) for line in self.lines.values() if line.has_edges)
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
@@ -92,13 +92,5 @@ def of_mean(view: View) -> View:
 
 
 def _median_picture(view: View) -> np.ndarray:
-    """Median (of an even number the upper one) of some frames at every HALF-th pixel: a wire that moves vanishes.
-
-    Each pass carries the largest of the rest to its end, whole pictures at a time: no sort of single pixels is as fast.
-    """
-    pictures = [np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)]
-    for last in range(len(pictures) - 1, len(pictures) // 2 - 1, -1):
-        for k in range(last):
-            lower = np.minimum(pictures[k], pictures[k + 1])
-            pictures[k], pictures[k + 1] = lower, np.maximum(pictures[k], pictures[k + 1])
-    return pictures[len(pictures) // 2]
+    """Median of some frames at every HALF-th pixel: a wire that moves vanishes."""
+    return median_of([np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)])

@@ -82,7 +82,7 @@ class BeamCheck:
         )
 
 
-def check_beam(problem: Problem, state: State, covariance, measured: Measured, by: Jacobians) -> BeamCheck:
+def check_beam(problem: Problem, state: State, covariance: np.ndarray, measured: Measured, by: Jacobians) -> BeamCheck:
     """The check of a whisk that touches. covariance (size, size): of the parameters, by the fit and by the cameras."""
     last = np.flatnonzero(problem.touching)[-1]
     departure, spread, follows, slip_by = _departure(problem, state, last)

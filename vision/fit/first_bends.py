@@ -4,85 +4,162 @@ Coarse: to a pixel or two, enough for the bands that `trace` reads.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import BAR, REST, Problem, start
+from vision.fit.problem import BAR, REST, REST_PRIOR_MM, Problem, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, one_curve
 from vision.geometry.contact import BarAxis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
 from vision.geometry.newton import cauchy_weights
-from vision.geometry.rods import Wire
-from vision.lines.bands import strongest_shift
+from vision.geometry.rods import Rods, Wire
+from vision.geometry.silhouette import outline
+from vision.lines.coarse import Votes, likely_curve, votes
 from vision.lines.points import LinePoints, Observed
-from vision.lines.trace import clear_of_bar, wire_pieces
-from vision.pictures.view import View
+from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
+from vision.pictures.view import View, median_of
 
 _PIECE_PX = 16
-_REACH_PX = 26
-_SIGMA_PX = 1.0
+_REACH_PX = 26  # from where the last two frames lead to
+_STEP_PX = 2  # from curve to curve: half a wire's width
+_REST_SIGMAS = 2.0  # of the rest shape's prior within which a wire is looked for
+_BEND_PX = 1.0  # from bend to bend, RMS along the wire
+_MEDIAN_OF = 11  # frames: more would not make what stands still clearer
 _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
 _BESIDE_BAR_PX = 8.0
-_SHARE = 0.35  # a rod's window holds at least this part of all difference in its band
 
 
-def _bars_px(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float) -> list:
-    return [outline_of_bar(view.camera, axis, reach_mm - wire.diameter_mm / 2) for view in views]
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """One camera's pictures of a whisk, what stands still in them, and the bar's outline."""
+
+    view: View
+    rods: Rods
+    still: View
+    still_share: float
+    bar_px: tuple[np.ndarray, np.ndarray]
+
+    @classmethod
+    def of(cls, view: View, rods: Rods, axis: BarAxis, frames: Sequence[int]) -> "Sight":
+        """frames: those of the whisk, in which the wire moves."""
+        frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))]
+        still = replace(view, background=median_of([view.frames[frame] for frame in frames]))
+        return cls(view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, rods.bar.radius_mm))
+
+    def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
+        """Where the wire may be beside predicted curves by frame, clear of hub and bar."""
+        pieces, still = (wire_pieces(view, curves, self.rods.wire, _PIECE_PX, reach_px - 3)
+                         for view in (self.view, self.still))
+        clear = clear_of_bar(pieces, *self.bar_px, _BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM)
+        return votes(pieces.select(clear), still.background[clear], self.still_share, reach_px)
 
 
-def coarse_points(view: View, curves: Mapping[int, Curves], wire: Wire, bar_px) -> tuple[LinePoints, np.ndarray]:
-    """Line points to a pixel, away from the bar (see `outline_of_bar`), and the frame of each."""
-    pieces = wire_pieces(view, curves, wire, _PIECE_PX, _REACH_PX - 3)
-    pieces = pieces.select(clear_of_bar(pieces, *bar_px, _BESIDE_BAR_PX))
-    shift, share = strongest_shift(pieces, _REACH_PX)
-    good = (share > _SHARE) & (np.abs(shift) < _REACH_PX - 4)
-    px = pieces.foot_px + shift[:, None] * pieces.normal
-    points = LinePoints(px, pieces.normal, np.full(len(pieces), _SIGMA_PX), pieces.place)
-    return points.select(good), pieces.source[good]
-
-
-def find_rest(views: Sequence[View], cameras: Cameras, wire: Wire, axis: BarAxis, reach_mm: float,
-              motor_rad: Mapping[int, float]) -> np.ndarray:
+def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: BarAxis, motor_rad: Mapping[int, float]) -> np.ndarray:
     """Rest shape (2, 4) in mm from frames {index: motor angle} in which nothing touches.
 
     Raises Refused where no whisker is seen to swing.
     """
-    motor = np.array(list(motor_rad.values()))
-    rest = np.zeros((2, REST_POWERS))
-    bars_px = _bars_px(views, wire, axis, reach_mm)
-    for _ in range(2):
-        curves = {f: one_curve(rest, np.zeros(2), wire.length_mm, m, wire) for f, m in motor_rad.items()}
-        seen = []
-        for number, (view, bar_px) in enumerate(zip(views, bars_px)):
-            points, source = coarse_points(view, curves, wire, bar_px)
-            seen += [Observed(k, number, points.select(source == f)) for k, f in enumerate(motor_rad)]
-        if sum(len(s.points) for s in seen) < 8 * len(motor_rad):
-            raise Refused("no whisker is seen where the motor angle says it should be")
-        nothing = np.zeros(len(motor), dtype=bool)
-        problem = Problem(cameras, wire, reach_mm, 0.0, axis, motor, nothing, nothing, seen)
-        state, _ = solve(problem, start(problem, wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
-        rest = state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
-    return rest
+    motor, rods, seen = np.array(list(motor_rad.values())), sights[0].rods, []
+    straight = np.zeros((2, REST_POWERS))
+    curves = {f: one_curve(straight, np.zeros(2), rods.wire.length_mm, m, rods.wire) for f, m in motor_rad.items()}
+    for number, sight in enumerate(sights):
+        points, source = _resting_points(sight, curves)
+        seen += [Observed(k, number, points.select(source == f)) for k, f in enumerate(motor_rad)]
+    if not any(len(one.points) for one in seen):
+        raise Refused("no whisker is seen where the motor angle says it should be")
+    nothing = np.zeros(len(motor), dtype=bool)
+    problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
+    state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
+    return state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
 
 
-def follow_bends(views: Sequence[View], wire: Wire, axis: BarAxis, reach_mm: float, rest_mm,
+def _resting_points(sight: Sight, curves: Mapping[int, Curves]) -> tuple[LinePoints, np.ndarray]:
+    """Points to a pixel or two of a wire that lies to the straight one alike in all frames, and the frame of each; none
+    where none is surely seen."""
+    straight, length_mm = next(iter(curves.values())), sight.rods.wire.length_mm
+    _, px_per_mm = outline(sight.view.camera, straight.points_mm, straight.tangents, 1.0)
+    most = _REST_SIGMAS * REST_PRIOR_MM[:3] * np.max(px_per_mm)  # of offset, slope, curvature
+    seen = sight.votes(curves, int(np.ceil(most[1])))
+    along = seen.pieces.place / length_mm
+    shapes = np.stack([1.0 - along, along, along * (1.0 - along)], axis=1)
+    count = np.ceil(most / _STEP_PX)
+    best, sure = likely_curve([seen], shapes, [np.arange(-n, n + 1) * _STEP_PX for n in count])
+    points, keep = seen.points(shapes @ best), np.full(len(shapes), sure)
+    return points.select(keep), seen.pieces.source[keep]
+
+
+def follow_bends(sights: Sequence[Sight], axis: BarAxis, rest_mm: np.ndarray,
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
     found: dict[int, np.ndarray] = {}
-    pull, bars_px = _pull(axis, len(views)), _bars_px(views, wire, axis, reach_mm)
+    pull, wire = _pull(axis, len(sights)), sights[0].rods.wire
     last, before = np.zeros(2), np.zeros(2)
     for frame, motor in motor_rad.items():
         guess = 2 * last - before
         arc = contact_arc(rest_mm, guess, motor, axis, wire)
-        curve = one_curve(rest_mm, guess, arc, motor, wire)
-        seen = [coarse_points(view, {frame: curve}, wire, bar_px)[0] for view, bar_px in zip(views, bars_px)]
-        bend = _fit_bend(views, seen, rest_mm, guess, arc, motor, wire, pull)
-        found[frame] = bend
-        before, last = last, bend
+        seen = [sight.votes({frame: one_curve(rest_mm, guess, arc, motor, wire)}) for sight in sights]
+        model = _Model([sight.view for sight in sights], rest_mm, arc, motor, wire)
+        before, last = last, _fit_bend(model, *_likely_bend(model, seen, guess), pull)
+        found[frame] = last
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Where one frame's wire is expected, by its bend: views, rest shape, contact arc, motor angle, wire."""
+
+    views: Sequence[View]
+    rest_mm: np.ndarray
+    arc_mm: float
+    motor_rad: float
+    wire: Wire
+
+    def px(self, bend, seen: Sequence[LinePoints]) -> np.ndarray:
+        """Distance (n,) in px from line points to the predicted line, all cameras."""
+        curve = one_curve(self.rest_mm, bend, self.arc_mm, self.motor_rad, self.wire)
+        return np.concatenate([np.sum(points.normal * (view.camera.project(curve.at(points.place)[0]) - points.px),
+                                      axis=1) for view, points in zip(self.views, seen)])
+
+    def slopes(self, bend, seen: Sequence[LinePoints], step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+        """The same, and its derivatives (n, 2) by the bend."""
+        left = self.px(bend, seen)
+        return left, np.stack([(self.px(bend + step * one, seen) - left) / step for one in np.eye(2)], axis=1)
+
+
+def _likely_bend(model: _Model, seen: Sequence[Votes], guess) -> tuple[np.ndarray, list[LinePoints]]:
+    """The bend with most votes of all cameras, or the guess where none surely has more than noise; points near it."""
+    none = np.zeros(sum(len(one.pieces) for one in seen))
+    _, slopes = model.slopes(guess, _points_of(seen, none))
+    _, px_per_rad, turned = np.linalg.svd(slopes / np.sqrt(max(len(none), 1)), full_matrices=False)
+    count = np.minimum(_REACH_PX / _BEND_PX, 2.0 * _PULL_RAD * px_per_rad / _BEND_PX)
+    grids = [np.arange(-n, n + 1) * _BEND_PX / max(scale, 1e-9) for n, scale in zip(np.floor(count), px_per_rad)]
+    best, sure = likely_curve(seen, slopes @ turned.T, grids)
+    change = best @ turned if sure else np.zeros(2)
+    return guess + change, _points_of(seen, slopes @ change)
+
+
+def _points_of(seen: Sequence[Votes], shift_px) -> list[LinePoints]:
+    """Points of each camera near a curve that lies shift_px (s,) away from the predicted one, s of all cameras."""
+    ends = np.cumsum([len(one.pieces) for one in seen])[:-1]
+    return [one.points(shift) for one, shift in zip(seen, np.split(shift_px, ends))]
+
+
+def _fit_bend(model: _Model, bend, seen: Sequence[LinePoints], pull, rounds: int = 8) -> np.ndarray:
+    """Least squares on the two components of the bend, Cauchy weights of 2 px, a pull (2, 2) towards none."""
+    sure = np.concatenate([points.sigma_px for points in seen]) ** -2.0
+    for _ in range(rounds):
+        left, jacobian = model.slopes(bend, seen)
+        weight = sure * cauchy_weights(left, 2.0)
+        normal = jacobian.T @ (weight[:, None] * jacobian) + pull
+        change = np.linalg.solve(normal, jacobian.T @ (weight * left) + pull @ bend)
+        bend = np.clip(bend - change, -0.5, 0.5)
+        if np.max(np.abs(change)) < _STILL_RAD:
+            break
+    return bend
 
 
 def _pull(axis: BarAxis, views: int) -> np.ndarray:
@@ -94,34 +171,9 @@ def _pull(axis: BarAxis, views: int) -> np.ndarray:
     return np.eye(2) / _PULL_RAD**2 + np.outer(along, along) / _ALONG_BAR_RAD**2
 
 
-def contact_arc(rest_mm, bend, motor, axis: BarAxis, wire: Wire) -> float:
+def contact_arc(rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: BarAxis, wire: Wire) -> float:
+    """Arc length in mm at which a whisker of this rest shape (2, 4), mm, and bend (2,), rad, is nearest to the axis."""
     straight = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
     arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)
     bent = one_curve(rest_mm, bend, arc, motor, wire)
     return float(np.clip(closest_arc(bent, axis), 1.0, wire.length_mm))
-
-
-def _fit_bend(views, seen: Sequence[LinePoints], rest_mm, bend, arc, motor, wire: Wire, pull, rounds: int = 8):
-    """Least squares on the two components of the bend, Cauchy weights of 2 px, a pull (2, 2) towards none."""
-    bend, step = np.array(bend, dtype=float), 1e-5
-    for _ in range(rounds):
-        left, columns = _bend_residual(views, seen, rest_mm, bend, arc, motor, wire), []
-        for k in range(2):
-            moved = _bend_residual(views, seen, rest_mm, bend + step * np.eye(2)[k], arc, motor, wire)
-            columns.append((moved - left) / step)
-        weight = cauchy_weights(left, 2.0)
-        jacobian = np.stack(columns, axis=1)
-        normal = jacobian.T @ (weight[:, None] * jacobian) + pull
-        change = np.linalg.solve(normal, jacobian.T @ (weight * left) + pull @ bend)
-        bend = np.clip(bend - change, -0.5, 0.5)
-        if np.max(np.abs(change)) < _STILL_RAD:
-            break
-    return bend
-
-
-def _bend_residual(views, seen, rest_mm, bend, arc, motor, wire: Wire) -> np.ndarray:
-    """Distance in px from line points to the predicted line, all cameras."""
-    curve = one_curve(rest_mm, bend, arc, motor, wire)
-    parts = [np.sum(points.normal * (view.camera.project(curve.at(points.place)[0]) - points.px), axis=1)
-             for view, points in zip(views, seen)]
-    return np.concatenate(parts)

@@ -27,7 +27,7 @@ class Onset:
     sigma_rad: float
 
 
-def seen_bend(bend_rad, covariance) -> tuple[np.ndarray, np.ndarray]:
+def seen_bend(bend_rad: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of bends (f, 2) with covariance (2 f, 2 f) the component that the pictures tell best: (f,), covariance (f, f)."""
     frames = len(bend_rad)
     by_frame = covariance.reshape(frames, 2, frames, 2)
@@ -36,7 +36,7 @@ def seen_bend(bend_rad, covariance) -> tuple[np.ndarray, np.ndarray]:
     return bend_rad @ best, np.einsum("i,figj,j->fg", best, by_frame, best)
 
 
-def onset(motor_rad, bend_rad, covariance) -> Onset | None:
+def onset(motor_rad: np.ndarray, bend_rad: np.ndarray, covariance: np.ndarray) -> Onset | None:
     """From a component of the bend (f,), covariance (f, f), in frames in order of the motor angle: none before the
     onset, then a parabola. None where fewer than three frames are seen to bend.
     """

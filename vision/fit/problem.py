@@ -9,7 +9,7 @@ from vision.fit.onset import Onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, axis_frame, closest_arc, shifted_axis
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Rods, Wire
 from vision.lines.points import SHARED, Observed
 
 BAR, REST = 4, 2 * REST_POWERS
@@ -47,9 +47,7 @@ class Problem:
     """
 
     cameras: Cameras
-    wire: Wire
-    reach_mm: float
-    reach_sigma_mm: float
+    rods: Rods
     axis: BarAxis
     motor_rad: np.ndarray
     touching: np.ndarray
@@ -57,6 +55,11 @@ class Problem:
     seen: Sequence[Observed]
     onset: Onset | None = None
     alike: Sequence[float] = ()
+
+    @property
+    def wire(self) -> Wire:
+        """The whisker."""
+        return self.rods.wire
 
     @property
     def size(self) -> int:
@@ -67,6 +70,11 @@ class Problem:
     def first_bend(self) -> int:
         """Index of the first bend."""
         return BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
+
+    def bend_of(self, frame: int) -> slice:
+        """Parameters of a frame's bend; the frame may bend."""
+        first = self.first_bend + 2 * int(np.sum(self.bent[:frame]))
+        return slice(first, first + 2)
 
     def wire_off(self, camera: int) -> slice:
         """Parameters by which a camera's lines of the wire are off as a whole: `wire_modes`, then what points share."""
@@ -87,24 +95,24 @@ class State:
     arcs_mm: np.ndarray
 
 
-def bar_axis(problem: Problem, vector) -> BarAxis:
+def bar_axis(problem: Problem, vector: np.ndarray) -> BarAxis:
     """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start."""
     return shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
 
 
-def rest_shape(vector) -> np.ndarray:
+def rest_shape(vector: np.ndarray) -> np.ndarray:
     """Rest polynomials (…, 2, 4) in mm."""
     return vector[..., BAR:BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
 
 
-def bends(problem: Problem, vector) -> np.ndarray:
+def bends(problem: Problem, vector: np.ndarray) -> np.ndarray:
     """Tangent angles at the contact (…, f, 2); zero in frames that may not bend."""
     angles = np.zeros((*vector.shape[:-1], len(problem.motor_rad), 2))
     angles[..., problem.bent, :] = vector[..., problem.first_bend:].reshape(*vector.shape[:-1], -1, 2)
     return angles
 
 
-def curves_of(problem: Problem, vector, arcs_mm, rounds: int = 1) -> tuple[Curves, np.ndarray]:
+def curves_of(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds: int = 1) -> tuple[Curves, np.ndarray]:
     """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
     rest = rest_shape(vector)[..., None, :, :]
     axis = bar_axis(problem, vector)
@@ -131,12 +139,12 @@ def point_rows(problem: Problem) -> list[tuple[Observed, slice]]:
     return [(seen, slice(end - len(seen.points), end)) for seen, end in zip(problem.seen, ends)]
 
 
-def wire_lever(length_mm: float, place_mm) -> np.ndarray:
+def wire_lever(length_mm: float, place_mm: np.ndarray) -> np.ndarray:
     """From -1 at the base to 1 at the tip, by which a line of the wire is tilted."""
     return 2.0 * place_mm / length_mm - 1.0
 
 
-def wire_modes(length_mm: float, place_mm, motor_rad, swing_rad) -> np.ndarray:
+def wire_modes(length_mm: float, place_mm: np.ndarray, motor_rad: np.ndarray, swing_rad: np.ndarray) -> np.ndarray:
     """Shapes (n, 6) by which lines of the wire are off: all alike, from end to end, and both of these changing with the
     motor angle, steadily and by its square.
 

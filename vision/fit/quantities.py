@@ -23,7 +23,7 @@ class Measured:
     frame: dict[str, np.ndarray]
 
 
-def measure(problem: Problem, vector, arcs_mm) -> Measured:
+def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measured:
     """All quantities for one parameter vector or a batch (b, size)."""
     touch = first_touch(problem, vector)
     axis = bar_axis(problem, vector)

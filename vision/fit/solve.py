@@ -32,6 +32,7 @@ from vision.fit.problem import (
     rest_shape,
     wire_modes,
 )
+from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves, centrelines
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.newton import cauchy_weights
@@ -109,7 +110,7 @@ def _over_sigma(points: LinePoints, px, jacobian, off: slice, modes, vector):
     return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
 
 
-def bar_middle(problem: Problem, camera, vector, place_mm) -> np.ndarray:
+def bar_middle(problem: Problem, camera: Camera, vector: np.ndarray, place_mm: np.ndarray) -> np.ndarray:
     """Middle (…, n, 2) of the bar's outline in one camera, at places (n,) along its axis; vector (…, size)."""
     one, other = _bar_edges(problem, camera, vector, place_mm, 0.0)
     return 0.5 * (one + other)
@@ -120,7 +121,7 @@ def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np
     axis = bar_axis(problem, vector)
     points = axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
     directions = np.broadcast_to(axis.direction[..., None, :], points.shape)
-    radius_mm = np.broadcast_to(problem.reach_mm - problem.wire.diameter_mm / 2 + wider_mm, points.shape[:-1])
+    radius_mm = np.broadcast_to(problem.rods.bar.radius_mm + wider_mm, points.shape[:-1])
     one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radius_mm.ravel())
     return one.reshape(*points.shape[:-1], 2), other.reshape(*points.shape[:-1], 2)
 
@@ -149,14 +150,15 @@ def _contact_block(problem: Problem, moved, curves: Curves, arcs_mm, columns, ve
     """Touching frames: signed distance from axis to centreline is reach + its error."""
     axis = bar_axis(problem, moved)
     axis = BarAxis(axis.point_mm[:, None], axis.direction[:, None])
-    distance = clearance(curves, axis, arcs_mm)[0]
+    distance, arc, _ = clearance(curves, axis, arcs_mm)
+    distance = distance - problem.rods.reach_mm(arc)
     frames = np.flatnonzero(problem.touching)
     jacobian = np.zeros((len(frames), problem.size))
     for (step, names), row in zip(columns, distance[1:]):
         held = names[frames] >= 0
         jacobian[np.flatnonzero(held), names[frames[held]]] = (row - distance[0])[frames[held]] / step
     jacobian[:, REACH] = -1.0
-    residual = distance[0, frames] - problem.reach_mm - vector[REACH]
+    residual = distance[0, frames] - vector[REACH]
     return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
 
 
@@ -167,18 +169,18 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
     curves = centrelines(rest, np.zeros((count, 2)), np.full(count, problem.wire.length_mm / 2),
                          np.full(count, onset.motor_rad), problem.wire)
     distance, arc, _ = clearance(curves, axis)
-    sigma_mm = onset.sigma_rad * arc[0]
+    distance, sigma_mm = distance - problem.rods.reach_mm(arc), onset.sigma_rad * arc[0]
     jacobian = np.zeros((1, problem.size))
     for k, (step, _) in enumerate(columns[:BAR + REST]):
         jacobian[0, k] = (distance[k + 1] - distance[0]) / step
     jacobian[0, REACH] = -1.0
-    residual = distance[:1] - problem.reach_mm - vector[REACH]
+    residual = distance[:1] - vector[REACH]
     return residual / sigma_mm, jacobian / sigma_mm
 
 
 def _prior_block(problem: Problem, vector):
     sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
-                            [max(problem.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
+                            [max(problem.rods.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 

@@ -7,7 +7,7 @@ import numpy as np
 from vision.fit.problem import REACH, Problem, bar_axis, rest_shape
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, clearance
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Rods
 
 FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _SURE_BEND_RAD = np.radians(0.25)
@@ -24,24 +24,24 @@ class FirstTouch:
     arc_mm: np.ndarray
 
 
-def first_touch(problem: Problem, vector, rounds: int = 8) -> FirstTouch:
+def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
     """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
     axis = bar_axis(problem, vector)
-    reach = problem.reach_mm + vector[..., REACH]
+    wider = vector[..., REACH]
     rest = rest_shape(vector)
     low = np.full(vector.shape[:-1], np.min(problem.motor_rad))
     high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
-    gap_low, gap_high = (_gap(rest, m, axis, reach, problem.wire)[0] for m in (low, high))
+    gap_low, gap_high = (_gap(rest, m, axis, wider, problem.rods)[0] for m in (low, high))
     for _ in range(rounds):
         moving = np.abs(gap_high) > _TOUCH_GAP_MM
         slope = (gap_high - gap_low) / np.where(moving, high - low, 1.0)
         new = np.where(moving, high - gap_high / np.where(moving, slope, 1.0), high)
         low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
-        high, (gap_high, arc, point) = new, _gap(rest, new, axis, reach, problem.wire)
+        high, (gap_high, arc, point) = new, _gap(rest, new, axis, wider, problem.rods)
     return FirstTouch(high, point, arc)
 
 
-def touch_and_sigma(problem: Problem, vector, answer) -> tuple[float, float]:
+def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) -> tuple[float, float]:
     """Motor angle of first touch and its sigma, rad, by noise and priors alone: what it takes to part the frames.
 
     answer (size, size): covariance that the fit gives.
@@ -53,15 +53,15 @@ def touch_and_sigma(problem: Problem, vector, answer) -> tuple[float, float]:
     return here, float(np.sqrt(slope @ answer[np.ix_(geometry, geometry)] @ slope))
 
 
-def _gap(rest_mm, motor_rad, axis: BarAxis, reach_mm, wire: Wire):
-    """How far the resting whisker still is from touching, mm; contact arc and point."""
+def _gap(rest_mm, motor_rad, axis: BarAxis, wider_mm, rods: Rods):
+    """How far the resting whisker still is from touching, mm; contact arc and point. wider_mm: the reach's error."""
     none = np.zeros((*motor_rad.shape, 2))
-    curves = centrelines(rest_mm, none, np.full(motor_rad.shape, wire.length_mm / 2), motor_rad, wire)
+    curves = centrelines(rest_mm, none, np.full(motor_rad.shape, rods.wire.length_mm / 2), motor_rad, rods.wire)
     distance, arc, point = clearance(curves, axis)
-    return distance - reach_mm, arc, point
+    return distance - rods.reach_mm(arc) - wider_mm, arc, point
 
 
-def frames_that_touch(motor_rad, bend_rad) -> tuple[np.ndarray, np.ndarray]:
+def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From coarse bends (f, 2): which frames surely touch, and which surely do not; (f,) bool each.
 
     The bend is nothing up to touch and then grows with the motor's angle, towards where it ends: the touch that
@@ -86,7 +86,7 @@ def _hinge(motor_rad, bend_rad) -> float:
     return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
 
 
-def frames_by_touch(motor_rad, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
+def frames_by_touch(motor_rad: np.ndarray, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
     """The same once touch is known to sigma: frames within three sigma of it are left undecided, but for the first two:
     they are free if touch comes after them."""
     margin = max(3.0 * sigma_rad, np.radians(0.02))

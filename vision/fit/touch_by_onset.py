@@ -12,7 +12,7 @@ from vision.geometry.errors import Refused
 _MOST_ONSET_RAD = np.radians(0.5)  # an onset known to 2.4 degrees had free frames touch, and the bar 10 mm off
 
 
-def touch_by_onset(problem: Problem, state: State, covariance) -> tuple[Problem, State]:
+def touch_by_onset(problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
     """The problem with what its frames, once fitted, show of when the whisker begins to bend; a state to go on from.
 
     Raises Refused where no bend is seen, or fewer than two frames before it.

@@ -33,7 +33,7 @@ class Uncertainty:
         return self.noise + self.lens
 
 
-def uncertainty(problem: Problem, state: State, answer) -> Uncertainty:
+def uncertainty(problem: Problem, state: State, answer: np.ndarray) -> Uncertainty:
     """What a fit is uncertain by. answer (size, size): what `solve` returns.
 
     Neighbouring line points of the wire err alike: their sigmas are as wide as is right for what changes slowly along
@@ -67,7 +67,7 @@ def _by_lens(problem: Problem, state: State, answer) -> np.ndarray:
     return -answer @ (linear.jacobian[linear.is_point].T @ (weights * camera_rows(problem, state)))
 
 
-def variance_by_cause(problem: Problem, state: State, known: Uncertainty, gradient) -> dict[str, float]:
+def variance_by_cause(problem: Problem, state: State, known: Uncertainty, gradient: np.ndarray) -> dict[str, float]:
     """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
 
     wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their sigmas; light: lines
@@ -131,6 +131,6 @@ def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> l
     axis, camera = bar_axis(problem, state.vector), problem.cameras.cameras[seen.camera]
     points = axis.point_mm + seen.points.place[:, None] * axis.direction
     edges = grazed(camera, points, np.broadcast_to(axis.direction, points.shape),
-                   problem.reach_mm - problem.wire.diameter_mm / 2)
+                   problem.rods.bar.radius_mm)
     beside = [np.sum((camera.project(edge) - camera.project(points)) * seen.points.normal) for edge in edges]
     return [edges[int(np.argmax(seen.side * np.array(beside)))]] if seen.side else list(edges)

@@ -68,12 +68,11 @@ class Rods:
     wire: Wire
     bar: Bar
 
-    @property
-    def reach_mm(self) -> float:
-        """Distance between the two axes while they touch, for a uniform wire."""
-        return self.bar.radius_mm + 0.5 * self.wire.diameter_mm
+    def reach_mm(self, arc_mm: np.ndarray | float) -> np.ndarray:
+        """Distance between the two axes where they touch at arc length `arc_mm`; the shape of `arc_mm`."""
+        return self.bar.radius_mm + self.wire.radius_mm(arc_mm)
 
     @property
     def reach_sigma_mm(self) -> float:
-        """One sigma of the reach, by both diameters."""
+        """One sigma of the reach, by both diameters; of a wire that tapers at its base, where it is largest."""
         return 0.5 * float(np.hypot(self.bar.diameter_sigma_mm, self.wire.diameter_sigma_mm))

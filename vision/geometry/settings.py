@@ -10,7 +10,9 @@ class VisionSettings:
     wire_piece_px, bar_piece_px: length of the pieces of which each gives one line point. wire_margin_px,
     bar_margin_px: background read on either side of the rod. rounds: how often the lines are traced anew from the
     fit. clock_sigma_s: how well the cameras' clock is known against the motor's; 0 takes frame times as exact.
-    bar_reach_mm: length of bar used on either side of the contact.
+    bar_reach_mm: length of bar used on either side of the contact. picture_scale: pictures are shrunk by so much, a
+    whole number. every_frame: of a stroke's frames one in so many is looked at. check_beam: whether the wire is fitted
+    once more as a curve that is no beam, to see whether it is one.
     """
 
     wire_piece_px: int = 12
@@ -20,3 +22,6 @@ class VisionSettings:
     rounds: int = 1
     clock_sigma_s: float = 0.0
     bar_reach_mm: float = 36.0
+    picture_scale: int = 1
+    every_frame: int = 1
+    check_beam: bool = True

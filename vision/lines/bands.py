@@ -8,10 +8,11 @@ Where the background is bright on one piece and dark on the next, both edges are
 or a highlight no longer pulls the position to one side.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import correlate1d, uniform_filter1d
+from scipy.ndimage import correlate1d
 
 from vision.pictures.pixel_noise import Noise
 
@@ -34,7 +35,8 @@ class Band:
     radius_px: np.ndarray
 
 
-def read_band(grey, background, curve_px, place, radius_px, half_width_px: int) -> Band:
+def read_band(grey: np.ndarray, background: np.ndarray, curve_px: np.ndarray, place: np.ndarray, radius_px: np.ndarray,
+              half_width_px: int) -> Band:
     """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along.
 
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals point to the same
@@ -97,22 +99,22 @@ class Pieces:
         """Pixels (s,) less the position and the background's gain and offset that each piece has of its own."""
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
 
-    def select(self, keep) -> "Pieces":
+    def select(self, keep: np.ndarray | slice) -> "Pieces":
         """The pieces where `keep` (s,) holds, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
-    def columns(self, keep) -> "Pieces":
+    def columns(self, keep: np.ndarray) -> "Pieces":
         """The same pieces with those of their pixels where `keep` (p,) holds."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
-    def moved(self, shift_px) -> "Pieces":
+    def moved(self, shift_px: np.ndarray) -> "Pieces":
         """The same pixels seen from curves moved by shift_px (s,) along their normals."""
         return replace(self, offset_px=self.offset_px - shift_px[:, None],
                        foot_px=self.foot_px + shift_px[:, None] * self.normal)
 
 
-def cut_pieces(bands, length_px: int, noise: Noise) -> Pieces:
+def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
     """All bands cut into pieces of `length_px` steps; what is left over at the end is not used."""
     parts = [_cut(band, length_px, noise, number) for number, band in enumerate(bands)
              if len(band.place) >= length_px]
@@ -147,31 +149,3 @@ def _changes(band: Band) -> list[np.ndarray]:
     known = np.where(np.isfinite(band.background), band.background, 0.0)
     return [correlate1d(known, share, axis=1, mode="nearest") / pitch**order
             for order, share in ((1, _FIRST), (2, _SECOND))]
-
-
-def strongest_shift(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coarse position (s,) of a rod-wide difference from the background, and its share (s,) of all difference.
-
-    For each piece the squared difference (over the noise) is summed in a window as wide as the rod; the window
-    with the largest sum wins. The background's gain and offset are those that fit the whole piece. Its picture is as
-    noisy as a frame's: a dim rod must not drown in a noise that is no difference.
-    """
-    if len(pieces) == 0:  # hidden, or outside the picture
-        return np.zeros(0), np.zeros(0)
-    columns = np.stack([pieces.background, np.ones_like(pieces.background)], -1) * pieces.weight[..., None]
-    seen = pieces.grey * pieces.weight
-    turned = columns.transpose(0, 2, 1)
-    found = np.linalg.solve(turned @ columns + np.diag([1e-3, 1e-3]), turned @ seen[..., None])[..., 0]
-    trusted = np.abs(found[:, 0] - 1.0) < 0.5
-    found = np.where(trusted[:, None], found, [1.0, 0.0])
-    noise = 1.0 + found[:, :1] ** 2
-    energy = np.clip((seen - (columns @ found[..., None])[..., 0]) ** 2, 0.0, 400.0) - noise
-    bins = np.clip(np.round(pieces.offset_px).astype(int) + reach_px, 0, 2 * reach_px)
-    count = 2 * reach_px + 1
-    place = bins + count * np.arange(len(pieces))[:, None]
-    profile = np.bincount(place.ravel(), energy.ravel(), count * len(pieces)).reshape(len(pieces), count)
-    half = max(1, round(float(np.median(pieces.radius_px))))
-    window = uniform_filter1d(profile, 2 * half + 1, axis=1, mode="constant") * (2 * half + 1)
-    best = np.argmax(window, axis=1)
-    share = window.max(axis=1) / np.maximum(np.sum(np.maximum(profile, 0.0), axis=1), 1e-9)
-    return best - float(reach_px), share

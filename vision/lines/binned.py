@@ -30,7 +30,7 @@ def without(blur_px: float, variance_px2: float) -> float:
     return float(np.sqrt(max(blur_px**2 - variance_px2, 0.25 * blur_px**2)))
 
 
-def sums(values, place, count: int) -> np.ndarray:
+def sums(values: np.ndarray, place: np.ndarray, count: int) -> np.ndarray:
     """Sums (s, count) of values (s, p) by their places in it."""
     size = len(values)
     return np.bincount(place.ravel(), values.ravel(), size * count).reshape(size, count)

@@ -7,22 +7,25 @@ import numpy as np
 WAVES, RIMS = 8, 6  # how many functions of the angle describe a thin rod, and the rims of a thick one
 # Gauss–Legendre nodes over the rod's half circumference, where the integrand is smooth: 1e-5 of the contrast.
 _NODES_PER_RADIUS_TO_BLUR = 4
-_SAME_RADIUS = 0.15
+_SAME_RADIUS = 0.05
 _RATIO_STEP, _ROWS_PER_BLUR, _REACH_BLURS = 0.05, 12, 6.0
-_DELTA_PX = 0.05
+_LEAST_RADIUS_PX = 0.05  # thinner is as good as nothing
 
 
-def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
+def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, terms: int) -> np.ndarray:
     """Blurred pictures (..., terms + 2) of a cylinder whose radiance is each function of `round_the_rod` in turn; the
     last two are `rim_bells`.
 
-    The first term is the share of the pixel that the rod covers. offset_px (...): distance from the axis;
-    radius_px broadcasts. Where the radius is nearly the same everywhere one table serves all pixels, stretched by
-    the radius (which stretches the blur with it, by as little).
+    The first term is the share of the pixel that the rod covers. offset_px (...): distance from the axis; radius_px:
+    one, or (s, 1) for offsets (s, p). One table serves all pixels of nearly the same radius, stretched by it (which
+    stretches the blur with it, by as little).
     """
     ratio = _one_ratio(radius_px, blur_px)
     if ratio is None:
-        return _integrated(np.asarray(offset_px), np.asarray(radius_px, dtype=float), blur_px, terms)
+        values = np.empty((*offset_px.shape, terms + 2))
+        for some in _alike(radius_px[:, 0]):
+            values[some] = shading_basis(offset_px[some], radius_px[some], blur_px, terms)
+        return values
     rows, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows, len(table))
     values = np.diff(table, axis=0).take(before, axis=0, mode="clip")
@@ -31,24 +34,24 @@ def shading_basis(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarra
     return values
 
 
-def slopes_of(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, np.ndarray]:
+def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,
+              waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and second derivatives (2, s, p) each, by offset, per px and per px², of what s cylinders add to the light
     and of what they hide.
 
     offset_px (s, p), radius_px (s,); waves (s, terms): the radiance of each in terms of `round_the_rod`.
     """
-    radius_px, terms = radius_px[:, None], waves.shape[1]
     ratio = _one_ratio(radius_px, blur_px)
+    slopes, curvatures = np.empty((2, 2, *offset_px.shape))
     if ratio is None:
-        ends = [_integrated(offset_px + d, radius_px, blur_px, terms) for d in (-_DELTA_PX, 0.0, _DELTA_PX)]
-        behind, here, ahead = (np.stack([np.einsum("spt,st->sp", end[..., :terms], waves), end[..., 0]])
-                               for end in ends)
-        return (ahead - behind) / (2.0 * _DELTA_PX), (ahead - 2.0 * here + behind) / _DELTA_PX**2
+        for some in _alike(radius_px):
+            slopes[:, some], curvatures[:, some] = slopes_of(offset_px[some], radius_px[some], blur_px, waves[some])
+        return slopes, curvatures
+    radius_px, terms = radius_px[:, None], waves.shape[1]
     rows, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows, len(table))
     own = table[:, :terms] @ waves.T
     each = before * len(waves) + np.arange(len(waves))[:, None]
-    slopes, curvatures = np.empty((2, 2, *offset_px.shape))
     for k, (profile, place, next_row) in enumerate(((own, each, len(waves)), (table[:, 0], before, 1))):
         for into in (slopes[k], curvatures[k]):
             profile = np.gradient(profile, axis=0)
@@ -57,7 +60,7 @@ def slopes_of(offset_px, radius_px, blur_px: float, waves) -> tuple[np.ndarray, 
     return slopes * (rows / radius_px), curvatures * (rows / radius_px) ** 2
 
 
-def rim_bells(offset_px, radius_px, blur_px: float) -> np.ndarray:
+def rim_bells(offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: float) -> np.ndarray:
     """Bells (..., 2) where the blurred rod begins and ends: normal densities of z, the distance from the edge over the
     blur, and z times them; those of the edge at negative offset are taken away from the other's."""
     bells = 0.0
@@ -71,7 +74,14 @@ def rim_bells(offset_px, radius_px, blur_px: float) -> np.ndarray:
 def _one_ratio(radius_px, blur_px: float) -> float | None:
     """Radius over blur, where it is nearly the same for all."""
     least, most = np.min(radius_px, initial=np.inf), np.max(radius_px, initial=0.0)
-    return 0.5 * (least + most) / blur_px if most - least < _SAME_RADIUS * least else None
+    same = most - least < _SAME_RADIUS * least or most <= _LEAST_RADIUS_PX
+    return 0.5 * (least + most) / blur_px if same else None
+
+
+def _alike(radius_px) -> list[np.ndarray]:
+    """Of radii (s,) the places of those that are nearly the same, group by group."""
+    group = np.floor(np.log(np.maximum(radius_px, _LEAST_RADIUS_PX)) / np.log1p(_SAME_RADIUS))
+    return [np.flatnonzero(group == one) for one in np.unique(group)]
 
 
 def _places(offset, rows: float, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -116,7 +126,7 @@ def _integrated(offset_px, radius_px, blur_px: float, terms: int) -> np.ndarray:
 _legendre = lru_cache(np.polynomial.legendre.leggauss)
 
 
-def round_the_rod(t, terms: int) -> np.ndarray:
+def round_the_rod(t: np.ndarray, terms: int) -> np.ndarray:
     """Functions (n, terms) of the angle t (n,) round the rod, from edge (-pi/2) to edge (pi/2); the first is 1.
 
     WAVES: 1, sin t, cos t, sin 2t …, the whole of a thin rod. RIMS: for each side its own square polynomial in the

@@ -7,6 +7,7 @@ pixel), not the contrast, not the background. So the background is made from bot
 blur are those under which the shared shading explains the pieces best.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -76,7 +77,8 @@ class _Width:
         return min(self.start_px, self.end_px) > _HIDES * self.blur_px
 
 
-def follow(grey, start_px, end_px, *, dark: bool = True, noise: Noise | None = None, piece_px: int = 8) -> Followed:
+def follow(grey: np.ndarray, start_px: Sequence[float], end_px: Sequence[float], *, dark: bool = True,
+           noise: Noise | None = None, piece_px: int = 8) -> Followed:
     """Points of a line in `grey` (rows, columns) from near start_px (x, y) to near end_px.
 
     dark: darker than what is behind it. noise: of a pixel; measured in the picture where None. piece_px: length of
@@ -118,7 +120,7 @@ def scatter_of(points: LinePoints) -> float:
     return float(np.median(np.abs(z)) / 0.6745)
 
 
-def noise_of(grey) -> Noise:
+def noise_of(grey: np.ndarray) -> Noise:
     """Noise of a single picture from its second differences along both axes, which smooth scenes do not have.
 
     Medians in classes of equal grey, so that edges and lines do not count (Immerkær's filter, 1996).

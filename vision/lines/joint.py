@@ -19,13 +19,16 @@ BLUR_SIGMA = 0.5  # of the logarithm of the blur: pixels say much more, where th
 _MOST_STEPS, _LONGEST_PX, _LONGEST_LOG = 40, 0.7, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
-_SETTLED = 0.02  # what a step may still gain in chi²: it moves what all share by a seventh of a sigma at most
+# What a step may still gain in chi² by what all share, which it moves by a seventh of a sigma at most, and in the mean
+# by a piece's own position, which it moves by 0.03 sigma: pieces that tell nothing wander on for ever.
+_SETTLED, _SETTLED_EACH = 0.02, 1e-3
 
 
 @dataclass(frozen=True)
 class Solved:
     """Of each piece: shift_px, own_sigma_px by its own noise, chi2 per pixel, contrast, all (s,); shared_px (s, k): by
-    how much it moves with one sigma of each of k independent causes that all share; robust (s,): its weight."""
+    how much it moves with one sigma of each of k independent causes that all share; robust (s,): its weight;
+    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma."""
 
     shift_px: np.ndarray
     own_sigma_px: np.ndarray
@@ -34,6 +37,7 @@ class Solved:
     shared_px: np.ndarray
     blur_px: float
     robust: np.ndarray
+    widened_px2: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,8 @@ class Task:
     blur_sigma: float = BLUR_SIGMA
 
 
-def solve(task: Task, shift_px=None, robust=None, damped: float = _DAMPED, most: int = _MOST_STEPS) -> Solved:
+def solve(task: Task, shift_px: np.ndarray | None = None, robust: np.ndarray | None = None, damped: float = _DAMPED,
+          most: int = _MOST_STEPS) -> Solved:
     """The most probable positions, shading and blur; begins with these shifts (s,) and weights (s,) of the pieces.
 
     The last step is taken without looking again: what is told of the pieces is as it was before it.
@@ -55,10 +60,11 @@ def solve(task: Task, shift_px=None, robust=None, damped: float = _DAMPED, most:
     count = len(task.pieces)
     here = _Point.at(task, np.zeros(count) if shift_px is None else shift_px, np.log(task.blur_px),
                      np.ones(count) if robust is None else robust)
+    here = here.weighted()
     arrow = _Arrow(task, here)
     for _ in range(most):
         step, by_blur, gain = arrow.step(damped)
-        if gain < _SETTLED:
+        if gain[0] < _SETTLED and gain[1] < _SETTLED_EACH * count:
             break
         there = here.moved(step, by_blur)
         if there.misfit > here.misfit:
@@ -112,9 +118,13 @@ class _Point:
                        self.log_blur + float(np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG)), self.robust, self.stiff)
 
     def weighted(self) -> "_Point":
-        """The same point, pieces weighed by what they leave, and light by the contrast that is seen here."""
+        """The same point, pieces weighed by what they leave, and light by the contrast that is seen here.
+
+        What all leave beyond noise is an error of the model: beside it the priors count as much as beside noise.
+        """
         misfit = self.chi2 / self.task.pieces.freedom
-        robust = 1.0 / np.maximum(misfit / max(np.median(misfit), 1e-9), 1.0) ** 2  # well above the median: left out
+        usual = max(float(np.median(misfit)), 1e-9)
+        robust = 1.0 / np.maximum(misfit / usual, 1.0) ** 2 / max(usual, 1.0)  # well above the median: left out
         return self.at(self.task, self.shift_px, self.log_blur, robust, equations=self.equations)
 
 
@@ -136,10 +146,12 @@ class _Arrow:
         self.by_blur = (point.robust @ slopes.gram[:, 1, 2]
                         - (point.log_blur - np.log(task.blur_px)) / task.blur_sigma**2)
 
-    def step(self, damped: float) -> tuple[np.ndarray, float, float]:
-        """Steps of the positions (s,) and of the blur's logarithm, and by how much chi² is expected to fall."""
+    def step(self, damped: float) -> tuple[np.ndarray, float, tuple[float, float]]:
+        """Steps of the positions (s,) and of the blur's logarithm, and by how much chi² is expected to fall, by what
+        all share and by positions alone."""
         robust = self.point.robust
-        power = robust * self.power + damped * np.median(self.power) + LEAST_POWER
+        power = robust * self.power
+        power = power + damped * np.median(power) + LEAST_POWER
         cross, right = robust[:, None] * self.cross, robust * self.right
         own = cross / power[:, None]
         left, shared_right = self.shared - cross.T @ own, -own.T @ right
@@ -147,7 +159,7 @@ class _Arrow:
         shared_right[-1] += self.by_blur
         shared = cho_solve(cho_factor(left, check_finite=False), shared_right, check_finite=False)
         step = (right - cross @ shared) / power
-        return step, float(shared[-1]), float(right @ step + self.by_blur * shared[-1])
+        return step, float(shared[-1]), (float(shared_right @ shared), float(right @ (right / power)))
 
     def solved(self, damped: float) -> Solved:
         """A step farther on, with covariance: each piece's own, and what all move by with what they share."""
@@ -155,7 +167,16 @@ class _Arrow:
         own = self.cross / self.power[:, None]
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
         chi2 = point.chi2 / point.task.pieces.freedom
-        shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T * np.sqrt(max(float(np.median(chi2)), 1.0))
+        shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T
         return Solved(point.shift_px + np.clip(step, -_LONGEST_PX, _LONGEST_PX),
                       np.sqrt(np.maximum(chi2, 1.0) / self.power), chi2, self.slopes.contrast, shared,
-                      float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG))), point.robust)
+                      float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG))), point.robust,
+                      self._widened(np.maximum(chi2, 1.0)))
+
+    def _widened(self, chi2) -> np.ndarray:
+        """By how much each piece's own blur² is above that of all, and sigma, (s, 2), its position free as well."""
+        gram = self.slopes.gram
+        power = gram[:, 1, 1] - gram[:, 0, 1] ** 2 / self.power + LEAST_POWER
+        by_log = 2.0 * np.exp(2.0 * self.point.log_blur)
+        step = (gram[:, 1, 2] - gram[:, 0, 1] * gram[:, 0, 2] / self.power) / power
+        return by_log * np.stack([step, np.sqrt(chi2 / power)], axis=1)

@@ -15,6 +15,7 @@ class LinePoints:
 
     px (n, 2), normal (n, 2) unit, sigma_px (n,) along the normal; place (n,) mm along the rod. shared_px (n, SHARED):
     by how much each moves with one sigma of each cause that all points of a camera share, beside sigma_px; None: by 0.
+    widened_px2 (n, 2): by how much blur² is above that of all, and sigma; None: nothing is known of it.
     """
 
     px: np.ndarray
@@ -22,15 +23,18 @@ class LinePoints:
     sigma_px: np.ndarray
     place: np.ndarray
     shared_px: np.ndarray | None = None
+    widened_px2: np.ndarray | None = None
 
     def __post_init__(self):
         if self.shared_px is None:
             object.__setattr__(self, "shared_px", np.zeros((len(self.place), SHARED)))
+        if self.widened_px2 is None:
+            object.__setattr__(self, "widened_px2", np.tile([0.0, np.inf], (len(self.place), 1)))
 
     def __len__(self) -> int:
         return len(self.place)
 
-    def select(self, keep) -> "LinePoints":
+    def select(self, keep: np.ndarray) -> "LinePoints":
         """The points where `keep` holds."""
         return LinePoints(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 

@@ -80,8 +80,8 @@ def _not_leaked(pieces: Pieces, bells, blur_px: float) -> np.ndarray:
     return bells[..., 0] * (blur_px * pieces.slope) - bells[..., 1] * ((0.5 * blur_px**2) * pieces.curvature)
 
 
-def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust=None,
-                prior=None) -> tuple[Shading, float]:
+def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust: np.ndarray | None = None,
+                prior: np.ndarray | None = None) -> tuple[Shading, float]:
     """Most probable radiance over all pieces with their positions as they stand; also how badly it fits, per pixel.
 
     Each piece has its own gain and offset of the background (shadow, drifting light). robust (s,): weight of
@@ -130,7 +130,7 @@ class Equations:
         self.moment = mixed[:, 2] - (turned @ explained)[..., 0]
         self.power = own[:, 2, 2] - np.sum(seen * explained, axis=(1, 2))
 
-    def shared(self, hats, robust) -> tuple[np.ndarray, np.ndarray]:
+    def shared(self, hats: np.ndarray, robust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (size, size) and right side (size,) of all knots' coefficients, the pieces' positions kept.
 
         hats (s, knots): weight of each knot in each piece; robust (s,): weight of each piece.
@@ -142,11 +142,11 @@ class Equations:
         return (left.transpose(0, 2, 1, 3).reshape(size, size),
                 ((hats * robust[:, None]).T @ self.moment).reshape(size))
 
-    def chi2(self, waves) -> np.ndarray:
+    def chi2(self, waves: np.ndarray) -> np.ndarray:
         """What pieces of this shading, waves (s, terms), leave (s,)."""
         return self.power + np.einsum("st,st->s", waves, (self.gram @ waves[..., None])[..., 0] - 2.0 * self.moment)
 
-    def linearised(self, waves) -> "Slopes":
+    def linearised(self, waves: np.ndarray) -> "Slopes":
         """How pieces of this shading, waves (s, terms), change with position and blur; what leaks is taken to stay."""
         pieces, rest = self.pieces, self._rest
         left = rest[:, 2] - (self._rod @ waves[..., None])[..., 0]
@@ -194,7 +194,7 @@ _CHANGE_SHARE = 0.1
 _TURNED_SHARE = 0.3
 
 
-def stiffness(prior, knots: Knots) -> np.ndarray:
+def stiffness(prior: np.ndarray, knots: Knots) -> np.ndarray:
     """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
     between = _between(len(knots.turn_rad), len(knots.place_mm))
     both, size = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :], len(knots) * len(prior)
@@ -222,6 +222,7 @@ class Located:
 
     contrast: signal of the rod against its background over the noise, over the whole piece. shared_px (s, k): by how
     much each moves with what all share, light and lens, by one sigma of each of k independent causes; beside sigma_px.
+    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
     """
 
     shift_px: np.ndarray
@@ -229,6 +230,7 @@ class Located:
     chi2: np.ndarray
     contrast: np.ndarray
     shared_px: np.ndarray | None = None
+    widened_px2: np.ndarray | None = None
 
     @property
     def whole_sigma_px(self) -> np.ndarray:

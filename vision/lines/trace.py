@@ -16,6 +16,7 @@ from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
 from vision.pictures.view import View
 
+NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 WIRE_WAVES = 11  # round a wire: with fewer, what they lack of a highlight passes for blur and for position
 # A lens blur to begin with. Narrow: one too wide can be the best nearby, for light that darkens at the rims mends it.
 _BLUR_PX = 0.8
@@ -46,7 +47,7 @@ def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.
     return arc, *outline(camera, points, directions, wire.radius_mm(arc))
 
 
-def clear_of_bar(pieces: Pieces, middle_px, radius_px, margin_px: float) -> np.ndarray:
+def clear_of_bar(pieces: Pieces, middle_px: np.ndarray, radius_px: np.ndarray, margin_px: float) -> np.ndarray:
     """Which pieces (s,) lie outside the bar's outline, given by its middle (m, 2) and half-width (m,); NaN where it
     passes behind the camera and hides nothing."""
     away = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
@@ -81,7 +82,8 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
         task = Task(pieces, terms, knots, blur_px, blur_sigma)
         solved = solve(task, solved.shift_px, solved.robust, damped=0.0, most=_LAST_STEPS)
         blur_px = solved.blur_px
-    found = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px)
+    found = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px,
+                    solved.widened_px2)
     return Traced(pieces.moved(solved.shift_px), found, blur_px)
 
 
@@ -90,7 +92,8 @@ def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
     pieces, found = traced.pieces, traced.found
     good = (found.chi2 < _WORST_MISFIT * max(traced.misfit, 0.5)) & (found.sigma_px < _WORST_SIGMA_PX)
     shared, rest = _leading(found.shared_px)
-    points = LinePoints(pieces.foot_px, pieces.normal, np.hypot(found.sigma_px, rest), pieces.place, shared)
+    points = LinePoints(pieces.foot_px, pieces.normal, np.hypot(found.sigma_px, rest), pieces.place, shared,
+                        found.widened_px2)
     return points.select(good), pieces.source[good]
 
 
@@ -103,7 +106,7 @@ def _leading(shared_px) -> tuple[np.ndarray, np.ndarray]:
     return most, np.linalg.norm(causes[:, SHARED:], axis=1)
 
 
-def observed(points: LinePoints, source, camera: int, frames: Sequence[int]) -> list[Observed]:
+def observed(points: LinePoints, source: np.ndarray, camera: int, frames: Sequence[int]) -> list[Observed]:
     """One Observed per frame that has points; frames: the frame index of each position of the whisk."""
     return [Observed(position, camera, points.select(source == frame))
             for position, frame in enumerate(frames) if np.any(source == frame)]

@@ -1,6 +1,6 @@
 """One camera's pictures of a whisk, beside the picture without rods."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,3 +46,16 @@ class View:
         for picture in pictures:
             total += picture
         return total / len(pictures)
+
+
+def median_of(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    """Median (h, w) of pictures (h, w) of any kind of number, of an even number the upper one: what moves vanishes.
+
+    Each pass carries the largest of the rest to its end, whole pictures at a time: no sort of single pixels is as fast.
+    """
+    pictures = list(pictures)
+    for last in range(len(pictures) - 1, len(pictures) // 2 - 1, -1):
+        for k in range(last):
+            lower = np.minimum(pictures[k], pictures[k + 1])
+            pictures[k], pictures[k + 1] = lower, np.maximum(pictures[k], pictures[k + 1])
+    return pictures[len(pictures) // 2]

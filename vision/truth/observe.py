@@ -15,7 +15,7 @@ import numpy as np
 from vision.bar.search import see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
-from vision.fit.beam_check import check_beam
+from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -24,6 +24,7 @@ from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import one_sided_lines
 from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.scale import shrunk_cameras, shrunk_frames, shrunk_picture
 from vision.pictures.view import View
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
@@ -54,7 +55,9 @@ def observe_trial(
     trial could be seen with.
     """
     time_s, motor_rad = np.asarray(time_s, dtype=float), np.asarray(motor_rad, dtype=float)
-    rods = Rods(wire, bar)
+    rods, scale = Rods(wire, bar), settings.picture_scale
+    frames, cameras = shrunk_frames(frames, scale), shrunk_cameras(cameras, scale)
+    background = {name: None if empty is None else shrunk_picture(empty, scale) for name, empty in background.items()}
     try:
         cameras, behind = _that_face_it(cameras, wire, motor_rad)
         views = _views(frames, cameras, background)
@@ -62,8 +65,9 @@ def observe_trial(
         bar_seen = see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
-    seen = [WhiskPictures(number, range(*where.indices(len(time_s))), time_s, motor_rad, views, used, rods, bar_seen,
-                          settings, left_out=tuple(behind)) for number, where in enumerate(whisks)]
+    strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
+    seen = [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
+                          left_out=tuple(behind)) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
     bars = seen_over_given(views, used, bar_seen, rods, motor_rad, settings)
@@ -131,10 +135,14 @@ def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
 def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
     truth = to_whisk(whisk, fitted)
-    beam = check_beam(fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter)
+    beam = _beam(fitted) if whisk.settings.check_beam else None
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk.views, whisk.rods, *stroke, whisk.motor, fitted.frames, whisk.light, whisk.settings)
-    status = "; ".join(filter(None, [truth.status, beam.alarm, *whisk.left_out]))
+    status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *whisk.left_out]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     return replace(truth, base=base_lines(*stroke, fitted.uncertainty.lens), beam=beam, turns=turns, status=status)
+
+
+def _beam(fitted: FittedWhisk) -> BeamCheck:
+    return check_beam(fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter)

@@ -8,6 +8,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import normals, outline
+from vision.pictures.scale import full_px
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
 from vision.truth.value import FIELDS, Value
@@ -121,10 +122,13 @@ def _column(values, rows, touching) -> np.ndarray:
 
 
 def _statuses(whisk: WhiskPictures, fitted: FittedWhisk, rows) -> tuple[str, ...]:
-    """Why a frame has no values; empty where it touches, or surely does not."""
+    """Why a frame has no values, or what is doubtful of them; empty where it touches, or surely does not."""
     at_touch = fitted.problem.bent & ~fitted.problem.touching
-    return tuple(("at touch" if at_touch[row] else "") if row >= 0 else
-                 "long before touch" if f in whisk.motor else "no picture" for f, row in zip(whisk.indices, rows))
+    slipped = [f"slipped during the exposure, by {rms:.3f} mm RMS" if rms else ""
+               for rms in np.sqrt(fitted.exposure.variance_mm2)]
+    seen = ["at touch" if near else moved for near, moved in zip(at_touch, slipped)]
+    return tuple(seen[row] if row >= 0 else "long before touch" if f in whisk.motor else "no picture"
+                 for f, row in zip(whisk.indices, rows))
 
 
 def _budget(fitted: FittedWhisk) -> dict[str, float]:
@@ -144,14 +148,15 @@ def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, d
     for k, f in enumerate(fitted.frames):
         one = Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k])
         contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
-        drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm)
-                         for view in whisk.views}
+        drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm,
+                                                  whisk.settings.picture_scale) for view in whisk.views}
     return drawn
 
 
-def _drawn(camera: Camera, curve: Curves, along, axis: BarAxis, contact,
-           bar_radius_mm: float) -> dict[str, np.ndarray]:
+def _drawn(camera: Camera, curve: Curves, along, axis: BarAxis, contact, bar_radius_mm: float,
+           scale: int) -> dict[str, np.ndarray]:
     middle, half = outline(camera, along, np.broadcast_to(axis.direction, along.shape), bar_radius_mm)
     aside = half[:, None] * normals(middle)
-    return {"wire": camera.project(curve.points_mm), "bar_left": middle - aside, "bar_right": middle + aside,
-            "contact": camera.project(contact)[0]}
+    lines = {"wire": camera.project(curve.points_mm), "bar_left": middle - aside, "bar_right": middle + aside,
+             "contact": camera.project(contact)[0]}
+    return {name: full_px(px, scale) for name, px in lines.items()}

@@ -1,6 +1,6 @@
 """One whisk: wire and bar traced in all its frames and fitted together, by turns."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,7 +10,7 @@ from vision.bar.edges import measure_edges
 from vision.bar.line import measure_bars
 from vision.bar.one_view import seen_from_one_side
 from vision.bar.search import SeenBar, of_mean
-from vision.fit.first_bends import contact_arc, find_rest, follow_bends
+from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
 from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
@@ -25,11 +25,10 @@ from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import clear_of_bar, observed, to_points, trace, wire_pieces
+from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
 from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
-_NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 _BESIDE_BAR_PX = 4.0
 # Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
 # another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
@@ -55,8 +54,9 @@ class _Look:
     free: np.ndarray
 
 
-def fit_whisk(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
-              light: dict[str, WireAppearance], settings: VisionSettings):
+def fit_whisk(views: Sequence[View], cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping[int, float],
+              light: dict[str, WireAppearance],
+              settings: VisionSettings) -> tuple[Problem, State, np.ndarray, list[int]]:
     """Problem and state after the last round, how its parameters answer (see `Uncertainty`), and the frames in it: all
     but those far before touch.
 
@@ -102,8 +102,9 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
                 by_onset: bool) -> tuple[Mapping[int, float], _Look]:
     """The frames to fit, and what coarse points tell of them."""
     early = _early(motor)
-    rest = find_rest(views, cameras, rods.wire, axis, rods.reach_mm, early)
-    coarse = follow_bends(views, rods.wire, axis, rods.reach_mm, rest, motor)
+    sights = [Sight.of(view, rods, axis, list(motor)) for view in views]
+    rest = find_rest(sights, cameras, axis, early)
+    coarse = follow_bends(sights, axis, rest, motor)
     motor = motor if by_onset else _near_touch(motor, coarse)
     angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
     touching, free = frames_that_touch(angles, bend)
@@ -122,7 +123,7 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
 def _fit(seen: list[Observed], cameras: Cameras, rods: Rods, look: _Look, motor: Mapping[int, float],
          by_onset: bool) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
-    problem = Problem(cameras, rods.wire, rods.reach_mm, rods.reach_sigma_mm, look.axis, np.array(list(motor.values())),
+    problem = Problem(cameras, rods, look.axis, np.array(list(motor.values())),
                       look.touching, ~look.free, seen)
     state, covariance = solve(problem, _begin(problem, look))
     if by_onset:
@@ -166,8 +167,8 @@ def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> d
     return dict(list(motor.items())[begin:])
 
 
-def free_stroke(views, rods: Rods, problem: Problem, state: State, motor: Mapping[int, float], near, light: dict,
-                settings: VisionSettings) -> tuple[Problem, State]:
+def free_stroke(views: Sequence[View], rods: Rods, problem: Problem, state: State, motor: Mapping[int, float],
+                near: Sequence[int], light: dict, settings: VisionSettings) -> tuple[Problem, State]:
     """All frames before touch and what is seen in them, about the bar and the shape at rest of a fit."""
     free = {f: angle for f, angle in motor.items() if f not in near or not problem.bent[near.index(f)]}
     rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
@@ -238,10 +239,10 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
                 settings: VisionSettings, *, last: bool = True) -> list[Observed]:
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
-    pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > _NEAR_CLAMP_MM))
+    pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
     if len(pieces) == 0:
         return []
-    knots = Knots.of_turning(np.arange(_NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
+    knots = Knots.of_turning(np.arange(NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
     traced = trace(pieces, knots, known.blur_px, last=last) if known else trace(pieces, knots, last=last)
     light[name] = known or WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px))

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from vision.bar.search import SeenBar
+from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.uncertainty import Uncertainty, uncertainty
@@ -68,7 +69,10 @@ class WhiskPictures:
 
 @dataclass(frozen=True, eq=False)
 class FittedWhisk:
-    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for."""
+    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for.
+
+    exposure: slip while the shutter was open, which the uncertainty has in it.
+    """
 
     problem: Problem
     state: State
@@ -76,12 +80,16 @@ class FittedWhisk:
     uncertainty: Uncertainty
     measured: Measured
     by_parameter: Jacobians
+    exposure: Exposure
 
     @classmethod
     def of(cls, problem: Problem, state: State, answer: np.ndarray, frames: list[int]) -> "FittedWhisk":
         """answer (size, size): how the parameters answer the observations (see `Uncertainty`)."""
         measured, by_parameter = jacobians(problem, state)
-        return cls(problem, state, frames, uncertainty(problem, state, answer), measured, by_parameter)
+        exposure = slip_in_exposure(problem, state, by_parameter.frame["slip"])
+        known = uncertainty(problem, state, answer)
+        return cls(problem, state, frames, replace(known, noise=known.noise + exposure.covariance), measured,
+                   by_parameter, exposure)
 
     @cached_property
     def covariance(self) -> np.ndarray:

@@ -8,7 +8,7 @@ from bench.session.session import Session
 from bench.trials.seen import NO_PICTURES
 from bench.trials.unit import OWN_GAUGES
 
-_SILENT = ("", NO_PICTURES, OWN_GAUGES)
+SILENT = ("", NO_PICTURES, OWN_GAUGES)
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
 _EXPECTED = ("no_slip", "frictionless", *RUNS)
 
@@ -17,7 +17,7 @@ def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[str]:
     """A line for each whisk that something is doubtful of. A gauge trial that cannot be judged is as it should be."""
     for result, seen, felt in whisks(results):
         name = f"{result.trial.name}, whisk {seen.whisk}"
-        parts = [part for part in dict.fromkeys((seen.status, felt.status)) if part not in _SILENT]
+        parts = [part for part in dict.fromkeys((seen.status, felt.status)) if part not in SILENT]
         if parts:
             yield f"{name}: {'; '.join(parts)}"
         if felt.saturated:

@@ -1,10 +1,12 @@
 """The error of each estimator, a line a whisk."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from bench.base.drawing import label_of
+from bench.records.trial import TrialResult
+from bench.report.assembly import estimate_rows
 from bench.trials.compare import Judged
 
 
@@ -22,6 +24,24 @@ def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
         mine = {(j.estimator, j.one_factor): j for j in judged if (j.trial, j.whisk) == key}
         cells = [f"{_error(mine.get(c)):>{width}}" for c, width in zip(columns, widths)]
         yield f"{key[0]:<18}{key[1]:>5}  {next(iter(mine.values())).beta_deg:>5.1f}°   " + "  ".join(cells)
+
+
+def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
+    """How far contact points, deflections and slip by (10) are from those seen: RMS, and what was stated of each."""
+    rows = [row for row in estimate_rows(results) if row["estimator"] == "with_friction"]
+    columns = (("point", None), ("d_y", "d_y_est_sigma_mm"), ("d_z", "d_z_est_sigma_mm"), ("slip", "slip_est_sigma_mm"))
+    parts = []
+    for name, sigma in columns:
+        known = [row for row in rows if np.isfinite(row[f"{name}_error_mm"])]
+        if known:
+            stated = f" ({_rms(known, sigma):.3f} stated)" if sigma else ""
+            parts.append(f"{name} {_rms(known, f'{name}_error_mm'):.3f} mm{stated}")
+    if parts:
+        yield f"the contact felt by (10), RMS of what it is off by: {', '.join(parts)} (estimates.csv)"
+
+
+def _rms(rows: Sequence[dict], column: str) -> float:
+    return float(np.sqrt(np.mean(np.square([row[column] for row in rows]))))
 
 
 def _error(j: Judged | None) -> str:

@@ -1,64 +1,90 @@
 """summary.txt: the verdict first, then what it rests on. Also shown in the terminal."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
-from bench.base.atomic import write_whole
+from bench.friction.curved import curved_lines
+from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
+from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
+from bench.report.run import Section
 from bench.report.summary.doubts import frame_lines, light_lines, taken_as_exact, whisk_doubts
-from bench.report.summary.errors import error_lines
+from bench.report.summary.errors import contact_lines, error_lines
 from bench.report.summary.gauges import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import gauges_of_all, run_lines, verdict
-from bench.trials.compare import judge
+from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, verdict
+from bench.trials.compare import Judged, judge
 
-DONE, DOUBTFUL = 0, 1
-_TABLES = ("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map")
+_TABLES = (
+    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
+    *("against_theta", "compliance", "curvature"),
+)
 
 
-def write_summary(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str]) -> int:
-    """Write and print the summary. Returns 0, or 1 where something is doubtful.
+@dataclass(frozen=True)
+class Summary:
+    """The verdict, what is doubtful, and titled sections, of which "Doubtful" is one."""
 
-    scores: lines on a synthetic session's truth; figures: names of the pictures.
-    """
+    verdict: tuple[str, ...]
+    doubtful: tuple[str, ...]
+    sections: tuple[Section, ...]
+
+    @property
+    def text(self) -> str:
+        """As summary.txt has it."""
+        titled = (line for s in self.sections for line in (s.title, *(f"  {line}" for line in s.lines), ""))
+        return "\n".join([*self.verdict, "", *titled]).rstrip() + "\n"
+
+
+def summary_of(
+    evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str], by_theta: Sequence[AtTheta] = ()
+) -> Summary:
+    """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta:
+    errors against θ."""
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
-    text = "\n".join(_lines(evaluation, doubtful, scores, figures)).rstrip()
-    write_whole(evaluation.out / "summary.txt", text + "\n")
-    print(text)
-    return DOUBTFUL if doubtful else DONE
+    judged = judge(evaluation.results)
+    said = verdict(evaluation.session, evaluation.results, judged, evaluation.settings, len(doubtful))
+    said = (*said, *gauges_of_all(evaluation.gauges), *looked_at(evaluation.results, evaluation.settings))
+    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta)
+    return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))
 
 
-def _lines(evaluation: Evaluation, doubtful: Sequence[str], scores: Sequence[str], figures: Sequence[str]) -> list[str]:
-    results, settings, judged = evaluation.results, evaluation.settings, judge(evaluation.results)
+def _sections(
+    evaluation: Evaluation,
+    judged: Sequence[Judged],
+    doubtful: Sequence[str],
+    scores: Sequence[str],
+    figures: Sequence[str],
+    by_theta: Sequence[AtTheta],
+) -> Iterator[Section]:
+    results, settings = evaluation.results, evaluation.settings
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
     truth = [*truth_lines(results), *budget_lines(results), *shared_lines(results), *beam_lines(results)]
-    return [
-        *verdict(evaluation.session, results, judged, settings, len(doubtful)),
-        *gauges_of_all(evaluation.gauges),
-        "",
-        *_titled("Truth, from the pictures (± one sigma)", truth),
-        *_titled("Clocks", clock_lines(results)),
-        *_titled(errors, error_lines(judged)),
-        *_titled("Friction angle α (± one sigma)", [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]),
-        *_titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
-        *_titled("Cameras", evaluation.camera_notes),
-        *_titled("Light from one side", light_lines(results)),
-        *_titled("Frames", frame_lines(results)),
-        *_titled("Doubtful", doubtful),
-        *_titled("Score against the truth files of this synthetic session (no result knows them)", scores),
-        *_titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session)),
-        *_titled("Files", _files(figures)),
-    ]
+    yield _titled("Truth, from the pictures (± one sigma)", truth)
+    yield _titled("Clocks", clock_lines(results))
+    yield _titled(errors, [*error_lines(judged), *contact_lines(results)])
+    yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
+    friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]
+    yield _titled("Friction angle α (± one sigma)", friction)
+    yield _titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)])
+    yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
+    yield _titled("Cameras", evaluation.calibration.notes)
+    yield _titled("Light from one side", light_lines(results))
+    yield _titled("Frames", frame_lines(results))
+    yield _titled("Doubtful", doubtful)
+    yield _titled("Score against the truth files of this synthetic session (no result knows them)", scores)
+    yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))
+    yield _titled("Files", _files(figures))
 
 
-def _titled(title: str, lines: Iterable[str]) -> list[str]:
-    lines = list(lines)
-    return [title, *(f"  {line}" for line in lines), ""] if lines else []
+def _titled(title: str, lines: Iterable[str]) -> Section:
+    return Section(title, tuple(lines))
 
 
 def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
     tables = [f"{name}.csv" for name in _TABLES]
-    return [", ".join([*tables, "track/", *single, *(f"{folder}/" for folder in folders)])]
+    return [", ".join(["report.html", *tables, "track/", *single, *(f"{folder}/" for folder in folders)])]

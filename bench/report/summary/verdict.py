@@ -1,12 +1,13 @@
 """The verdict: how wrong each estimator is, over the measured whisks."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from bench.base.drawing import label_of
-from bench.base.settings import Settings
-from bench.friction.runs import FITTED, RUNS, SEEN
+from bench.base.settings import Seeing, Settings
+from bench.friction.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
@@ -22,30 +23,19 @@ def verdict(
     measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     known = sum(s.has_truth for s in seen)
-    told = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
-    asked = [j for j in told if not j.apart]
+    asked = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
     for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
         mine = [j for j in measured if j.estimator == name]
         missing = _told([j for j in asked if j.estimator == name])
         yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + missing
-    yield from _left_out([j for j in told if j.apart])
     if not measured:
-        yield "No verdict on the estimators: no whisk free of doubt has both a truth and an estimate."
+        yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
     yield (
         f"{session.name}: truth for {known} of {len(seen)} measured whisks"
         if pictures
         else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
     ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
-
-
-def _left_out(apart: Sequence[Judged]) -> Iterator[str]:
-    """Which whisks the verdict does not rest on."""
-    names = list(dict.fromkeys((j.trial, j.whisk) for j in apart))
-    if names:
-        which = ", ".join(dict.fromkeys(trial for trial, _ in names))
-        count = f"{len(names)} whisks are" if len(names) > 1 else "1 whisk is"
-        yield f"{count} doubtful and in no verdict ({which})."
 
 
 def _told(asked: Sequence[Judged]) -> str:
@@ -67,29 +57,55 @@ def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
         )
 
 
+def looked_at(results: Iterable[TrialResult], settings: Settings) -> Iterator[str]:
+    """How hard pictures were looked at, where that is not the standard."""
+    seeing, looked = settings.seeing, [seen for _, seen, _ in whisks(results) if seen.looked]
+    if settings.accuracy_mm is not None:
+        counts = Counter(seen.looked for seen in looked)
+        above = sum(not seen.d_x_mm.sigma <= settings.accuracy_mm for seen in looked)
+        by = ", ".join(f"{name} {count}" for name, count in counts.items())
+        above_it = f"{above} of {len(looked)} whisks are above."
+        yield f"Looked at until d_x's sigma is {settings.accuracy_mm:g} mm or less: {by}; {above_it}"
+    elif seeing != Seeing():
+        asked = f", cameras {', '.join(seeing.cameras)}" if seeing.cameras else ""
+        yield f"Pictures were looked at by the settings {seeing.name}{asked}."
+
+
 def _measured(judged: Sequence[Judged]) -> list[Judged]:
-    usual = (j for j in judged if j.purpose == "measure" and not j.one_factor and not j.apart)
-    return [j for j in usual if np.isfinite(j.error_percent)]
+    return [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)]
 
 
 def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
     """(10) once more with what is known of the friction, where that is anything."""
-    for name, what in ((FITTED, "to the other whisks of the surface"), (SEEN, "which no robot has; what is left then")):
+    for name, what in (
+        (FITTED, "to the other whisks of the surface"),
+        (SEEN, "which no robot has; what is left then"),
+        (KINETIC, "where moments alone show stick–slip"),
+    ):
         mine = [j for j in _measured(judged) if j.estimator == name]
         if mine:
             yield _verdict_on(name, mine, settings).replace(label_of(name), f"{label_of(name)} ({what}),", 1)
 
 
 def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
-    errors = np.array([j.error_percent for j in judged])
-    sigmas = np.array([j.error_sigma_percent for j in judged])
-    worst = judged[int(np.argmax(np.abs(errors)))]
+    """The range of the errors of the whisks of which nothing is doubtful; of the others how many, and theirs."""
+    sound, doubtful = ([j for j in judged if j.doubtful == doubt] for doubt in (False, True))
     assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
-    ends = dict.fromkeys(int(k) for k in (np.argmin(errors), np.argmax(errors)))
-    spread = " to ".join(f"{errors[k]:+.1f} ± {sigmas[k]:.1f}" for k in ends)
-    count = f"{len(errors)} whisks" if len(errors) > 1 else "1 whisk"
-    significant = np.any(np.abs(errors) > _SIGNIFICANT * sigmas)
+    if not sound:
+        all_of_them = f"all of its {len(judged)} whisks are doubtful ({_range(judged)})"
+        return f"{label_of(name)}{assumed} has no verdict: {all_of_them}."
+    worst = max(sound, key=lambda j: abs(j.error_percent))
+    is_significant = any(abs(j.error_percent) > _SIGNIFICANT * j.error_sigma_percent for j in sound)
+    count = f"{len(sound)} whisks" if len(sound) > 1 else "1 whisk"
+    not_significant = "" if is_significant else ", not significant"
+    left_out = f"; {len(doubtful)} doubtful left out ({_range(doubtful)})" if doubtful else ""
     return (
-        f"{label_of(name)}{assumed} is wrong by {spread} % of d_x over {count}, most at β = {worst.beta_deg:.1f}° "
-        f"({worst.trial})" + ("." if significant else ": not significant.")
+        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {count}, most at β = {worst.beta_deg:.1f}° "
+        f"({worst.trial}){not_significant}{left_out}."
     )
+
+
+def _range(judged: Sequence[Judged]) -> str:
+    """From the least to the largest error, each with its sigma; one where there is one."""
+    ends = dict.fromkeys(pick(judged, key=lambda j: j.error_percent) for pick in (min, max))
+    return " to ".join(f"{j.error_percent:+.1f} ± {j.error_sigma_percent:.1f}" for j in ends) + " %"

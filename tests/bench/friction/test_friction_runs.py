@@ -9,9 +9,10 @@ import pytest
 from bench.base.settings import Settings
 from bench.friction.alphas import mean_alpha
 from bench.friction.runs import FITTED, SEEN, with_runs
-from bench.friction.section_vii import Contact, by_consistency, by_tilting, weights
+from bench.friction.section_vii import Contact, by_consistency, by_smoothness, by_tilting, weights
 from bench.friction.tables import alpha_lines, friction_of, write_friction
 from bench.report.assembly import estimate_rows
+from bench.session.whisker import Whisker
 from estimator import slip
 from tests.scenes.friction_results import ALPHA, PHI_SIGMA, THETA, WHISKER, C, result
 
@@ -129,3 +130,21 @@ def test_at_the_bound_of_the_search_there_is_no_angle():
             for c, k in ((contact(20), 1.0), (contact(40), 2.0), (contact(60), 4.0))]  # fmt: skip
     way = by_consistency(bars, WHISKER)
     assert np.isnan([way.alpha_rad, way.sigma_rad]).all() and "at the bound of the search" in way.status
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cone"])
+def test_smoothness_finds_the_friction_of_bars_along_one_edge(shape):
+    """(13), (14) exactly, at two distances in turn: the α that they were made with."""
+    whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0)
+    bars = [along(beta, (45.0, 60.0)[k % 2], whisker) for k, beta in enumerate((-60, -45, -20, 0, 30, 50, 65))]
+    way = by_smoothness(bars, whisker)
+    assert way.alpha_rad == pytest.approx(ALPHA, abs=1e-6)
+    assert way.status == "" and way.sigma_rad < np.radians(1.0)
+    assert "two nominal distances" in by_smoothness([replace(b, d_x_nominal_mm=60.0) for b in bars], whisker).status
+
+
+def along(beta_deg: float, d_x: float, whisker: Whisker) -> Contact:
+    """A contact of a bar at this slope and distance, in a recording of its own."""
+    beta = np.radians(beta_deg)
+    m_y, m_z = slip.moments(whisker.beam.as_cylinder_mm(d_x), THETA, beta, ALPHA, whisker.beam.C_Nmm2)
+    return Contact(beta, d_x, THETA, m_y, m_z, np.arctan2(m_y, m_z), 1e-3, f"b{beta_deg:g}")

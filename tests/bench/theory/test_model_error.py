@@ -7,8 +7,9 @@ import pytest
 
 from bench.base.workers import Workers
 from bench.theory import model_error_maps
-from bench.theory.model_error import ROD, Push, error_percent, predicted_percent, radius_map, tilt_map
+from bench.theory.model_error import ROD, Push, error_percent, errors_percent, predicted_percent, radius_map, tilt_map
 from bench.theory.model_error_maps import MAPS, Map, write_map
+from estimator.first_order import HELD_SHARE
 
 THIN_MM = 1e-6  # radius of a bar that is nearly a line
 
@@ -96,3 +97,16 @@ def test_the_radius_map_grows_towards_thick_bars_near_the_base():
     for panel in radius_map(Workers(0), d_x_mm=np.array([20.0, 80.0]), bar_radius_mm=np.array([2.0, 20.0])):
         assert (panel.error_percent[1] < 0).all()  # slip towards the base: d_x comes out short, as the paper says
         assert panel.error_percent[1, 0] == panel.error_percent.min()
+
+
+@pytest.mark.parametrize("push", [Push(0.0, 0.0, 23.3), Push(40.0, 0.0, 0.0, d_x_mm=30.0, bar_radius_mm=10.0),
+                                  Push(50.0, 0.0, 10.5), Push(0.0, 0.0, 10.5, d_x_mm=20.0, bar_radius_mm=15.0)])
+def test_10_corrected_leaves_the_second_order(push):
+    """Half the angle leaves a quarter, but for friction of a held contact beyond HELD_SHARE: all of it at β = 0."""
+    held = 20.0 * (1 - HELD_SHARE) * np.tan(np.radians(push.alpha_deg)) if push.beta_deg == 0 else 0.0
+    left = []
+    for theta_deg in (0.5, 0.25):
+        plain, better = errors_percent(Push(**(vars(push) | {"theta_deg": theta_deg})))
+        left.append(better + held * np.radians(theta_deg))
+        assert abs(better) < 0.5 * abs(plain)
+    assert left[1] == pytest.approx(left[0] / 4, rel=0.15, abs=1e-4)

@@ -7,7 +7,7 @@ import pytest
 
 from bench.records.trial import FeltWhisk
 from bench.session.session import load_session
-from bench.trials.consistency import turns_doubt, width_doubt
+from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
 from bench.trials.placing import _by_scale
 from bench.trials.unit import _against_pictures
 from tests.scenes.model_scenes import begun, scene, with_points
@@ -16,6 +16,7 @@ from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
 from vision.geometry.board import Board
+from vision.truth.value import UNKNOWN, Value
 
 SPEED = np.radians(18.0)  # rad/s: 0.9° a frame, 20 frames a second
 FRAMES = 9
@@ -134,3 +135,21 @@ def test_a_leaning_axis_is_no_scale(small_session, rng):
     session = load_session(small_session)
     exact = by_board(session.T_rig_board, 0.0, 0.0)
     assert _by_scale(session, exact, strokes(session, 1.1, rng, turned=0.1)) == ""
+
+
+@pytest.mark.parametrize(
+    ("beta_deg", "sigma_deg", "nominal", "said"),
+    [
+        (26.0, 0.8, 0.0, "seen as 26.0 ± 0.8°, beta_deg says 0: check it"),
+        (-31.0, 0.2, 30.0, "its sign looks turned"),
+        (33.0, 0.2, 30.0, None),  # as a protractor is read
+        (26.0, 9.0, 0.0, None),  # a slope that is hardly known
+        (26.0, 0.8, None, None),
+    ],
+)
+def test_a_slope_is_held_to_its_nominal_one(beta_deg, sigma_deg, nominal, said, trial):
+    beta = Value(np.radians(beta_deg), np.radians(sigma_deg))
+    trial = replace(trial, beta_deg=nominal)
+    found = slope_doubt(beta, trial)
+    assert said in found if said else found == ""
+    assert slope_doubt(UNKNOWN, trial) == ""

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.ladder.lines import NOISE, PIECE_PX, SCENES, Figures, bounds, find
-from vision.lines.bands import Band, cut_pieces, read_band, strongest_shift
-from vision.pictures.pixel_noise import Noise, measure_noise
+from vision.lines.bands import read_band
+from vision.pictures.pixel_noise import measure_noise
 
 PLAIN = ["even rod, flat background", "step of a fifth of the contrast", "highlight and step",
          "within 2° of the rows, highlight"]  # fmt: skip
@@ -75,21 +75,3 @@ def test_noise_is_measured_by_grey_level(rng):
     # variance of the class medians: 13 000 pixels a class, 1.2 % each; the fit's ends are good to 10 %
     for grey in (30.0, 100.0, 180.0):
         assert noise.sigma(grey) == pytest.approx(np.sqrt(2.0 + 0.1 * grey), rel=0.07)
-
-
-def test_a_dim_rod_does_not_drown_in_the_noise_of_the_known_picture(rng):
-    """Two noise levels bright and 5 px wide on an even floor, 16 rows a piece, in a band 53 px wide.
-
-    Its squares make 5 * 16 * 4 = 320 of all difference; the noise of two pictures, 2 sqrt(2 * 16) a column, adds 0.4 of
-    that in each of the other 48: 217, so the share is 0.6. Where the known picture's noise was taken for difference,
-    16 more in each column made it 0.35.
-    """
-    across, noise, rows = np.arange(-26.0, 27.0), 3.0, 16 * 20
-    floor = 50.0 + noise * rng.standard_normal((rows, 53))
-    frame = 50.0 + noise * rng.standard_normal((rows, 53)) + np.where(np.abs(across) <= 2.0, 2.0 * noise, 0.0)
-    bands = Band(np.tile(across, (rows, 1)), frame, floor, np.zeros((rows, 2)), np.tile([0.0, 1.0], (rows, 1)),
-                 np.arange(float(rows)), np.full(rows, 2.0))
-    shift, share = strongest_shift(cut_pieces([bands], 16, Noise(noise**2, 0.0)), 26)
-    # a piece's noise in the window, sqrt(5) * 11 + 2 * 2 sqrt(5 * 16 * 2), is a fifth of the rod's: a median to 0.03
-    assert np.median(share) == pytest.approx(0.6, abs=0.1)
-    assert np.median(np.abs(shift)) <= 1.0

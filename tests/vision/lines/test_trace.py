@@ -6,10 +6,10 @@ import pytest
 from tests.ladder import starts
 from tests.ladder.lines import COLUMNS, FRAMES, KNOTS, NOISE, PIECE_PX, SCENES, SHAPE, axis_height, band, drawn, errors
 from tests.scenes.model_scenes import camera
-from vision.fit.first_bends import coarse_points
+from vision.fit.first_bends import Sight
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, outline_of_bar
-from vision.geometry.rods import Wire
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.lines.bands import cut_pieces
 from vision.lines.trace import clear_of_bar, to_points, trace, wire_pieces
 from vision.pictures.pixel_noise import Noise
@@ -76,8 +76,8 @@ def test_a_wire_that_the_bar_hides_whole_has_no_points(still):
     """There is no median width of no pieces: that ended the whole run."""
     view, curves, wire = still
     over_all = np.array([[640.0, 360.0]]), np.array([2000.0])
-    points, source = coarse_points(view, curves, wire, over_all)
-    assert len(points) == len(source) == 0
+    seen = Sight(view, Rods(wire, Bar(4.0)), view, 1.0, over_all).votes(curves)
+    assert len(seen.pieces) == len(seen.share) == len(seen.points(np.zeros(0))) == 0
 
 
 def test_a_bar_that_passes_behind_the_camera_hides_no_more_than_what_is_before_it(still):

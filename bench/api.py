@@ -1,0 +1,158 @@
+"""The verbs for Python: results as NumPy tables, figures as Matplotlib has them.
+
+>>> run = evaluate(session, out, alpha_est_deg=12.0)
+>>> run.verdict[-1]
+'sample: no pictures, so no truth; 2 measured whisks felt...'
+>>> run.whisks.dtype.names[:4]
+('trial', 'whisk', 'surface', 'speed_deg_s')
+>>> given = run.estimates["estimator"] == "with_friction"
+>>> run.estimates["alpha_est_deg"][given].round(1).tolist()
+[12.0, 12.0, 12.0, 12.0]
+>>> read(out).whisks["trial"].tolist()
+['b30_3', 'b60_4', 'gauge_roll0', 'gauge_roll90']
+>>> sorted(run.figures())
+['fig8']
+
+`session` and `out` are folders, as on the command line, which is made of these functions. Bad input raises
+`bench.base.errors.BadInput` or `vision.geometry.errors.Refused`, whose text is the line that the command line shows.
+"""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bench.base.drawing import style
+from bench.base.settings import Settings
+from bench.base.tables import read_table
+from bench.evaluate import evaluate as _evaluate
+from bench.report.evaluation import Finished, finished
+from bench.report.page.write import report_again
+from bench.report.paper import session_figures
+from bench.report.pooled import read_run
+from bench.report.record import read_record
+from bench.report.run import RunRecord
+from bench.trials.seeing import STANDARD, by_preset
+
+TABLES = (
+    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
+    *("against_theta", "compliance", "curvature"),
+)
+Folder = Path | str
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """An evaluated session. Each table is a structured array (rows,) whose fields are the columns of docs/formats.md:
+    NaN is a number that is missing, '' a text. doubtful: whether anything is."""
+
+    out: Path
+    record: RunRecord
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """How good each estimator is, in sentences."""
+        return self.record.verdict
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful, a line each."""
+        return self.record.doubts
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether anything is doubtful; the command line's exit code is then 1."""
+        return bool(self.doubts)
+
+    @property
+    def whisks(self) -> np.ndarray:
+        """A row a whisk: truth and moments, with sigmas."""
+        return self.table("whisks")
+
+    @property
+    def estimates(self) -> np.ndarray:
+        """A row a whisk and estimator."""
+        return self.table("estimates")
+
+    def table(self, name: str) -> np.ndarray:
+        """A table by its name, one of TABLES. Raises KeyError for another."""
+        if name not in TABLES:
+            raise KeyError(f"{name!r} is no table; there are {', '.join(TABLES)}")
+        return read_table(self.out / f"{name}.csv")
+
+    def track(self, trial: str) -> np.ndarray:
+        """A row a frame of a trial. Raises KeyError where there is no such trial."""
+        if trial not in self.record.recordings:
+            raise KeyError(f"there is no trial {trial!r}; there are {', '.join(self.record.recordings)}")
+        return read_table(self.out / "track" / f"{trial}.csv")
+
+    def results(self) -> Finished:
+        """Everything of every whisk as typed records (`bench.records.trial`), and the friction of each surface."""
+        return finished(read_run(self.out), self.record.whisker, self.record.settings)
+
+    def figures(self) -> dict[str, Figure]:
+        """The session's figures by name, to change and save as one likes."""
+        whole = self.results()
+        with style():
+            return session_figures(whole.results, whole.friction, self.record.whisker, self.record.settings)
+
+
+def evaluate(
+    session: Folder,
+    out: Folder,
+    *,
+    theta_deg: float = 3.0,
+    alpha_est_deg: float = 10.0,
+    alpha_est_sigma_deg: float | None = None,
+    cutoff_Hz: float | None = None,
+    clock_sigma_s: float | None = None,
+    gauges_from_all: bool = False,
+    estimators: Sequence[str] = (),
+    trials: str = "*",
+    figures: bool = True,
+    preset: str = STANDARD,
+    accuracy_mm: float | None = None,
+    workers: int = 1,
+    figure_formats: Sequence[str] = (),
+) -> Run:
+    """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the screen.
+
+    The options are those of the command line. Raises BadInput, Refused.
+    """
+    settings = Settings(
+        theta_deg=theta_deg,
+        alpha_est_deg=alpha_est_deg,
+        alpha_est_sigma_deg=alpha_est_sigma_deg,
+        cutoff_Hz=cutoff_Hz,
+        clock_sigma_s=clock_sigma_s,
+        gauges_from_all=gauges_from_all,
+        estimators=tuple(estimators),
+        trials=trials,
+        figures=figures,
+        seeing=by_preset(preset),
+        accuracy_mm=accuracy_mm,
+    )
+    return evaluate_with(Path(session), Path(out), settings, workers, figure_formats)
+
+
+def evaluate_with(
+    session: Path, out: Path, settings: Settings, workers: int = 1, figure_formats: Sequence[str] = (), **shown
+) -> Run:
+    """The same with the options in one object. shown: progress and announce of `bench.evaluate.evaluate`."""
+    quiet = {"announce": logging.getLogger(__name__).info}
+    _evaluate(session, out, settings, workers=workers, figure_formats=figure_formats, **quiet | shown)
+    return read(out)
+
+
+def read(out: Folder) -> Run:
+    """A run that was evaluated before. Raises BadInput where the folder is none."""
+    return Run(Path(out), read_record(Path(out)))
+
+
+def report(out: Folder, figure_formats: Sequence[str] = ()) -> list[Path]:
+    """report.html, methods.md and results.bib again, and figures for a paper in these formats ("png", "pdf", "svg").
+    The paths written. Raises BadInput where the folder is no run."""
+    return report_again(Path(out), figure_formats)

@@ -1,0 +1,56 @@
+"""How hard pictures are looked at: the options of `evaluate` for it, and the verb `tradeoff`."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from bench.options import add_out, add_session, add_verb, count
+
+
+def add_seeing(verb: argparse.ArgumentParser) -> None:
+    """Options by which pictures are looked at less hard, or harder."""
+    how = verb.add_mutually_exclusive_group()
+    how.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
+    )
+    how.add_argument(
+        "--accuracy-mm",
+        type=float,
+        metavar="X",
+        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
+    )
+    how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
+
+
+def seeing_of(options: argparse.Namespace):
+    """The settings of `--preset` or `--settings`."""
+    from bench.trials.seeing import STANDARD, by_preset, from_file
+
+    return from_file(options.settings) if options.settings else by_preset(options.preset or STANDARD)
+
+
+def add_tradeoff(verbs) -> None:
+    """The verb `tradeoff`."""
+    verb = add_verb(
+        verbs,
+        "tradeoff",
+        _tradeoff,
+        "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
+        "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
+    )
+    add_session(verb)
+    add_out(verb, "OUT", "folder for the table, the plot and the settings files")
+    verb.add_argument("--trials", default="*", metavar="PATTERN", help="only trials of such names (default: all)")
+    verb.add_argument("--repeats", type=count, default=2, metavar="N", help="how often each is timed (default 2)")
+
+
+def _tradeoff(options: argparse.Namespace) -> int:
+    from bench.base.workers import single_thread
+
+    single_thread()
+    from bench.tradeoff import tradeoff
+
+    progress = sys.stderr.isatty()
+    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, progress=progress)

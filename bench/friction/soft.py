@@ -1,0 +1,167 @@
+"""How soft an object is, from whisks at two distances (section VII): compliance.csv, a row a pair of distances.
+
+The whisker is moved along itself by a known shift, between trials of one surface and speed whose nominal distances
+(d_x_mm in trial.toml) differ. Only whisks that do not slip sideways serve, for the equation has no slip. No picture is
+looked at.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.tables import write_table
+from bench.records.trial import FeltWhisk, TrialFacts, TrialResult, whisks
+from bench.session.session import Session
+from bench.session.whisker import Whisker
+from bench.trials.compare import is_sound
+from estimator import compliance, first_order
+from estimator.uncertainty import Z_95, model_share
+
+COLUMNS = (
+    *("surface", "speed_deg_s", "near_nominal_mm", "far_nominal_mm", "whisks_near", "whisks_far", "shift_mm"),
+    *("shift_sigma_mm", "d_x_mm", "d_x_sigma_mm", "give_mm_N", "give_sigma_mm_N", "stiffness_N_mm"),
+    *("stiffness_low_N_mm", "stiffness_high_N_mm", "status"),
+)
+_LEAST_SHIFT_MM = 2.0  # nominal distances that differ by less are one distance set up again
+_HELD_SIGMAS = 3.0  # of φ felt: beyond, the contact slips sideways
+NOT_SOFT = "no softer than a rigid object within the noise"
+NO_CYLINDER = "the equation is that of a cylinder"
+NO_PUSH = "no distance explains both compliances"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Whisks at one nominal distance: mean compliance k_θ with sigma, rad/(N·mm), of so many whisks."""
+
+    nominal_mm: float
+    nominal_sigma_mm: float
+    compliance: float
+    sigma: float
+    whisks: int
+
+
+@dataclass(frozen=True)
+class Soft:
+    """What two places tell of one surface: the nearer distance, how far the object gives way, mm/N; NaN and why."""
+
+    surface: str
+    speed_deg_s: float | None
+    near: Place
+    far: Place
+    d_x_mm: float
+    d_x_sigma_mm: float
+    give_mm_N: float
+    give_sigma_mm_N: float
+    status: str = ""
+
+    @property
+    def stiffness_N_mm(self) -> tuple[float, float, float]:
+        """k and both ends of its 95 % interval; infinite where the object gives way no more than a rigid one."""
+        reach = Z_95 * self.give_sigma_mm_N
+        middle, low, high = (1 / g if g > 0 else np.inf for g in (self.give_mm_N, self.give_mm_N + reach,
+                                                                 self.give_mm_N - reach))  # fmt: skip
+        return (middle, low, high) if np.isfinite(self.give_mm_N) else (np.nan,) * 3
+
+
+def soft_objects(session: Session, results: Sequence[TrialResult], alpha_est_rad: float) -> list[Soft]:
+    """A row for each two neighbouring nominal distances of a surface and speed."""
+    found = []
+    for panel in dict.fromkeys(r.trial.panel for r in results if r.trial.purpose == "measure"):
+        mine = [r for r in results if r.trial.purpose == "measure" and r.trial.panel == panel]
+        places = [place for place in _places(session, mine) if place is not None]
+        facts, theta = mine[0].trial, float(np.radians(mine[0].theta_deg))
+        found += [softness(session.whisker, facts, *pair, theta, alpha_est_rad) for pair in pairwise(places)
+                  if pair[1].nominal_mm - pair[0].nominal_mm >= _LEAST_SHIFT_MM]  # fmt: skip
+    return found
+
+
+def _places(session: Session, results: Sequence[TrialResult]) -> Iterator[Place | None]:
+    """By nominal distance, from near to far; None where no whisk serves."""
+    nominal = {r.trial.d_x_nominal_mm for r in results}
+    for d_x in sorted(d for d in nominal if np.isfinite(d)):
+        there = [r for r in results if r.trial.d_x_nominal_mm == d_x]
+        rows = [_compliance(r, felt) for r, seen, felt in whisks(there) if is_sound(seen, felt) and _is_held(felt)]
+        sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there)
+        yield _place(d_x, sigma_mm, np.array(rows)) if rows else None
+
+
+def _place(d_x: float, sigma_mm: float, rows: np.ndarray) -> Place:
+    """Mean of compliances and sigmas (n, 2). Gauges are common to them: their number makes the sigma no less."""
+    return Place(d_x, sigma_mm, float(rows[:, 0].mean()), float(np.sqrt(np.mean(rows[:, 1] ** 2))), len(rows))
+
+
+def _is_held(felt: FeltWhisk) -> bool:
+    phi = felt.phi_felt_rad
+    return felt.has_moments and abs(phi.value) <= _HELD_SIGMAS * phi.sigma
+
+
+def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float]:
+    """k_θ = θ/m_z and its sigma."""
+    theta, m_z = float(np.radians(result.theta_deg)), felt.m_z_Nmm
+    shares = np.array([felt.theta_sigma_rad / theta, m_z.sigma / m_z.value])
+    mixed = felt.theta_moment_covariance_at[1] / (theta * m_z.value)
+    return theta / m_z.value, theta / m_z.value * float(np.sqrt(max(shares @ shares - 2 * mixed, 0.0)))
+
+
+def softness(whisker: Whisker, trial: TrialFacts, near: Place, far: Place, theta_rad: float, alpha_rad: float) -> Soft:
+    """What two places tell, whose whisks are those of `trial` but for the distance; alpha_rad: as assumed."""
+    described = trial.surface, trial.speed_deg_s, near, far
+    if whisker.shape != "cylinder":
+        return Soft(*described, *(np.nan,) * 4, NO_CYLINDER)
+    C, shift = whisker.C_Nmm2, far.nominal_mm - near.nominal_mm
+    reach = 0.5 * float(np.nan_to_num(trial.bar_diameter_mm) + whisker.diameter_mm)
+    (k_near, near_sigma), (k_far, far_sigma) = (_corrected(p, C, reach, theta_rad, alpha_rad) for p in (near, far))
+    d_x, _ = compliance.two_distances(k_near, k_far, shift, C)
+    if not np.isfinite(d_x):
+        return Soft(*described, *(np.nan,) * 4, NO_PUSH)
+    give = compliance.give(d_x, k_near, C)
+    shift_sigma = float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))
+    sigmas = compliance.two_distances_spread(d_x, give, shift, C, near_sigma, far_sigma, shift_sigma)
+    status = NOT_SOFT if give <= Z_95 * sigmas[1] else ""
+    return Soft(*described, float(d_x), float(sigmas[0]), float(give), float(sigmas[1]), status)
+
+
+def _corrected(place: Place, C: float, reach: float, theta: float, alpha_rad: float) -> tuple[float, float]:
+    """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`), and its sigma with what
+    is left of that. reach: radii of bar and whisker together, mm."""
+    d_x = place.nominal_mm
+    share = first_order.rolling(theta, reach, 0.0, alpha_rad, d_x, 1.0)
+    share += first_order.HELD_SHARE * first_order.dragging(theta, alpha_rad)
+    left = model_share(theta, 0.0, alpha_rad, d_x, held_spread=first_order.HELD_SPREAD)
+    return place.compliance - share * d_x / C, float(np.hypot(place.sigma, left * d_x / C))
+
+
+def write_compliance(out: Path, found: Sequence[Soft]) -> None:
+    """compliance.csv."""
+    write_table(out / "compliance.csv", COLUMNS, map(_row, found))
+
+
+def _row(soft: Soft) -> dict:
+    near, far = soft.near, soft.far
+    row = {"surface": soft.surface, "speed_deg_s": soft.speed_deg_s, "near_nominal_mm": near.nominal_mm}
+    row |= {"far_nominal_mm": far.nominal_mm, "whisks_near": near.whisks, "whisks_far": far.whisks}
+    row |= {"shift_mm": far.nominal_mm - near.nominal_mm, "status": soft.status}
+    row |= {"shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))}
+    row |= {name: getattr(soft, name) for name in ("d_x_mm", "d_x_sigma_mm", "give_mm_N", "give_sigma_mm_N")}
+    names = ("stiffness_N_mm", "stiffness_low_N_mm", "stiffness_high_N_mm")
+    return row | {name: value if np.isfinite(value) else np.nan for name, value in zip(names, soft.stiffness_N_mm)}
+
+
+def soft_lines(found: Sequence[Soft]) -> Iterator[str]:
+    """A line a pair of distances that tells something."""
+    for soft in found:
+        if not np.isfinite(soft.give_mm_N):
+            continue
+        k, low, high = soft.stiffness_N_mm
+        told = f"gives way by {soft.give_mm_N:.3f} ± {soft.give_sigma_mm_N:.3f} mm/N: "
+        told += f"stiffness {k:.3g} N/mm ({low:.3g} to {high:.3g})" if not soft.status else (
+            f"{NOT_SOFT}, stiffer than {low:.2g} N/mm (95 %)")  # fmt: skip
+        shift = soft.far.nominal_mm - soft.near.nominal_mm
+        speed = f", {soft.speed_deg_s:g}°/s" if soft.speed_deg_s is not None else ""
+        yield (
+            f"{soft.surface or 'surface not named'}{speed}: two distances {shift:g} mm apart (section VII): {told}; "
+            f"d_x {soft.d_x_mm:.2f} ± {soft.d_x_sigma_mm:.2f} mm"
+        )

@@ -1,0 +1,86 @@
+"use strict";
+// The table sorts and filters; a whisk's card opens from any link to it; arrow keys go from card to card.
+(function () {
+  const table = document.getElementById("table"), body = table.tBodies[0];
+  const rows = Array.from(body.rows), heads = Array.from(table.tHead.rows[0].cells);
+
+  function valueOf(row, column) {
+    const cell = row.cells[column];
+    if (!("v" in cell.dataset)) return cell.textContent.trim();
+    return cell.dataset.v === "" ? null : Number(cell.dataset.v);
+  }
+
+  function compare(a, b) {
+    if (typeof a === "number" && typeof b === "number") return a - b;
+    return String(a).localeCompare(String(b), "en", { numeric: true });
+  }
+
+  function sortBy(column) {
+    const head = heads[column], down = head.getAttribute("aria-sort") === "ascending";
+    heads.forEach((other) => other.removeAttribute("aria-sort"));
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    const known = rows.filter((row) => valueOf(row, column) !== null);
+    const missing = rows.filter((row) => valueOf(row, column) === null);
+    known.sort((a, b) => (down ? -1 : 1) * compare(valueOf(a, column), valueOf(b, column)));
+    body.append(...known, ...missing); // what is missing stands last, either way
+  }
+  heads.forEach((head, column) => head.querySelector("button").addEventListener("click", () => sortBy(column)));
+
+  const search = document.getElementById("search"), count = document.getElementById("count");
+  function filter() {
+    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const off = new Set();
+    for (const row of rows) {
+      const text = row.textContent.toLowerCase();
+      row.hidden = !words.every((word) => text.includes(word));
+      if (row.hidden) off.add(row.dataset.w);
+    }
+    for (const mark of document.querySelectorAll(".mark, .bar-row")) mark.classList.toggle("off", off.has(mark.dataset.w));
+    count.textContent = `${rows.length - off.size} of ${rows.length} whisks`;
+  }
+  search.addEventListener("input", filter);
+  filter();
+
+  function open(key) {
+    const card = document.getElementById(key);
+    if (!card || !card.matches("dialog.card") || card.open) return;
+    document.querySelectorAll("dialog[open]").forEach((other) => other.close());
+    card.showModal();
+    card.scrollTop = 0;
+    history.replaceState(null, "", "#" + key);
+    document.dispatchEvent(new CustomEvent("whisk", { detail: key }));
+  }
+
+  function go(card, step) {
+    const shown = Array.from(body.rows).filter((row) => !row.hidden).map((row) => row.dataset.w);
+    const next = shown[shown.indexOf(card.id) + step];
+    if (next) open(next);
+  }
+
+  document.addEventListener("click", (event) => {
+    const link = event.target.closest("a[href^='#w']"), card = event.target.closest("dialog.card");
+    if (link) {
+      event.preventDefault();
+      open(link.getAttribute("href").slice(1));
+    } else if (event.target.matches("[data-go]")) {
+      const step = Number(event.target.dataset.go);
+      if (step) go(card, step);
+      else card.close();
+    } else if (event.target.matches("dialog.card")) {
+      event.target.close(); // the backdrop
+    }
+  });
+  for (const card of document.querySelectorAll("dialog.card")) {
+    card.addEventListener("close", () => {
+      if (location.hash === "#" + card.id) history.replaceState(null, "", location.pathname + location.search);
+    });
+    card.addEventListener("keydown", (event) => {
+      if (event.key === "ArrowLeft") go(card, -1);
+      if (event.key === "ArrowRight") go(card, 1);
+    });
+  }
+  window.addEventListener("hashchange", () => open(location.hash.slice(1)));
+  open(location.hash.slice(1));
+  document.getElementById("print-cards").addEventListener("change", (event) =>
+    document.body.classList.toggle("print-cards", event.target.checked));
+})();

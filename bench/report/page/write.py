@@ -1,0 +1,163 @@
+"""The page put together and written, with methods.md and results.bib beside it."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from bench.base.atomic import lock_output, write_whole
+from bench.base.results import plain
+from bench.base.settings import Seeing
+from bench.friction.explained import SHARES
+from bench.friction.tables import SurfaceFriction
+from bench.records.trial import TrialResult
+from bench.report.evaluation import finished
+from bench.report.page.cards import SOUND, card, cells, columns
+from bench.report.page.cures import cure_of
+from bench.report.page.methods import bibliography, methods
+from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
+from bench.report.page.scene import ELLIPSOID_FACTOR, scene
+from bench.report.page.standing import standings, sureness
+from bench.report.page.words import number, rows_of
+from bench.report.paper import write_paper_figures
+from bench.report.pooled import read_run
+from bench.report.record import read_record
+from bench.report.run import CameraFacts, RunRecord
+from bench.report.summary.doubts import SILENT
+from vision.fit.uncertainty import CAUSES
+
+REPORT, METHODS, BIBLIOGRAPHY = "report.html", "methods.md", "results.bib"
+_PARTS = {
+    "by_touch_mm": "touch felt → seen",
+    "by_moments_mm": "moments felt → seen",
+    "by_alpha_mm": "α_est → α seen",
+    "remainder_mm": "beam theory, slip along",
+}
+_MOST_BARS = 60  # whisks; of more, those with the largest sum of shares are drawn
+_IN_FIGURES = ("Truth", "Error of d_x", "Doubtful", "Cameras", "Gauges", "Taken as exact")
+
+
+def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
+    """The report of an evaluated run, from its results alone, and its figures for a paper in these formats. The paths
+    written. Raises BadInput where it is none."""
+    record = read_record(out)
+    whole = finished(read_run(out), record.whisker, record.settings)
+    of_run = whole.results, whole.friction
+    with lock_output(out):
+        figures = write_paper_figures(out, *of_run, record.whisker, record.settings, figure_formats)
+        return [*write_report(out, record, *of_run), *figures]
+
+
+def write_report(
+    out: Path, record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
+) -> list[Path]:
+    """report.html, methods.md and results.bib, each whole. The paths written; the same results give the same bytes."""
+    written = {
+        REPORT: page(out, record, results, friction),
+        METHODS: methods(record, results, friction),
+        BIBLIOGRAPHY: bibliography(record),
+    }
+    for name, text in written.items():
+        write_whole(out / name, text)
+    return [out / name for name in written]
+
+
+def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> str:
+    """The page as HTML. out: where its pictures are taken from."""
+    rows = rows_of(results)
+    estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
+    standing = standings(results)
+    drawn = scene(record, rows)
+    at = {(row.trial, row.seen.whisk): row for row in rows}
+    return _environment().get_template("report.html.j2").render(
+        record=record,
+        rows=[(row, cells(row, estimators)) for row in rows],
+        columns=columns(estimators),
+        cards=[card(row, record.whisker, out, len(rows)) for row in rows],
+        standing=[(s, at.get(s.worst_at)) for s in standing],
+        sure=sureness(results),
+        doubts=[(line, cure_of(line)) for line in record.doubts],
+        figures=list(figures(record, rows, friction)),
+        explained=_stack(explained_bars(record, rows), SHARES, _PARTS),
+        budget=_stack(budget_bars(rows), CAUSES, {cause: cause for cause in CAUSES}),
+        scene=as_script(drawn),
+        scene_known=bool(drawn["cameras"] or drawn["whisks"]),
+        settings=[(f.name, _setting(getattr(record.settings, f.name))) for f in fields(record.settings)],
+        factor=ELLIPSOID_FACTOR,
+        cameras=[(camera, _distance(camera)) for camera in record.cameras],
+        others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
+        citation=bibliography(record),
+        number=number,
+        silent=(SOUND, *SILENT),
+    ) + "\n"  # fmt: skip
+
+
+def _stack(bars: Sequence[Bar], causes: Sequence[str], labels: dict[str, str]) -> dict:
+    """Stacked bars on one scale: each cause's label, and the bars with their segments to either side of zero."""
+    chosen = sorted(bars, key=lambda bar: -_extent(bar))[:_MOST_BARS]
+    drawn = [bar for bar in bars if bar in chosen]
+    low = min((_reach(bar, -1) for bar in drawn), default=0.0)
+    high = max((_reach(bar, 1) for bar in drawn), default=0.0)
+    scale = 100.0 / ((high - low) or 1.0)
+    return {
+        "labels": [labels[cause] for cause in causes],
+        "bars": [(bar, list(_segments(bar, causes, low, scale))) for bar in drawn],
+        "zero": -low * scale,
+        "left_out": len(bars) - len(drawn),
+    }
+
+
+def _segments(bar: Bar, causes: Sequence[str], low: float, scale: float) -> Iterator[tuple[int, str, str, float]]:
+    """(number of the cause, left and width in per cent of the track, share)."""
+    ends = {True: 0.0, False: 0.0}
+    for n, cause in enumerate(causes):
+        share = bar.shares.get(cause, 0.0)
+        start = ends[share > 0]
+        ends[share > 0] = start + share
+        left, width = scale * (min(start, start + share) - low), scale * abs(share)
+        if width > 0.05:
+            yield n, f"{left:.2f}", f"{width:.2f}", share
+
+
+def _reach(bar: Bar, side: int) -> float:
+    """How far the bar goes to one side of zero."""
+    return side * sum(max(0.0, side * share) for share in bar.shares.values())
+
+
+def _extent(bar: Bar) -> float:
+    return sum(map(abs, bar.shares.values()))
+
+
+def _setting(value: object) -> str:
+    """A setting as a reader takes it."""
+    if isinstance(value, Seeing):
+        return value.name
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value)) or "none"
+    return "by default" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _distance(camera: CameraFacts) -> float:
+    """From the camera's centre to the whisker's base, mm."""
+    return float((camera.T_camera_rig[:, 3] @ camera.T_camera_rig[:, 3]) ** 0.5)
+
+
+def as_script(value: object) -> Markup:
+    """JSON that may stand within a script: no "<" can end it, and what is missing is null."""
+    text = json.dumps(plain(value), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))
+
+
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("bench.report", "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

@@ -1,0 +1,74 @@
+"""The session's figures as Matplotlib has them, and at the width of a journal's column (`--figure-format`)."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from bench.base.drawing import paper_style, publish
+from bench.base.settings import Settings
+from bench.friction.error_map import draw_error_map, measured_cells, typical_taper
+from bench.friction.explained import draw_explained, explained_rows, mean_row
+from bench.friction.tables import SurfaceFriction
+from bench.records.trial import TrialResult
+from bench.report.against_theta import against_theta, figure
+from bench.report.figure_8 import figure_8
+from bench.report.figures import error_against_slope
+from bench.session.whisker import Whisker
+from bench.trials.compare import judge
+
+FOLDER = "figures"
+# IEEE's journals: one column is 3.5 in wide, both are 7.16 in.
+_COLUMN_IN, _BOTH_IN = 3.5, 7.16
+_DPI = 600
+_BESIDE = 2  # panels side by side take both columns
+
+
+def session_figures(
+    results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], whisker: Whisker, settings: Settings
+) -> dict[str, Figure]:
+    """All figures of the session that the results allow, by the names of their files."""
+    fitted, found = [f.surface for f in friction], {}
+    if fitted:
+        found["fig8"] = figure_8(fitted)
+    judged = [j for j in judge(results) if j.purpose == "measure" and math.isfinite(j.error_percent)]
+    if judged:
+        found["error_against_slope"] = error_against_slope(judged, fitted, settings)
+    rows = list(explained_rows(results, whisker))
+    if rows:
+        found["explained"] = draw_explained([*rows, mean_row(rows)])
+    cells = measured_cells(results, friction, settings.alpha_est_rad)
+    if cells:
+        found["error_map"] = draw_error_map(cells, settings.alpha_est_rad, typical_taper(friction))
+    by_theta = against_theta(results)
+    if any(row.whisks for row in by_theta):
+        found["against_theta"] = figure(by_theta)
+    return found
+
+
+def write_paper_figures(
+    out: Path,
+    results: Sequence[TrialResult],
+    friction: Sequence[SurfaceFriction],
+    whisker: Whisker,
+    settings: Settings,
+    formats: Sequence[str],
+) -> list[Path]:
+    """The figures in out/figures, as wide as one column or both of a journal. formats: of `drawing.FORMATS`. The paths
+    written."""
+    paths = []
+    with paper_style():
+        for name, figure in session_figures(results, friction, whisker, settings).items() if formats else ():
+            width, height = figure.get_size_inches()
+            wide = _BOTH_IN if _columns(figure) >= _BESIDE else _COLUMN_IN
+            figure.set_size_inches(wide, wide * max(height / width, 0.45))
+            paths += publish(figure, out / FOLDER / name, list(dict.fromkeys(formats)), _DPI)
+    return paths
+
+
+def _columns(figure: Figure) -> int:
+    """Panels side by side."""
+    return max(
+        (axes.get_subplotspec().get_gridspec().ncols for axes in figure.axes if axes.get_subplotspec()), default=1
+    )

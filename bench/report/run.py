@@ -1,0 +1,60 @@
+"""What a run was told and what it said: with the trials' results, all that a report is made from."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bench.base.settings import Settings
+from bench.session.whisker import Whisker
+
+
+@dataclass(frozen=True)
+class Section:
+    """A title of the summary with its lines."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFacts:
+    """A camera as it was used: size_px (width, height), matrix (3, 3), T_camera_rig (3, 4), mm."""
+
+    name: str
+    size_px: tuple[int, ...]
+    matrix: np.ndarray
+    distortion: np.ndarray
+    T_camera_rig: np.ndarray
+    rms_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class BoardFacts:
+    """The board as it stands on the rig: squares along x and y, T_rig_board (3, 4), mm."""
+
+    squares: tuple[int, ...]
+    square_mm: float
+    T_rig_board: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class RunRecord:
+    """verdict, doubts and sections: as the summary has them; figures: names of the pictures in the folder; recordings:
+    hash of each trial's files, by name; versions: by distribution."""
+
+    session: str
+    whisker: Whisker
+    settings: Settings
+    verdict: tuple[str, ...]
+    doubts: tuple[str, ...]
+    sections: tuple[Section, ...]
+    figures: tuple[str, ...]
+    has_pictures: bool
+    cameras: tuple[CameraFacts, ...] = ()
+    board: BoardFacts | None = None
+    recordings: dict[str, str] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
+
+    def lines(self, title: str) -> tuple[str, ...]:
+        """The lines of the section whose title begins so; none where there is no such section."""
+        return next((s.lines for s in self.sections if s.title.startswith(title)), ())

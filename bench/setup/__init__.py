@@ -1,0 +1,4 @@
+"""Before the first recording: a session to fill in, a board to print.
+
+May import base, session, rig.
+"""

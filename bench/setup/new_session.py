@@ -1,0 +1,150 @@
+"""`whisker-bench new`: the folders of a session, and an annotated session.toml to fill in."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import tomli_w
+
+from bench.base.atomic import write_whole
+from bench.base.errors import BadInput
+from bench.session.manifest import BarKeys, BoardKeys, WhiskerKeys
+from bench.session.plausible import Window
+from bench.session.session import MANIFEST
+
+FOLDERS = ("boards", "boards/rig", "trials")
+Ask = Callable[[str], str]
+
+
+_TABLES = {"whisker": WhiskerKeys, "bar": BarKeys, "board": BoardKeys}
+
+
+@dataclass(frozen=True)
+class Question:
+    """A number that session.toml needs: option's name, table, key, and what to ask for."""
+
+    option: str
+    table: str
+    key: str
+    asked: str
+
+    @property
+    def window(self) -> Window:
+        """What is plausible."""
+        return _TABLES[self.table].windows[self.key]
+
+
+QUESTIONS = (
+    Question("whisker_length_mm", "whisker", "length_mm", "length of the whisker, base to tip, mm"),
+    Question("whisker_diameter_mm", "whisker", "diameter_mm", "diameter of the whisker at its base, mm"),
+    Question("youngs_modulus_GPa", "whisker", "youngs_modulus_GPa", "Young's modulus of the whisker, GPa"),
+    Question("bar_diameter_mm", "bar", "diameter_mm", "diameter of the round bar that is touched, mm"),
+    Question("square_mm", "board", "square_mm", "side of a square of the ChArUco board, as measured, mm"),
+    Question("marker_mm", "board", "marker_mm", "side of a marker of the board, mm"),
+)
+
+
+def new_session(
+    path: Path, name: str, given: Mapping[str, float], squares: tuple[int, int], dictionary: str, ask: Ask | None = None
+) -> list[str]:
+    """Make the folder of a session with its manifest. Lines that say what comes next. Raises BadInput where there is a
+    session already, or a number is implausible.
+
+    given: by option's name; ask: answers a question, '' for not known; None asks nothing.
+    """
+    if (path / MANIFEST).exists():
+        raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
+    for question in QUESTIONS:
+        if question.option in given:
+            question.window.check(given[question.option], f"--{question.option.replace('_', '-')}", str(path))
+    known = dict(given)
+    for question in QUESTIONS if ask else ():
+        if question.option not in known:
+            known |= _answered(question, ask)
+    for folder in FOLDERS:
+        (path / folder).mkdir(parents=True, exist_ok=True)
+    write_whole(path / MANIFEST, manifest_text(name or path.resolve().name, known, squares, dictionary))
+    return list(_next_steps(path, known))
+
+
+def _answered(question: Question, ask: Ask) -> dict[str, float]:
+    """The answer, asked for until it is a number within its window, or nothing."""
+    while text := ask(f"{question.asked} (Enter: fill in later): ").strip():
+        try:
+            question.window.check(float(text), question.key, MANIFEST)
+            return {question.option: float(text)}
+        except ValueError:
+            print(f"  {text!r} is no number; a decimal point, no unit")
+        except BadInput as bad:
+            print(f"  {bad.reason}")
+    return {}
+
+
+def manifest_text(name: str, known: Mapping[str, float], squares: tuple[int, int], dictionary: str) -> str:
+    """session.toml with what is known, and a line to fill in for what is not."""
+    lines = {q.option: _line(q.key, known.get(q.option), q.asked) for q in QUESTIONS}
+    named = tomli_w.dumps({"name": name}).strip()
+    return _TEMPLATE.format(named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines)
+
+
+def _line(key: str, value: float | None, asked: str) -> str:
+    return f"# {key} =        # FILL IN: {asked}" if value is None else f"{key} = {value:.10g}".ljust(32) + f"# {asked}"
+
+
+def _next_steps(path: Path, known: Mapping[str, float]):
+    yield f"written: {path / MANIFEST}"
+    missing = sum(q.option not in known for q in QUESTIONS)
+    if missing:
+        yield f"{missing} lines are to be filled in: look for FILL IN"
+    yield f"then record boards/ and trials/ (comments in the file say how), and run: whisker-bench check {path}"
+
+
+_TEMPLATE = """\
+# A session of whisker-bench: what was recorded in one sitting, with one whisker on one rig.
+# Lengths in mm, angles in degrees, gauges in volts. Any length or angle may have its standard deviation beside it:
+# length_sigma_mm, square_sigma_mm. What has none is taken as exact, and the report says so.
+# Every key: docs/formats.md. `whisker-bench check` on this folder lists all that is wrong or doubtful.
+format = 1
+{named}
+
+[whisker]
+shape = "cylinder"              # "cone": base diameter to a point; "tapered": to tip_diameter_mm
+{whisker_length_mm}
+{whisker_diameter_mm}
+{youngs_modulus_GPa}
+# flexural_rigidity_Nmm2 =      # E I at the base, in place of Young's modulus
+
+[bar]
+{bar_diameter_mm}
+
+[board]                         # `whisker-bench board` prints one with these numbers
+squares = [{x}, {y}]                # along x, along y
+{square_mm}
+{marker_mm}
+dictionary = "{dictionary}"
+
+[rig]
+# Where the board stands on the rig, in the pictures boards/rig/<camera>.png:
+# rig = rows * [board x, board y, board z, 1].
+# The rig frame: origin at the whisker's base, z the motor's axis, x along the whisker at motor angle 0, mm.
+# The board frame: origin at its upper left corner, x right, y down, z into the board.
+# Without T_rig_board the free strokes of the whisker tell where the rig is (some 10 degrees of them are needed).
+# T_rig_board = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]
+# T_rig_board_sigma_mm = 0.2
+# T_rig_board_sigma_deg = 0.2
+
+[trial]                         # for all trials; a key in trials/<trial>/trial.toml goes before it
+# surface = "steel"             # groups trials in fits and figures
+# speed_deg_s = 10.0            # nominal
+# frame_rate_Hz = 20.0          # where no frames.csv tells the frames' times
+# first_frame_s = 0.0
+
+# What to record:
+#   boards/<camera>/*.png       10 or more views of the board a camera: tilted, near and far, into the corners
+#   boards/rig/<camera>.png     the empty rig with the board standing on it, one picture a camera
+#   trials/<trial>/<camera>/*   the frames, or <camera>.mp4, .avi, .mkv
+#   trials/<trial>/frames.csv   frame,time_s
+#   trials/<trial>/signals.csv  time_s,motor_deg,y_V,z_V
+#   trials/<trial>/trial.toml   surface, speed_deg_s, beta_deg; purpose = "gauge" for trials that calibrate the gauges:
+#                               two of them, follicle_roll_deg = 0 and 90
+"""

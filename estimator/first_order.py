@@ -1,0 +1,49 @@
+"""The error of (10) to first order in θ, term by term, as shares of d_x; derived in docs/maps.md.
+
+(10) takes small angles, and a contact that slips along a line across the whisker. Each function is one thing that this
+leaves out, with the sign that it has in the error (estimate less truth). Angles in rad, lengths in mm.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimator.domain import RIGHT_ANGLE, elementwise
+
+# A contact that does not slip sideways is held at some slope from 0 to α, and no moment tells at which. The share of
+# friction that is left to act along the whisker, √(1 − (tan β/tan α)²): mean and standard deviation over such slopes.
+HELD_SHARE = np.pi / 4
+HELD_SPREAD = np.sqrt(2 / 3 - HELD_SHARE**2)
+
+
+@elementwise
+def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike):
+    """½ θ tan ψ sin φ / cos α: the contact moves along the whisker as it slips along an object that leans by ψ.
+
+    >>> round(leaning(0.05, 0.1, 0.5, 0.2), 8)
+    0.00122703
+    """
+    return 0.5 * theta * np.tan(psi) * np.sin(np.abs(phi)) / np.cos(alpha)
+
+
+@elementwise
+def rolling(theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, alpha: ArrayLike, d_x: ArrayLike, left: ArrayLike):
+    """−θ (R/d_x) cos β (½/w − ⅛), β = φ + α: the contact rolls over a round object towards the base.
+
+    reach: R, radii of object and whisker together; left: w, share of the base's diameter that is left at d_x. Where the
+    contact is held, its slope is taken as 0.
+
+    >>> round(rolling(0.05, 3.0, 0.0, 0.0, 60.0, 1.0), 8)
+    -0.0009375
+    """
+    slope = np.where(phi == 0, 0.0, np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE))
+    return -theta * reach / d_x * np.cos(slope) * (0.5 / left - 0.125)
+
+
+@elementwise
+def dragging(theta: ArrayLike, alpha: ArrayLike):
+    """−⅕ θ tan α: friction that acts along the whisker alone stretches it, and makes it stiffer.
+
+    >>> round(dragging(0.05, 0.4), 8)
+    -0.00422793
+    """
+    return -0.2 * theta * np.tan(alpha)

@@ -1,0 +1,86 @@
+"""Softness of an object from whisks at two distances: exact compliances, and a simulated session."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.evaluate import evaluate
+from bench.friction.soft import NO_CYLINDER, NO_PUSH, NOT_SOFT, Place, soft_lines, softness
+from bench.records.trial import TrialFacts
+from bench.rig.simulate import simulate
+from bench.session.whisker import Whisker
+from estimator.compliance import compliance_on_soft_object
+from tests.scenes.rig_sessions import protocol_file
+
+WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
+FACTS = TrialFacts("soft", "measure", "sponge", 10.0)
+PROTOCOL = """
+name = "soft"
+[gauges]
+known = true
+[[trials]]
+surface = "sponge"
+d_x_mm = [45.0, 65.0]
+stiffness_N_mm = 0.3
+beta_scatter_deg = 0.0
+d_x_scatter_mm = 0.0
+[[trials]]
+surface = "steel"
+d_x_mm = [45.0, 65.0]
+beta_scatter_deg = 0.0
+d_x_scatter_mm = 0.0
+"""
+
+
+def places(stiffness: float, sigma: float = 1e-6) -> list[Place]:
+    C = WHISKER.C_Nmm2
+    each = ((d, compliance_on_soft_object(d, stiffness, C) if np.isfinite(stiffness) else d / C) for d in (45.0, 65.0))
+    return [Place(d, 0.0, float(k), sigma, 1) for d, k in each]
+
+
+def test_two_places_tell_the_stiffness_to_what_is_corrected():
+    """At θ = 1e-4 what (2) leaves out is nothing."""
+    found = softness(WHISKER, FACTS, *places(0.5), 1e-4, 0.0)
+    assert found.give_mm_N == pytest.approx(2.0, abs=1e-3)
+    k, low, high = found.stiffness_N_mm
+    assert low < k < high and k == pytest.approx(0.5, rel=1e-3)
+    assert found.d_x_mm == pytest.approx(45.0, abs=1e-2)
+
+
+def test_a_rigid_object_is_only_stiffer_than_something():
+    found = softness(WHISKER, FACTS, *places(np.inf, sigma=2e-5), 1e-4, 0.0)
+    assert found.status == NOT_SOFT
+    _, low, high = found.stiffness_N_mm
+    assert 0 < low < np.inf and high == np.inf
+    (line,) = soft_lines([found])
+    assert "stiffer than" in line and "inf" not in line
+
+
+def test_what_no_distance_explains_has_no_stiffness():
+    near, far = places(0.5)
+    found = softness(WHISKER, FACTS, Place(45.0, 0.0, 1e-9, 1e-6, 1), far, 0.05, 0.0)
+    assert found.status == NO_PUSH and np.isnan(found.stiffness_N_mm).all()
+    cone = Whisker("cone", 100.0, 1.0, youngs_modulus_GPa=60.0)
+    assert softness(cone, FACTS, near, far, 0.05, 0.0).status == NO_CYLINDER
+    assert list(soft_lines([found])) == []
+
+
+def test_a_simulated_sponge_is_soft_and_steel_is_not(tmp_path):
+    session = simulate(tmp_path / "session", protocol=protocol_file(tmp_path, PROTOCOL), signals_only=True, seed=2)
+    evaluate(session, tmp_path / "out", Settings(), workers=0)
+    with (tmp_path / "out" / "compliance.csv").open(newline="") as file:
+        sponge, steel = csv.DictReader(file)
+    assert float(sponge["stiffness_low_N_mm"]) < 0.3 < float(sponge["stiffness_high_N_mm"])
+    assert float(sponge["stiffness_N_mm"]) == pytest.approx(0.3, rel=0.1)
+    assert abs(float(sponge["d_x_mm"]) - 45.0) < 2 * float(sponge["d_x_sigma_mm"])
+    assert steel["status"] == NOT_SOFT and float(steel["stiffness_low_N_mm"]) > 1.0
+    assert "gives way by" in (tmp_path / "out" / "summary.txt").read_text()
+
+
+def test_a_soft_bar_is_not_painted(tmp_path):
+    camera = '[[cameras]]\nname = "a"\nposition_mm = [20.0, -220.0, 300.0]\n'
+    with pytest.raises(BadInput, match="--signals-only"):
+        simulate(tmp_path / "session", protocol=protocol_file(tmp_path, PROTOCOL + camera))

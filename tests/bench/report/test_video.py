@@ -1,0 +1,91 @@
+"""A trial as a film: every frame of its whisks, with the contact where it was seen."""
+
+import json
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+
+from bench.cli import main
+from bench.report.video import wire_between
+
+SIZE = (320, 180)
+CAMERA = {
+    "name": "top",
+    "size_px": list(SIZE),
+    "matrix": [[400, 0, 160], [0, 400, 90], [0, 0, 1]],
+    "distortion": [0.0] * 5,
+    "T_camera_rig": [[1, 0, 0, -50], [0, -1, 0, 0], [0, 0, -1, 200]],  # straight above, 200 mm
+    "rms_px": 0.1,
+}
+
+
+@pytest.fixture(scope="module")
+def filmed(exact_run, steel_signals, tmp_path_factory):
+    """A run with a camera, and its session with grey pictures of one trial."""
+    folder = tmp_path_factory.mktemp("filmed")
+    out, session = shutil.copytree(exact_run, folder / "out"), shutil.copytree(steel_signals, folder / "session")
+    record = json.loads((out / "run.json").read_text()) | {"cameras": [CAMERA]}
+    (out / "run.json").write_text(json.dumps(record))
+    rows = (session / "trials" / "b60_4" / "frames.csv").read_text().splitlines()[1:]
+    (session / "trials" / "b60_4" / "top").mkdir()
+    grey = np.full(SIZE[::-1], 120, np.uint8)
+    for k in range(len(rows)):
+        cv2.imwrite(str(session / "trials" / "b60_4" / "top" / f"{k:03d}.png"), grey)
+    return out, session
+
+
+def read(path) -> list[np.ndarray]:
+    video, found = cv2.VideoCapture(str(path)), []
+    while (frame := video.read())[0]:
+        found.append(frame[1])
+    return found
+
+
+@pytest.mark.parametrize("name", ["film.webm", "film.avi"])
+def test_every_frame_is_there_with_its_contact(filmed, tmp_path, name, capsys):
+    out, session = filmed
+    command = ["view", str(out), "b60_4", "--session", str(session), "--out", str(tmp_path / name)]
+    assert main(command) == 0
+    assert capsys.readouterr().out.strip() == str(tmp_path / name)
+    frames = json.loads((out / "trials" / "b60_4.json").read_text())["seen"]["whisks"][0]["frames"]
+    film = read(tmp_path / name)
+    assert len(film) == len(frames["index"])
+    k = max(k for k, touching in enumerate(frames["touching"]) if touching)
+    x, y, z = frames["point_mm"][k]
+    scale = film[k].shape[1] / SIZE[0]
+    px = scale * (np.array([400 * (x - 50) / (200 - z) + 160, 400 * -y / (200 - z) + 90]) + 0.5) - 0.5
+    around = film[k][int(px[1]) - 8 : int(px[1]) + 9, int(px[0]) - 8 : int(px[0]) + 9].astype(int)
+    redness = around[..., 2] - around[..., 0]
+    assert redness.max() > 60  # the ring about the contact; the picture itself is grey
+    rows, columns = np.nonzero(redness > 0.5 * redness.max())
+    assert abs(columns.mean() - 8) < 2 and abs(rows.mean() - 8) < 2
+
+
+def test_the_drawn_wire_goes_through_the_contact():
+    contact = np.array([58.0, 4.5, 2.0])
+    wire = wire_between(0.05, contact, 100.0)
+    nearest = np.min(np.linalg.norm(wire[:, None] - contact, axis=2))
+    assert np.allclose(wire[0], 0.0) and nearest < 1.5  # points stand 2.5 mm apart
+    straight = wire_between(0.05, None, 100.0)
+    assert np.allclose(straight[-1], [100 * np.cos(0.05), 100 * np.sin(0.05), 0.0])
+
+
+def test_what_cannot_be_shown_is_one_line(filmed, tmp_path, capsys):
+    out, session = filmed
+    bare = shutil.copytree(out, tmp_path / "bare")
+    (bare / ".session").unlink()
+    for arguments in (
+        [out, "no_such_trial"],
+        [out, "b60_4", "--out", tmp_path / "film.mp4"],
+        [out, "b60_4", "--session", tmp_path / "nowhere"],
+        [out, "b00_2", "--session", session],  # has no pictures
+        [out, "b60_4", "--rate-Hz", "0"],
+        [bare, "b60_4"],
+        [tmp_path, "b60_4"],
+    ):
+        assert main(["view", *map(str, arguments)]) == 2, arguments
+        said = capsys.readouterr().err
+        assert said.startswith("whisker-bench: ") and said.count("\n") == 1
+    assert not list(tmp_path.glob("*.mp4")) and not (out / "video").exists()

@@ -1,0 +1,59 @@
+"""The Python interface: its examples work as shown, its tables are those of the files."""
+
+import doctest
+
+import numpy as np
+import pytest
+
+from bench import api
+from bench.base.errors import BadInput
+from bench.base.tables import TEXT, WHOLE, read_table
+from tests.scenes.formats import documented
+
+
+def test_the_examples_are_right(without_pictures, tmp_path):
+    out = tmp_path / "out"
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    names = vars(api) | {"session": str(without_pictures), "out": str(out)}
+    example = doctest.DocTestParser().get_doctest(api.__doc__, names, "bench.api", None, 0)
+    assert len(example.examples) >= 7
+    found = []
+    doctest.DocTestRunner(optionflags=flags).run(example, out=found.append)
+    assert not found, "".join(found)
+
+
+def test_tables_are_those_of_the_files(exact_run):
+    run = api.read(exact_run)
+    for name in api.TABLES:
+        table = run.table(name)
+        lines = (exact_run / f"{name}.csv").read_text().splitlines()
+        assert list(table.dtype.names) == lines[0].split(",") == documented(f"{name}.csv")
+        assert len(table) == len(lines) - 1 - (name == "explained")  # whose last row is a mean
+        for column in table.dtype.names:
+            assert table.dtype[column].kind == ("U" if column in TEXT else "i" if column in WHOLE else "f")
+    row = run.whisks[run.whisks["trial"] == "b60_4"][0]
+    assert row["d_x_mm"] == pytest.approx(64.949086, abs=1e-5) and np.isnan(run.estimates["beta_est_deg"][0])
+    assert len(run.track("b60_4")) == len((exact_run / "track" / "b60_4.csv").read_text().splitlines()) - 1
+
+
+def test_what_is_not_there_is_named(exact_run, tmp_path):
+    run = api.read(exact_run)
+    with pytest.raises(KeyError, match="b60_4"):
+        run.track("no_such_trial")
+    with pytest.raises(KeyError, match="whisks"):
+        run.table("truth")
+    with pytest.raises(BadInput, match=r"run\.json"):
+        api.read(tmp_path)
+
+
+def test_a_damaged_table_is_one_line(tmp_path):
+    for text in ("", "trial,whisk\nb,one\n", "trial,whisk\nb\n"):
+        (tmp_path / "whisks.csv").write_text(text)
+        with pytest.raises(BadInput, match="evaluate the session again"):
+            read_table(tmp_path / "whisks.csv")
+
+
+def test_figures_are_matplotlibs(exact_run):
+    figures = api.read(exact_run).figures()
+    assert set(figures) == {"fig8", "error_against_slope", "explained", "error_map", "against_theta"}
+    assert all(figure.axes for figure in figures.values())

@@ -1,0 +1,70 @@
+"""A frame that a jump of slip falls into says so by its blur, and slip of that frame alone gets a wider sigma."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
+from vision.fit.exposure import slip_in_exposure
+from vision.fit.problem import bar_axis, curves_of
+from vision.fit.quantities import jacobians
+from vision.fit.solve import solve
+from vision.geometry.contact import BarAxis, clearance
+
+JUMPED, VARIANCE_MM2, SIGMA_PX2 = 2, 0.05**2, 0.05
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """A scene of exact points, its parameters, and the derivatives of slip."""
+    scene = draw_scene(0)
+    problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
+    state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
+    return problem, state, jacobians(problem, state)[1].frame["slip"]
+
+
+def slipped_px(problem, state, slip, frame):
+    """How far each of a frame's points moves (n,) as the wire slips by 1 mm along the bar."""
+    own, step = problem.bend_of(frame), 1e-5
+
+    def gap_and_lines(change):
+        vector = state.vector.copy()
+        vector[own] += change
+        curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=3)
+        axis = bar_axis(problem, vector)
+        lines = [np.sum(one.points.normal * problem.cameras.cameras[one.camera].project(
+            curves.at(one.points.place)[0][frame]), axis=1) for one in problem.seen if one.frame == frame]
+        return clearance(curves, BarAxis(axis.point_mm, axis.direction), arcs)[0][frame], np.concatenate(lines)
+
+    here, moved = gap_and_lines(np.zeros(2)), [gap_and_lines(step * one) for one in np.eye(2)]
+    away = np.array([(one[0] - here[0]) / step for one in moved])
+    bend = np.array([-away[1], away[0]])  # keeps touching
+    lines = np.stack([(one[1] - here[1]) / step for one in moved], axis=1)
+    return lines @ (bend / (slip[frame, own] @ bend))
+
+
+def test_the_frame_that_jumped_is_told_and_its_slip_alone_is_less_sure(fitted, rng):
+    """Blur of a part in 25 of a pixel² more, known to 0.05 in each of some 60 points."""
+    problem, state, slip = fitted
+    frame = np.flatnonzero(problem.touching)[JUMPED]
+    px_per_mm, seen = slipped_px(problem, state, slip, frame), []
+    for one in problem.seen:
+        count = len(one.points)
+        above = 0.3 + SIGMA_PX2 * rng.standard_normal(count)  # all are as blurred as the motor's speed makes them
+        if one.frame == frame:
+            mine, px_per_mm = np.split(px_per_mm, [count])
+            above += VARIANCE_MM2 * mine**2
+        widened = np.stack([above, np.full(count, SIGMA_PX2)], axis=1)
+        seen.append(replace(one, points=replace(one.points, widened_px2=widened)))
+    found = slip_in_exposure(replace(problem, seen=seen), state, slip)
+    assert np.flatnonzero(found.variance_mm2).tolist() == [frame]
+    assert found.variance_mm2[frame] == pytest.approx(VARIANCE_MM2, rel=0.15)
+    variances = np.einsum("fi,ij,fj->f", slip, found.covariance, slip)
+    assert np.allclose(variances, found.variance_mm2, atol=1e-9)
+
+
+def test_points_of_which_no_blur_is_known_say_nothing(fitted):
+    """Lines that were not traced in pictures."""
+    found = slip_in_exposure(*fitted)
+    assert not np.any(found.variance_mm2) and not np.any(found.covariance)
