@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.session.daq import DaqFile, frame_edges, read_daq
 from bench.session.footage import decoded_count, frame_count, read_frames
 from bench.session.signals import Signals
 from bench.session.table import Table, forward_in_time, read_table, require_columns
@@ -61,9 +62,9 @@ class FrameTimes:
 def frame_times(trial: Trial) -> FrameTimes:
     """The frame times of a trial, from the first source that there is.
 
-    In this order: frames.csv, frames_<camera>.csv, frame_rate_Hz and first_frame_s, the container's times.
-    Raises BadInput where there is none, times do not increase, their number is not that of the frames, or the
-    stated frame rate is another.
+    In this order: frames.csv, frames_<camera>.csv, edges of a DAQ channel, frame_rate_Hz and first_frame_s, the
+    container's times. Raises BadInput where there is none, times do not increase, their number is not that of the
+    frames, or the stated frame rate is another.
     """
     if (trial.folder / "frames.csv").is_file():
         return _common(trial)
@@ -75,6 +76,8 @@ def frame_times(trial: Trial) -> FrameTimes:
         raise BadInput(f"is missing, and camera {own[0]} has its own", file=trial.shown(_own(missing)))
     if not trial.camera_sources:
         return FrameTimes(np.array([]), "none", {})
+    if trial.daq is not None and "frame_V" in trial.daq.channels:
+        return _by_edges(trial, trial.daq)
     return _steady(trial) if trial.frame_rate_Hz else _from_container(trial)
 
 
@@ -142,6 +145,18 @@ def merge_times(times_s: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str
     )
     spread = every[order][last - 1] - every[order][first]
     return total / np.bincount(frame), picture, float(spread.max())
+
+
+def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:
+    """Rising edges of a channel of the DAQ, one a frame of every camera."""
+    shown = trial.shown(trial.signals_path.name)
+    edges_s = frame_edges(trial.signals_path, daq, read_daq(trial.signals_path, daq, shown)[TIME], shown)
+    count = _one_count({camera: frame_count(source) for camera, source in trial.camera_sources.items()}, trial)
+    if len(edges_s) != count:
+        found = f"channel {daq.channels['frame_V'].channel} rises {len(edges_s)} times, the cameras have {count} frames"
+        raise BadInput(f"{found}; there must be an edge a frame", file=shown)
+    picture = {camera: np.arange(count) for camera in trial.camera_sources}
+    return FrameTimes(edges_s, "edges of a DAQ channel", picture)
 
 
 def _steady(trial: Trial) -> FrameTimes:

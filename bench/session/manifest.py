@@ -1,6 +1,6 @@
 """session.toml and trial.toml as people write them: which keys there are, and what values are plausible."""
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 
@@ -125,6 +125,33 @@ class TrialKeys(Keys, kw_only=True):
     }
 
 
+class ChannelKeys(Keys, kw_only=True):
+    """A channel of [signals]: scale · raw + offset."""
+
+    channel: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class SignalKeys(Keys, kw_only=True):
+    """[signals] of session.toml: the DAQ's file in each trial's folder, and its channels."""
+
+    file: str
+    rate_Hz: float | None = None
+    time_s: ChannelKeys | None = None
+    motor_deg: ChannelKeys
+    y_V: ChannelKeys | None = None
+    z_V: ChannelKeys | None = None
+    m_y_Nmm: ChannelKeys | None = None
+    m_z_Nmm: ChannelKeys | None = None
+    frame_V: ChannelKeys | None = None
+
+    windows: ClassVar = {"rate_Hz": plausible.RATE}
+    tables: ClassVar = dict.fromkeys(
+        ("time_s", "motor_deg", "y_V", "z_V", "m_y_Nmm", "m_z_Nmm", "frame_V"), ChannelKeys
+    )
+
+
 class SessionKeys(Keys, kw_only=True):
     """session.toml."""
 
@@ -136,7 +163,7 @@ class SessionKeys(Keys, kw_only=True):
     rig: RigKeys = RigKeys()
     cameras: tuple[CameraKeys, ...] = ()
     gauges: GaugeKeys | None = None
-    signals: dict[str, Any] | None = None
+    signals: SignalKeys | None = None
     trial: TrialKeys = TrialKeys()
 
     tables: ClassVar = {
@@ -146,6 +173,7 @@ class SessionKeys(Keys, kw_only=True):
         "rig": RigKeys,
         "cameras": CameraKeys,
         "gauges": GaugeKeys,
+        "signals": SignalKeys,
         "trial": TrialKeys,
     }
 

@@ -9,6 +9,7 @@ import numpy as np
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.session import manifest
+from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
@@ -120,10 +121,6 @@ def _read_manifest(path: Path, doubts: Doubts) -> manifest.SessionKeys:
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
     keys = as_keys(tables, manifest.SessionKeys, MANIFEST, doubts)
-    if keys.signals is not None:
-        columns = "time_s,motor_deg,y_V,z_V"
-        fix = f"export each trial's signals as signals.csv with the columns {columns} and take [signals] out"
-        raise BadInput(f"[signals] is not yet read by this version; {fix}", file=MANIFEST)
     return keys
 
 
@@ -186,11 +183,13 @@ def _gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
 
 
 def _trials(path: Path, keys: manifest.SessionKeys, doubts: Doubts) -> tuple[Trial, ...]:
-    found = []
+    found, daq = [], None
+    with doubts.guard():
+        daq = daq_file(keys.signals, MANIFEST)
     for entry in visible(path / "trials"):
         if entry.is_dir():
             with doubts.guard():
-                found.append(load_trial(entry, keys, doubts))
+                found.append(load_trial(entry, keys, doubts, daq))
     return tuple(found)
 
 

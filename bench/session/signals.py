@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session import strokes
+from bench.session.daq import read_daq
 from bench.session.plausible import DEGREES_PER_RADIAN, MICROSECONDS, MILLISECONDS, MILLIVOLTS, Window
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
@@ -68,8 +69,8 @@ def read_signals(trial: Trial) -> Signals:
     Raises BadInput naming file and row: what `read_table` refuses, missing columns, times that stand still or
     go back, and values that look like another unit (milliseconds, radians, millivolts).
     """
-    shown = trial.shown(trial.signals_path.name)
-    table = read_table(trial.signals_path, shown)
+    path, shown = trial.signals_path, trial.shown(trial.signals_path.name)
+    table = read_table(path, shown) if trial.daq is None else read_daq(path, trial.daq, shown)
     kind, channels = _columns(table, shown)
     table, duplicates = forward_in_time(table, TIME, shown)
     motor_deg, wraps = _unwrapped(table[MOTOR])

@@ -6,6 +6,7 @@ from pathlib import Path
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.session import manifest
+from bench.session.daq import DaqFile
 from bench.session.footage import camera_sources
 from bench.session.strict_toml import as_keys, read_toml, values
 
@@ -46,25 +47,27 @@ class Trial:
     frame_rate_sigma_Hz: float
     first_frame_s: float | None
     first_frame_sigma_s: float
+    daq: DaqFile | None = None
 
     def shown(self, file: str) -> str:
         """How messages name one of its files: by the path inside the session."""
         return f"trials/{self.name}/{file}"
 
 
-def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts) -> Trial:
-    """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput."""
+def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq: DaqFile | None = None) -> Trial:
+    """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput. daq: of [signals]."""
     shown = f"trials/{folder.name}"
     keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}", doubts)
     _check_weight(keys, f"{shown}/{MANIFEST}")
-    signals_path = folder / SIGNALS
+    signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
-        raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{SIGNALS}")
+        raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{signals_path.name}")
     return Trial(
         name=folder.name,
         folder=folder,
         camera_sources=camera_sources(folder, shown),
         signals_path=signals_path,
+        daq=daq,
         **values(keys) | _bar(keys, session.bar),
     )
 

@@ -63,13 +63,13 @@ class Difference:
         left = left - size * cause.trace
         return float(left @ self.information @ left), size
 
-    def likeliest(self, causes: Sequence[Cause]) -> str:
+    def likeliest(self, causes: Sequence[Cause], otherwise: str = "no single cause explains it") -> str:
         """The cause that leaves the least χ², two for each number that it may choose; of those that explain all."""
         left = [self.without(cause) for cause in causes]
         explains = [chdtrc(max(self.freedom - c.free, 1), x2) > _EXPLAINED for (x2, _), c in zip(left, causes)]
         costs = [x2 + _PER_PARAMETER * c.free if ok else np.inf for (x2, _), c, ok in zip(left, causes, explains)]
-        best = int(np.argmin(costs)) if costs else -1
-        return causes[best].said(left[best][1]) if costs and np.isfinite(costs[best]) else "no single cause explains it"
+        best = int(np.argmin(costs))
+        return causes[best].said(left[best][1]) if np.isfinite(costs[best]) else otherwise
 
 
 def turns_doubt(turns: Turns | None, speed_rad_s: float) -> str:

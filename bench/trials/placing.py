@@ -12,6 +12,7 @@ from bench.base.workers import Workers
 from bench.cameras.calibration import SessionCalibration
 from bench.cameras.first_look import by_first_look, first_look, spread
 from bench.session.session import Session
+from bench.trials.consistency import Cause, Difference
 from bench.trials.unit import Unit, see_unit
 from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
 from vision.calibration.swing import by_strokes
@@ -43,8 +44,10 @@ def place_rig(
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
-            both = combine(board, _by_strokes(chosen, pool))
-            placed_here = calibration
+            strokes = _by_strokes(chosen, pool)
+            both, placed_here = combine(board, strokes), calibration
+            if both.alarm:
+                both = replace(both, alarm=both.alarm + _by_scale(session, board, strokes))
         else:
             placed_here, both = _settled(calibration, board, chosen, pool)
     except Refused as reason:
@@ -58,6 +61,24 @@ def place_rig(
     if both.alarm and not alone:
         doubts.note(both.alarm)
     return placed_here.with_notes(*(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays)
+
+
+def _by_scale(session: Session, board: Placement, strokes: Placement) -> str:
+    """What square_mm would explain that board and strokes disagree; '' where none does.
+
+    Where all lengths are taken f times too long, the centre of rotation is seen f times as far from the board as it
+    stands: it is off by (1 − f) of T_rig_board's shift.
+    """
+    if session.board is None or session.T_rig_board is None:
+        return ""
+    information = np.linalg.inv(strokes.covariance + board.covariance)
+    apart = Difference(strokes.step - board.step, information, len(strokes.step))
+    trace, square_mm = np.append(np.zeros(3), -session.T_rig_board[:, 3]), session.board.square_mm
+
+    def said(size: float) -> str:
+        return f"; a square_mm of {square_mm / (1.0 + size):.4g} for {square_mm:g} explains it"
+
+    return apart.likeliest([Cause(said, np.zeros(6), trace, 1)], otherwise="")
 
 
 def _elsewhere(session: Session, calibration: SessionCalibration) -> list[str]:

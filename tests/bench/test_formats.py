@@ -31,6 +31,7 @@ TOML = {
     "[rig]": manifest.RigKeys,
     "[[cameras]]": manifest.CameraKeys,
     "[gauges]": manifest.GaugeKeys,
+    "[signals]": manifest.SignalKeys,
     "[trial]": manifest.TrialKeys,
     "gauges.toml": FileKeys,
     "[seeing]": seeing.SeeingKeys,

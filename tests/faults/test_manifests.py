@@ -73,7 +73,17 @@ def test_no_manifest(session):
         ("[[0.997563342,", "[[1.997563342,", r"\[rig\] T_rig_board: .*not a right-handed rotation"),
         ("4.24180287", "4241.80287e9", r"\[rig\] T_rig_board"),
         ("format = 1", "format = 2", r"format is 2; this version reads format 1"),
-        ("format = 1", "format = 1\n[signals]\nfile = 'daq.mat'", r"\[signals\] is not yet read"),
+        ("[bar]", "[signals]\nfile = 'daq.mat'\n[bar]", r"\[signals\] motor_deg is missing"),
+        (
+            "[bar]",
+            "[signals]\nfile = '../daq.mat'\nmotor_deg = { channel = 'enc' }\n[bar]",
+            r"\[signals\] file '../daq.mat' must be the name of a file in each trial's folder",
+        ),
+        (
+            "[bar]",
+            "[signals]\nfile = 'daq.xlsx'\nmotor_deg = { channel = 'enc' }\n[bar]",
+            r"\[signals\] file 'daq.xlsx' is of no kind that is read; these are: .csv, .mat",
+        ),
         ("format = 1", "format = = 1", r"session.toml, row 1: is not TOML"),
         ('shape = "cylinder"', 'shape = "prism"', r"\[whisker\] shape: .*prism"),
     ],

@@ -115,8 +115,10 @@ def without_figures() -> None:
     import bench.evaluate as steps
     import bench.report.figures
 
-    bench.report.figures.write_figures = lambda *_: []
-    steps.write_explained = steps.write_error_map = lambda *_: []
+    def nothing(*_, **__) -> list:
+        return []
+
+    bench.report.figures.write_figures = steps.write_explained = steps.write_error_map = nothing
 
 
 def main() -> None:

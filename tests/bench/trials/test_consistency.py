@@ -8,8 +8,10 @@ import pytest
 from bench.records.trial import FeltWhisk
 from bench.session.session import load_session
 from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
+from bench.trials.placing import _by_scale
 from bench.trials.unit import _against_pictures
 from tests.scenes.model_scenes import begun, scene, with_points
+from vision.calibration.place import Placement, by_board
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
@@ -109,6 +111,30 @@ def test_a_contradicted_whisk_is_apart_and_names_no_gauge(exact_record, trial):
     felt = _against_pictures(FeltWhisk(status=""), None, None, None, replace(seen, contradicted=True))
     assert felt.apart
     assert felt.status == ""
+
+
+SIGMA = np.array([0.005, 0.1, 0.005, 0.8, 0.14, 0.12])  # rad and mm, of two strokes of 1.5°
+
+
+def strokes(session, factor, rng, turned=0.0) -> Placement:
+    """What free strokes say where all lengths are taken `factor` times too long, and the axis leans besides."""
+    step = np.append([turned, 0.0, 0.0], (1.0 - factor) * session.T_rig_board[:, 3])
+    return Placement(step + SIGMA * rng.standard_normal(6), np.diag(SIGMA**2))
+
+
+@pytest.mark.parametrize("factor", [1.1, 0.9, 1.05])
+def test_a_board_at_another_scale_is_told_by_where_the_whisker_turns(small_session, rng, factor):
+    session = load_session(small_session)
+    exact = by_board(session.T_rig_board, 0.0, 0.0)
+    said = _by_scale(session, exact, strokes(session, factor, rng))
+    found = float(said.removeprefix("; a square_mm of ").split(" for 15 ")[0])
+    assert found == pytest.approx(15.0 / factor, abs=0.1)  # 59 mm to the board, known to 0.15
+
+
+def test_a_leaning_axis_is_no_scale(small_session, rng):
+    session = load_session(small_session)
+    exact = by_board(session.T_rig_board, 0.0, 0.0)
+    assert _by_scale(session, exact, strokes(session, 1.1, rng, turned=0.1)) == ""
 
 
 @pytest.mark.parametrize(
