@@ -21,6 +21,8 @@ from vision.pictures.view import View, median_of
 
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
+_NO_EDGES = 3.0  # as clearness: a bar is 5 to 9 clear
+_CLEARER = 1.0  # by so much one camera's axis must be clearer than one that the edges in all cameras led to
 _WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
 _NO_BAR = "no bar of diameter {:g} mm is seen near the whisker; record with the bar in view of every camera"
 _MEDIAN_OF = 11  # frames: more would not make the bar clearer
@@ -41,8 +43,9 @@ class SeenBar:
     @property
     def clearness(self) -> float:
         """How clearly all cameras see a bar there. Not by the evidence: each hypothesis has its own pixels, and a wrong
-        one along something bright in one camera has more evidence there than the bar has in both."""
-        return sum(max(line.clearness, 0.0) for line in self.lines.values() if line.has_edges)
+        one along something bright in one camera has more evidence there than the bar has in both. A camera that shows
+        the place and no edge there speaks against it."""
+        return sum(max(line.clearness, 0.0) if line.has_edges else -_NO_EDGES for line in self.lines.values())
 
 
 def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
@@ -76,8 +79,10 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
             found += [seen] if view.camera.name in seen.seen_by else []
     if not found:
         raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm))
-    one_side = len(found) > 1 and seen_from_one_side(cameras, found[1].axis)
-    return max(found[1:] if one_side else found, key=lambda one: one.clearness)
+    if len(found) > 1 and seen_from_one_side(cameras, found[1].axis):
+        found = found[1:]
+    clearer = max(found, key=lambda one: one.clearness)
+    return clearer if clearer.clearness > found[0].clearness + _CLEARER else found[0]
 
 
 def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
