@@ -230,7 +230,7 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings
                                                  wires[view.camera.name], settings) for view in asked}
     else:
         asked, found = views, {}
-    lines = measure_bars(asked, axis, rods.bar.radius_mm, wires, settings, rough=not last)
+    lines = measure_bars(asked, axis, rods.bar.radius_mm, wires, settings)
     middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
