@@ -8,7 +8,6 @@ import pytest
 from bench.rig.protocol import PicturesTable
 from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.fit.exposure import Exposure
 from vision.fit.quantities import jacobians
 from vision.fit.solve import linearise, solve
 from vision.fit.uncertainty import Uncertainty
@@ -47,5 +46,5 @@ def _whisk(scene, problem, state, clock_sigma_s):
     frames = range(len(problem.motor_rad))
     pictures = WhiskPictures(0, frames, scene.recording.frames.time_s, problem.motor_rad, (), scene.cameras,
                              Rods(scene.wire, scene.bar), None, VisionSettings(clock_sigma_s=clock_sigma_s))
-    known, still = Uncertainty(answer, answer, 0.0 * answer), Exposure(np.zeros(len(frames)), 0.0 * answer)
-    return to_whisk(pictures, FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state), still))
+    known = Uncertainty(answer, answer, 0.0 * answer)
+    return to_whisk(pictures, FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state)))

@@ -5,7 +5,6 @@ import pytest
 
 from bench.rig.protocol import PicturesTable
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
-from vision.fit.exposure import Exposure
 from vision.fit.problem import BAR
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
@@ -22,8 +21,7 @@ def row_of(noise_of):
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     state, answer = solve(problem, begin(problem), scales=(1e9,) * 6)
     frames, known = range(len(scene.motor_rad)), Uncertainty(answer, noise_of(answer), 0.0 * answer)
-    fitted = FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state),
-                         Exposure(np.zeros(len(frames)), 0.0 * answer))
+    fitted = FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state))
     rods, no_bar = Rods(scene.wire, scene.bar), None
     return scene, to_whisk(WhiskPictures(0, frames, scene.recording.frames.time_s, scene.motor_rad, (), scene.cameras,
                                          rods, no_bar, VisionSettings()), fitted)
