@@ -134,12 +134,12 @@ def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
 
 def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
-    truth = to_whisk(whisk, fitted)
+    truth, unexplained = to_whisk(whisk, fitted), [looks.doubt(name) for name, looks in whisk.light.items()]
     beam = _beam(fitted) if whisk.settings.check_beam else None
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk.views, whisk.rods, *stroke, whisk.motor, fitted.frames, whisk.light, whisk.settings)
-    status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *whisk.left_out]))
+    status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *unexplained, *whisk.left_out]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     return replace(truth, base=base_lines(*stroke, fitted.uncertainty.lens), beam=beam, turns=turns, status=status)
 

@@ -41,3 +41,10 @@ def test_the_report_names_camera_and_width_once():
     narrow, whole = (WireAppearance(0.9, SeenWidth(*width)) for width in ((3.1, 5.6, -1.4), (5.5, 5.6, 0.0)))
     (line,) = one_sided_lines([{"high": narrow, "low": whole}, {"high": whole}])
     assert line.startswith("camera high sees 3.1 of the wire's 5.6 px: light from one side")
+
+
+def test_light_that_is_not_explained_is_a_doubt():
+    width = SeenWidth(5.5, 5.6, 0.0)
+    assert WireAppearance(0.9, width, misfit=5.0).doubt("low") == ""
+    said = WireAppearance(0.9, width, misfit=10.1).doubt("low")
+    assert said.startswith("camera low: the wire's light differs from that of any lit wire by 10 times the noise")
