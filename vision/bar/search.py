@@ -63,7 +63,7 @@ def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSett
     wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
 
     def settled(axis: BarAxis, off_px: float) -> SeenBar:
-        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=off_px, rough=True)
+        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=off_px)
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
