@@ -31,6 +31,7 @@ def test_a_third_camera_is_left_out_in_turn():
     assert not any(seeing.cameras for seeing in ladder(("a", "b")))
 
 
+@pytest.mark.slow
 def test_a_table_and_files_to_give_back(tmp_path, monkeypatch, capsys):
     """That of d_x is below the 0.1 mm of tests/bench/test_scenes.py."""
     monkeypatch.setattr(tradeoff, "_CHANGES", {})

@@ -51,6 +51,7 @@ def test_a_wrong_setting_is_named_and_nothing_is_written(webcam, tmp_path):
     assert not out.exists() and not out.with_suffix(".npz").exists()
 
 
+@pytest.mark.slow
 def test_a_session_with_a_rig_prints_what_the_rig_board_says(small_session, tmp_path, capsys):
     assert calibrate_cameras_command(small_session, tmp_path / "cameras.toml") == 0
     said = capsys.readouterr().out

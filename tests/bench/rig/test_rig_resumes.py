@@ -62,6 +62,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_goes_on_after_a_kill(tiny, tmp_path):
     """Killed in the middle of its parts; what was whole stays untouched, the rest is made, and all is as ever."""
     script, session = tmp_path / "run.py", tmp_path / "session"

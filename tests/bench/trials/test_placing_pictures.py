@@ -99,6 +99,7 @@ def test_a_board_1_mm_across_is_an_alarm(wide, tmp_path):
     assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubt)[1]) == pytest.approx(-1.0, abs=0.4)
 
 
+@pytest.mark.slow
 def test_the_swing_alone_places_the_rig(wide, tmp_path):
     session = replace(wide, T_rig_board=None)
     cameras, T_rig_board, note = on_the_rig(session, moved(wide, invert_transform(wide.T_rig_board)), np.eye(3, 4))

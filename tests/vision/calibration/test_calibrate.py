@@ -222,6 +222,7 @@ def test_disturbed_corners_do_not_enter_the_mean(rng):
     assert mean.sigma_px[2] > mean.sigma_px[1]
 
 
+@pytest.mark.slow
 def test_predicted_sigmas_are_the_sampled_ones():
     """The small form of tests/ladder/cameras_montecarlo.py, which draws a thousand."""
     from tests.ladder.cameras_montecarlo import sample_calibrations

@@ -40,6 +40,7 @@ def test_the_step_is_found_again():
     assert made.step[2] == pytest.approx(STEP[2], rel=0.15)
 
 
+@pytest.mark.slow
 def test_noise_scatters_as_each_frame_says(rng):
     """Along the whisker the fan alone decides: its own sigma must be the sampled one."""
     strokes = [base_lines(p, s, np.zeros((p.size,) * 2)) for p, s in (a_whisk(rng=rng) for _ in range(40))]
