@@ -147,12 +147,22 @@ def _gauge_lines(session: Session, gauges: Gauges | None) -> Iterator[str]:
     true = np.array(true)
     for name, made in (("fitted", gauges.all), ("at one angle", gauges.at_angle), ("one factor", gauges.one_factor)):
         if made is not None:
-            diagonal = 100.0 * (np.diag(made.matrix) / np.diag(true) - 1.0)
-            cross = 100.0 * (made.matrix / np.diag(made.matrix) - true / np.diag(true))
+            diagonal = 100.0 * (np.diag(made.matrix) * _inverse(np.diag(true)) - 1.0)
+            cross = 100.0 * (_over_diagonal(made.matrix) - _over_diagonal(true))
             yield (
                 f"gauges {name:<14} diagonal {diagonal[0]:+.2f} %, {diagonal[1]:+.2f} %; "
                 f"cross-talk {cross[0, 1]:+.2f}, {cross[1, 0]:+.2f} points"
             )
+
+
+def _over_diagonal(matrix: np.ndarray) -> np.ndarray:
+    """Each column (2, 2) over its entry on the diagonal; NaN where that is 0: a channel that answers to no moment."""
+    return matrix * _inverse(np.diag(matrix))
+
+
+def _inverse(values: np.ndarray) -> np.ndarray:
+    """1 / values, NaN where they are 0."""
+    return 1.0 / np.where(values == 0.0, np.nan, values)
 
 
 def _read(path: Path) -> list[dict]:

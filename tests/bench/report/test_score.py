@@ -71,6 +71,12 @@ def test_gauges_against_the_true_matrix(finished, small_session):
     assert "diagonal +1.00 %, +0.00 %" in lines[-1] and "cross-talk +0.00, +0.00" in lines[-1]
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_channel_that_answers_to_no_moment_has_no_cross_talk(finished, small_session):
+    lines = score(load_session(small_session), finished, Gauges(GaugeMatrix(np.diag([11.3116, 0.0])), ""))
+    assert "diagonal +0.00 %, -100.00 %" in lines[-1] and "cross-talk +nan, +2.20 points" in lines[-1]
+
+
 def test_a_recorded_session_has_no_score(finished, small_copy):
     for path in [small_copy / "truth.json", *small_copy.glob("trials/*/truth.*")]:
         path.unlink()
