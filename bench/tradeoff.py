@@ -52,8 +52,8 @@ class Trade:
     @property
     def rms_mm(self) -> float:
         """Of the errors of all whisks; NaN where there is none."""
-        known = self.errors_mm[np.isfinite(self.errors_mm)]
-        return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+        finite = self.errors_mm[np.isfinite(self.errors_mm)]
+        return float(np.sqrt(np.mean(finite**2))) if len(finite) else np.nan
 
     @property
     def missing(self) -> int:
@@ -62,10 +62,10 @@ class Trade:
 
     def row(self, standard_cpu_s: float, on_front: bool) -> dict:
         """As the table has it."""
-        known = np.isfinite(self.errors_mm)
-        inside = np.abs(self.errors_mm[known]) <= _WITHIN_95 * self.sigma_mm[known]
-        sigma = float(np.median(self.sigma_mm[known])) if np.any(known) else np.nan
-        values = (self.seeing.name, int(on_front), len(known), len(known) - self.missing, self.cpu_s, self.wall_s,
+        finite = np.isfinite(self.errors_mm)
+        inside = np.abs(self.errors_mm[finite]) <= _WITHIN_95 * self.sigma_mm[finite]
+        sigma = float(np.median(self.sigma_mm[finite])) if np.any(finite) else np.nan
+        values = (self.seeing.name, int(on_front), len(finite), len(finite) - self.missing, self.cpu_s, self.wall_s,
                   self.cpu_s / standard_cpu_s, self.rms_mm, sigma, 100.0 * np.mean(inside) if len(inside) else np.nan)
         return dict(zip(COLUMNS, values))
 
@@ -128,8 +128,8 @@ def _against_truth(session: Session, units: Sequence[Unit], trades: Sequence[Tra
     """With errors: against the known truth, or the finest setting."""
     finest = trades[len(PRESETS) - 1].d_x_mm  # the last rung
     counts = [len(forward_strokes(read_signals(unit.trial))) for unit in units]
-    known = [truth_of(session, u.trial.name, number) for u, count in zip(units, counts) for number in range(count)]
-    true = np.array([np.nan if truth is None else truth["d_x_mm"] for truth in known], dtype=float)
+    truths = [truth_of(session, u.trial.name, number) for u, count in zip(units, counts) for number in range(count)]
+    true = np.array([np.nan if truth is None else truth["d_x_mm"] for truth in truths], dtype=float)
     return [replace(trade, errors_mm=trade.d_x_mm - np.where(np.isnan(true), finest, true)) for trade in trades]
 
 

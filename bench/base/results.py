@@ -62,10 +62,10 @@ def hash_of_code(places: tuple[str, ...], root: Path = _ROOT) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for place in places:
         path = root / place
-        found = [path] if path.suffix == ".py" else sorted(path.rglob("*.py"))
-        if not found:
+        sources = [path] if path.suffix == ".py" else sorted(path.rglob("*.py"))
+        if not sources:
             raise FileNotFoundError(f"no sources in {place}")
-        for file in found:
+        for file in sources:
             digest.update(f"{file.relative_to(root).as_posix()}\0".encode())
             digest.update(hashlib.blake2b(file.read_bytes()).digest())
     return digest.hexdigest()

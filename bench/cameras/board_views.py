@@ -64,7 +64,7 @@ def _open(source: Path, name: str) -> Frames:
 
 def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
     """A view a frame; frames that are not looked at or damaged count as without a board."""
-    views, chosen, samples, found = [], sampled_frames(frames.count), [], []
+    views, chosen, samples, with_board = [], sampled_frames(frames.count), [], []
     every = max(1, len(chosen) // _SAMPLES)
 
     def look(frame: tuple[int, np.ndarray | None]):
@@ -75,14 +75,14 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
         views.append(view)
         if grey is not None and len(view) == 0 and len(samples) < _SAMPLES and index % every == 0:
             samples.append(grey)
-        if len(view) and len(found) < _SAMPLES and (not found or index % every == 0):
-            found.append(grey)
+        if len(view) and len(with_board) < _SAMPLES and (not with_board or index % every == 0):
+            with_board.append(grey)
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
         reason = why_not_found(samples, board) if samples else None
         if reason:
             raise BadInput(reason, file=f"boards/{name}")
     try:
-        check_marker_size(found, board)
+        check_marker_size(with_board, board)
     except Refused as problem:
         raise BadInput(str(problem), file=f"boards/{name}") from None
     return views
@@ -114,16 +114,16 @@ def _trial_views(session: Session, name: str, rig_view: Corners) -> tuple[list[C
     if not trials or len(rig_view) == 0:
         return [], []
     each = max(1, _MOST_TRIAL_FRAMES // len(trials))
-    found, notes = [], []
+    kept, notes = [], []
     for trial in trials[:: max(1, len(trials) // _MOST_TRIAL_FRAMES)]:
         views = list(_views_of(trial.camera_sources[name], each, rig_view, session.board))
         shift = np.median([_shift_px(view, rig_view) for view in views]) if views else np.inf
         if shift < _MOVED_PX:
-            found += views
+            kept += views
         elif np.isfinite(shift):
             notes.append(f"camera {name} stands {shift:.1f} px elsewhere in trial {trial.name} than in boards/rig; "
                          "that trial was not used for calibration")  # fmt: skip
-    return found, notes
+    return kept, notes
 
 
 def _views_of(source: Path, each: int, rig_view: Corners, board: Board) -> Iterator[Corners]:

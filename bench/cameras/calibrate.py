@@ -180,9 +180,9 @@ def held_out_lines(measured: HeldOut | None, calibration: Calibration) -> Iterat
         yield f"  with all pictures of a view taken as of one instant: {_agreement(measured.at_once)}"
 
 
-def _agreement(found: Agreement) -> str:
-    pitch = f"RMS {found.pitch_rms_mm:.4f} mm, mean {found.pitch_mean_mm:+.4f} mm over {found.pitches} pitches"
-    return f"{found.joint_px:.3f} px joint; distances of neighbouring corners in space less the pitch: {pitch}"
+def _agreement(of: Agreement) -> str:
+    pitch = f"RMS {of.pitch_rms_mm:.4f} mm, mean {of.pitch_mean_mm:+.4f} mm over {of.pitches} pitches"
+    return f"{of.joint_px:.3f} px joint; distances of neighbouring corners in space less the pitch: {pitch}"
 
 
 def _doubts(calibration: Calibration) -> Iterator[str]:

@@ -136,15 +136,15 @@ def moved_cameras(
 
     A camera that does not see the rig board is not checked.
     """
-    found = {}
+    moved = {}
     if session.board is None or calibration.T_rig_board is None:
-        return found
+        return moved
     for name, pictures in frames.items():
         if pictures and calibration.background.get(name) is not None:
             doubts = (_moved(session, calibration, name, pictures[k]) for k in (min(pictures), max(pictures)))
             doubt = next(filter(None, doubts), "")
-            found |= {name: doubt} if doubt else {}
-    return found
+            moved |= {name: doubt} if doubt else {}
+    return moved
 
 
 def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -> str:

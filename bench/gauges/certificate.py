@@ -73,10 +73,10 @@ class Certificate:
         share = self.moments[driven, axis] / self.gauges.full_scale_Nmm[axis]
         off = self.residuals[driven, axis] / self.gauges.full_scale_Nmm[axis]
         design = np.stack([share, share * np.abs(share)], axis=1)
-        found, squares, *_ = np.linalg.lstsq(design, off, rcond=None)
+        coefficients, squares, *_ = np.linalg.lstsq(design, off, rcond=None)
         scatter = np.sqrt(squares[0] / (len(off) - 2)) if len(squares) else 0.0
         sigma = scatter * np.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-        return 25.0 * abs(found[1]), 25.0 * U95 * sigma  # a parabola b s² is b/4 from its chord at half scale
+        return 25.0 * abs(coefficients[1]), 25.0 * U95 * sigma  # a parabola b s² is b/4 from its chord at half scale
 
     def repeatability_percent(self) -> float | None:
         """Standard deviation, in %, of the gain over whisks in one position of the follicle; None without a second."""
@@ -124,8 +124,8 @@ class Certificate:
 
     def _quality(self) -> Iterator[str]:
         for axis, name in enumerate(("m_y", "m_z")):
-            found = self.nonlinearity_percent(axis)
-            said = NOT_MEASURED if found is None else f"{found[0]:.2f} ± {found[1]:.2f} % of full scale"
+            bow = self.nonlinearity_percent(axis)
+            said = NOT_MEASURED if bow is None else f"{bow[0]:.2f} ± {bow[1]:.2f} % of full scale"
             yield f"Non-linearity of {name}: {said}"
         again = self.repeatability_percent()
         yield "Repeatability of the gain: " + (

@@ -11,7 +11,7 @@ from bench.gauges.readings import Pairs
 
 _CHANNELS = "yz"
 _HEARD_SIGMAS = 8.0
-_LEAST_KNOWN = 0.2  # of the samples; a whisk that saturates late can still be used
+_LEAST_UNSATURATED = 0.2  # of the samples; a whisk that saturates late can still be used
 
 
 class Undetermined(BadInput):
@@ -22,9 +22,9 @@ def check_alive(strokes: Sequence[Stroke]) -> None:
     """Raises BadInput where a channel stands still in every stroke, or is saturated throughout."""
     for column, channel in enumerate(_CHANNELS):
         values = np.concatenate([stroke.channels[:, column] for stroke in strokes]) if strokes else np.zeros(0)
-        known = values[np.isfinite(values)]
-        if len(values) and (len(known) < _LEAST_KNOWN * len(values) or np.ptp(known) == 0.0):
-            at = f"reads {known[0]:g} V" if len(known) else "is saturated"
+        unsaturated = values[np.isfinite(values)]
+        if len(values) and (len(unsaturated) < _LEAST_UNSATURATED * len(values) or np.ptp(unsaturated) == 0.0):
+            at = f"reads {unsaturated[0]:g} V" if len(unsaturated) else "is saturated"
             raise BadInput(f"channel {channel} {at} throughout: at its rail, or not connected", file="trials")
 
 

@@ -87,7 +87,7 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: boo
     if signals.kind == "V":
         for where in places:  # elsewhere the motor may rest, and a channel stand still with it
             channels[where] = off_the_rails(channels[where])
-    found, lowpassed = [], {}
+    strokes, lowpassed = [], {}
     for where, end in zip(places, [*(place.start for place in places[1:]), len(signals.time_s)]):
         time, motor = signals.time_s[where], signals.motor_rad[where]
         cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
@@ -95,8 +95,8 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: boo
             lowpassed[cutoff_Hz] = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
         stroke, back = Stroke(time, motor, channels[where], lowpassed[cutoff_Hz][where]), slice(where.stop, end)
         way_back = signals.time_s[back], signals.motor_rad[back], channels[back]
-        found.append(_levelled(stroke, *way_back) if level else stroke)
-    return found
+        strokes.append(_levelled(stroke, *way_back) if level else stroke)
+    return strokes
 
 
 def _levelled(stroke: Stroke, time_s, motor_rad, channels) -> Stroke:
@@ -131,9 +131,9 @@ def _lowpass(channels, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:
 def _bridged(channels) -> np.ndarray:
     bridged, place = channels.copy(), np.arange(len(channels))
     for column in bridged.T:
-        known = np.isfinite(column)
-        if known.any():
-            column[~known] = np.interp(place[~known], place[known], column[known])
+        finite = np.isfinite(column)
+        if finite.any():
+            column[~finite] = np.interp(place[~finite], place[finite], column[finite])
         else:
             column[:] = 0.0
     return bridged

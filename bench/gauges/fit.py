@@ -63,15 +63,15 @@ def leave_out(pairs: Sequence[Pairs], fitted: GaugeMatrix) -> dict[str, GaugeMat
     The weights are those of the whole fit, so that hundreds of trials cost hundreds of subtractions.
     """
     parts, wider = [_normal(p, fitted.matrix) for p in pairs], widening(pairs, fitted.matrix)
-    found: dict[str, GaugeMatrix | None] = {}
+    without: dict[str, GaugeMatrix | None] = {}
     for name in dict.fromkeys(p.trial for p in pairs):
         rest = [part for p, part in zip(pairs, parts) if p.trial != name]
         if fixes_matrix([p for p in pairs if p.trial != name]):
             coefficients, covariance = _solve(rest)
-            found[name] = GaugeMatrix(coefficients.reshape(2, 2), covariance * wider)
+            without[name] = GaugeMatrix(coefficients.reshape(2, 2), covariance * wider)
         else:
-            found[name] = None
-    return found
+            without[name] = None
+    return without
 
 
 def fixes_matrix(pairs: Sequence[Pairs]) -> bool:

@@ -34,11 +34,11 @@ def reversals(trial: Trial, signals: Signals, settings: Settings) -> list[Revers
     strokes = strokes_of(signals, trial, settings, level=False)
     motor, _ = without_spikes(signals.motor_rad)
     channels = np.stack([signals.y, signals.z], axis=1)
-    found = [
+    of_whisks = [
         _reversal(trial.name, stroke, motor[place.stop : end], channels[place.stop : end])
         for stroke, place, end in zip(strokes, places, ends)
     ]
-    return [one for one in found if one is not None]
+    return [one for one in of_whisks if one is not None]
 
 
 def _reversal(name: str, stroke: Stroke, motor, channels) -> Reversal | None:
@@ -70,10 +70,10 @@ def _line_at(motor, channels) -> np.ndarray:
 
 
 def in_percent(
-    found: Sequence[Reversal], matrix: np.ndarray, full_scale_Nmm: np.ndarray
+    reversals: Sequence[Reversal], matrix: np.ndarray, full_scale_Nmm: np.ndarray
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Largest hysteresis (2,) and largest return error (2,) of m_y, m_z in % of full scale; None where not measured."""
     scale = 100.0 / np.asarray(full_scale_Nmm)
-    differences = [np.nanmax(np.abs(one.difference @ matrix.T), axis=0) for one in found]
-    returns = [np.abs(matrix @ one.zero_return) for one in found if np.isfinite(one.zero_return).all()]
+    differences = [np.nanmax(np.abs(one.difference @ matrix.T), axis=0) for one in reversals]
+    returns = [np.abs(matrix @ one.zero_return) for one in reversals if np.isfinite(one.zero_return).all()]
     return tuple(np.max(values, axis=0) * scale if values else None for values in (differences, returns))

@@ -45,8 +45,8 @@ def scale_by_weights(
     if not loaded:
         return None
     zeros = {t.follicle_roll_deg: _reading(t) for t in weights if not t.force_N}
-    found = [_one(t, gauges, *zeros.get(t.follicle_roll_deg, (zero_V, zero_sigma_V))) for t in loaded]
-    factors, sigmas = np.array(found).T
+    scaled = [_one(t, gauges, *zeros.get(t.follicle_roll_deg, (zero_V, zero_sigma_V))) for t in loaded]
+    factors, sigmas = np.array(scaled).T
     shares = sigmas**-2.0 / np.sum(sigmas**-2.0)
     factor = float(shares @ factors)
     # Scales, balances and rulers may be common to all: their sigma is not divided by the number of weights.

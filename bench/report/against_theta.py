@@ -56,12 +56,12 @@ def against_theta(results: Sequence[TrialResult]) -> list[AtTheta]:
 
 
 def _pooled(estimator: str, theta_deg: float, percent: np.ndarray) -> AtTheta:
-    known = percent[np.isfinite(percent).all(axis=1)]
-    count = len(known), len(percent) - len(known)
-    if not len(known):
+    finite = percent[np.isfinite(percent).all(axis=1)]
+    count = len(finite), len(percent) - len(finite)
+    if not len(finite):
         return AtTheta(estimator, theta_deg, *count, *(np.nan,) * 4)
-    rms = np.sqrt(np.mean(known**2, axis=0)).tolist()
-    return AtTheta(estimator, theta_deg, *count, float(known[:, 0].mean()), *rms)
+    rms = np.sqrt(np.mean(finite**2, axis=0)).tolist()
+    return AtTheta(estimator, theta_deg, *count, float(finite[:, 0].mean()), *rms)
 
 
 def best(rows: Sequence[AtTheta], estimator: str) -> AtTheta | None:

@@ -114,15 +114,15 @@ def _changes(first: _Run, other: _Run) -> Iterator[Change]:
 
 
 def _sigma(a: Value, b: Value, same: bool) -> float:
-    known = [v.sigma for v in (a, b) if math.isfinite(v.sigma)]
-    return max(known, default=math.nan) if same else math.hypot(*known)
+    finite = [v.sigma for v in (a, b) if math.isfinite(v.sigma)]
+    return max(finite, default=math.nan) if same else math.hypot(*finite)
 
 
 def _quantities(seen: SeenWhisk, felt: FeltWhisk) -> dict[str, Value]:
     """By name, in the unit that it ends with."""
-    found = {name: _scaled(get(seen), scale) for name, scale, get in _SEEN}
-    found["touch_felt_deg"] = _scaled(felt.touch_felt_rad, _DEGREES)
-    return found | {f"{answer.estimator}: d_x_est_mm": answer.d_x_est_mm for answer in felt.estimates}
+    quantities = {name: _scaled(get(seen), scale) for name, scale, get in _SEEN}
+    quantities["touch_felt_deg"] = _scaled(felt.touch_felt_rad, _DEGREES)
+    return quantities | {f"{answer.estimator}: d_x_est_mm": answer.d_x_est_mm for answer in felt.estimates}
 
 
 def _scaled(value: Value, scale: float) -> Value:
@@ -147,13 +147,13 @@ def _lines(first: _Run, other: _Run, changes: Sequence[Change]) -> Iterator[str]
     yield f"{other.out} against {first.out}: {len(compared)} whisks in both, {same} of them of one recording"
     alone = [(run.out, set(run.whisks()) - set(rest.whisks())) for run, rest in ((first, other), (other, first))]
     yield from (f"  only in {out}: {_named(sorted(keys))}" for out, keys in alone if keys)
-    told = sorted((c for c in changes if c.matters), key=lambda c: -abs(c.sigmas))
-    for change in told[:_MOST_SHOWN]:
-        yield f"  {_told(change)}"
-    if len(told) > _MOST_SHOWN:
-        yield f"  … and {len(told) - _MOST_SHOWN} more (--out FILE has all)"
+    significant = sorted((c for c in changes if c.matters), key=lambda c: -abs(c.sigmas))
+    for change in significant[:_MOST_SHOWN]:
+        yield f"  {_change_line(change)}"
+    if len(significant) > _MOST_SHOWN:
+        yield f"  … and {len(significant) - _MOST_SHOWN} more (--out FILE has all)"
     quiet = max((abs(c.sigmas) for c in changes if not c.matters), default=0.0)
-    yield f"  {len(changes) - len(told)} of {len(changes)} values moved by {quiet:.2f} sigma at most"
+    yield f"  {len(changes) - len(significant)} of {len(changes)} values moved by {quiet:.2f} sigma at most"
 
 
 def _standing_lines(runs: Sequence[_Run]) -> Iterator[str]:
@@ -169,7 +169,7 @@ def _standing_lines(runs: Sequence[_Run]) -> Iterator[str]:
         )
 
 
-def _told(change: Change) -> str:
+def _change_line(change: Change) -> str:
     name, _, unit = change.quantity.rpartition("_")
     estimator, _, quantity = name.rpartition(": ")
     what = f"{label_of(estimator)}, {quantity}" if estimator else quantity

@@ -50,12 +50,12 @@ def _theta(whisk: SeenWhisk, frame: int) -> str:
 
 def _pictures(trial: Trial, cameras, frames: set[int]) -> dict[str, dict[int, np.ndarray]]:
     """Pictures by camera and frame; a camera that dropped a frame lacks it."""
-    times, found = frame_times(trial), {}
+    times, pictures = frame_times(trial), {}
     for camera in cameras:
         index = {frame: int(times.picture[camera][frame]) for frame in frames}
         read = read_frames(trial.camera_sources[camera], [k for k in index.values() if k >= 0])
-        found[camera] = {frame: read.get(k) for frame, k in index.items()}
-    return found
+        pictures[camera] = {frame: read.get(k) for frame, k in index.items()}
+    return pictures
 
 
 def _draw(axes: Axes, picture, lines: dict[str, np.ndarray]) -> None:
@@ -83,8 +83,8 @@ def _draw(axes: Axes, picture, lines: dict[str, np.ndarray]) -> None:
 def _look_at(axes: Axes, picture, wire) -> None:
     """The part of the picture that holds the whisker, in the shape of 16:9."""
     height, width = picture.shape
-    known = wire[np.isfinite(wire).all(axis=1)]
-    middle, size = 0.5 * (known.min(axis=0) + known.max(axis=0)), np.ptp(known, axis=0) + 2 * _MARGIN_PX
+    finite = wire[np.isfinite(wire).all(axis=1)]
+    middle, size = 0.5 * (finite.min(axis=0) + finite.max(axis=0)), np.ptp(finite, axis=0) + 2 * _MARGIN_PX
     size = max(size[0], size[1] * 16 / 9) * np.array([1.0, 9 / 16])
     low = np.clip(middle - 0.5 * size, 0, np.maximum(np.array([width, height]) - size, 0))
     high = np.minimum(low + size, [width, height])

@@ -29,22 +29,22 @@ def session_figures(
     results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], whisker: Whisker, settings: Settings
 ) -> dict[str, Figure]:
     """All figures of the session that the results allow, by the names of their files."""
-    fitted, found = [f.surface for f in friction], {}
+    fitted, figures = [f.surface for f in friction], {}
     if fitted:
-        found["fig8"] = figure_8(fitted)
+        figures["fig8"] = figure_8(fitted)
     judged = [j for j in judge(results) if j.purpose == "measure" and math.isfinite(j.error_percent)]
     if judged:
-        found["error_against_slope"] = error_against_slope(judged, fitted, settings)
+        figures["error_against_slope"] = error_against_slope(judged, fitted, settings)
     rows = list(explained_rows(results, whisker))
     if rows:
-        found["explained"] = draw_explained([*rows, mean_row(rows)])
+        figures["explained"] = draw_explained([*rows, mean_row(rows)])
     cells = measured_cells(results, friction, settings.alpha_est_rad)
     if cells:
-        found["error_map"] = draw_error_map(cells, settings.alpha_est_rad, typical_taper(friction))
+        figures["error_map"] = draw_error_map(cells, settings.alpha_est_rad, typical_taper(friction))
     by_theta = against_theta(results)
     if any(row.whisks for row in by_theta):
-        found["against_theta"] = figure(by_theta)
-    return found
+        figures["against_theta"] = figure(by_theta)
+    return figures
 
 
 def write_paper_figures(

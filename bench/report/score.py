@@ -38,8 +38,8 @@ class Score:
     def line(self) -> str:
         """Bias, RMS, and how well the stated sigmas hold."""
         z = np.abs(self.errors) / self.sigmas
-        known = z[np.isfinite(z)]
-        held = f"{100 * np.mean(known <= _WITHIN_95):5.0f} %   {known.max():5.2f}" if len(known) else "    -       -"
+        finite = z[np.isfinite(z)]
+        held = f"{100 * np.mean(finite <= _WITHIN_95):5.0f} %   {finite.max():5.2f}" if len(finite) else "    -       -"
         return (
             f"{self.name:<28}{len(self.errors):5d}  {np.mean(self.errors):+9.4f}  "
             f"{np.sqrt(np.mean(self.errors**2)):8.4f} {self.unit:<4}{held}"

@@ -35,8 +35,8 @@ class Board:
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
         """The board as OpenCV has it."""
-        known = _dictionary(self.dictionary)
-        board = cv2.aruco.CharucoBoard(tuple(self.squares), self.square_mm, self.marker_mm, known)
+        predefined = _dictionary(self.dictionary)
+        board = cv2.aruco.CharucoBoard(tuple(self.squares), self.square_mm, self.marker_mm, predefined)
         board.setLegacyPattern(self.legacy)
         return board
 
@@ -81,5 +81,5 @@ def _dictionary(name):
 
 
 def _bits(dictionary, number):
-    known = _dictionary(dictionary)
-    return cv2.aruco.generateImageMarker(known, number, known.markerSize + 2)
+    predefined = _dictionary(dictionary)
+    return cv2.aruco.generateImageMarker(predefined, number, predefined.markerSize + 2)

@@ -89,14 +89,14 @@ class March:
 
     def _advance(self, motor_rad):
         tip = self.state.status == "tip"
-        found = self._friction_step(motor_rad, tip)
-        if not tip and found[-1].arc_mm > self.contact.rod.length_mm:
-            found = self._friction_step(motor_rad, True)
-        elif tip and self.contact.foot_side(found[-1]) > 0:
-            found = self._friction_step(motor_rad, False)
-        for state in found:
+        states = self._friction_step(motor_rad, tip)
+        if not tip and states[-1].arc_mm > self.contact.rod.length_mm:
+            states = self._friction_step(motor_rad, True)
+        elif tip and self.contact.foot_side(states[-1]) > 0:
+            states = self._friction_step(motor_rad, False)
+        for state in states:
             self.before, self.state = self.state, state
-        return found
+        return states
 
     def _friction_step(self, motor_rad, tip):
         if self.friction.static == self.friction.kinetic:

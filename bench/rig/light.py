@@ -40,7 +40,7 @@ def round_shade(
     against `across`.
     """
     up = np.sqrt(np.maximum(1 - across**2, 0))
-    lit = np.maximum(up * facing + across * aside, 0)
+    diffuse = np.maximum(up * facing + across * aside, 0)
     highlight = np.maximum(up * mirror[0] + across * mirror[1], 0) ** material.gloss
     edge = up**material.rim if material.rim else 1.0
-    return (material.matt * (light.soft + light.lamp * lit) + material.shiny * light.lamp * highlight) * edge
+    return (material.matt * (light.soft + light.lamp * diffuse) + material.shiny * light.lamp * highlight) * edge

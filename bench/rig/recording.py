@@ -101,15 +101,15 @@ def _whisks(protocol, run, rod, bar, touch, stroke, frames, rng):
     stops = frames.motor_rad[(frames.whisk == 0) & ~frames.back]
     factors = np.exp(friction.scatter * rng.standard_normal(len(stroke.forward)))
     rests = [_rests(friction.irregular, rng) for _ in factors]
-    found = {}
+    made = {}
     for kind in zip(factors, rests):
-        if kind not in found:
+        if kind not in made:
             factor, reached = kind
             finest = math.radians(friction.finest_deg)
             coefficients = Friction(static * factor, table.friction * factor, finest, reached)
-            found[kind] = Whisk.run(rod, bar, coefficients, touch, end, step_rad=_STEP_RAD, stops_rad=stops,
+            made[kind] = Whisk.run(rod, bar, coefficients, touch, end, step_rad=_STEP_RAD, stops_rad=stops,
                                     back=back)
-    return tuple(found[kind] for kind in zip(factors, rests))
+    return tuple(made[kind] for kind in zip(factors, rests))
 
 
 def _rests(irregular: float, rng) -> tuple[float, ...]:

@@ -61,7 +61,7 @@ def as_keys(tables: dict[str, Any], kind: type[Keys], shown: str, doubts: Doubts
         with doubts.guard():
             raise BadInput(line, file=shown)
     try:
-        keys = msgspec.convert(_known(tables, kind), kind, strict=True)
+        keys = msgspec.convert(_only_keys_of(tables, kind), kind, strict=True)
     except msgspec.ValidationError as problem:
         raise BadInput(_in_plain_words(str(problem)), file=shown) from None
     _check_values(keys, "", shown)
@@ -111,12 +111,12 @@ def _unknown_keys(value: Any, kind: type[Keys], top: type[Keys], path: tuple[str
                 yield from _unknown_keys(inner, kind.tables[key], top, (*path, name))
 
 
-def _known(value: Any, kind: type[Keys] | None) -> Any:
+def _only_keys_of(value: Any, kind: type[Keys] | None) -> Any:
     """A table, or a list of tables, without its unknown keys; anything else as it is."""
     if kind and isinstance(value, list):
-        return [_known(item, kind) for item in value]
+        return [_only_keys_of(item, kind) for item in value]
     if kind and isinstance(value, dict):
-        return {k: _known(v, kind.tables.get(k)) for k, v in value.items() if k in kind.__struct_fields__}
+        return {k: _only_keys_of(v, kind.tables.get(k)) for k, v in value.items() if k in kind.__struct_fields__}
     return value
 
 

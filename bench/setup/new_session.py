@@ -57,14 +57,14 @@ def new_session(
     for question in QUESTIONS:
         if question.option in given:
             question.window.check(given[question.option], f"--{question.option.replace('_', '-')}", str(path))
-    known = dict(given)
+    answers = dict(given)
     for question in QUESTIONS if ask else ():
-        if question.option not in known:
-            known |= _answered(question, ask)
+        if question.option not in answers:
+            answers |= _answered(question, ask)
     for folder in FOLDERS:
         (path / folder).mkdir(parents=True, exist_ok=True)
-    write_whole(path / MANIFEST, manifest_text(name or path.resolve().name, known, squares, dictionary))
-    return list(_next_steps(path, known))
+    write_whole(path / MANIFEST, manifest_text(name or path.resolve().name, answers, squares, dictionary))
+    return list(_next_steps(path, answers))
 
 
 def _answered(question: Question, ask: Ask) -> dict[str, float]:
@@ -80,9 +80,9 @@ def _answered(question: Question, ask: Ask) -> dict[str, float]:
     return {}
 
 
-def manifest_text(name: str, known: Mapping[str, float], squares: tuple[int, int], dictionary: str) -> str:
+def manifest_text(name: str, answers: Mapping[str, float], squares: tuple[int, int], dictionary: str) -> str:
     """session.toml with what is known, and a line to fill in for what is not."""
-    lines = {q.option: _line(q.key, known.get(q.option), q.asked) for q in QUESTIONS}
+    lines = {q.option: _line(q.key, answers.get(q.option), q.asked) for q in QUESTIONS}
     named = tomli_w.dumps({"name": name}).strip()
     return _TEMPLATE.format(named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines)
 
@@ -91,9 +91,9 @@ def _line(key: str, value: float | None, asked: str) -> str:
     return f"# {key} =        # FILL IN: {asked}" if value is None else f"{key} = {value:.10g}".ljust(32) + f"# {asked}"
 
 
-def _next_steps(path: Path, known: Mapping[str, float]):
+def _next_steps(path: Path, answers: Mapping[str, float]):
     yield f"written: {path / MANIFEST}"
-    missing = sum(q.option not in known for q in QUESTIONS)
+    missing = sum(q.option not in answers for q in QUESTIONS)
     if missing:
         yield f"{missing} lines are to be filled in: look for FILL IN"
     yield f"then record boards/ and trials/ (comments in the file say how), and run: whisker-bench check {path}"

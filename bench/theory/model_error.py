@@ -82,8 +82,8 @@ def errors_percent(push: Push) -> tuple[float, float]:
     if state is None:
         return _NO_HOLD
     felt = Whisk(*(np.zeros(0),) * 4, theta, *moments_Nmm(state), _NOISE_NMM**2 * np.eye(2), 0.0, _BEAM)
-    told = EstimatorSettings(alpha, object_radius_mm=push.bar_radius_mm, whisker_radius_mm=ROD.diameter_mm / 2)
-    return tuple(100.0 * (f(felt, told).d_x_mm / touch.d_x_mm - 1.0) for f in (with_friction, corrected))
+    settings = EstimatorSettings(alpha, object_radius_mm=push.bar_radius_mm, whisker_radius_mm=ROD.diameter_mm / 2)
+    return tuple(100.0 * (f(felt, settings).d_x_mm / touch.d_x_mm - 1.0) for f in (with_friction, corrected))
 
 
 def predicted_percent(push: Push) -> float:

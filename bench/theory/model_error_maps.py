@@ -55,8 +55,8 @@ def write_map(name: str, out: Path, *, workers: int = 1, progress: bool = False)
 def rows(panels: Sequence[Panel]) -> Iterator[dict]:
     """A row a cell, by COLUMNS; errors that are not known are NaN."""
     for panel in panels:
-        found = panel.error_percent, panel.predicted_percent, panel.corrected_percent
-        for pushes, *errors in zip(panel.pushes, *found):
+        errors_percent = panel.error_percent, panel.predicted_percent, panel.corrected_percent
+        for pushes, *errors in zip(panel.pushes, *errors_percent):
             for push, *each in zip(pushes, *errors):
                 yield asdict(push) | dict(zip(COLUMNS[-3:], map(float, each)))
 
@@ -83,9 +83,9 @@ def draw(panels: Sequence[Panel], title: str) -> Figure:
 
 def _errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:
     """Errors in colour, and their lines with numbers."""
-    known = np.ma.masked_invalid(percent)
-    drawn = axes.contourf(*_axes(panel), known, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both")
-    lines = axes.contour(*_axes(panel), known, **_LINES, colors="black", linestyles="-")
+    finite = np.ma.masked_invalid(percent)
+    drawn = axes.contourf(*_axes(panel), finite, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both")
+    lines = axes.contour(*_axes(panel), finite, **_LINES, colors="black", linestyles="-")
     axes.clabel(lines, fmt=lambda level: f"{level:+g} %" if level else "0", fontsize=7)
     return drawn
 

@@ -94,12 +94,12 @@ def looked_twice(background, frames, off_px: float, phase_rad: float) -> Traced:
     return trace(cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0)), KNOTS, seen.blur_px)
 
 
-def errors(found: Traced) -> np.ndarray:
+def errors(traced: Traced) -> np.ndarray:
     """Distance (s,) of each piece from the axis, px."""
     column, heights = np.arange(SHAPE[1]), np.array(axis_heights())
     slopes = np.gradient(heights, axis=1)
-    x, y = found.pieces.foot_px.T
-    height, slope = (np.array([np.interp(at, column, table[k]) for at, k in zip(x, found.pieces.source)])
+    x, y = traced.pieces.foot_px.T
+    height, slope = (np.array([np.interp(at, column, table[k]) for at, k in zip(x, traced.pieces.source)])
                      for table in (heights, slopes))
     return (y - height) / np.hypot(1.0, slope)
 
@@ -113,9 +113,9 @@ def main() -> None:
         pictures, begin = [drawn(scene, rng) for _ in range(repeats)], None
         for start, off in STARTS.items():
             first = np.concatenate([errors(looked_once(*one, *off)) for one in pictures])
-            found = [looked_twice(*one, *off) for one in pictures]
-            error = np.concatenate([errors(one) for one in found])
-            own, sigma = (np.concatenate([getattr(one.found, key) for one in found])
+            located = [looked_twice(*one, *off) for one in pictures]
+            error = np.concatenate([errors(one) for one in located])
+            own, sigma = (np.concatenate([getattr(one.located, key) for one in located])
                           for key in ("sigma_px", "whole_sigma_px"))
             begin = error if begin is None else begin
             moved = np.abs(error - begin) / sigma

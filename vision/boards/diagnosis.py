@@ -51,7 +51,7 @@ def _plausible_count(grey: np.ndarray, board: Board) -> int:
 
 def _best(greys: Sequence[np.ndarray], boards: Iterable[Board]) -> tuple[Board | None, float]:
     shares = [(board, corner_share(greys, board)) for board in boards]
-    return max(shares, key=lambda found: found[1], default=(None, 0.0))
+    return max(shares, key=lambda candidate: candidate[1], default=(None, 0.0))
 
 
 def _other_print(board: Board) -> list[Board]:
@@ -92,8 +92,8 @@ def _size(dictionary: str) -> int:
 def _marker_count(greys: Sequence[np.ndarray], dictionary: str) -> float:
     parameters = cv2.aruco.DetectorParameters()
     parameters.detectInvertedMarker = True
-    found = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
-    detector = cv2.aruco.ArucoDetector(found, parameters)
+    predefined = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
+    detector = cv2.aruco.ArucoDetector(predefined, parameters)
     ids = [detector.detectMarkers(to_8_bit(grey))[1] for grey in greys]
     return float(np.mean([0 if i is None else len(i) for i in ids]))
 

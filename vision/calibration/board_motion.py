@@ -31,8 +31,8 @@ class Trajectory:
     @property
     def interval_s(self) -> float:
         """Median time between views that follow each other."""
-        known = np.sort(self.time_s[np.isfinite(self.time_s)])
-        return float(np.median(np.diff(known))) if len(known) > 1 else np.nan
+        taken_s = np.sort(self.time_s[np.isfinite(self.time_s)])
+        return float(np.median(np.diff(taken_s))) if len(taken_s) > 1 else np.nan
 
     def is_reference(self, view: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """Of pictures (view, camera) (s,), which give their view its time. (s,) bool."""
@@ -43,12 +43,12 @@ class Trajectory:
     @cached_property
     def neighbours(self) -> np.ndarray:
         """The view before and the view after each, (V, 2); the view itself where there is none near enough."""
-        found = np.tile(np.arange(len(self.time_s))[:, None], 2)
+        pair = np.tile(np.arange(len(self.time_s))[:, None], 2)
         order = np.argsort(self.time_s)[: np.isfinite(self.time_s).sum()]
         near = np.diff(self.time_s[order]) < _REACH_INTERVALS * self.interval_s
-        found[order[1:][near], 0] = order[:-1][near]
-        found[order[:-1][near], 1] = order[1:][near]
-        return found
+        pair[order[1:][near], 0] = order[:-1][near]
+        pair[order[:-1][near], 1] = order[1:][near]
+        return pair
 
     def paths(self, T_world_board: np.ndarray) -> np.ndarray:
         """From each view's pose to the pose before and after: rotation vector rad and shift mm, (V, 2, 6)."""

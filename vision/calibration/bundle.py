@@ -209,17 +209,17 @@ class _Paths:
         return _Paths(paths, np.linalg.inv(left_jacobian(paths[:, :, :3])))
 
 
-def _motion(state: State, camera: int, seen: Sightings, known: _Paths | None) -> _Motion:
+def _motion(state: State, camera: int, seen: Sightings, board: _Paths | None) -> _Motion:
     n = len(seen)
-    if known is None:
+    if board is None:
         still, eye = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))
         return _Motion(eye, still, still, still, [eye], [np.ones((n, 1, 1))])
     elapsed = seen.time_s + state.instants[seen.view, camera] + state.clock[camera]
     shares, rates = state.trajectory.shares(seen.view, elapsed)
-    path, rate = (np.einsum("nk,nki->ni", s, known.paths[seen.view]) for s in (shares, rates))
+    path, rate = (np.einsum("nk,nki->ni", s, board.paths[seen.view]) for s in (shares, rates))
     turn, J = exp_rotation(path[:, :3]), left_jacobian(path[:, :3])
     # log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
-    inverse = known.inverse[seen.view] * shares[:, :, None, None]
+    inverse = board.inverse[seen.view] * shares[:, :, None, None]
     by_neighbours = [J @ inverse[:, k] for k in (0, 1)]
     by_own = turn - J @ np.swapaxes(inverse.sum(axis=1), 1, 2)
     parts = [1.0 - shares.sum(axis=1), shares[:, 0], shares[:, 1]]

@@ -47,8 +47,9 @@ def _tables(path: Path) -> dict[str, dict]:
         document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise Refused(f"{path.name} is not TOML: {error}") from error
-    found = document.get("cameras", document)
-    tables = {str(key): t for key, t in found.items() if isinstance(t, dict) and "matrix" in t and not t.get("ignore")}
+    candidates = document.get("cameras", document)
+    cameras = {key: t for key, t in candidates.items() if isinstance(t, dict) and "matrix" in t}
+    tables = {str(key): t for key, t in cameras.items() if not t.get("ignore")}
     if not tables:
         raise Refused(f"{path.name} holds no camera as caliscope or aniposelib write them")
     return {_name(key, table): table for key, table in tables.items()}

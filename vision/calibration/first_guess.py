@@ -63,10 +63,10 @@ def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.nd
     ab = lens_model.unproject(view.px, lens)
     seen = np.all(np.isfinite(ab), axis=1)
     points = corners_mm[view.ids[seen]]
-    found, turns, shifts, _ = cv2.solvePnPGeneric(
+    solved, turns, shifts, _ = cv2.solvePnPGeneric(
         points, ab[seen][:, None], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )
-    if not found or np.any(points @ cv2.Rodrigues(turns[0])[0][2] + shifts[0][2] <= 0):
+    if not solved or np.any(points @ cv2.Rodrigues(turns[0])[0][2] + shifts[0][2] <= 0):
         raise Refused(
             f"a view of {len(view)} corners gives no board pose: corners along one line, or a wrong board"
         )

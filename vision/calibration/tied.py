@@ -63,12 +63,12 @@ class Tied:
         if not looked_at_once(self.alone):
             return *self._settled(False), []
         try:
-            found = self._settled(True)
-            doubt = "" if self.triggered else self._far_worse(found[1])
+            tied = self._settled(True)
+            doubt = "" if self.triggered else self._far_worse(tied[1])
         except Refused as reason:
             doubt = str(reason)
         if not doubt:
-            return *found, []
+            return *tied, []
         said = f"views of one index look as if the cameras saw one board at once, but they did not: {doubt}"
         if self.standing is None:
             raise Refused(f"{said}; record views that all cameras see at once, or a picture of the board on the rig")

@@ -63,8 +63,8 @@ def moving_lines(
 ) -> MovingLines:
     """Lines of one stroke. frames: grey pictures by camera and frame index; motor_rad: by frame index, all of them."""
     planes = [_planes(camera, frames[camera.name], motor_rad) for camera in cameras if frames.get(camera.name)]
-    found = [(motor_rad[f], *line) for f in motor_rad if (line := _meet([p[f] for p in planes if f in p])) is not None]
-    motor, points, directions = zip(*found) if found else ((), np.zeros((0, 3)), np.zeros((0, 3)))
+    lines = [(motor_rad[f], *line) for f in motor_rad if (line := _meet([p[f] for p in planes if f in p])) is not None]
+    motor, points, directions = zip(*lines) if lines else ((), np.zeros((0, 3)), np.zeros((0, 3)))
     return MovingLines(np.array(motor), np.array(points), np.array(directions))
 
 

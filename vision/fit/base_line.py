@@ -93,8 +93,8 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
     bent = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
     prior = np.concatenate([bent, bent, np.full(J.shape[1] - REST, WANDER_PX)])
     covariance = np.linalg.inv(J.T @ J + np.diag(prior**-2.0))
-    found = -covariance @ (J.T @ np.concatenate([r.residual for r in rows]))
-    return found[:REST], covariance[:REST, :REST]
+    solution = -covariance @ (J.T @ np.concatenate([r.residual for r in rows]))
+    return solution[:REST], covariance[:REST, :REST]
 
 
 def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

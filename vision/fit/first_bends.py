@@ -95,7 +95,7 @@ def _resting_points(sight: Sight, curves: Mapping[int, Curves]) -> tuple[LinePoi
 def follow_bends(sights: Sequence[Sight], axis: BarAxis, rest_mm: np.ndarray,
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
-    found: dict[int, np.ndarray] = {}
+    bend_rad: dict[int, np.ndarray] = {}
     pull, wire = _pull(axis, len(sights)), sights[0].rods.wire
     last, before = np.zeros(2), np.zeros(2)
     for frame, motor in motor_rad.items():
@@ -104,8 +104,8 @@ def follow_bends(sights: Sequence[Sight], axis: BarAxis, rest_mm: np.ndarray,
         seen = [sight.votes({frame: one_curve(rest_mm, guess, arc, motor, wire)}) for sight in sights]
         model = _Model([sight.view for sight in sights], rest_mm, arc, motor, wire)
         before, last = last, _fit_bend(model, *_likely_bend(model, seen, guess), pull)
-        found[frame] = last
-    return found
+        bend_rad[frame] = last
+    return bend_rad
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,5 +71,5 @@ def _misfit(motor_rad, bend_rad, covariance, at_rad: float) -> float:
     slope = abs(columns[:, 0] @ wanted) / (columns[:, 0] @ columns[:, 0])
     columns = np.vstack([columns, [0.0, 1.0 / max(slope * _CURVED_PER_RAD, 1e-9)]])
     wanted = np.append(wanted, 0.0)
-    found = np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    return float(np.sum((wanted - columns @ found) ** 2) + np.sum(~near))
+    solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    return float(np.sum((wanted - columns @ solution) ** 2) + np.sum(~near))

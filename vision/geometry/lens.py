@@ -92,8 +92,8 @@ def unproject(px: np.ndarray, lens: np.ndarray, tolerance_px: float = 1e-9) -> n
         if not np.any(np.abs(miss) > tolerance):
             break
         ab = ab - _solve_2x2(distort_jacobian(ab, lens[4:]), miss)
-    found = np.all(np.abs(distort(ab, lens[4:]) - target) <= 1e3 * tolerance, axis=1)
-    return np.where(found[:, None], ab, np.nan)
+    converged = np.all(np.abs(distort(ab, lens[4:]) - target) <= 1e3 * tolerance, axis=1)
+    return np.where(converged[:, None], ab, np.nan)
 
 
 def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:

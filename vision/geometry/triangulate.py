@@ -56,9 +56,9 @@ def _step(cameras: Cameras, px, sigma_px, seen, points: np.ndarray):
     normal, gradient = np.zeros((n, 3, 3)), np.zeros((n, 3))
     coupling = np.zeros((n, 3, N_PARAMETERS * len(cameras)))
     for k, camera in enumerate(cameras):
-        found, by_point, by_camera = camera.project_with_jacobians(points)
+        predicted, by_point, by_camera = camera.project_with_jacobians(points)
         weight = np.where(seen[camera.name], 1.0 / sigma_px[camera.name], 0.0)[:, None]
-        residual = np.nan_to_num((px[camera.name] - found) * weight)
+        residual = np.nan_to_num((px[camera.name] - predicted) * weight)
         J, Jc = (np.nan_to_num(M * weight[:, :, None]) for M in (by_point, by_camera))
         Jt = np.swapaxes(J, 1, 2)
         normal, gradient = normal + Jt @ J, gradient + (Jt @ residual[:, :, None])[:, :, 0]

@@ -110,7 +110,7 @@ def _unexplained(pieces: Pieces, background, share: float) -> np.ndarray:
     picture's variance that the background has."""
     columns = np.stack([background, np.ones_like(background)], axis=-1) * pieces.weight[..., None]
     seen, turned = pieces.grey * pieces.weight, columns.transpose(0, 2, 1)
-    found = np.linalg.solve(turned @ columns + 1e-3 * np.eye(2), turned @ seen[..., None])[..., 0]
-    plain = np.abs(found[:, :1] - 1.0) < _PLAIN_GAIN
-    found = np.where(plain, found, [1.0, 0.0])
-    return (seen - (columns @ found[..., None])[..., 0]) / np.sqrt(1.0 + share * found[:, :1] ** 2)
+    gain_offset = np.linalg.solve(turned @ columns + 1e-3 * np.eye(2), turned @ seen[..., None])[..., 0]
+    plain = np.abs(gain_offset[:, :1] - 1.0) < _PLAIN_GAIN
+    gain_offset = np.where(plain, gain_offset, [1.0, 0.0])
+    return (seen - (columns @ gain_offset[..., None])[..., 0]) / np.sqrt(1.0 + share * gain_offset[:, :1] ** 2)

@@ -219,8 +219,8 @@ def _from_sides(pieces: Pieces, width: _Width) -> Pieces:
     weighted = columns * (pieces.weight * outside)[..., None]
     turned = weighted.transpose(0, 2, 1)
     normal = turned @ weighted + 1e-6 * np.eye(columns.shape[-1])
-    found = np.linalg.solve(normal, turned @ (pieces.grey * pieces.weight)[..., None])
-    return replace(pieces, background=(columns @ found)[..., 0])
+    solution = np.linalg.solve(normal, turned @ (pieces.grey * pieces.weight)[..., None])
+    return replace(pieces, background=(columns @ solution)[..., 0])
 
 
 def _knots(pieces: Pieces) -> Knots:
@@ -245,6 +245,6 @@ def _best_width(pieces: Pieces, begin: _Width) -> _Width:
     starts = [(begin.start_px, begin.end_px, begin.blur_px), *((radius, radius, 1.0) for radius in _FIRST_RADII_PX)]
     middle = min((np.log(start) for start in starts), key=misfit)  # a thick line and a blurred one are two minima
     bounds = [np.log(_RADII_PX)] * 2 + [np.log(_BLURS_PX)]
-    found = minimize(misfit, middle, method="Nelder-Mead", bounds=bounds,
+    solution = minimize(misfit, middle, method="Nelder-Mead", bounds=bounds,
                      options={"initial_simplex": middle + 0.4 * np.eye(4, 3, -1), "xatol": 0.03, "maxfev": 60})
-    return _Width(*(float(v) for v in np.exp(found.x)))
+    return _Width(*(float(v) for v in np.exp(solution.x)))

@@ -21,23 +21,25 @@ _ONE_SIDED = 0.8  # share of the width: a rod seen whole comes out at 0.95 to 1.
 
 @dataclass(frozen=True)
 class SeenWidth:
-    """Width seen and known, px, and by how much the middle of what is seen lies off the axis, along the normal."""
+    """Width seen and by the diameter, px, and by how far the middle of what is seen lies off the axis, along the
+    normal."""
 
     seen_px: float
-    known_px: float
+    expected_px: float
     off_px: float
 
     @property
     def one_sided(self) -> bool:
         """Whether an edge of the rod is not seen."""
-        return self.seen_px < _ONE_SIDED * self.known_px
+        return self.seen_px < _ONE_SIDED * self.expected_px
 
     def line(self, camera: str) -> str:
         """For the report; empty where both edges are seen."""
         if not self.one_sided:
             return ""
-        return (f"camera {camera} sees {self.seen_px:.1f} of the wire's {self.known_px:.1f} px: light from one side; "
-                f"the axis was taken {abs(self.off_px):.1f} px from the middle of what is seen, by the known diameter")
+        return (f"camera {camera} sees {self.seen_px:.1f} of the wire's {self.expected_px:.1f} px: light from one "
+                f"side; the axis was taken {abs(self.off_px):.1f} px from the middle of what is seen, by the known "
+                "diameter")
 
 
 def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
@@ -80,7 +82,7 @@ def one_sided_lines(whisks: Sequence[Mapping[str, WireAppearance]]) -> tuple[str
     """A line a camera that sees light from one side, from the whisk in which it saw least."""
     least: dict[str, WireAppearance] = {}
     for whisk in whisks:
-        for camera, lit in whisk.items():
-            if camera not in least or lit.width.seen_px < least[camera].width.seen_px:
-                least[camera] = lit
-    return tuple(filter(None, (lit.width.line(camera) for camera, lit in least.items())))
+        for camera, appearance in whisk.items():
+            if camera not in least or appearance.width.seen_px < least[camera].width.seen_px:
+                least[camera] = appearance
+    return tuple(filter(None, (appearance.width.line(camera) for camera, appearance in least.items())))

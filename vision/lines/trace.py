@@ -59,13 +59,13 @@ class Traced:
     """Pieces brought to where the rod is, with what is known of each, and the lens blur in px."""
 
     pieces: Pieces
-    found: Located
+    located: Located
     blur_px: float
 
     @property
     def misfit(self) -> float:
         """Median chi² per pixel."""
-        return float(np.median(self.found.chi2))
+        return float(np.median(self.located.chi2))
 
 
 def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: float = BLUR_SIGMA,
@@ -82,18 +82,18 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
         task = Task(pieces, terms, knots, blur_px, blur_sigma)
         solved = solve(task, solved.shift_px, solved.robust, damped=0.0, most=_LAST_STEPS)
         blur_px = solved.blur_px
-    found = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px,
+    located = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px,
                     solved.widened_px2)
-    return Traced(pieces.moved(solved.shift_px), found, blur_px)
+    return Traced(pieces.moved(solved.shift_px), located, blur_px)
 
 
 def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
     """Trusted line points and the source of each, with sigmas that hold the misfit."""
-    pieces, found = traced.pieces, traced.found
-    good = (found.chi2 < _WORST_MISFIT * max(traced.misfit, 0.5)) & (found.sigma_px < _WORST_SIGMA_PX)
-    shared, rest = _leading(found.shared_px)
-    points = LinePoints(pieces.foot_px, pieces.normal, np.hypot(found.sigma_px, rest), pieces.place, shared,
-                        found.widened_px2)
+    pieces, located = traced.pieces, traced.located
+    good = (located.chi2 < _WORST_MISFIT * max(traced.misfit, 0.5)) & (located.sigma_px < _WORST_SIGMA_PX)
+    shared, rest = _leading(located.shared_px)
+    points = LinePoints(pieces.foot_px, pieces.normal, np.hypot(located.sigma_px, rest), pieces.place, shared,
+                        located.widened_px2)
     return points.select(good), pieces.source[good]
 
 

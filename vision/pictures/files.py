@@ -234,8 +234,8 @@ def _grey_reader(capture: cv2.VideoCapture):
 
 
 def _retrieve(capture: cv2.VideoCapture) -> np.ndarray | None:
-    found, frame = capture.retrieve()
-    return frame if found else None
+    decoded, frame = capture.retrieve()
+    return frame if decoded else None
 
 
 def _retrieve_colour(capture: cv2.VideoCapture) -> np.ndarray | None:

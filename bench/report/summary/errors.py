@@ -32,10 +32,10 @@ def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     columns = (("point", None), ("d_y", "d_y_est_sigma_mm"), ("d_z", "d_z_est_sigma_mm"), ("slip", "slip_est_sigma_mm"))
     parts = []
     for name, sigma in columns:
-        known = [row for row in rows if np.isfinite(row[f"{name}_error_mm"])]
-        if known:
-            stated = f" ({_rms(known, sigma):.3f} stated)" if sigma else ""
-            parts.append(f"{name} {_rms(known, f'{name}_error_mm'):.3f} mm{stated}")
+        finite = [row for row in rows if np.isfinite(row[f"{name}_error_mm"])]
+        if finite:
+            stated = f" ({_rms(finite, sigma):.3f} stated)" if sigma else ""
+            parts.append(f"{name} {_rms(finite, f'{name}_error_mm'):.3f} mm{stated}")
     if parts:
         yield f"the contact felt by (10), RMS of what it is off by: {', '.join(parts)} (estimates.csv)"
 

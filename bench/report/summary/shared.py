@@ -59,27 +59,27 @@ def _scatter(results: Sequence[TrialResult], key: str) -> tuple[float, int]:
 
 def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
     """For the summary."""
-    found = shared_distance(results)
-    if found is None:
+    shared = shared_distance(results)
+    if shared is None:
         return
     yield (
-        f"of d_x's sigma ± {found.shared_mm:.4f} mm is one error that all {found.n} whisks share "
-        f"({', '.join(SHARED)}), ± {found.own_mm:.4f} mm each whisk's own: their mean is known to ± "
-        f"{found.mean_sigma_mm:.4f} mm"
+        f"of d_x's sigma ± {shared.shared_mm:.4f} mm is one error that all {shared.n} whisks share "
+        f"({', '.join(SHARED)}), ± {shared.own_mm:.4f} mm each whisk's own: their mean is known to ± "
+        f"{shared.mean_sigma_mm:.4f} mm"
     )
-    if found.freedom:
+    if shared.freedom:
         beside = (f"{name} {np.degrees(_scatter(results, key)[0]):.4f}°" for name, key in _BESIDE)
         yield (
-            f"  whisks of one recording scatter about their mean by d_x {found.scatter_mm:.4f} mm, {', '.join(beside)} "
-            f"({found.freedom} degrees of freedom)"
+            f"  whisks of one recording scatter about their mean by d_x {shared.scatter_mm:.4f} mm, "
+            f"{', '.join(beside)} ({shared.freedom} degrees of freedom)"
         )
 
 
 def shared_doubts(results: Sequence[TrialResult]) -> Iterator[str]:
     """A line where whisks of one recording, which share bar and light, differ by more than they may."""
-    found = shared_distance(results)
-    if found is not None and found.is_too_narrow:
+    shared = shared_distance(results)
+    if shared is not None and shared.is_too_narrow:
         yield (
-            f"whisks of one recording scatter by {found.scatter_mm:.4f} mm in d_x, {found.own_mm:.4f} mm is stated as "
-            "each whisk's own: bar or wire moves from whisk to whisk, or that part of the sigma is too narrow"
+            f"whisks of one recording scatter by {shared.scatter_mm:.4f} mm in d_x, {shared.own_mm:.4f} mm is stated "
+            "as each whisk's own: bar or wire moves from whisk to whisk, or that part of the sigma is too narrow"
         )

@@ -22,23 +22,23 @@ def verdict(
     """How wrong each estimator is, and of how many whisks the truth is known. doubtful: how many lines are."""
     measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
-    known = sum(s.has_truth for s in seen)
+    with_truth = sum(s.has_truth for s in seen)
     asked = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
     for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
         mine = [j for j in measured if j.estimator == name]
-        missing = _told([j for j in asked if j.estimator == name])
+        missing = _without_or_doubted([j for j in asked if j.estimator == name])
         yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + missing
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
     yield (
-        f"{session.name}: truth for {known} of {len(seen)} measured whisks"
+        f"{session.name}: truth for {with_truth} of {len(seen)} measured whisks"
         if pictures
         else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
     ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
 
 
-def _told(asked: Sequence[Judged]) -> str:
+def _without_or_doubted(asked: Sequence[Judged]) -> str:
     """How many of an estimator's answers are none, and how many more come with a status."""
     none = [j for j in asked if not np.isfinite(j.error_percent)]
     doubted = [j for j in asked if j.status and np.isfinite(j.error_percent)]

@@ -45,7 +45,7 @@ def test_a_wire_is_found_again_from_a_curve_that_is_off_as_a_whole(rng, name):
     points, source = to_points(traced)
     off = errors(scene, points, source)
     for third in np.array_split(np.argsort(points.place), 3):
-        sigma = np.linalg.norm(np.mean(traced.found.shared_px[third], axis=0))
+        sigma = np.linalg.norm(np.mean(traced.located.shared_px[third], axis=0))
         assert sigma < 0.03 and abs(np.mean(off[third])) < 0.02 + 3 * sigma
 
 
@@ -58,7 +58,7 @@ def test_a_line_forgets_where_it_was_looked_for(rng, off_px, phase_rad):
     """
     pictures = starts.drawn(starts.SCENES["flat, bright wire"], rng)
     near, far = (starts.looked_twice(*pictures, *start) for start in ((0.0, 0.0), (off_px, phase_rad)))
-    sigma = far.found.whole_sigma_px
+    sigma = far.located.whole_sigma_px
     assert np.sqrt(np.mean(starts.errors(far) ** 2)) < 3 * np.sqrt(np.mean(sigma**2)) < 0.06
     assert np.sqrt(np.mean((starts.errors(far) - starts.errors(near)) ** 2 / sigma**2)) < 0.2
 
