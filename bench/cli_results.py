@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-from bench.options import DONE, add_figure_format, add_run, add_verb
+from bench.options import DONE, Verbs, add_figure_format, add_run, add_verb
 
 
-def add_report(verbs) -> None:
+def add_report(verbs: Verbs) -> None:
     """`report`."""
     verb = add_verb(
         verbs,
@@ -19,7 +19,7 @@ def add_report(verbs) -> None:
     add_figure_format(verb)
 
 
-def add_compare(verbs) -> None:
+def add_compare(verbs: Verbs) -> None:
     """`compare`."""
     verb = add_verb(
         verbs,
@@ -42,7 +42,7 @@ def _compare(options: argparse.Namespace) -> int:
     return code
 
 
-def add_view(verbs) -> None:
+def add_view(verbs: Verbs) -> None:
     """`view`."""
     verb = add_verb(
         verbs,

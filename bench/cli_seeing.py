@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from bench.options import add_out, add_session, add_verb, count
+from bench.options import Verbs, add_out, add_session, add_verb, count
 
 
 def add_seeing(verb: argparse.ArgumentParser) -> None:
@@ -31,7 +31,7 @@ def seeing_of(options: argparse.Namespace):
     return from_file(options.settings) if options.settings else by_preset(options.preset or STANDARD)
 
 
-def add_tradeoff(verbs) -> None:
+def add_tradeoff(verbs: Verbs) -> None:
     """The verb `tradeoff`."""
     verb = add_verb(
         verbs,

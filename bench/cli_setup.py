@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from bench.options import DONE, add_out, add_session, add_verb
+from bench.options import DONE, Verbs, add_out, add_session, add_verb
 
 
 def _squares(text: str) -> tuple[int, int]:
@@ -13,7 +13,7 @@ def _squares(text: str) -> tuple[int, int]:
     return int(counts[0]), int(counts[1])
 
 
-def add_new(verbs) -> None:
+def add_new(verbs: Verbs) -> None:
     """`new`."""
     verb = add_verb(
         verbs,
@@ -50,7 +50,7 @@ def _new(options: argparse.Namespace) -> int:
     return DONE
 
 
-def add_board(verbs) -> None:
+def add_board(verbs: Verbs) -> None:
     """`board`."""
     verb = add_verb(
         verbs,

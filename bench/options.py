@@ -3,14 +3,16 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 DONE, DOUBTFUL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
 
 Run = Callable[[argparse.Namespace], int]
+Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
-def add_verb(verbs, name: str, run: Run, summary: str, example: str) -> argparse.ArgumentParser:
+def add_verb(verbs: Verbs, name: str, run: Run, summary: str, example: str) -> argparse.ArgumentParser:
     """A verb with its summary, a worked example and `-v`; `run` is called with the parsed options."""
     verb = verbs.add_parser(
         name,

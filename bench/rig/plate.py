@@ -56,8 +56,8 @@ class Plate:
         """Whether the print is seen from a point."""
         return float((point_mm - self.pose[:, 3]) @ self.pose[:, 2]) < 0
 
-    def paint(self, window: Window, paint: np.ndarray, light: Light) -> None:
-        """Over what is painted, where the camera is in front of the print."""
+    def draw(self, window: Window, radiance: np.ndarray, light: Light) -> None:
+        """Over what is drawn, where the camera is in front of the print."""
         camera = window.camera
         if not self.faces(camera.centre_mm) or (camera.in_camera(self.corners_mm())[:, 2] <= 1).any():
             return
@@ -65,7 +65,7 @@ class Plate:
         if part is None:
             return
         cover, tone = _printed(self.print, *_on_plane(camera, self.pose, part))
-        canvas = paint[part.within(window)]
+        canvas = radiance[part.within(window)]
         canvas += cover * (np.float32(light.flat(-self.pose[:, 2])) * tone - canvas)
 
 

@@ -1,4 +1,4 @@
-"""What stands in front of a camera: floor, board, post and hub, whisker, bar with its block. Painted far to near."""
+"""What stands in front of a camera: floor, board, post and hub, whisker, bar with its block. Drawn far to near."""
 
 import math
 from dataclasses import dataclass
@@ -61,15 +61,16 @@ class Box:
         pose = np.column_stack([first, second, inward, self.origin_mm + corner])
         return Plate(Print.plain(high[i] - low[i], high[j] - low[j], self.reflectance), pose)
 
-    def paint(
-        self, window: Window, paint: np.ndarray, light: Light, print_: Print | None = None, on: tuple[int, int] = (2, 1)
+    def draw(
+        self, window: Window, radiance: np.ndarray, light: Light, print_: Print | None = None,
+        on: tuple[int, int] = (2, 1),
     ):
         """All faces, and a print centred on one of them."""
         for name, plate in self.faces():
-            plate.paint(window, paint, light)
+            plate.draw(window, radiance, light)
             if print_ is not None and name == on:
                 x, y = (0.5 * e[[0, -1]].sum() for e in (plate.print.x_mm, plate.print.y_mm))
-                Plate(print_.moved(x, y), plate.pose).paint(window, paint, light)
+                Plate(print_.moved(x, y), plate.pose).draw(window, radiance, light)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,29 +83,29 @@ class Scene:
 
     def backdrop(self, window: Window) -> np.ndarray:
         """Floor, wall and board: what the rig's board picture shows."""
-        paint = floor_and_wall(window, self.looks)
-        self.print_board(window, paint, self.T_rig_board)
-        return paint
+        radiance = floor_and_wall(window, self.looks)
+        self.print_board(window, radiance, self.T_rig_board)
+        return radiance
 
-    def print_board(self, window: Window, paint: np.ndarray, T_rig_board: np.ndarray) -> None:
+    def print_board(self, window: Window, radiance: np.ndarray, T_rig_board: np.ndarray) -> None:
         """The board anywhere, as the views for the lens show it."""
         looks = self.looks
         plate = Plate(self.board.printed(looks.ink, looks.margin_mm), T_rig_board)
-        plate.paint(window, paint, looks.light)
+        plate.draw(window, radiance, looks.light)
 
-    def stand_bar(self, window: Window, paint: np.ndarray, bar: Bar, middle_mm: np.ndarray) -> None:
+    def stand_bar(self, window: Window, radiance: np.ndarray, bar: Bar, middle_mm: np.ndarray) -> None:
         """The post under the hub, and the bar (its middle where first touched) with a block at its upper end."""
         looks = self.looks
         post = Tube.straight([-6, 0, -18], [-6, 0, looks.floor_z_mm], 11.0, looks.dark)
-        post.paint(window, paint, looks.light)
-        Tube.straight([-6, 0, -4], [-6, 0, -19], 3.0, looks.dark).paint(window, paint, looks.light)
+        post.draw(window, radiance, looks.light)
+        Tube.straight([-6, 0, -4], [-6, 0, -19], 3.0, looks.dark).draw(window, radiance, looks.light)
         up, down = middle_mm + 52 * bar.axis, middle_mm - self._reach_down(bar, middle_mm) * bar.axis
-        Tube.straight(down, up, bar.radius_mm, looks.bar).paint(window, paint, looks.light)
+        Tube.straight(down, up, bar.radius_mm, looks.bar).draw(window, radiance, looks.light)
         print_ = marker(self.board.dictionary, self._marker(_BLOCK_MARKER), 10.0, looks.ink)
         front = np.array([0.0, -1.0, 0.0]) - bar.axis * -bar.axis[1]
         front /= np.linalg.norm(front)
         axes = np.column_stack([np.cross(front, bar.axis), front, bar.axis])
-        Box(-_BLOCK_HALF, _BLOCK_HALF, axes, up, 0.1).paint(window, paint, looks.light, print_, (1, 1))
+        Box(-_BLOCK_HALF, _BLOCK_HALF, axes, up, 0.1).draw(window, radiance, looks.light, print_, (1, 1))
 
     def _reach_down(self, bar, middle):
         """To the board, but no further than a rod of this length would."""
@@ -121,17 +122,17 @@ class Scene:
         """The hub at a motor angle."""
         return Box(_HUB_LOW, _HUB_HIGH, turned(np.eye(3), motor_rad).T, np.zeros(3), 0.05)
 
-    def move(self, window: Window, paint: np.ndarray, motor_rad: float, whisker: Tube) -> None:
+    def move(self, window: Window, radiance: np.ndarray, motor_rad: float, whisker: Tube) -> None:
         """The hub at a motor angle and the whisker; the nearer of the two last."""
         hub = self.hub(motor_rad)
         print_ = marker(self.board.dictionary, self._marker(_HUB_MARKER), 10.0, self.looks.ink)
         front = dict(hub.faces())[(0, 1)]
         if front.faces(window.camera.centre_mm):
-            hub.paint(window, paint, self.looks.light, print_)
-            whisker.paint(window, paint, self.looks.light)
+            hub.draw(window, radiance, self.looks.light, print_)
+            whisker.draw(window, radiance, self.looks.light)
         else:
-            whisker.paint(window, paint, self.looks.light)
-            hub.paint(window, paint, self.looks.light, print_)
+            whisker.draw(window, radiance, self.looks.light)
+            hub.draw(window, radiance, self.looks.light, print_)
 
     def moving_px(self, camera: Camera, motor_rad: float, whisker: Tube) -> np.ndarray:
         """Pixels (n, 2) between which all that moves lies."""

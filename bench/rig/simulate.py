@@ -37,7 +37,7 @@ def simulate(
         raise BadInput(f"seed {seed}; a whole number from 0 is allowed")
     job = Job(Path(session), load(protocol), int(seed), bool(signals_only))
     _check_can_be_built(job, protocol)
-    _check_can_be_painted(job, protocol)
+    _check_can_be_rendered(job, protocol)
     _claim(job)
     left = [part for part in job.parts() if not part.folder.exists()]
     if announce is not None:
@@ -75,7 +75,7 @@ def _check_can_be_built(job, name):
         raise BadInput(" ".join(str(problem).split()), file=name) from None
 
 
-def _check_can_be_painted(job, name):
+def _check_can_be_rendered(job, name):
     if not job.signals_only and job.protocol.cameras and any(t.stiffness_N_mm for t in job.protocol.trials):
         raise BadInput("a soft bar (stiffness_N_mm) is simulated in signals alone; add --signals-only", file=name)
 

@@ -1,4 +1,4 @@
-"""One camera before one scene: still parts painted once, moving parts for each frame."""
+"""One camera before one scene: still parts drawn once, moving parts for each frame."""
 
 import math
 from dataclasses import dataclass
@@ -38,15 +38,15 @@ class Studio:
 
     @cached_property
     def backdrop(self) -> np.ndarray:
-        """Painted samples of what the board picture of the rig shows."""
+        """Radiance, in samples, of what the board picture of the rig shows."""
         return self.scene.backdrop(self.window)
 
     def board_brightness(self, T_rig_board: np.ndarray) -> np.ndarray:
         """The board held in the air. Nothing covers it, so its edges take lens and pixel area at once."""
         window = Window.whole(self.camera, 1, math.hypot(self.sensor.blur_px, math.sqrt(1 / 12)))
-        paint = floor_and_wall(window, self.scene.looks)
-        self.scene.print_board(window, paint, T_rig_board)
-        return paint
+        radiance = floor_and_wall(window, self.scene.looks)
+        self.scene.print_board(window, radiance, T_rig_board)
+        return radiance
 
     def rig_brightness(self) -> np.ndarray:
         """The board standing on the rig."""
@@ -54,9 +54,9 @@ class Studio:
 
     def setting(self, bar: Bar, middle_mm: np.ndarray) -> "Setting":
         """The still scene of a trial: the rig with a bar whose middle is near a point."""
-        paint = self.backdrop.copy()
-        self.scene.stand_bar(self.window, paint, bar, middle_mm)
-        return Setting(self, paint, self.window.seen(paint, self.sensor.blur_px))
+        radiance = self.backdrop.copy()
+        self.scene.stand_bar(self.window, radiance, bar, middle_mm)
+        return Setting(self, radiance, self.window.seen(radiance, self.sensor.blur_px))
 
     def cropped(self, picture: np.ndarray) -> np.ndarray:
         """The camera's picture out of a wider one."""
@@ -66,8 +66,8 @@ class Studio:
 class Setting:
     """A trial's still scene, ready for its frames."""
 
-    def __init__(self, studio: Studio, paint: np.ndarray, seen: np.ndarray):
-        self._studio, self._paint, self._seen = studio, paint, seen
+    def __init__(self, studio: Studio, radiance: np.ndarray, seen: np.ndarray):
+        self._studio, self._radiance, self._seen = studio, radiance, seen
 
     def brightness(self, moments: list[Moment]) -> np.ndarray:
         """One exposure, the mean over its moments (one where nothing moves far)."""
@@ -81,12 +81,12 @@ class Setting:
         return studio.cropped(picture)
 
     def _moved(self, part, moments):
-        still = self._paint[part.within(self._studio.window)]
+        still = self._radiance[part.within(self._studio.window)]
         total = np.zeros_like(still)
         for moment in moments:
-            paint = still.copy()
-            self._studio.scene.move(part, paint, moment.motor_rad, moment.whisker)
-            total += paint
+            radiance = still.copy()
+            self._studio.scene.move(part, radiance, moment.motor_rad, moment.whisker)
+            total += radiance
         return total / np.float32(len(moments))
 
 

@@ -53,13 +53,13 @@ class Tube:
         facing = square / near[:, None]
         return facing, np.cross(tangent, facing), near
 
-    def paint(self, window: Window, paint: np.ndarray, light: Light) -> None:
-        """Over what is painted."""
+    def draw(self, window: Window, radiance: np.ndarray, light: Light) -> None:
+        """Over what is drawn."""
         edges = self.silhouette(window.camera)
         part = window.around(np.concatenate(edges), 4 * window.soft_px + 2)
         if part is None:
             return
-        canvas, frame = paint[part.within(window)], _Frame.of(edges)
+        canvas, frame = radiance[part.within(window)], _Frame.of(edges)
         at, u, v = _band(part, frame, edges, 4.5 * window.soft_px + 1)
         along, side = frame.of_px(np.stack([u, v], -1))
         cover, across, per_px = frame.cover(along, side, window.soft_px)

@@ -1,4 +1,4 @@
-"""A rectangle of a camera's picture, sampled finer than its pixels: what the painters paint on."""
+"""A rectangle of a camera's picture, sampled finer than its pixels: what is drawn on."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ from bench.rig.camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Pixels first…last (exclusive) of a camera, `fine` samples to a pixel each way; `soft_px` blurs every painted
+    """Pixels first…last (exclusive) of a camera, `fine` samples to a pixel each way; `soft_px` blurs every drawn
     edge.
     """
 
@@ -62,11 +62,11 @@ class Window:
         """Directions x/z and y/z of the samples' sights."""
         return self.camera.rays(self.u_px, self.v_px)
 
-    def seen(self, paint: np.ndarray, blur_px: float) -> np.ndarray:
-        """The lens' blur (sigma, of which `soft_px` is there already) and the pixels' area applied to painted
+    def seen(self, radiance: np.ndarray, blur_px: float) -> np.ndarray:
+        """The lens' blur (sigma, of which `soft_px` is there already) and the pixels' area applied to drawn
         samples.
         """
         left = np.sqrt(max(blur_px**2 - self.soft_px**2, 0.0)) * self.fine
-        blurred = cv2.GaussianBlur(paint, (0, 0), left) if left > 0.2 else paint
+        blurred = cv2.GaussianBlur(radiance, (0, 0), left) if left > 0.2 else radiance
         rows, columns = self.shape
         return cv2.resize(blurred, (columns // self.fine, rows // self.fine), interpolation=cv2.INTER_AREA)

@@ -1,4 +1,4 @@
-"""Path-traced scenes through the command's whole way: light, shadows and rims that no painted picture has."""
+"""Path-traced scenes through the command's whole way: light, shadows and rims that no rasterised picture has."""
 
 import csv
 import shutil

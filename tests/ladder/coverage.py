@@ -1,4 +1,4 @@
-"""Do the stated 95 % intervals hold? Independent scenes, from line points or from painted pictures.
+"""Do the stated 95 % intervals hold? Independent scenes, from line points or from rasterised pictures.
 
     python tests/ladder/coverage.py points FOLDER --count 1000
     python tests/ladder/coverage.py pictures FOLDER --count 300
@@ -9,7 +9,7 @@
 
 Every scene is drawn anew (slope, distance, cameras, noise, friction, sag, tilt of the bar, light) and its cameras are
 calibrated anew from noisy corners. `points` fits line points with every error that the fit allows for; `pictures` has
-the rig paint each frame and looks at it with `observe_trial`; `alone` shows it the first camera; `hard` does so with
+the rig draw each frame and looks at it with `observe_trial`; `alone` shows it the first camera; `hard` does so with
 wires and bars of any brightness. A scene is a row of FOLDER/points.csv, pictures.csv and so on; one that is there is
 not seen again: interrupt it and go on at will. Prints the coverage of all rows.
 """
@@ -84,7 +84,7 @@ def see_points(scene: Scene) -> Seen:
 
 
 def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
-    """What `observe_trial` says of painted pictures, of the first cameras only where a number is given."""
+    """What `observe_trial` says of rasterised pictures, of the first cameras only where a number is given."""
     rng = np.random.default_rng([scene.seed, 23])
     cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
     job = Job(Path(), scene.protocol, scene.seed, False)

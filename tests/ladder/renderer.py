@@ -1,4 +1,4 @@
-"""How exactly the rig's pictures are painted: wires and board corners against projection by OpenCV, without noise.
+"""How exactly the rig's pictures are rasterised: wires and board corners against projection by OpenCV, without noise.
 
     python tests/ladder/renderer.py
 
@@ -35,13 +35,13 @@ ANGLES_DEG = (0, 0.5, 3, 30, 44, 46, 60, 89.7, 90, 120, 135, 170)
 BENT_RADIUS_MM = 230.0  # of a whisker pushed by 5° at 60 mm
 
 
-def painted(tube, blur_px, *, fine=3, soft_px=0.2, ground=GROUND, light=EVEN):
+def rasterised(tube, blur_px, *, fine=3, soft_px=0.2, ground=GROUND, light=EVEN):
     """Brightness (rows, columns) of a tube before an even ground."""
     margin = math.ceil(4 * blur_px) + 1
     window = Window.whole(CAMERA, fine, min(soft_px, blur_px), margin)
-    paint = np.full(window.shape, ground, np.float32)
-    tube.paint(window, paint, light)
-    return window.seen(paint, blur_px)[margin:-margin, margin:-margin]
+    radiance = np.full(window.shape, ground, np.float32)
+    tube.draw(window, radiance, light)
+    return window.seen(radiance, blur_px)[margin:-margin, margin:-margin]
 
 
 def wire(angle_deg, width_px, material=None, bent=False):
@@ -67,7 +67,7 @@ def crossing(line_px, at, axis):
 
 def wire_profiles(tube, angle_deg, blur_px):
     """(positions, axis, profiles): the share of the wire in 50 lines of pixels that cross it."""
-    amount = (painted(tube, blur_px) - GROUND) / (TONE - GROUND)
+    amount = (rasterised(tube, blur_px) - GROUND) / (TONE - GROUND)
     axis = 0 if abs(math.cos(math.radians(angle_deg))) > 0.7 else 1
     profile = (amount if axis == 0 else amount.T).astype(float)
     at = np.arange(profile.shape[1] // 2 - 25, profile.shape[1] // 2 + 25)
@@ -78,7 +78,7 @@ def wire_errors_px(width_px, blur_px, bent=False):
     """(angles, 50) twice: centroids across evenly bright wires, minus the middle between the two silhouettes, and minus
     the projected centreline.
 
-    The first is exact but for the painting. A thick wire, oblique to the view or bent, is not seen midway about its
+    The first is exact but for the rasterising. A thick wire, oblique to the view or bent, is not seen midway about its
     centreline in a column: the second holds that too, at a width of 12 px up to 0.006 px where it is straight.
     """
     middle_errors, axis_errors = [], []

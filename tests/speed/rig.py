@@ -50,7 +50,7 @@ def whisk_s(beta_deg: float, static: float, kinetic: float, back: bool) -> float
 
 
 def frame_s(protocol_name: str, trial: int, camera: int) -> tuple[float, int]:
-    """One frame of a trial: painted, exposed and encoded; its CPU seconds and the file's bytes."""
+    """One frame of a trial: drawn, exposed and encoded; its CPU seconds and the file's bytes."""
     with TemporaryDirectory() as folder:
         job = Job(Path(folder), load(protocol_name), 0, False)
         recording = Recording.make(job.protocol, job.protocol.runs()[trial], job.stream(2, trial))
@@ -59,7 +59,7 @@ def frame_s(protocol_name: str, trial: int, camera: int) -> tuple[float, int]:
         def encode():
             sizes.append(len(cv2.imencode(".jpg", next(frames), [cv2.IMWRITE_JPEG_QUALITY, 95])[1]))
 
-        encode()  # the still scene is painted once
+        encode()  # the still scene is drawn once
         return cpu_s(encode, 9), int(np.median(sizes))
 
 

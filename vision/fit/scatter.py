@@ -2,7 +2,7 @@
 
 A point errs by its noise and by what its neighbours share: what is behind the wire, and its light. In path-traced
 frames neighbours along the wire are nearly independent while the same place of the next frames errs alike by two
-fifths; in painted ones both are less. So it is measured, for each camera of each whisk.
+fifths; in rasterised ones both are less. So it is measured, for each camera of each whisk.
 """
 
 from collections.abc import Sequence

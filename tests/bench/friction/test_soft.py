@@ -80,7 +80,7 @@ def test_a_simulated_sponge_is_soft_and_steel_is_not(tmp_path):
     assert "gives way by" in (tmp_path / "out" / "summary.txt").read_text()
 
 
-def test_a_soft_bar_is_not_painted(tmp_path):
+def test_a_soft_bar_is_not_drawn(tmp_path):
     camera = '[[cameras]]\nname = "a"\nposition_mm = [20.0, -220.0, 300.0]\n'
     with pytest.raises(BadInput, match="--signals-only"):
         simulate(tmp_path / "session", protocol=protocol_file(tmp_path, PROTOCOL + camera))

@@ -28,7 +28,7 @@ from tests.ladder.renderer import (
     WIDTHS_PX,
     corner_errors_px,
     crossing,
-    painted,
+    rasterised,
     rms,
     wire,
     wire_errors_px,
@@ -83,7 +83,7 @@ def grazing(tube, at, axis):
 
 
 @pytest.mark.parametrize("off_px, largest, whole", [(1.5, 0.5 / 255, 0.01), (-1.5, 0.5 / 255, 0.01), (0.0, 0.03, 0.08)])
-def test_painting_finer_changes_nothing(off_px, largest, whole):
+def test_drawing_finer_changes_nothing(off_px, largest, whole):
     """A shaded wire over a step in the background along its edge, at 3 and at 12 samples a pixel.
 
     The step is what a border of printed squares is: beside the wire or under it, nothing changes by half a grey level.
@@ -96,9 +96,9 @@ def test_painting_finer_changes_nothing(off_px, largest, whole):
         margin = 5
         window = Window.whole(CAMERA, fine, soft_px, margin)
         border = crossing(tube.silhouette(CAMERA)[0], window.u_px, 0) + off_px
-        paint = (0.05 + 0.6 * ndtr((window.v_px[:, None] - border) / soft_px)).astype(np.float32)
-        tube.paint(window, paint, light)
-        pictures.append(window.seen(paint, 0.9)[margin:-margin, margin:-margin])
+        radiance = (0.05 + 0.6 * ndtr((window.v_px[:, None] - border) / soft_px)).astype(np.float32)
+        tube.draw(window, radiance, light)
+        pictures.append(window.seen(radiance, 0.9)[margin:-margin, margin:-margin])
     difference = np.abs(pictures[0] - pictures[1])[40:-40, 40:-40]
     assert difference.max() < largest
     assert difference.sum(0).max() < whole
@@ -182,7 +182,7 @@ def test_lamp_from_one_side_moves_the_seen_wire_towards_it():
     tube, shifts = wire(0.0, 5.7, Material(0.25, 0.5, 18.0, 0.3)), []
     for side in (-1, 1):
         towards = CAMERA.rotation.T @ np.array([0.0, side * 0.94, -0.34])
-        picture = painted(tube, 0.9, ground=0.02, light=Light(towards, 0.9, 0.02))
+        picture = rasterised(tube, 0.9, ground=0.02, light=Light(towards, 0.9, 0.02))
         column = picture[:, 160].astype(float) - 0.02
         low, high = (crossing(edge, 160, 0) for edge in tube.silhouette(CAMERA))
         shifts.append((column * np.arange(len(column))).sum() / column.sum() - 0.5 * (low + high))

@@ -1,4 +1,4 @@
-"""What the rig paints, the cameras' side reads: two programs that share no code agree on where bar and wire are."""
+"""What the rig draws, the cameras' side reads: two programs that share no code agree on where bar and wire are."""
 
 import csv
 import tomllib

@@ -67,7 +67,7 @@ def test_friction_holds_slip_and_moment_back_on_both_ways(ways):
 
 
 @pytest.mark.parametrize("back", [False, True])
-def test_the_whisker_that_is_painted_touches_where_truth_says(back, tmp_path):
+def test_the_whisker_that_is_drawn_touches_where_truth_says(back, tmp_path):
     """On both ways its centreline runs through the contact point, at frames and between them."""
     protocol = load(protocol_file(tmp_path, WAYS))
     recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng(2))

@@ -1,4 +1,4 @@
-"""The first look at the rig: exact on exact lines, not led astray by others, and a painted line found to a pixel."""
+"""The first look at the rig: exact on exact lines, not led astray by others, and a drawn line found to a pixel."""
 
 import numpy as np
 import pytest
@@ -60,10 +60,10 @@ def test_nothing_that_turns_is_refused():
         first_rig([still])
 
 
-def test_a_painted_line_is_found():
+def test_a_drawn_line_is_found():
     rng = np.random.default_rng(1)
     motor = dict(enumerate(np.radians(np.linspace(-12.0, 0.0, 17))))
-    frames = {c.name: {f: painted(c, m, rng) for f, m in motor.items()} for c in CAMERAS}
+    frames = {c.name: {f: drawn(c, m, rng) for f, m in motor.items()} for c in CAMERAS}
     lines = moving_lines(frames, motor, CAMERAS)
     assert len(lines.motor_rad) == len(motor)
     along = np.column_stack([np.cos(lines.motor_rad), np.sin(lines.motor_rad), np.zeros(len(motor))])
@@ -74,7 +74,7 @@ def test_a_painted_line_is_found():
     assert invert_transform(first_rig([lines]).T_rig_world)[:, 3] == pytest.approx([0, 0, 0], abs=1.5)
 
 
-def painted(camera, motor_rad, rng):
+def drawn(camera, motor_rad, rng):
     """A grey picture of a bright line of 100 mm from the rig's origin, and of a still bright block beside it."""
     width, height = camera.size_px
     grey = 60.0 + 2.0 * rng.standard_normal((height, width))

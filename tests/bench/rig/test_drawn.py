@@ -1,4 +1,4 @@
-"""Bar and whisker are painted where truth says."""
+"""Bar and whisker are drawn where truth says."""
 
 import json
 import math
@@ -49,7 +49,7 @@ psi_deg = 6
 
 
 @pytest.mark.slow
-def test_the_painted_bar_and_whisker_are_where_truth_says(tmp_path):
+def test_the_drawn_bar_and_whisker_are_where_truth_says(tmp_path):
     """End to end, from truth's numbers alone: both edges of the bar to 0.15 px, and the whisker's tone at the
     contact.
     """
