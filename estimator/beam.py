@@ -6,13 +6,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.domain import elementwise, require_positive
+from estimator.domain import Numbers, elementwise, require_positive
 
 NMM2_PER_GPA_MM4 = 1000.0
 SHAPES = ("cylinder", "cone", "tapered")
 
 
-def second_moment_of_area(diameter_mm: ArrayLike):
+def second_moment_of_area(diameter_mm: ArrayLike) -> Numbers:
     """I = pi d^4 / 64 of a round section, in mm^4.
 
     >>> round(second_moment_of_area(1.0), 7)
@@ -21,7 +21,7 @@ def second_moment_of_area(diameter_mm: ArrayLike):
     return np.pi * diameter_mm**4 / 64
 
 
-def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike):
+def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike) -> Numbers:
     """EI in N·mm² of a round section.
 
     >>> round(flexural_rigidity(60.0, 1.0), 1)
@@ -30,7 +30,7 @@ def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike):
     return NMM2_PER_GPA_MM4 * youngs_modulus_GPa * second_moment_of_area(diameter_mm)
 
 
-def diameter_at(arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike):
+def diameter_at(arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike) -> Numbers:
     """Diameter in mm at the arc length `arc_mm` from the base.
 
     `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a cone.
@@ -38,12 +38,12 @@ def diameter_at(arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: Array
     return base_diameter_mm * (1 - taper * arc_mm / length_mm)
 
 
-def rigidity_at(arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike):
+def rigidity_at(arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike) -> Numbers:
     """EI in N·mm² at the arc length `arc_mm`; it goes with the fourth power of the diameter."""
     return base_rigidity_Nmm2 * (1 - taper * arc_mm / length_mm) ** 4
 
 
-def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike):
+def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike) -> Numbers:
     """Moment in the paper's unit EI/metre, i.e. the curvature at the base in 1/m (Fig. 8).
 
     >>> moment_in_EI_per_metre(2.0, 4000.0)
@@ -52,7 +52,7 @@ def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike):
     return 1000.0 * moment_Nmm / rigidity_Nmm2
 
 
-def taper_of(shape, tip_share=None):
+def taper_of(shape: str, tip_share: float | None = None) -> float:
     """Share of the base's diameter that is lost up to the tip: 0 of a cylinder, 1 of a cone, between them if tapered.
 
     tip_share: the tip's diameter over the base's, given for "tapered" alone. Raises ValueError for another shape, and
@@ -113,19 +113,19 @@ class Beam:
         """Share of the base's diameter that is lost up to the tip."""
         return taper_of(self.shape, self.tip_share)
 
-    def as_cylinder_mm(self, d_x_mm):
+    def as_cylinder_mm(self, d_x_mm: ArrayLike) -> Numbers:
         """Distance at which the base's cylinder is as stiff as this whisker at d_x; infinite at a cone's point."""
         return _inverse_sum(d_x_mm, -self.taper / self.length_mm)
 
-    def moment_Nmm(self, theta_rad, d_x_mm):
+    def moment_Nmm(self, theta_rad: ArrayLike, d_x_mm: ArrayLike) -> Numbers:
         """m_z of (2): of a push by θ against a contact at d_x, without slip."""
         return self.C_Nmm2 * theta_rad / self.as_cylinder_mm(d_x_mm)
 
-    def distance_mm(self, as_cylinder_mm):
+    def distance_mm(self, as_cylinder_mm: ArrayLike) -> Numbers:
         """d_x from the distance that the base's cylinder would give; NaN unless that is positive."""
         return _inverse_sum(as_cylinder_mm, self.taper / self.length_mm)
 
-    def error_share(self, d_x_mm, of_cylinder):
+    def error_share(self, d_x_mm: ArrayLike, of_cylinder: ArrayLike) -> Numbers:
         """Relative error of d_x from that of the distance that its base's cylinder would give; −1: there is none."""
         wrong = self.distance_mm(self.as_cylinder_mm(d_x_mm) * (1.0 + np.asarray(of_cylinder)))
         return np.where(np.asarray(of_cylinder) > -1, wrong / d_x_mm, 0.0)[()] - 1.0

@@ -7,10 +7,10 @@ of settings and the equations' names, is `estimator.curvature`.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.domain import RIGHT_ANGLE, elementwise, where_all
+from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, where_all
 
 
-def conditions(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike):
+def conditions(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> tuple[tuple[str, np.ndarray], ...]:
     """What a push against the circle must fulfil: pairs (what is wrong, mask of what must hold)."""
     known = ~np.isnan(r_n) & np.isfinite(theta) & np.isfinite(beta_0)
     return (
@@ -23,23 +23,23 @@ def conditions(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike):
     )
 
 
-def inside(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, *values):
+def inside(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, *values) -> tuple[np.ndarray, ...]:
     """The values where `conditions` hold, NaN elsewhere."""
     return tuple(where_all(conditions(r_n, theta, beta_0), value) for value in values)
 
 
-def turn(q: ArrayLike, beta_0: ArrayLike):
+def turn(q: ArrayLike, beta_0: ArrayLike) -> np.ndarray:
     """ζ − β_0: by how much the push turns the virtual point about the centre."""
     return np.arctan2(q * np.sin(beta_0), 1 - q * np.cos(beta_0))
 
 
-def relative_virtual_radius(q: ArrayLike, beta_0: ArrayLike):
+def relative_virtual_radius(q: ArrayLike, beta_0: ArrayLike) -> np.ndarray:
     """p / r_n."""
     return np.hypot(1 - q * np.cos(beta_0), q * np.sin(beta_0))
 
 
 @elementwise
-def exact(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
+def exact(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> tuple[Numbers, Numbers]:
     """(φ, d) with the friction cone at the contact point.
 
     Where the contact slides, the surface there is steeper than at first touch by δ, φ = β_0 − α + δ, and
@@ -59,7 +59,7 @@ def exact(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike)
 
 
 @elementwise
-def printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike):
+def printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> tuple[Numbers, Numbers]:
     """(φ, d) of (24) and (31), as printed."""
     slope, q = np.abs(beta_0), theta / r_n
     phi = np.maximum(0.0, slope - alpha + turn(q, slope))

@@ -10,11 +10,11 @@ Two whisks from bases a known shift apart give two such equations. Lengths in mm
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.domain import elementwise, require_positive, require_sigma
+from estimator.domain import Numbers, elementwise, require_positive, require_sigma
 
 
 @elementwise
-def compliance_on_soft_object(d_x: ArrayLike, stiffness: ArrayLike, C: ArrayLike):
+def compliance_on_soft_object(d_x: ArrayLike, stiffness: ArrayLike, C: ArrayLike) -> Numbers:
     """k_θ in rad/(N·mm) of a whisker that touches an object of the given stiffness [N/mm] at d_x [mm]."""
     require_positive("C", C, "N·mm²")
     inside = (d_x > 0) & (stiffness > 0)
@@ -22,7 +22,9 @@ def compliance_on_soft_object(d_x: ArrayLike, stiffness: ArrayLike, C: ArrayLike
 
 
 @elementwise
-def two_distances(compliance_near: ArrayLike, compliance_far: ArrayLike, shift: ArrayLike, C: ArrayLike):
+def two_distances(
+    compliance_near: ArrayLike, compliance_far: ArrayLike, shift: ArrayLike, C: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(d_x, k): distance of the nearer whisk in mm, stiffness of the object in N/mm.
 
     compliance_near and compliance_far are k_θ of (1) in rad/(N·mm), as of `distance.rotational_compliance`; the
@@ -52,7 +54,7 @@ def _positive_root(square, linear, constant):
 
 
 @elementwise
-def give(d_x: ArrayLike, compliance: ArrayLike, C: ArrayLike):
+def give(d_x: ArrayLike, compliance: ArrayLike, C: ArrayLike) -> Numbers:
     """1/k, mm/N, of an object at d_x whose compliance k_θ was felt: k_θ d² − d³/C; below zero by noise.
 
     >>> round(give(50.0, compliance_on_soft_object(50.0, 0.5, 9000.0), 9000.0), 9)
@@ -71,7 +73,7 @@ def two_distances_spread(
     near_sigma: ArrayLike,
     far_sigma: ArrayLike,
     shift_sigma: ArrayLike = 0.0,
-):
+) -> tuple[Numbers, Numbers]:
     """(sigma of d_x in mm, sigma of 1/k in mm/N) of `two_distances` by those of both compliances and of the shift.
 
     With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg. The shift
@@ -92,7 +94,7 @@ def two_distances_spread(
 
 def two_distances_sigma(
     d_x: ArrayLike, stiffness: ArrayLike, shift: ArrayLike, C: ArrayLike, near_sigma: ArrayLike, far_sigma: ArrayLike
-):
+) -> tuple[Numbers, Numbers]:
     """(sigma of d_x in mm, sigma of k in N/mm) of `two_distances`, see `two_distances_spread`."""
     stiffness = np.asarray(stiffness, dtype=float)
     d_sigma, give_sigma = two_distances_spread(d_x, 1 / stiffness, shift, C, near_sigma, far_sigma)

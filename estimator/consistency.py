@@ -59,13 +59,13 @@ class Contacts:
         return replace(self, **{name: np.delete(a, index, axis=0) for name, a in kept.items() if a is not None})
 
     @property
-    def shares(self):
+    def shares(self) -> np.ndarray:
         """Weights (n,) that sum to one."""
         weights = np.ones(len(self.theta)) if self.weights is None else np.asarray(self.weights, dtype=float)
         return weights / weights.sum()
 
     @property
-    def phi(self):
+    def phi(self) -> np.ndarray:
         """Slip angles (n,), rad."""
         return distance.felt_slip_angle(self.m_y, self.m_z)
 

@@ -4,16 +4,17 @@ Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the ar
 surface the distance is NaN, never negative and never infinite, and `why_not` says which condition failed.
 β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0 and α_est outside [0°, 90°) raise
 ValueError.
-
-Products and quotients take numbers near one and powers of two apart (frexp, ldexp): C, moments and their squares may be
-doubles where what stands between them in an equation is none. So no distance that a double holds is lost on the way.
 """
+
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.domain import (
     RIGHT_ANGLE,
+    Numbers,
     elementwise,
     first_failure,
     quotient,
@@ -21,10 +22,13 @@ from estimator.domain import (
     require_positive,
     where_all,
 )
+from estimator.double_range import across_slope, by_friction, by_slope, friction_share, harmonic
+
+NoSlip: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # d_x of θ and |m| where nothing slips, mm
 
 
 @elementwise
-def rotational_compliance(theta: ArrayLike, m_z: ArrayLike):
+def rotational_compliance(theta: ArrayLike, m_z: ArrayLike) -> Numbers:
     """k_θ of (1), in rad/(N·mm): how far the base turns per moment, from two angles or a whole stroke.
 
     theta and m_z have the samples along their last axis, two at least (ValueError otherwise). It is one over
@@ -43,14 +47,14 @@ def rotational_compliance(theta: ArrayLike, m_z: ArrayLike):
 
 
 @elementwise
-def from_compliance(compliance: ArrayLike, C: ArrayLike):
+def from_compliance(compliance: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
     return _distance(quotient((C, compliance), ()), (("the compliance is missing", np.isfinite(compliance)),))
 
 
 @elementwise
-def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike):
+def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (2), in mm: Cθ / m_z, exact where the whisker does not slip sideways.
 
     >>> no_slip(0.05, 9.0, 9000.0)
@@ -61,14 +65,14 @@ def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike):
 
 
 @elementwise
-def known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike):
+def known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (6), in mm, for a surface of known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
     require_positive("C", C, "N·mm²")
-    return _distance(_by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
+    return _distance(by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
 
 
 @elementwise
-def friction_angle(mu: ArrayLike):
+def friction_angle(mu: ArrayLike) -> Numbers:
     """α of (7), in rad: atan μ. A negative or infinite coefficient raises ValueError."""
     if not np.all((mu >= 0) & np.isfinite(mu)):
         raise ValueError(f"mu = {mu}: a friction coefficient must be zero or positive, and finite")
@@ -76,13 +80,13 @@ def friction_angle(mu: ArrayLike):
 
 
 @elementwise
-def felt_slip_angle(m_y: ArrayLike, m_z: ArrayLike):
+def felt_slip_angle(m_y: ArrayLike, m_z: ArrayLike) -> Numbers:
     """φ of (8), in rad: atan2(m_y, m_z). NaN unless m_z > 0, since the whisker pushes towards +y."""
     return np.where((m_z > 0) & np.isfinite(m_y) & np.isfinite(m_z), np.arctan2(m_y, m_z), np.nan)
 
 
 @elementwise
-def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike):
+def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike) -> Numbers:
     """β_est of (9), in rad: φ ± α_est on the side of φ; NaN where it reaches 90°, and for m_z ≤ 0."""
     require_friction_angle("alpha_est", alpha_est)
     steep = np.arctan2(np.abs(m_y), m_z) + alpha_est
@@ -91,31 +95,31 @@ def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike):
 
 
 @elementwise
-def with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike):
+def with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (10), in mm, for an assumed friction cone angle: Cθ (m_z − μ |m_y|) / (m_z² + m_y²), μ = tan
     α_est.
 
     The printed form with β_est = φ + α_est is the same number; this one is exact to the last digit.
     """
     _require_settings(alpha_est, C)
-    return _distance(_by_friction(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est))
+    return _distance(by_friction(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est))
 
 
 @elementwise
-def frictionless_sum(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike):
+def frictionless_sum(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (11), in mm: Cθ / (m_z + m_y²/m_z), (10) without friction; computed as (12), which it equals."""
     return frictionless(theta, m_y, m_z, C)
 
 
 @elementwise
-def frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike):
+def frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²)."""
     require_positive("C", C, "N·mm²")
-    return _distance(_by_friction(theta, m_y, m_z, 0.0, C), _conditions(theta, m_y, m_z))
+    return _distance(by_friction(theta, m_y, m_z, 0.0, C), _conditions(theta, m_y, m_z))
 
 
 @elementwise
-def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: ArrayLike):
+def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: NoSlip) -> Numbers:
     """d_x of (16) as printed, in mm: ν(θ, |m|) cos φ, for a no-slip extraction `nu(theta, magnitude)`.
 
     Exact only where ν is proportional to θ/|m|, that is for a cylinder; use `general`.
@@ -125,54 +129,56 @@ def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: ArrayL
 
 
 @elementwise
-def general(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: ArrayLike):
+def general(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: NoSlip) -> Numbers:
     """d_x of (16) with the angle scaled in place of the distance, in mm; for any no-slip extraction ν.
 
     ν(θ cos(φ + α_est) / cos α_est, |m|): slip takes its share from the deflection, hence from the angle.
     `nu(theta, magnitude)` takes and returns arrays.
     """
     require_friction_angle("alpha_est", alpha_est)
-    share, exponent = _friction_share(m_y, m_z, alpha_est)
+    share, exponent = friction_share(m_y, m_z, alpha_est)
     magnitude = np.hypot(m_y, m_z)
     scaled_theta = quotient((theta, share), (magnitude,), exponent)
     return _distance(nu(scaled_theta, magnitude), _conditions(theta, m_y, m_z, alpha_est))
 
 
 @elementwise
-def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike):
+def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike) -> Numbers:
     """ν(θ, |m|) of a cone that comes to a point at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
     _require_settings(0.0, C, length)
-    return _distance(_harmonic(quotient((C, theta), (m,)), length), _conditions(theta, 0.0, m))
+    return _distance(harmonic(quotient((C, theta), (m,)), length), _conditions(theta, 0.0, m))
 
 
 @elementwise
-def cone_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike):
+def cone_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike) -> Numbers:
     """d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ. Far off under slip; use `cone`."""
     _require_settings(0.0, C, length)
     magnitude = np.hypot(m_y, m_z)
-    d_x = _harmonic(quotient((C, theta), (magnitude,)), length) * (m_z / magnitude)
+    d_x = harmonic(quotient((C, theta), (magnitude,)), length) * (m_z / magnitude)
     return _distance(d_x, _conditions(theta, m_y, m_z))
 
 
 @elementwise
-def cone(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike):
+def cone(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike
+) -> Numbers:
     """d_x of a cone, in mm, by (17) at the scaled angle: 1 / (1/L + 1/d) with d from (10) for the base's
     cylinder.
     """
     _require_settings(alpha_est, C, length)
-    d_x = _harmonic(_by_friction(theta, m_y, m_z, alpha_est, C), length)
+    d_x = harmonic(by_friction(theta, m_y, m_z, alpha_est, C), length)
     return _distance(d_x, _conditions(theta, m_y, m_z, alpha_est))
 
 
 @elementwise
-def taper(d_x: ArrayLike, length: ArrayLike):
+def taper(d_x: ArrayLike, length: ArrayLike) -> Numbers:
     """Distance along a cone from that which its base's cylinder would give, in mm: 1 / (1/d_x + 1/L)."""
     require_positive("length", length, "mm")
-    return np.where((d_x > 0) & np.isfinite(d_x), _harmonic(d_x, length), np.nan)
+    return np.where((d_x > 0) & np.isfinite(d_x), harmonic(d_x, length), np.nan)
 
 
 @elementwise
-def clamp_to_length(d_x: ArrayLike, length: ArrayLike):
+def clamp_to_length(d_x: ArrayLike, length: ArrayLike) -> tuple[Numbers, bool | np.ndarray]:
     """(d_x no longer than the whisker, mask of those that were): past the tip means tip contact, section VII.
 
     >>> clamp_to_length(120.0, 100.0)
@@ -184,7 +190,7 @@ def clamp_to_length(d_x: ArrayLike, length: ArrayLike):
 
 
 @elementwise
-def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0):
+def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0) -> tuple[Numbers, Numbers, Numbers]:
     """(r_c, θ_c, z_c) of section II: cylindrical coordinates of the contact, in mm, rad, mm.
 
     `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All
@@ -195,7 +201,7 @@ def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0):
 
 
 @elementwise
-def cartesian(r_c: ArrayLike, theta_c: ArrayLike, z_c: ArrayLike):
+def cartesian(r_c: ArrayLike, theta_c: ArrayLike, z_c: ArrayLike) -> tuple[Numbers, Numbers, Numbers]:
     """(x, y, z) in mm of a contact in cylindrical coordinates, as of `contact_point`."""
     return r_c * np.cos(theta_c), r_c * np.sin(theta_c), z_c + 0 * r_c
 
@@ -208,7 +214,7 @@ def why_not(
     alpha_est: ArrayLike = 0.0,
     beta: ArrayLike | None = None,
     C: ArrayLike | None = None,
-):
+) -> str | np.ndarray:
     """Why there is no distance for these arguments, a sentence; empty where there is one. str or array of str.
 
     Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C a distance too large or too
@@ -230,7 +236,7 @@ def why_not(
 
 def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
-    downhill = _across_slope(m_y, m_z, beta)[0] > 0
+    downhill = across_slope(m_y, m_z, beta)[0] > 0
     return (
         ("a measured value is missing or infinite", finite),
         ("the pushing angle is not positive", theta > 0),
@@ -238,7 +244,7 @@ def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
         ("m_z is not positive: the whisker does not push towards the object", m_z > 0),
         ("the slope beta is 90 degrees or more", np.abs(beta) < RIGHT_ANGLE),
         ("m_y points up the slope beta, too strongly for a contact there", downhill),
-        ("phi + alpha_est is 90 degrees or more", _friction_share(m_y, m_z, alpha_est)[0] > 0),
+        ("phi + alpha_est is 90 degrees or more", friction_share(m_y, m_z, alpha_est)[0] > 0),
     )
 
 
@@ -259,46 +265,3 @@ def _centred(samples):
     deviation = samples - samples.mean(axis=-1, keepdims=True)
     largest = np.abs(deviation).max(axis=-1, keepdims=True)
     return deviation / largest, largest[..., 0]
-
-
-def _exponent(x):
-    """Power of two that brings x near one; far below all others for zero."""
-    return np.where(x == 0, -9999, np.frexp(x)[1])
-
-
-def _scaled(m_y, m_z):
-    """m_y, m_z over a common power of two that brings the larger near one, and its exponent."""
-    exponent = np.maximum(_exponent(m_y), _exponent(m_z))
-    return np.ldexp(m_y, -exponent), np.ldexp(m_z, -exponent), exponent
-
-
-def _friction_share(m_y, m_z, alpha_est):
-    """(m_z − μ|m_y|) as a number near one and an exponent of two."""
-    (across, across_power), (along, along_power) = np.frexp(m_z), np.frexp(np.abs(m_y))
-    drag = np.tan(alpha_est) * along
-    exponent = np.where(drag == 0, across_power, np.maximum(across_power, along_power))
-    return np.ldexp(across, across_power - exponent) - np.ldexp(drag, along_power - exponent), exponent
-
-
-def _across_slope(m_y, m_z, beta):
-    """(m_z cos β + m_y sin β) as a number near one and an exponent of two."""
-    m_y, m_z, exponent = _scaled(m_y, m_z)
-    return m_z * np.cos(beta) + m_y * np.sin(beta), exponent
-
-
-def _by_slope(theta, m_y, m_z, beta, C):
-    across, exponent = _across_slope(m_y, m_z, beta)
-    return quotient((C, theta, np.cos(beta)), (across,), -exponent)
-
-
-def _by_friction(theta, m_y, m_z, alpha_est, C):
-    share, share_exponent = _friction_share(m_y, m_z, alpha_est)
-    m_y, m_z, exponent = _scaled(m_y, m_z)
-    square = m_z * m_z + m_y * m_y
-    return quotient((C, theta, share), (square,), share_exponent - 2 * exponent)
-
-
-def _harmonic(d_x, length):
-    """1 / (1/d_x + 1/L) without leaving the range of float64, even where d_x does."""
-    short, long = np.minimum(d_x, length), np.maximum(d_x, length)
-    return short / (1 + short / long)

@@ -6,11 +6,14 @@ ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 RIGHT_ANGLE = np.pi / 2
+# What an equation gives: a float for scalars, an array of their common shape for arrays.
+Numbers: TypeAlias = float | np.ndarray
 
 
 def elementwise(function: Callable) -> Callable:

@@ -7,7 +7,7 @@ leaves out, with the sign that it has in the error (estimate less truth). Angles
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.domain import RIGHT_ANGLE, elementwise
+from estimator.domain import RIGHT_ANGLE, Numbers, elementwise
 
 # A contact that does not slip sideways is held at some slope from 0 to α, and no moment tells at which. The share of
 # friction that is left to act along the whisker, √(1 − (tan β/tan α)²): mean and standard deviation over such slopes.
@@ -16,7 +16,7 @@ HELD_SPREAD = np.sqrt(2 / 3 - HELD_SHARE**2)
 
 
 @elementwise
-def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike):
+def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike) -> Numbers:
     """½ θ tan ψ sin φ / cos α: the contact moves along the whisker as it slips along an object that leans by ψ.
 
     >>> round(leaning(0.05, 0.1, 0.5, 0.2), 8)
@@ -26,7 +26,9 @@ def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike):
 
 
 @elementwise
-def rolling(theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, alpha: ArrayLike, d_x: ArrayLike, left: ArrayLike):
+def rolling(
+    theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, alpha: ArrayLike, d_x: ArrayLike, left: ArrayLike
+) -> Numbers:
     """−θ (R/d_x) cos β (½/w − ⅛), β = φ + α: the contact rolls over a round object towards the base.
 
     reach: R, radii of object and whisker together; left: w, share of the base's diameter that is left at d_x. Where the
@@ -40,7 +42,7 @@ def rolling(theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, alpha: ArrayLike
 
 
 @elementwise
-def dragging(theta: ArrayLike, alpha: ArrayLike):
+def dragging(theta: ArrayLike, alpha: ArrayLike) -> Numbers:
     """−⅕ θ tan α: friction that acts along the whisker alone stretches it, and makes it stiffer.
 
     >>> round(dragging(0.05, 0.4), 8)

@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 
 from estimator import slip
 from estimator.consistency import Consistency, Contacts, most_consistent_alpha
-from estimator.domain import elementwise, require_friction_angle, require_positive, require_sigma
+from estimator.domain import Numbers, elementwise, require_friction_angle, require_positive, require_sigma
 
 __all__ = [
     "Consistency",
@@ -102,7 +102,9 @@ def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
     return _fit(alpha, sigma, freedom, residuals, _fits_as_well_without_slip(residuals, beta, data, scale, reading))
 
 
-def curves(alpha: ArrayLike, beta: ArrayLike, d_x: ArrayLike, theta: ArrayLike, C: ArrayLike):
+def curves(
+    alpha: ArrayLike, beta: ArrayLike, d_x: ArrayLike, theta: ArrayLike, C: ArrayLike
+) -> tuple[np.ndarray, np.ndarray]:
     """(|m|, φ) over β for a fitted α: the solid lines of Fig. 8, in N·mm and rad."""
     return slip.moment_magnitude(d_x, theta, beta, alpha, C), slip.slip_angle(beta, alpha)
 
@@ -250,7 +252,9 @@ def _dead_band(tilt, phi, phi_sigma):
 
 
 @elementwise
-def confidence(phi: ArrayLike, alpha_est: ArrayLike, alpha_est_sigma: ArrayLike, relative_sigma: ArrayLike = 0.01):
+def confidence(
+    phi: ArrayLike, alpha_est: ArrayLike, alpha_est_sigma: ArrayLike, relative_sigma: ArrayLike = 0.01
+) -> Numbers:
     """Weight in (0, 1] of a contact whose slip angle is φ (section VII, way 3): less where α matters more.
 
     The variance that would be left with α known over the whole: s² / (s² + (σ_α ∂ln d_x/∂α_est)²), with s the

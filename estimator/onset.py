@@ -78,7 +78,7 @@ class Touch:
         return cls(np.nan, np.nan, status)
 
     @property
-    def offset(self):
+    def offset(self) -> np.ndarray:
         """Level (k,) of the free stroke, to be taken off the moments."""
         return self.level.offset
 

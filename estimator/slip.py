@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from estimator.domain import (
     RIGHT_ANGLE,
+    Numbers,
     elementwise,
     first_failure,
     quotient,
@@ -24,7 +25,7 @@ from estimator.domain import (
 
 
 @elementwise
-def slip_angle(beta: ArrayLike, alpha: ArrayLike):
+def slip_angle(beta: ArrayLike, alpha: ArrayLike) -> Numbers:
     """φ of (4), in rad: zero while the friction cone holds the whisker, |β| − α beyond.
 
     >>> slip_angle(0.5, 0.2)
@@ -38,7 +39,9 @@ def slip_angle(beta: ArrayLike, alpha: ArrayLike):
 
 
 @elementwise
-def moments(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike):
+def moments(
+    d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(m_y, m_z) of (14) and (13), in N·mm, at the pushing angle θ against a flat surface of slope β.
 
     m_z = (Cθ/d_x) cos β cos φ / cos(β − φ),  m_y = (Cθ/d_x) cos β sin φ / cos(β − φ).
@@ -55,7 +58,7 @@ def moments(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike,
 
 
 @elementwise
-def moment_magnitude(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike):
+def moment_magnitude(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike) -> Numbers:
     """|m| of (13) and (14), in N·mm: (Cθ/d_x) cos β / cos(β − φ)."""
     _require_settings(alpha, C)
     magnitude = quotient((C, theta, np.cos(beta)), (d_x, np.cos(_held_angle(beta, alpha))))
@@ -63,7 +66,7 @@ def moment_magnitude(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: A
 
 
 @elementwise
-def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike):
+def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike) -> Numbers:
     """σ of (5), in mm: how far the contact has slid along the surface. σ = d_x θ sin φ / cos(β − φ)."""
     require_friction_angle("alpha", alpha)
     slip = quotient((d_x, theta, np.sin(slip_angle(beta, alpha))), (np.cos(_held_angle(beta, alpha)),))
@@ -71,7 +74,7 @@ def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: Arra
 
 
 @elementwise
-def moment_from_deflection(d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: ArrayLike):
+def moment_from_deflection(d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: ArrayLike) -> tuple[Numbers, Numbers]:
     """(m_y, m_z) of (19) and (18), in N·mm, from the deflections d_y, d_z in mm.
 
     m_z = C d_y / d_x², m_y = C d_z / d_x²; the paper prints d_z² under (19), a slip of the pen.
@@ -86,7 +89,7 @@ def moment_from_deflection(d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: Ar
 
 
 @elementwise
-def slope_from_deflection(d_x: ArrayLike, theta: ArrayLike, d_y: ArrayLike, d_z: ArrayLike):
+def slope_from_deflection(d_x: ArrayLike, theta: ArrayLike, d_y: ArrayLike, d_z: ArrayLike) -> tuple[Numbers, Numbers]:
     """(β, φ) of (20) and (21), in rad, from the deflections d_y, d_z in mm.
 
     tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no trace: β is
@@ -99,7 +102,7 @@ def slope_from_deflection(d_x: ArrayLike, theta: ArrayLike, d_y: ArrayLike, d_z:
     return np.where(possible & (d_z != 0), beta, np.nan), phi
 
 
-def why_not(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike):
+def why_not(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike) -> str | np.ndarray:
     """Why (4), (5), (13) and (14) give NaN for these arguments: a sentence, empty inside the domain."""
     arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (d_x, theta, beta)))
     return first_failure(_conditions(*arrays), arrays[0].shape)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import circle
-from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive
+from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, require_friction_angle, require_positive
 
 EQUATIONS = ("no_slip", "with_friction")
 SEARCH_STEP = np.radians(0.25)
@@ -23,7 +23,7 @@ def distance_error(
     theta: ArrayLike = 0.0,
     equation: str = "with_friction",
     printed: bool = False,
-):
+) -> Numbers:
     """Relative error of (2) or (10), estimate over truth minus one, for a surface of slope β_0 at first touch.
 
     α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature (15).
@@ -45,7 +45,7 @@ def slope_threshold(
     theta: ArrayLike = 0.0,
     equation: str = "with_friction",
     printed: bool = False,
-):
+) -> Numbers:
     """β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN if never.
 
     Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0.

@@ -10,26 +10,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import distance, first_order
-from estimator.domain import RIGHT_ANGLE, elementwise, require_friction_angle, require_positive, require_sigma
+from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, require_friction_angle, require_positive, require_sigma
 
 Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 _STEEPEST_RAD = RIGHT_ANGLE - 1e-9  # of a friction angle: at 90° its tangent has no number
 
 
-def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike):
+def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (2): d_x (1/θ, 0, −1/m_z, 0)."""
     d_x = distance.no_slip(theta, m_z, C)
     return _stack(d_x, _inverse(theta), 0.0, -_inverse(m_z), 0.0)
 
 
-def gradient_known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike):
+def gradient_known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (6), the slope taken as exact."""
     d_x = distance.known_slope(theta, m_y, m_z, beta, C)
     share = _inverse(np.multiply(m_z, np.cos(beta)) + np.multiply(m_y, np.sin(beta)))
     return _stack(d_x, _inverse(theta), -np.sin(beta) * share, -np.cos(beta) * share, 0.0)
 
 
-def gradient_with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike):
+def gradient_with_friction(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike
+) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (10).
 
     ∂ln d_x/∂α_est = −tan(φ + α_est) + tan α_est. At m_y = 0, where |m_y| has a kink, the derivative of
@@ -39,7 +41,7 @@ def gradient_with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alp
     return _stack(d_x, *_log_gradient(theta, m_y, m_z, alpha_est))
 
 
-def gradient_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike):
+def gradient_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (11) and (12); the last one is 0."""
     d_x = distance.frictionless(theta, m_y, m_z, C)
     return _stack(d_x, *_log_gradient(theta, m_y, m_z, 0.0)[:3], 0.0)
@@ -47,7 +49,7 @@ def gradient_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: A
 
 def gradient_cone(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike
-):
+) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's d_x)²."""
     cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
     shrink = (distance.cone(theta, m_y, m_z, alpha_est, C, length) / cylinder) ** 2
@@ -55,7 +57,9 @@ def gradient_cone(
 
 
 @elementwise
-def gradient_printed(theta, m_y, m_z, C, taper_per_mm):
+def gradient_printed(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, taper_per_mm: ArrayLike
+) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (16) as printed, cos φ / (|m|/(Cθ) + τ/L); the last one is 0."""
     m = np.hypot(m_y, m_z)
     d_x = (m_z / m) / (m / (C * theta) + taper_per_mm)
@@ -72,7 +76,7 @@ def sigma(
     covariance: ArrayLike | None = None,
     alpha_est_sigma: ArrayLike = 0.0,
     theta_moment_covariance: ArrayLike | None = None,
-):
+) -> Numbers:
     """Standard deviation of d_x, in mm, for one of the gradients above.
 
     theta_sigma: of the motor angle, touch_sigma: of the touch, both in rad; covariance (..., 2, 2) of
@@ -98,34 +102,42 @@ def sigma(
     return _root(variance)
 
 
-def sigma_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas):
+def sigma_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike) -> Numbers:
     """Standard deviation of (2), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_no_slip(theta, m_z, C), **sigmas)
 
 
-def sigma_known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike, **sigmas):
+def sigma_known_slope(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
+) -> Numbers:
     """Standard deviation of (6), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_known_slope(theta, m_y, m_z, beta, C), **sigmas)
 
 
-def sigma_with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, **sigmas):
+def sigma_with_friction(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
+) -> Numbers:
     """Standard deviation of (10), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_with_friction(theta, m_y, m_z, alpha_est, C), **sigmas)
 
 
-def sigma_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas):
+def sigma_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike) -> Numbers:
     """Standard deviation of (11) and (12), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_frictionless(theta, m_y, m_z, C), **sigmas)
 
 
 def sigma_cone(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike, **sigmas
-):
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike,
+    **sigmas: ArrayLike,
+) -> Numbers:
     """Standard deviation of the cone's distance, in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_cone(theta, m_y, m_z, alpha_est, C, length), **sigmas)
 
 
-def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0, model_sigma=0.0, **sigmas):
+def interval_with_friction(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, *,
+    alpha_est_sigma: ArrayLike = 0.0, model_sigma: ArrayLike = 0.0, **sigmas: ArrayLike,
+) -> tuple[Numbers, Numbers]:
     """(low, high), mm: the 95 % interval of (10), beyond a φ + α_est of 90° too; NaN where m_z or θ is no push.
 
     (10) falls with α_est, and by more than a line where its sigma is large. So each side is its own: the change that
@@ -145,7 +157,10 @@ def interval_with_friction(theta, m_y, m_z, alpha_est, C, *, alpha_est_sigma=0.0
     return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(push, np.maximum(high, 0.0), np.nan)[()]
 
 
-def model_share(theta, phi, alpha, d_x, *, reach=0.0, tilt_sigma=0.0, left=1.0, held_spread=1.0):
+def model_share(
+    theta: ArrayLike, phi: ArrayLike, alpha: ArrayLike, d_x: ArrayLike, *,
+    reach: ArrayLike = 0.0, tilt_sigma: ArrayLike = 0.0, left: ArrayLike = 1.0, held_spread: ArrayLike = 1.0,
+) -> Numbers:
     """How far (10) may be off by itself, as a share of d_x: leading terms in θ, derived in docs/maps.md.
 
     reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left: share of the base's
