@@ -21,6 +21,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -139,7 +140,7 @@ def evaluate(
 
 
 def evaluate_with(
-    session: Path, out: Path, settings: Settings, workers: int = 1, figure_formats: Sequence[str] = (), **shown
+    session: Path, out: Path, settings: Settings, workers: int = 1, figure_formats: Sequence[str] = (), **shown: Any
 ) -> Run:
     """The same with the options in one object. shown: progress and announce of `bench.evaluate.evaluate`."""
     quiet = {"announce": logging.getLogger(__name__).info}

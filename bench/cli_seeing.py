@@ -3,8 +3,12 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bench.options import Verbs, add_out, add_session, add_verb, count
+
+if TYPE_CHECKING:
+    from bench.base.settings import Seeing
 
 
 def add_seeing(verb: argparse.ArgumentParser) -> None:
@@ -24,7 +28,7 @@ def add_seeing(verb: argparse.ArgumentParser) -> None:
     how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
-def seeing_of(options: argparse.Namespace):
+def seeing_of(options: argparse.Namespace) -> "Seeing":
     """The settings of `--preset` or `--settings`."""
     from bench.trials.seeing import STANDARD, by_preset, from_file
 

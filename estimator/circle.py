@@ -23,7 +23,7 @@ def conditions(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> tuple[tup
     )
 
 
-def inside(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, *values) -> tuple[np.ndarray, ...]:
+def inside(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, *values: ArrayLike) -> tuple[np.ndarray, ...]:
     """The values where `conditions` hold, NaN elsewhere."""
     return tuple(where_all(conditions(r_n, theta, beta_0), value) for value in values)
 

@@ -25,7 +25,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 _MANY = 1000  # values; larger arrays are hashed by their bytes
 
 
-def hash_of(*parts) -> str:
+def hash_of(*parts: object) -> str:
     """Hash of plain values, in their order. Pictures count by their pixels, paths by their names: a session that was
     moved is the same session."""
     return hashlib.blake2b(json.dumps(_hashable(parts), sort_keys=True).encode(), digest_size=16).hexdigest()

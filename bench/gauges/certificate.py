@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from bench.gauges.readings import Pairs
 from bench.gauges.reversal import Reversal, in_percent
 from bench.gauges.weights import Scale
 from bench.session.whisker import Whisker
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 U95 = 1.96
 NOT_MEASURED = "not measured"
@@ -194,7 +198,7 @@ def matrix_lines(made: GaugeMatrix | None) -> Iterator[str]:
         yield "  " + "   ".join(cells)
 
 
-def page(certificate: Certificate):
+def page(certificate: Certificate) -> "Figure":
     """The certificate as one page: its lines, and the residuals over the moments."""
     from matplotlib.figure import Figure
 

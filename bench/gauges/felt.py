@@ -70,7 +70,7 @@ class Stroke:
         """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
         return felt_touch(self.motor_rad, self.channels, self.time_s)
 
-    def at(self, theta_rad: float, touch: Touch, **window) -> MomentAt:
+    def at(self, theta_rad: float, touch: Touch, **window: float) -> MomentAt:
         """Channels above the free stroke's level, at a pushing angle past `touch`: a line through the samples as
         recorded, which averages as section V's low-pass does. That smears the onset, by 5 % of it at 0.5°."""
         return moment_at(theta_rad, self.motor_rad, self.channels, touch, time_s=self.time_s, **window)

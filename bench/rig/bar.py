@@ -73,7 +73,7 @@ class Touch:
         return float(np.linalg.norm(self.point_mm))
 
 
-def unloaded(rod: Rod, motor_rad: float, arc_mm: float | np.ndarray):
+def unloaded(rod: Rod, motor_rad: float, arc_mm: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points and tangents of the unloaded whisker in the rig frame, each (..., 3)."""
     arc = np.asarray(arc_mm, float)
     along = np.stack([arc, 0 * arc, 0 * arc], -1)

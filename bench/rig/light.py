@@ -32,7 +32,7 @@ class Material:
 
 def round_shade(
     light: Light, material: Material, across: np.ndarray, facing: np.ndarray, aside: np.ndarray, mirror: np.ndarray
-):
+) -> np.ndarray:
     """Brightness on a round bar at `across` (−1…1 from silhouette to silhouette).
 
     `facing`, `aside`: the lamp's components towards the camera and across the bar; `mirror`: the same two (stacked)

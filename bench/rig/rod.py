@@ -20,13 +20,13 @@ class Rest:
     set_y_mm: float = 0.0
     set_z_mm: float = 0.0
 
-    def offset_mm(self, arc_mm: float | np.ndarray):
+    def offset_mm(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Departure from the straight line at arc length: (..., 3), its x component zero."""
         u = np.asarray(arc_mm, float) / self.length_mm
         weight = (u**4 - 4 * u**3 + 6 * u**2) / 3
         return np.stack([0 * u, self.set_y_mm * u**2, self.set_z_mm * u**2 - self.sag_mm * weight], -1)
 
-    def slope(self, arc_mm: float | np.ndarray):
+    def slope(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Derivative of the departure along the arc: (..., 3)."""
         u = np.asarray(arc_mm, float) / self.length_mm
         weight = 4 * (u**3 - 3 * u**2 + 3 * u) / 3
@@ -86,11 +86,11 @@ class Rod:
             return 1 - self.tip_diameter_mm / self.diameter_mm
         return 1.0 if self.shape == "cone" else 0.0
 
-    def width(self, arc_mm: float | np.ndarray):
+    def width(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Diameter relative to the base's at arc length."""
         return np.maximum(1 - self.lost * np.asarray(arc_mm, float) / self.length_mm, 0.0)
 
-    def radius_mm(self, arc_mm: float | np.ndarray):
+    def radius_mm(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Radius at arc length."""
         return 0.5 * self.diameter_mm * self.width(arc_mm)
 

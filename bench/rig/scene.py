@@ -1,6 +1,7 @@
 """What stands in front of a camera: floor, board, post and hub, whisker, bar with its block. Drawn far to near."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +46,7 @@ class Box:
     origin_mm: np.ndarray
     reflectance: float
 
-    def faces(self):
+    def faces(self) -> Iterator[tuple[tuple[int, int], Plate]]:
         """(name, plate) of the six faces, prints facing outwards."""
         for axis in range(3):
             for end, limit in ((-1, self.low_mm), (1, self.high_mm)):
@@ -64,7 +65,7 @@ class Box:
     def draw(
         self, window: Window, radiance: np.ndarray, light: Light, print_: Print | None = None,
         on: tuple[int, int] = (2, 1),
-    ):
+    ) -> None:
         """All faces, and a print centred on one of them."""
         for name, plate in self.faces():
             plate.draw(window, radiance, light)
@@ -140,7 +141,7 @@ class Scene:
         return np.concatenate([camera.project(corners), *whisker.silhouette(camera)])
 
 
-def floor_and_wall(window: Window, looks: Looks):
+def floor_and_wall(window: Window, looks: Looks) -> np.ndarray:
     """A grey floor that darkens away from the rig, and the wall behind it."""
     coarse = Window(window.camera, window.left, window.top, window.right, window.bottom, 1, 1.0)
     x, y = coarse.rays()

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -90,7 +91,7 @@ class Whisk:
         step_rad: float,
         stops_rad: Sequence[float] = (),
         back: bool = False,
-    ):
+    ) -> Self:
         """March from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad` on the way there."""
         march = March(rod, bar, friction, touch)
         up = _stations(touch.motor_rad, end_rad, step_rad, stops_rad)

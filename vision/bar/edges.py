@@ -35,7 +35,7 @@ _LONGEST = np.array([0.7, 0.7, 0.7, 0.7, 0.4])
 _SETTLED_PX, _PARTS = 0.005, (1.0, 0.3, 0.1, 0.03)
 
 
-def measure_edges(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+def measure_edges(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                   settings: VisionSettings, *, coarse: bool = False) -> dict[int, LinePoints] | None:
     """Two points of each of the bar's edges in the mean picture `grey`, by side: 1 towards the points' normals, -1
     against them. None where too little of the bar is clear, or what is seen is no bar.
@@ -55,7 +55,7 @@ def measure_edges(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: S
     return _edges(pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4])
 
 
-def coarse_share(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+def coarse_share(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                  settings: VisionSettings) -> float | None:
     """How wide the bar looks over how wide it should, to some hundredths, as `measure_edges` begins with it; None where
     too little of the bar is clear, or where that lies far from where it was expected."""

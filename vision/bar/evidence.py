@@ -164,7 +164,7 @@ class Evidence:
     misfit_of_none: np.ndarray
 
 
-def evidence(seen: Sequence[Profile], shift_px, blur_px: float) -> Evidence:
+def evidence(seen: Sequence[Profile], shift_px: np.ndarray, blur_px: float) -> Evidence:
     """Evidence of the bar's middle at shifts (g,) px, in each profile."""
     of_bar, misfit = zip(*(_of_bar(profile, shift_px, blur_px) for profile in seen))
     of_none = np.array([one.of_none for one in seen]).T

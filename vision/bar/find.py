@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter
 
 from vision.geometry.camera import Camera
@@ -45,7 +46,7 @@ class Clear:
     half_px: float
 
 
-def clear_edges(camera: Camera, still, background, rods: Rods, motor_rad: float) -> Clear:
+def clear_edges(camera: Camera, still: np.ndarray, background: np.ndarray, rods: Rods, motor_rad: float) -> Clear:
     """The edges of still things in a picture beside one without rods, both (h, w) at every HALF-th pixel."""
     middle = 0.5 * rods.wire.length_mm * rotation_z(motor_rad)[:, 0]
     focal_px = float(np.mean(np.diag(camera.matrix)[:2])) / HALF
@@ -100,7 +101,7 @@ def _apart(each, score, apart, most: int) -> np.ndarray:
     return np.array(chosen)
 
 
-def edges_px(grey, background, blur_px: float) -> np.ndarray:
+def edges_px(grey: np.ndarray, background: np.ndarray, blur_px: float) -> np.ndarray:
     """Edges (3, h, w) of a picture that its background does not have: how clear, by direction across (xx, xy, yy).
 
     From 0 to 1: beside the noise, and more than the light changes a little aside.
@@ -117,7 +118,8 @@ def edges_px(grey, background, blur_px: float) -> np.ndarray:
     return share * np.stack([x * x, x * y, y * y])
 
 
-def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
+def axis_from_angles(x_mm: ArrayLike, touch_rad: ArrayLike, beta_rad: ArrayLike, psi_rad: ArrayLike,
+                     reach_mm: ArrayLike) -> BarAxis:
     """The bar that a straight whisker first touches at distance x, at motor angle touch, with these slopes.
 
     All arguments (n,); reach_mm: between the axes of bar and whisker where they touch.
@@ -131,7 +133,7 @@ def axis_from_angles(x_mm, touch_rad, beta_rad, psi_rad, reach_mm) -> BarAxis:
     return BarAxis(*(np.einsum("...ij,...j->...i", turn, v) for v in (p, a)))
 
 
-def both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) -> np.ndarray:
+def both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts: np.ndarray, along_mm: np.ndarray) -> np.ndarray:
     """How clear both edges are of bars (n,) in a camera, up to 1, at these places beside each axis's point.
 
     counts: see _COUNTS.
@@ -168,7 +170,7 @@ def _across(seen: Clear, px, tangent) -> np.ndarray:
     return np.mean(np.where(inside, across, 0.0), axis=-1)
 
 
-def climb(starts, first_step, score: Callable) -> tuple[np.ndarray, np.ndarray]:
+def climb(starts: np.ndarray, first_step: np.ndarray, score: Callable) -> tuple[np.ndarray, np.ndarray]:
     """Best hypotheses (n, k) and their scores (n,): from each start to the best neighbour, by ever smaller steps."""
     size = len(first_step)
     steps = first_step * np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * size, indexing="ij"), axis=-1).reshape(-1, size)

@@ -43,7 +43,7 @@ def _axis(hypotheses, camera: Camera, motor_rad: float) -> BarAxis:
     return BarAxis(point, np.cos(turn) * right + np.sin(turn) * np.cross(right, ahead))
 
 
-def see_bar_alone(first: BarAxis, view: View, wire: Wire, radius_mm: float, motor_rad,
+def see_bar_alone(first: BarAxis, view: View, wire: Wire, radius_mm: float, motor_rad: np.ndarray,
                   settings: VisionSettings) -> BarAxis:
     """The bar's axis from one camera, from a coarse one, before any wire is known. motor_rad (n,): of all frames.
 

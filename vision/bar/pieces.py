@@ -23,7 +23,7 @@ _KNOT_MM = 14.0
 NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
 
 
-def bar_pieces(view: View, grey, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+def bar_pieces(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                settings: VisionSettings) -> Pieces:
     """Pieces of the bar's band in the picture `grey`, to either side of the axis's point, that show no wire.
 

@@ -1,6 +1,6 @@
 """Where the bar is, before any wire is known: looked for by its edges, then by its lines in all cameras."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -48,7 +48,8 @@ class SeenBar:
         return sum(max(line.clearness, 0.0) if line.has_edges else -_NO_EDGES for line in self.lines.values())
 
 
-def see_bar(views, cameras: Cameras, rods: Rods, motor_rad, settings: VisionSettings) -> SeenBar:
+def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.ndarray,
+            settings: VisionSettings) -> SeenBar:
     """The bar from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
 
     Of the axes whose edges are clear in all cameras, that whose lines are the best seen in all of them. Where the

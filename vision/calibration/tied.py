@@ -119,7 +119,8 @@ def _settle(layout: Layout, board: Board, priors: Priors, error_alone: np.ndarra
     return settled, Timing(settled.solution.state.clock, settled.priors.late_sigma_s, in_frames)
 
 
-def timing_note(names, timing: Timing) -> str:
+def timing_note(names: Sequence[str], timing: Timing) -> str:
+    """A sentence for the report: by how much each camera's pictures are later than the view, and their scatter."""
     scale, unit = (1.0, "frames") if timing.in_frames else (1e3, "ms")
     late = (
         f"{name} {scale * offset:+.3g} ± {scale * scatter:.2g} {unit}"

@@ -4,6 +4,7 @@ A fit takes motor angles for exact. Here each frame may turn by itself about the
 fit, with a column for each frame. What all frames have in common is the whisker's clamp and is not told.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +27,7 @@ class Turns:
     covariance: np.ndarray
 
 
-def frame_turns(problem: Problem, state: State, index) -> Turns:
+def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
     """Turns of the frames (f,) of a fit that is done."""
     linear = linear_at(problem, state)
     turned = linearise(replace(problem, motor_rad=problem.motor_rad + _STEP_RAD), state, linear.jacobian)[0]

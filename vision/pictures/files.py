@@ -106,6 +106,7 @@ class PictureFolder(Frames):
 
     @property
     def times_s(self) -> None:
+        """Pictures in a folder carry no times."""
         return None
 
     def _first_size(self) -> tuple[int, int]:
