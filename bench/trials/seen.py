@@ -18,9 +18,10 @@ from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
-from vision.geometry.rods import Bar
+from vision.geometry.rods import Bar, Rods
 from vision.truth.observe import observe_trial
 from vision.truth.records import TrialTruth, WhiskTruth
+from vision.truth.trial_pictures import TrialPictures
 
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12
@@ -59,16 +60,14 @@ def _see(
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     places = [times.frames_in(signals, stroke) for stroke in strokes]
     back = _backwards(signals, times)
-    observe = partial(
-        observe_trial,
+    pictures = TrialPictures(
         {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
-        cameras=calibration.cameras,
-        wire=wire,
-        bar=Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
-        background=calibration.background,
+        calibration.background,
     )
+    rods = Rods(wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))
+    observe = partial(observe_trial, pictures, cameras=calibration.cameras, rods=rods)
     first, *harder = [(one.name, replace(one.vision, clock_sigma_s=clock_sigma_s)) for one in rungs(settings)]
     truth = observe(whisks=[*places, *back], settings=first[1])
     looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]

@@ -37,7 +37,9 @@ from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
 from vision.geometry.errors import Refused
+from vision.geometry.rods import Rods
 from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}
 # Slip of a scene is that of the frame nearest this pushing angle; its frames share most of their error.
@@ -91,8 +93,8 @@ def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
     frames = {studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
               for k, studio in enumerate(job.studios[:most_cameras])}
     background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
-    (whisk,) = observe_trial(frames, scene.recording.frames.time_s, scene.motor_rad,
-                             [slice(0, len(scene.motor_rad))], cameras, wire, bar, background).whisks
+    pictures = TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background)
+    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, Rods(wire, bar)).whisks
     if math.isnan(whisk.d_x_mm.value):
         return Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}

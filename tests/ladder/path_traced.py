@@ -23,6 +23,7 @@ from tests.ladder.rows import all_rows
 from vision.bar.one_view import widest_angle_rad
 from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 ROOT = Path(__file__).resolve().parents[2]
 FAR_SIGMAS = 4.0
@@ -56,9 +57,9 @@ def see_scene(number: int, folder: Path, settings: VisionSettings = _STANDARD) -
     told = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
     frames = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)
     slip = np.where(frames["contact"] > 0, frames["slip_mm"], np.nan)
-    (whisk,) = observe_trial({view.camera.name: view.frames for view in views}, frames["time_s"], motor_rad,
-                             [slice(0, len(motor_rad))], cameras, rods.wire, rods.bar,
-                             {view.camera.name: view.background for view in views}, settings).whisks
+    pictures = TrialPictures({view.camera.name: view.frames for view in views}, frames["time_s"], motor_rad,
+                             {view.camera.name: view.background for view in views})
+    (whisk,) = observe_trial(pictures, [slice(0, len(motor_rad))], cameras, rods, settings).whisks
     seen = slice(None) if whisk.frames is None else whisk.frames.index
     truth = Truth(np.radians(told["touch_deg"]), told["d_x_mm"], np.radians(told["beta_deg"]), slip[seen])
     plane_angle_deg = float(np.degrees(widest_angle_rad(cameras, axis)))

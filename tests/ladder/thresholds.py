@@ -34,10 +34,11 @@ from tests.scenes.recorded import exact_cameras
 from vision.boards.corners import find_corners
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.camera import Cameras
-from vision.geometry.rods import Bar
+from vision.geometry.rods import Bar, Rods
 from vision.geometry.rotation import apply
 from vision.pictures.files import Frames, read_picture
 from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 SESSION = Path(__file__).resolve().parents[2] / "fixtures" / "small-session"
 SCENES = SESSION.parent / "scenes"
@@ -107,16 +108,13 @@ def _look(folder: Path, name: str, cameras: Cameras) -> partial:
     session = load_session(folder)
     trial = session.trial(name)
     times, signals = frame_times(trial), read_signals(trial)
+    background = {name: read_picture(path).astype(float) for name, path in session.rig_pictures.items()}
     return partial(
         observe_trial,
-        read_trial(trial, times),
-        times.time_s,
-        signals.motor_at(times.time_s),
+        TrialPictures(read_trial(trial, times), times.time_s, signals.motor_at(times.time_s), background),
         [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)],
         cameras,
-        session.whisker.wire,
-        Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm),
-        {name: read_picture(path).astype(float) for name, path in session.rig_pictures.items()},
+        Rods(session.whisker.wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)),
     )
 
 

@@ -7,11 +7,13 @@ import tomllib
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.rods import Bar, Wire
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.pictures.files import Frames, read_picture
 from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 WIRE, BAR = Wire("cylinder", 100.0, 1.0), Bar(6.0)
+RODS = Rods(WIRE, BAR)
 
 
 def exact_cameras(session):
@@ -43,6 +45,9 @@ class Recorded:
         frames = {name: {k: pictures[f] for k, f in enumerate(chosen) if f in pictures}
                   for name, pictures in self.frames.items()}
         motor, time = np.radians(self.rows["motor_deg"][keep]), self.rows["time_s"][keep]
-        (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], self.cameras, WIRE, BAR,
-                                 self.background).whisks
+        return self.see_frames(TrialPictures(frames, time, motor, self.background))
+
+    def see_frames(self, pictures):
+        """The truth of these pictures, taken as one whisk."""
+        (whisk,) = observe_trial(pictures, [slice(0, len(pictures.motor_rad))], self.cameras, RODS).whisks
         return whisk

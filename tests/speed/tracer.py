@@ -20,12 +20,12 @@ from scipy.special import ndtr
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.scenes.recorded import BAR, WIRE, Recorded
+from tests.scenes.recorded import Recorded
 from vision.lines.bands import cut_pieces, read_band
 from vision.lines.shading import Knots
 from vision.lines.trace import to_points, trace
 from vision.pictures.pixel_noise import Noise
-from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES, SHAPE = 13, (480, 640)
@@ -87,8 +87,8 @@ def whisk_call(session: Path, trial: str):
     chosen = np.unique(np.linspace(0, len(recorded.rows["time_s"]) - 1, FRAMES).round().astype(int))
     frames = {name: {k: pictures[f] for k, f in enumerate(chosen)} for name, pictures in recorded.frames.items()}
     motor, clock = np.radians(recorded.rows["motor_deg"][chosen]), recorded.rows["time_s"][chosen]
-    return lambda: observe_trial(frames, clock, motor, [slice(0, len(chosen))], recorded.cameras, WIRE, BAR,
-                                 recorded.background).whisks[0]
+    pictures = TrialPictures(frames, clock, motor, recorded.background)
+    return lambda: recorded.see_frames(pictures)
 
 
 def main() -> None:

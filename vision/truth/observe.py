@@ -7,7 +7,7 @@
 Nothing here knows of a gauge.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,14 +20,13 @@ from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
 from vision.geometry.errors import Misled, Refused
-from vision.geometry.rods import Bar, Rods, Wire
+from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import one_sided_lines
-from vision.pictures.pixel_noise import measure_noise
-from vision.pictures.scale import shrunk_cameras, shrunk_frames, shrunk_picture
-from vision.pictures.view import View
+from vision.pictures.scale import shrunk_cameras
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
+from vision.truth.trial_pictures import TrialPictures
 from vision.truth.whisk import fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -36,31 +35,18 @@ _FEWEST_FRAMES = 4
 _USUAL = VisionSettings()
 
 
-def observe_trial(
-    frames: Mapping[str, Mapping[int, np.ndarray]],
-    time_s: np.ndarray,
-    motor_rad: np.ndarray,
-    whisks: Sequence[slice],
-    cameras: Cameras,
-    wire: Wire,
-    bar: Bar,
-    background: Mapping[str, np.ndarray | None],
-    settings: VisionSettings = _USUAL,
-) -> TrialTruth:
+def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
+                  settings: VisionSettings = _USUAL) -> TrialTruth:
     """Truth of a trial: bar, first touch, contact and slip in each whisk.
 
-    frames: per camera the grey pictures by frame index (a missing index is a lost frame); time_s, motor_rad (n,)
-    at each frame; whisks: slices of frame indices, one a forward stroke; background: the scene without whisker and
-    bar, or None. What keeps a whisk from having a truth is its status; raises Refused only for input that no
-    trial could be seen with.
+    whisks: slices of frame indices, one a forward stroke. What keeps a whisk from having a truth is its status; raises
+    Refused only for input that no trial could be seen with.
     """
-    time_s, motor_rad = np.asarray(time_s, dtype=float), np.asarray(motor_rad, dtype=float)
-    rods, scale = Rods(wire, bar), settings.picture_scale
-    frames, cameras = shrunk_frames(frames, scale), shrunk_cameras(cameras, scale)
-    background = {name: None if empty is None else shrunk_picture(empty, scale) for name, empty in background.items()}
+    pictures, cameras = pictures.shrunk(settings.picture_scale), shrunk_cameras(cameras, settings.picture_scale)
+    time_s, motor_rad = (np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad))
     try:
-        cameras, behind = _that_face_it(cameras, wire, motor_rad)
-        views = _views(frames, cameras, background)
+        cameras, behind = _that_face_it(cameras, rods.wire, motor_rad)
+        views = pictures.views(cameras)
         used = cameras.subset([view.camera.name for view in views])
         bar_seen = see_bar(views, used, rods, motor_rad, settings)
     except Refused as reason:
@@ -88,21 +74,6 @@ def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, lis
     if not any(faces.values()):
         raise Refused("; ".join(lines))
     return cameras.subset([name for name, faced in faces.items() if faced]), lines
-
-
-def _views(frames, cameras: Cameras, background) -> tuple[View, ...]:
-    views = []
-    for camera in cameras:
-        pictures = frames.get(camera.name, {})
-        if len(pictures) < 3:
-            continue
-        first, second = list(pictures.values())[:2]
-        empty = background.get(camera.name)
-        empty = np.zeros(first.shape) if empty is None else np.asarray(empty, dtype=float)
-        views.append(View(camera, pictures, empty, measure_noise(first, second)))
-    if not views:
-        raise Refused("no camera has three frames or more")
-    return tuple(views)
 
 
 def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:

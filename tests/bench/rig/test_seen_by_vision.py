@@ -12,9 +12,10 @@ from bench.session.frame_times import frame_times
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 from tests.scenes.recorded import exact_cameras
-from vision.geometry.rods import Bar, Wire
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.pictures.files import read_picture
 from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 PROTOCOL = """
 name = "one"
@@ -53,8 +54,9 @@ def test_a_dark_set_wire_on_a_tilted_thin_bar(tmp_path):
     frames = {name: read_frames(source, range(len(times))) for name, source in trial.camera_sources.items()}
     background = {name: read_picture(path).astype(float) for name, path in session.rig_pictures.items()}
     whisks = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
-    (seen,) = observe_trial(frames, times.time_s, signals.motor_at(times.time_s), whisks,
-                            exact_cameras(session.path), Wire("cylinder", 100.0, 1.0), Bar(4.0), background).whisks
+    pictures = TrialPictures(frames, times.time_s, signals.motor_at(times.time_s), background)
+    rods = Rods(Wire("cylinder", 100.0, 1.0), Bar(4.0))
+    (seen,) = observe_trial(pictures, whisks, exact_cameras(session.path), rods).whisks
     assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=0.10)
     assert abs(seen.d_x_mm.value - truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
     assert np.degrees(seen.beta_rad.value) == pytest.approx(truth["beta_deg"], abs=0.3)

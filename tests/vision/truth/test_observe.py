@@ -5,9 +5,9 @@ from copy import copy
 import numpy as np
 import pytest
 
-from tests.scenes.recorded import BAR, WIRE, Recorded
+from tests.scenes.recorded import Recorded
 from vision.geometry.camera import Camera, Cameras
-from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 
 
 @pytest.fixture(scope="module")
@@ -97,16 +97,13 @@ def test_without_a_bar_in_view_the_trial_says_so(steep):
     background = {name: pictures[0].astype(float) for name, pictures in steep.frames.items()}
     motor = np.radians(steep.rows["motor_deg"][:4])
     frames = {name: dict.fromkeys(range(4), pictures[0]) for name, pictures in steep.frames.items()}
-    (whisk,) = observe_trial(frames, steep.rows["time_s"][:4], motor, [slice(0, 4)], steep.cameras, WIRE, BAR,
-                             background).whisks
+    whisk = steep.see_frames(TrialPictures(frames, steep.rows["time_s"][:4], motor, background))
     assert np.isnan(whisk.d_x_mm.value) and "no bar of diameter 6 mm is seen" in whisk.status
 
 
 def _whisk(recorded, frames):
     motor, time = np.radians(recorded.rows["motor_deg"]), recorded.rows["time_s"]
-    (whisk,) = observe_trial(frames, time, motor, [slice(0, len(motor))], recorded.cameras, WIRE, BAR,
-                             recorded.background).whisks
-    return whisk
+    return recorded.see_frames(TrialPictures(frames, time, motor, recorded.background))
 
 
 def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
@@ -135,8 +132,6 @@ def test_a_camera_with_gaps_is_left_out_by_name(steep):
 def test_a_camera_that_shows_another_wire_is_left_out(steep):
     """Its pictures jump from frame to frame, as from a camera that shakes: what is left is one camera's truth."""
     shaken = {k: np.roll(picture, 4 * (-1) ** k, axis=0) for k, picture in steep.frames["low"].items()}
-    motor = np.radians(steep.rows["motor_deg"])
-    (whisk,) = observe_trial({"high": steep.frames["high"], "low": shaken}, steep.rows["time_s"], motor,
-                             [slice(0, len(motor))], steep.cameras, WIRE, BAR, steep.background).whisks
+    whisk = _whisk(steep, {"high": steep.frames["high"], "low": shaken})
     assert whisk.cameras == 1 and "camera low was left out: its lines of the wire scatter by" in whisk.status
     assert abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma

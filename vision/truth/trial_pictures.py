@@ -1,0 +1,45 @@
+"""A trial as the cameras recorded it: the pictures, and where the motor stood when they were taken."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vision.geometry.camera import Cameras
+from vision.geometry.errors import Refused
+from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.scale import shrunk_frames, shrunk_picture
+from vision.pictures.view import View
+
+_FEWEST_PICTURES = 3  # two tell the noise, a third what moves
+
+
+@dataclass(frozen=True, eq=False)
+class TrialPictures:
+    """frames: per camera the grey pictures (h, w) by frame index, a missing index is a lost frame; time_s, motor_rad
+    (n,) at each frame; background: per camera the scene (h, w) without whisker and bar, or None."""
+
+    frames: Mapping[str, Mapping[int, np.ndarray]]
+    time_s: np.ndarray
+    motor_rad: np.ndarray
+    background: Mapping[str, np.ndarray | None]
+
+    def shrunk(self, scale: int) -> "TrialPictures":
+        """The same with pixels `scale` times as wide."""
+        behind = self.background.items()
+        background = {name: None if empty is None else shrunk_picture(empty, scale) for name, empty in behind}
+        return replace(self, frames=shrunk_frames(self.frames, scale), background=background)
+
+    def views(self, cameras: Cameras) -> tuple[View, ...]:
+        """What each camera that has three pictures or more shows. Raises Refused where none has."""
+        views = tuple(self._view(camera) for camera in cameras
+                      if len(self.frames.get(camera.name, ())) >= _FEWEST_PICTURES)
+        if not views:
+            raise Refused("no camera has three frames or more")
+        return views
+
+    def _view(self, camera) -> View:
+        pictures, empty = self.frames[camera.name], self.background.get(camera.name)
+        first, second = list(pictures.values())[:2]
+        empty = np.zeros(first.shape) if empty is None else np.asarray(empty, dtype=float)
+        return View(camera, pictures, empty, measure_noise(first, second))
