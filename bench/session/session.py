@@ -58,7 +58,6 @@ class Session:
     T_rig_board_sigma_rad: float
     gauges: GivenGauges | None
     camera_names: tuple[str, ...]
-    exposure_s: dict[str, float]
     board_sources: dict[str, Path]
     rig_pictures: dict[str, Path]
     trials: tuple[Trial, ...]
@@ -100,7 +99,6 @@ def load_session(path: Path | str, doubts: Doubts | None = None, *, lenses_known
         T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
         gauges=_gauges(keys.gauges),
         camera_names=_camera_names(board_sources, trials),
-        exposure_s={c.name: c.exposure_s for c in keys.cameras if c.exposure_s is not None},
         board_sources=board_sources,
         rig_pictures=single_pictures(path / "boards" / "rig", "boards/rig"),
         trials=trials,

@@ -1,6 +1,5 @@
 """Pictures in, verdict out: the real thing on the small session, and in full (slow) on the sample session."""
 
-import csv
 import json
 import re
 
@@ -11,17 +10,13 @@ from bench.base.settings import Settings
 from bench.cli import main
 from bench.evaluate import evaluate
 from tests.scenes.formats import documented, keys
-
-
-def read(path) -> list[dict]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+from tests.scenes.results import table
 
 
 def check(session, out, trials) -> None:
     """The limits of truth and estimate that the sample session was recorded for."""
-    truth = {row["trial"]: row for row in read(out / "whisks.csv")}
-    estimates = {(row["trial"], row["estimator"]): row for row in read(out / "estimates.csv")}
+    truth = {row["trial"]: row for row in table(out / "whisks.csv")}
+    estimates = {(row["trial"], row["estimator"]): row for row in table(out / "estimates.csv")}
     for trial, d_x, beta in trials:
         row = truth[trial]
         for column, true, most in (("d_x", d_x, 0.10), ("beta", beta, 0.6)):
@@ -36,8 +31,8 @@ def check(session, out, trials) -> None:
 
 
 def _touching(session, out, trial):
-    true = {row["frame"]: row for row in read(session / "trials" / trial / "truth.csv")}
-    for row in read(out / "track" / f"{trial}.csv"):
+    true = {row["frame"]: row for row in table(session / "trials" / trial / "truth.csv")}
+    for row in table(out / "track" / f"{trial}.csv"):
         if row["touching"] == "1":
             yield float(row["slip_mm"]), float(true[row["frame"]]["slip_mm"])
 
@@ -76,6 +71,6 @@ def test_sample_session(steel_sample, tmp_path):
         tmp_path,
         [("b00_2", 60.122331, -0.552223), ("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)],
     )
-    rows = {(row["trial"], row["estimator"]): row for row in read(tmp_path / "estimates.csv")}
+    rows = {(row["trial"], row["estimator"]): row for row in table(tmp_path / "estimates.csv")}
     for trial, ratio in (("b30_3", 1.204), ("b60_4", 3.03)):
         assert 1 + float(rows[trial, "no_slip"]["error_percent"]) / 100 == pytest.approx(ratio, rel=0.04)

@@ -1,6 +1,5 @@
 """The whole path on a session whose truth is known exactly, so that what is tested is the bench and not vision."""
 
-import csv
 import json
 import shutil
 import sys
@@ -14,17 +13,13 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.records.trial import SeenWhisk
 from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
+from tests.scenes.results import table
 
 TRUE_ALPHA = Settings(alpha_est_deg=10.5)
 
 
 def run(session, out, settings=TRUE_ALPHA, workers=0) -> int:
     return evaluate(session, out, settings, workers=workers)
-
-
-def table(path) -> list[dict]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def estimates(out) -> dict[tuple[str, str], dict]:

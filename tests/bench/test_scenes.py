@@ -1,6 +1,5 @@
 """Path-traced scenes through the command's whole way: light, shadows and rims that no rasterised picture has."""
 
-import csv
 import shutil
 import tomllib
 from pathlib import Path
@@ -11,13 +10,9 @@ import pytest
 from bench.base.settings import Settings
 from bench.base.tables import sigma_name
 from bench.evaluate import evaluate
+from tests.scenes.results import table
 
 SCENES = Path(__file__).resolve().parents[2] / "fixtures" / "scenes"
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.mark.parametrize("name", ["ring", pytest.param("lamp", marks=pytest.mark.slow)])
@@ -32,12 +27,12 @@ def test_a_scene_is_seen_within_what_it_states(name, tmp_path):
     shutil.copytree(SCENES / name, session, ignore=shutil.ignore_patterns("truth*"))
     evaluate(session, tmp_path / "out", Settings(), workers=1)
     truth = tomllib.loads((SCENES / name / "trials" / "w" / "truth.toml").read_text())
-    (seen,) = rows(tmp_path / "out" / "whisks.csv")
+    (seen,) = table(tmp_path / "out" / "whisks.csv")
     for quantity, most in (("d_x_mm", 0.1), ("touch_deg", 0.025), ("beta_deg", 0.6)):
         error, sigma = float(seen[quantity]) - truth[quantity], float(seen[sigma_name(quantity)])
         assert abs(error) < min(most, 3 * sigma), (quantity, error, sigma)
-    true = {row["frame"]: float(row["slip_mm"]) for row in rows(SCENES / name / "trials" / "w" / "truth.csv")}
-    track = [row for row in rows(tmp_path / "out" / "track" / "w.csv") if row["touching"] == "1"]
+    true = {row["frame"]: float(row["slip_mm"]) for row in table(SCENES / name / "trials" / "w" / "truth.csv")}
+    track = [row for row in table(tmp_path / "out" / "track" / "w.csv") if row["touching"] == "1"]
     errors = np.array([float(row["slip_mm"]) - true[row["frame"]] for row in track])
     assert np.all(np.abs(errors) < 3 * np.array([float(row["slip_sigma_mm"]) for row in track]))
     assert np.sqrt(np.mean(errors**2)) < 0.015

@@ -6,17 +6,9 @@ import shutil
 import pytest
 
 from bench.base.doubts import Doubts
-from bench.base.errors import BadInput
 from bench.session.check import checked_session
 from bench.session.session import load_session
-
-
-def refusal(session) -> str:
-    with pytest.raises(BadInput) as bad:
-        checked_session(session)
-    line = str(bad.value)
-    assert "\n" not in line
-    return line
+from tests.scenes.refusals import refusal
 
 
 def edit(file, old: str, new: str) -> None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from bench.base.doubts import Doubts
-from bench.base.errors import BadInput
 from bench.session.check import checked_session, find_damage
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
+from tests.scenes.refusals import refusal
 
 TRIAL = "b30_3"
 
@@ -25,14 +25,6 @@ def signals(session):
 @pytest.fixture
 def frames(session):
     return session / "trials" / TRIAL / "frames.csv"
-
-
-def refusal(session) -> str:
-    with pytest.raises(BadInput) as bad:
-        checked_session(session)
-    line = str(bad.value)
-    assert "\n" not in line
-    return line
 
 
 def notes(session) -> list[str]:

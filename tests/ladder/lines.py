@@ -167,7 +167,7 @@ def band(scene: Scene, picture, background, curve):
 
 
 @dataclass(frozen=True)
-class Found:
+class Measured:
     """Points of all frames: error, stated sigma, bound (px), place, distance from the bar's outline; share kept."""
 
     error: np.ndarray
@@ -177,7 +177,7 @@ class Found:
     from_bar: np.ndarray
     kept: float
 
-    def select(self, keep) -> "Found":
+    def select(self, keep) -> "Measured":
         fields = ("error", "sigma", "bound", "place", "from_bar")
         return replace(self, **{name: getattr(self, name)[keep] for name in fields})
 
@@ -193,7 +193,7 @@ def bounds(scene: Scene, frames, background) -> np.ndarray:
 
 
 def first_look(scene: Scene, rng, off_px: float = 0.7):
-    """Noisy frames, background, and the wire as it is found from a rough curve."""
+    """Noisy frames, background, and the wire as it is measured from a rough curve."""
     background = drawn(scene, None)
     pictures = [drawn(scene, f) + NOISE * rng.standard_normal(SHAPE) for f in range(FRAMES)]
     bands = [band(scene, p, background, rough_curve(scene, f, off_px)) for f, p in enumerate(pictures)]
@@ -204,7 +204,7 @@ def first_look(scene: Scene, rng, off_px: float = 0.7):
 
 
 def look_again(scene: Scene, pictures, background, seen: Traced) -> tuple[Traced, np.ndarray]:
-    """The wire beside a curve through what was found, and the bound of each piece's position, px."""
+    """The wire beside a curve through what was measured, and the bound of each piece's position, px."""
     points, source = to_points(seen)
     curves = [_through(points.select(source == f)) for f in range(FRAMES)]
     bands = [band(scene, p, background, c) for c, p in zip(curves, pictures)]
@@ -215,12 +215,12 @@ def look_again(scene: Scene, pictures, background, seen: Traced) -> tuple[Traced
     return trace(pieces, KNOTS, seen.blur_px), bound
 
 
-def find(scene: Scene, rng) -> Found:
-    """The scene's wire as vision finds it: from a rough start, then again beside a curve through what was found."""
+def find(scene: Scene, rng) -> Measured:
+    """The scene's wire as vision finds it: from a rough start, then again beside a curve through what was measured."""
     traced, bound = look_again(scene, *first_look(scene, rng))
     points, source = to_points(traced)
     kept = np.isin(traced.pieces.place + 1e4 * traced.pieces.source, points.place + 1e4 * source)
-    return Found(errors(scene, points, source), points.sigma_px, bound[kept], np.round(points.place),
+    return Measured(errors(scene, points, source), points.sigma_px, bound[kept], np.round(points.place),
                  _from_bar(scene, points), len(points) / len(traced.pieces))
 
 
@@ -255,10 +255,10 @@ class Figures:
     z: float
 
     @classmethod
-    def of(cls, found: Found) -> "Figures":
-        own, common, share = _apart(found)
-        return cls(len(found.error), found.kept, float(found.error.mean()), float(np.std(common)),
-                   _rms(own / found.bound) / share, _rms(own / found.sigma) / share)
+    def of(cls, measured: Measured) -> "Figures":
+        own, common, share = _apart(measured)
+        return cls(len(measured.error), measured.kept, float(measured.error.mean()), float(np.std(common)),
+                   _rms(own / measured.bound) / share, _rms(own / measured.sigma) / share)
 
     def line(self, name: str) -> str:
         return (f"{name:<40} {self.count:>5} {100 * self.kept:>5.0f} % {self.bias:>+8.4f} {self.common:>8.4f} "
@@ -269,20 +269,20 @@ def _rms(values) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _apart(found: Found):
+def _apart(measured: Measured):
     """Errors less what the frames share at a place (n,), that (p,), and by how much sharing shrinks the former."""
-    bins = np.unique(found.place, return_inverse=True)[1]
+    bins = np.unique(measured.place, return_inverse=True)[1]
     count = np.bincount(bins)
-    common = np.bincount(bins, found.error) / count
-    return found.error - common[bins], common[count > 1], np.sqrt(1.0 - len(count) / len(found.error))
+    common = np.bincount(bins, measured.error) / count
+    return measured.error - common[bins], common[count > 1], np.sqrt(1.0 - len(count) / len(measured.error))
 
 
-def joined(parts: list[Found]) -> Found:
+def joined(parts: list[Measured]) -> Measured:
     """Repeats of a scene as one; their places stay apart."""
     columns = {name: np.concatenate([getattr(p, name) for p in parts])
                for name in ("error", "sigma", "bound", "from_bar")}
     place = np.concatenate([p.place + 1000 * k for k, p in enumerate(parts)])
-    return Found(place=place, kept=float(np.mean([p.kept for p in parts])), **columns)
+    return Measured(place=place, kept=float(np.mean([p.kept for p in parts])), **columns)
 
 
 def main() -> None:
@@ -290,13 +290,13 @@ def main() -> None:
     rng = np.random.default_rng(0)
     print(f"{'wire':<40} {'n':>5} {'kept':>7} {'bias':>8} {'common':>8} {'/bound':>7} {'z':>6}")
     for name, scene in SCENES.items():
-        found = joined([find(scene, rng) for _ in range(repeats)])
+        measured = joined([find(scene, rng) for _ in range(repeats)])
         if scene.bar is None:
-            print(Figures.of(found).line(name), flush=True)
+            print(Figures.of(measured).line(name), flush=True)
             continue
-        near = found.from_bar < 10.0
-        print(Figures.of(found.select(near)).line(f"{name}: within 10 px of it"))
-        print(Figures.of(found.select(~near)).line(f"{name}: farther"), flush=True)
+        near = measured.from_bar < 10.0
+        print(Figures.of(measured.select(near)).line(f"{name}: within 10 px of it"))
+        print(Figures.of(measured.select(~near)).line(f"{name}: farther"), flush=True)
 
 
 if __name__ == "__main__":

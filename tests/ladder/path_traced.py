@@ -54,14 +54,14 @@ class PathTraced:
 def see_scene(number: int, folder: Path, settings: VisionSettings = _STANDARD) -> tuple[PathTraced, Seen]:
     """A scene with its truth, and what is seen of it."""
     views, cameras, rods, motor_rad, axis = read_scene(folder)
-    told = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
+    written = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
     frames = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)
     slip = np.where(frames["contact"] > 0, frames["slip_mm"], np.nan)
     pictures = TrialPictures({view.camera.name: view.frames for view in views}, frames["time_s"], motor_rad,
                              {view.camera.name: view.background for view in views})
     (whisk,) = observe_trial(pictures, [slice(0, len(motor_rad))], cameras, rods, settings).whisks
     seen = slice(None) if whisk.frames is None else whisk.frames.index
-    truth = Truth(np.radians(told["touch_deg"]), told["d_x_mm"], np.radians(told["beta_deg"]), slip[seen])
+    truth = Truth(np.radians(written["touch_deg"]), written["d_x_mm"], np.radians(written["beta_deg"]), slip[seen])
     plane_angle_deg = float(np.degrees(widest_angle_rad(cameras, axis)))
     scene = PathTraced(number, truth, tuple(cameras), plane_angle_deg, motor_rad[seen])
     if np.isnan(whisk.d_x_mm.value):

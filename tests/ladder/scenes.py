@@ -3,7 +3,7 @@ line points of wire and bar that are wrong in every way that the fit allows for.
 
     seed → protocol → recording (bench/rig) → truth
                     → cameras → noisy corners → calibration ┐
-                    → line points with noise, lumps, offsets ┴→ vision's Problem
+                    → line points with noise, offsets        ┴→ vision's Problem
 
 Nothing in here uses the fit's model of whisker or touch. All lengths in mm.
 """
@@ -35,7 +35,7 @@ POINT_STEP_MM, FIRST_POINT_MM, BESIDE_BAR_PX = 2.4, 6.0, 4.0
 # Small pictures and few frames: a scene costs seconds, and many are wanted.
 SIZE_PX, STEP_DEG = (960, 600), 0.7
 BAR_PLACES_MM = np.array([-20.0, 20.0])
-LUMP = 4  # so many neighbouring points have one error
+GROUP = 4  # so many neighbouring points have one error
 LEAST_SIGHT_DEG = 20.0  # between a camera's sight and bar or wire; nearer there is no line to see
 # Where the cameras' planes through the bar nearly coincide, its slope is told by nothing but offsets of whole lines:
 # sigmas of tens of degrees, where nothing is linear.
@@ -234,7 +234,7 @@ def given(scene: Scene, rng: np.random.Generator) -> tuple[Wire, Bar]:
 def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Observed]:
     """Line points of wire and bar in all frames and cameras; exact without a generator.
 
-    With one, each point has its noise, the wire's in lumps; each camera's lines are off as a whole; wire and bar are
+    With one, each point has its noise, the wire's correlated; each camera's lines are off as a whole; wire and bar are
     out of round at each frame's contact, by as much as the fit's priors say.
     """
     frames = len(scene.motor_rad)
@@ -253,7 +253,8 @@ def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> l
         px = camera.project(_centreline_mm(scene, frame, place, more_mm))
         normal = normals(px)
         motor = np.full(len(place), scene.motor_rad[frame])
-        off = model.wire_modes(length, place, motor, scene.motor_rad) @ off_by + sigma * lumpy_noise(len(place), rng)
+        whole = model.wire_modes(length, place, motor, scene.motor_rad) @ off_by
+        off = whole + sigma * correlated_noise(len(place), rng)
         keep = _clear(px, *bar) & np.all((px > 3) & (px < np.array(camera.size_px) - 4), axis=1)
         points = LinePoints(px + off[:, None] * normal, normal, np.full(len(px), sigma), place)
         seen.append(Observed(frame, number, points.select(keep)))
@@ -302,12 +303,12 @@ def _whole(rng, modes_px: np.ndarray) -> np.ndarray:
     return np.zeros(len(modes_px)) if rng is None else modes_px * rng.standard_normal(len(modes_px))
 
 
-def lumpy_noise(count: int, rng) -> np.ndarray:
-    """Noise (count,) of unit variance, the same over each LUMP neighbours; lumps begin anywhere. Zeros without rng."""
+def correlated_noise(count: int, rng) -> np.ndarray:
+    """Noise (count,) of unit variance, the same over each GROUP neighbours, which begin anywhere. Zeros without rng."""
     if rng is None:
         return np.zeros(count)
-    lump = (np.arange(count) + rng.integers(LUMP)) // LUMP
-    return rng.standard_normal(lump[-1] + 1)[lump]
+    group = (np.arange(count) + rng.integers(GROUP)) // GROUP
+    return rng.standard_normal(group[-1] + 1)[group]
 
 
 def _clear(px, middle_px, half_px) -> np.ndarray:

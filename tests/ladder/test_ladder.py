@@ -13,8 +13,8 @@ from tests.ladder.exactness import model_errors, own_errors, scenes
 from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
 from tests.ladder.precision import repeat
 from tests.ladder.rows import all_rows, read_rows
-from tests.ladder.scenes import LUMP, draw_scene, lumpy_noise
-from tests.ladder.views import known
+from tests.ladder.scenes import GROUP, correlated_noise, draw_scene
+from tests.ladder.views import precision_of
 
 FEW = PicturesTable(step_deg=1.5)  # five frames a whisk
 
@@ -70,7 +70,7 @@ def test_rung_4_sigmas_are_neither_too_small_nor_too_wide():
 
 def test_rung_4_one_camera_errs_within_what_it_states():
     """Three draws: a root mean square of three exceeds 2.5 sigma once in three thousand."""
-    alone = known([0.0], 3)
+    alone = precision_of([0.0], 3)
     assert alone.count == 3 and alone.sigma["d_x_mm"] < 0.5
     for name, sigma in alone.sigma.items():
         assert alone.error[name] < 2.5 * sigma, name
@@ -105,10 +105,10 @@ def test_the_same_seed_draws_the_same_scene():
     assert one.protocol != third.protocol
 
 
-def test_lumps_make_a_mean_as_uncertain_as_so_many_fewer_points(rng):
+def test_correlated_noise_makes_a_mean_as_uncertain_as_so_many_fewer_points(rng):
     """2000 means of 400 points tell their variance to 3 %; three of these."""
-    means = [np.mean(lumpy_noise(400, rng)) for _ in range(2000)]
-    assert 400 * np.var(means) == pytest.approx(LUMP, rel=0.1)
+    means = [np.mean(correlated_noise(400, rng)) for _ in range(2000)]
+    assert 400 * np.var(means) == pytest.approx(GROUP, rel=0.1)
 
 
 @pytest.mark.parametrize("shape", ["cylinder"])

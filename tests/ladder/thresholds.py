@@ -118,7 +118,7 @@ def _look(folder: Path, name: str, cameras: Cameras) -> partial:
     )
 
 
-def told(look: partial) -> dict[str, tuple[float, float]]:
+def seen_values(look: partial) -> dict[str, tuple[float, float]]:
     """Values and sigmas of a whisk by name; nothing where there is no truth."""
     (whisk,) = look().whisks
     if np.isnan(whisk.d_x_mm.value):
@@ -150,11 +150,12 @@ def put(module, constant: str, value) -> None:
 
 def sweep_whisks(module, constant: str, values: list[str]) -> None:
     looks = whisks()
-    usual = {name: told(look) for name, look in looks.items()}
+    usual = {name: seen_values(look) for name, look in looks.items()}
     for value in map(literal_eval, values):
         is_array = isinstance(getattr(module, constant), np.ndarray)
         put(module, constant, np.asarray(value) if is_array else value)
-        print(f"{value!s:>20}   {compared(usual, {name: told(look) for name, look in looks.items()})}", flush=True)
+        moved = {name: seen_values(look) for name, look in looks.items()}
+        print(f"{value!s:>20}   {compared(usual, moved)}", flush=True)
 
 
 def main() -> None:

@@ -32,7 +32,7 @@ MIDDLE_MM = np.array([52.0, 3.0, 0.0])
 
 
 @dataclass(frozen=True)
-class Known:
+class Precision:
     """Root mean square errors and median stated sigmas by quantity; how many trials had a truth."""
 
     error: dict[str, float]
@@ -54,7 +54,7 @@ def table_of(turns_deg: Sequence[float]) -> list[CameraTable]:
     return cameras
 
 
-def known(turns_deg: Sequence[float], count: int) -> Known:
+def precision_of(turns_deg: Sequence[float], count: int) -> Precision:
     """How well a whisk is known by cameras turned so far, over `count` trials."""
     trial = TrialTable(beta_deg=SLOPE_DEG, d_x_mm=D_X_MM)
     protocol = Protocol(cameras=table_of(turns_deg), trials=[trial], pictures=PicturesTable(step_deg=STEP_DEG))
@@ -62,17 +62,17 @@ def known(turns_deg: Sequence[float], count: int) -> Known:
     rows = [row for row in (row_of(scene, see_points(scene)) for scene in scenes) if "d_x_mm_error" in row]
     columns = {name: np.array([[row[f"{name}_{what}"] for row in rows] for what in ("error", "sigma")])
                for name in QUANTITIES}
-    return Known({name: float(np.sqrt(np.mean(c[0] ** 2))) for name, c in columns.items()},
+    return Precision({name: float(np.sqrt(np.mean(c[0] ** 2))) for name, c in columns.items()},
                  {name: float(np.median(c[1])) for name, c in columns.items()}, len(rows))
 
 
-def line(label: str, known: Known) -> str:
+def line(label: str, precision: Precision) -> str:
     """One line of the table."""
-    parts = (f"{name} {known.error[name]:.4f} ({known.sigma[name]:.4f})" for name in QUANTITIES)
+    parts = (f"{name} {precision.error[name]:.4f} ({precision.sigma[name]:.4f})" for name in QUANTITIES)
     return f"{label:24s}" + "  ".join(parts)
 
 
-def draw(found: dict[float, Known], path: Path) -> None:
+def draw(found: dict[float, Precision], path: Path) -> None:
     """Errors (points) and stated sigmas (lines) of d_x, slip and slope against the angle between the planes."""
     from matplotlib.figure import Figure
 
@@ -100,10 +100,10 @@ def main() -> None:
     print(f"{options.count} trials each: RMS error (median stated sigma)")
     for label, turns in (("one camera", [0.0]), ("two, 40 degrees apart", [-20.0, 20.0]),
                          ("three, 20 degrees apart", [-20.0, 20.0, 0.0])):
-        print(line(label, known(turns, options.count)), flush=True)
+        print(line(label, precision_of(turns, options.count)), flush=True)
     found = {}
     for angle in ANGLES_DEG:
-        found[angle] = known([-angle / 2, angle / 2], options.count)
+        found[angle] = precision_of([-angle / 2, angle / 2], options.count)
         print(line(f"two, {angle:g} degrees apart", found[angle]), flush=True)
     if options.figure:
         draw(found, options.figure)

@@ -1,6 +1,5 @@
 """The report: all of it in one file, every name escaped, every whisk found, and made again from results alone."""
 
-import csv
 import io
 import re
 import shutil
@@ -22,6 +21,7 @@ from bench.report.page.standing import standings, sureness
 from bench.report.page.svg import Panel, ticks
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script
 from bench.report.pooled import read_run
+from tests.scenes.results import table
 
 WRITTEN = (REPORT, METHODS, BIBLIOGRAPHY)
 EMPTY = {"meta", "link", "input", "img", "br"}
@@ -65,11 +65,6 @@ def reader(html) -> Reader:
     found.feed(html)
     assert not found.open
     return found
-
-
-def table(path) -> list[dict]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_nothing_is_loaded_from_elsewhere(html, reader):

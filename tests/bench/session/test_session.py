@@ -123,11 +123,6 @@ def test_gauges_of_the_session(small_copy):
     np.testing.assert_array_equal(gauges.matrix_sigma_Nmm_per_V, np.zeros((2, 2)))
 
 
-def test_exposure_of_a_camera(small_copy):
-    replace(small_copy / "session.toml", 'name = "low"', 'name = "low"\nexposure_s = 0.002')
-    assert load_session(small_copy).exposure_s == {"low": 0.002}
-
-
 def test_written_rotation_is_made_exact(small_session):
     rotation = load_session(small_session).T_rig_board[:, :3]
     np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-14)

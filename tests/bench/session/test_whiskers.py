@@ -1,6 +1,5 @@
 """Whiskers that taper, from a session's signals alone to α and d_x; and how the session states them."""
 
-import csv
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
+from tests.scenes.results import table
 
 ALPHA_DEG, D_X_MM = 10.5, 55.0
 PROTOCOL = """
@@ -29,11 +29,6 @@ d_x_scatter_mm = 0.0
 """
 
 
-def read(path):
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 @pytest.fixture(scope="module", params=["cylinder", "cone", "tapered"])
 def evaluated(request, tmp_path_factory):
     """Folder of results of a session without pictures, on a bar as wanted."""
@@ -46,12 +41,12 @@ def evaluated(request, tmp_path_factory):
 
 
 def test_fitted_friction_is_that_of_the_rig(evaluated):
-    (row,) = read(evaluated / "out" / "surfaces.csv")
+    (row,) = table(evaluated / "out" / "surfaces.csv")
     assert float(row["alpha_least_squares_deg"]) == pytest.approx(ALPHA_DEG, abs=0.4)
 
 
 def test_10_at_the_right_friction_finds_the_distance(evaluated):
-    rows = [r for r in read(evaluated / "out" / "estimates.csv") if r["estimator"] == "with_friction"]
+    rows = [r for r in table(evaluated / "out" / "estimates.csv") if r["estimator"] == "with_friction"]
     gentle = [r for r in rows if r["trial"].split("_")[1] in ("b00", "b15", "b30")]
     assert len(gentle) == 3
     for row in gentle:

@@ -1,6 +1,5 @@
 """Felt moments against those of the seen shape: what stands out, with its likeliest cause, spoils no other whisk."""
 
-import csv
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.gauges.readings import Pairs
 from bench.rig.simulate import simulate
 from bench.trials.agreement import LEAST_CHANCE, agreement
+from tests.scenes.results import table
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
 GAUGES = GaugeMatrix(MATRIX, (0.003 * 11) ** 2 * np.eye(4))
@@ -85,25 +85,20 @@ d_x_mm = 55.0
 """
 
 
-def read(path):
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 @pytest.mark.parametrize("shape", ["cylinder", "cone"])
 def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(tmp_path, exact_vision, shape):
     (tmp_path / "p.toml").write_text(PROTOCOL.format(shape=shape))
     session = simulate(tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4)
     evaluate(session, tmp_path / "sound", Settings(), workers=0)
-    assert {r["status"] for r in read(tmp_path / "sound" / "whisks.csv") if r["trial"].startswith("steel")} == {""}
+    assert {r["status"] for r in table(tmp_path / "sound" / "whisks.csv") if r["trial"].startswith("steel")} == {""}
     (trial,) = (session / "trials").glob("steel_b45*")
     signals = trial / "signals.csv"
     signals.write_text(signals.read_text().replace("y_V,z_V", "z_V,y_V", 1))
     evaluate(session, tmp_path / "out", Settings(), workers=0)
-    status = {r["trial"]: r["status"] for r in read(tmp_path / "out" / "whisks.csv")}
+    status = {r["trial"]: r["status"] for r in table(tmp_path / "out" / "whisks.csv")}
     assert "y_V and z_V look exchanged" in status.pop(trial.name)
     assert all("seen shape" not in s for s in status.values())
-    (sound,), (spoilt,) = (read(tmp_path / out / "surfaces.csv") for out in ("sound", "out"))
+    (sound,), (spoilt,) = (table(tmp_path / out / "surfaces.csv") for out in ("sound", "out"))
     alphas = [float(s["alpha_least_squares_deg"]) for s in (sound, spoilt)]
     assert alphas[1] == pytest.approx(alphas[0], abs=0.5)
     assert float(spoilt["alpha_felt_deg"]) == pytest.approx(float(sound["alpha_felt_deg"]), abs=0.5)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.scenes import LUMP, as_problem, begin, draw_scene, line_points, lumpy_noise
+from tests.ladder.scenes import GROUP, as_problem, begin, correlated_noise, draw_scene, line_points
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve, weighted_jacobian
 from vision.fit.uncertainty import uncertainty
@@ -56,22 +56,22 @@ def test_what_changes_along_the_wire_is_told_better(fitted):
     assert np.median(ratio[problem.first_bend:]) < 0.98
 
 
-@pytest.mark.parametrize("lump", [1, LUMP])
-def test_what_neighbours_share_is_measured(lump):
-    """Lumps of four make the variance of a mean four times as large; the fit's own freedom hides a fifth of it.
+@pytest.mark.parametrize("group", [1, GROUP])
+def test_what_neighbours_share_is_measured(group):
+    """Groups of four with one error make the variance of a mean four times as large; the fit hides a fifth of it.
 
     Ten frames of some thirty points tell each correlation to 0.06, and a sum of those above 0.05 to 0.3 or so.
     """
     scene = draw_scene(0)
     rng = np.random.default_rng(3)
     exact = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
-    problem = replace(exact, seen=[_with_noise(seen, lump, rng) if seen.frame >= 0 else seen for seen in exact.seen])
+    problem = replace(exact, seen=[_with_noise(seen, group, rng) if seen.frame >= 0 else seen for seen in exact.seen])
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
     wider = [(1.0 + alike) / (1.0 - alike) for alike in inflated_by_residuals(problem, state).alike]
-    assert np.mean(wider) == pytest.approx({1: 1.0, LUMP: 0.8 * LUMP}[lump], abs={1: 0.3, LUMP: 0.8}[lump])
+    assert np.mean(wider) == pytest.approx({1: 1.0, GROUP: 0.8 * GROUP}[group], abs={1: 0.3, GROUP: 0.8}[group])
 
 
-def _with_noise(seen, lump: int, rng):
+def _with_noise(seen, group: int, rng):
     points = seen.points
-    off = lumpy_noise(len(points), rng) if lump == LUMP else rng.standard_normal(len(points))
+    off = correlated_noise(len(points), rng) if group == GROUP else rng.standard_normal(len(points))
     return replace(seen, points=replace(points, px=points.px + (points.sigma_px * off)[:, None] * points.normal))
