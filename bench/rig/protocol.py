@@ -4,7 +4,6 @@ refused.
 
 import hashlib
 import itertools
-import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,6 +11,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from bench.base.errors import BadInput
+from bench.rig.feasible import check_protocol
 
 Three = tuple[float, float, float]
 Pair = tuple[float, float]
@@ -277,32 +277,5 @@ def load(protocol: str | Path) -> Protocol:
         found = msgspec.convert(tables, Protocol)
     except msgspec.ValidationError as problem:
         raise BadInput(str(problem), file=path) from None
-    _check(found, path)
+    check_protocol(found, path)
     return found
-
-
-def _check(protocol, path):
-    names = [c.name for c in protocol.cameras]
-    if len(set(names)) < len(names) or "rig" in names:
-        raise BadInput(f"cameras need names of their own, none of them 'rig'; found {names}", file=path)
-    for run in protocol.runs():
-        _check_run(protocol, run, path)
-
-
-def _check_run(protocol, run, path):
-    table, pictures = run.table, protocol.pictures
-    if not -80 <= run.beta_deg <= 80 or not -60 <= run.psi_deg <= 60:
-        raise BadInput(f"beta_deg {run.beta_deg:g}, psi_deg {run.psi_deg:g}; ±80 and ±60 are allowed", file=path)
-    if not 0.1 * protocol.whisker.length_mm <= run.d_x_mm <= 1.05 * protocol.whisker.length_mm:
-        raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside 0.1 to 1.05 of the whisker's length", file=path)
-    if not 0.01 <= run.speed_deg_s <= 1000:
-        raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 1000 is allowed", file=path)
-    if table.static_friction is not None and table.static_friction < table.friction:
-        raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
-    if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:
-        found = f"found {run.before_deg:g} and {run.after_deg:g}"
-        raise BadInput(f"the motor's before_deg is 0.1 to 90 and its after_deg 0.1 to 25; {found}", file=path)
-    if pictures.before_deg > run.before_deg or pictures.after_deg > run.after_deg:
-        raise BadInput("pictures: before_deg and after_deg are at most the motor's", file=path)
-    if math.isclose(sum(abs(x) for x in protocol.light.towards), 0):
-        raise BadInput("light: towards is a direction, not zero", file=path)

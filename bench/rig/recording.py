@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -54,7 +55,11 @@ class Recording:
         bar, touch = _placed(protocol, run, rod, rng)
         stroke = _stroke(protocol, run, touch)
         frames = _frames(protocol, run, touch, stroke)
-        whisks = _whisks(protocol, run, rod, bar, touch, stroke, frames, rng)
+        frictions = _frictions(protocol, run.table, len(stroke.forward), rng)
+        march = partial(Whisk.run, rod, bar, touch=touch, end_rad=float(stroke.angles_rad.max()), step_rad=_STEP_RAD,
+                        stops_rad=frames.motor_rad[(frames.whisk == 0) & ~frames.back], back=bool(stroke.back))
+        made = {friction: march(friction) for friction in dict.fromkeys(frictions)}  # whisks of one friction are alike
+        whisks = tuple(made[friction] for friction in frictions)
         return cls(run, rod, bar, touch, stroke, whisks, frames, _signals(protocol, run, stroke, whisks, rng))
 
 
@@ -93,23 +98,14 @@ def _frames(protocol, run, touch, stroke):
     )
 
 
-def _whisks(protocol, run, rod, bar, touch, stroke, frames, rng):
-    """The whisks of a recording; without scatter of the friction, and with regular rests, each is like the first."""
-    table, friction = run.table, protocol.friction
+def _frictions(protocol, table, count: int, rng) -> list[Friction]:
+    """Friction in each of the whisks."""
+    friction = protocol.friction
     static = table.friction if table.static_friction is None else table.static_friction
-    end, back = float(stroke.angles_rad.max()), bool(stroke.back)
-    stops = frames.motor_rad[(frames.whisk == 0) & ~frames.back]
-    factors = np.exp(friction.scatter * rng.standard_normal(len(stroke.forward)))
+    factors = np.exp(friction.scatter * rng.standard_normal(count))
     rests = [_rests(friction.irregular, rng) for _ in factors]
-    made = {}
-    for kind in zip(factors, rests):
-        if kind not in made:
-            factor, reached = kind
-            finest = math.radians(friction.finest_deg)
-            coefficients = Friction(static * factor, table.friction * factor, finest, reached)
-            made[kind] = Whisk.run(rod, bar, coefficients, touch, end, step_rad=_STEP_RAD, stops_rad=stops,
-                                    back=back)
-    return tuple(made[kind] for kind in zip(factors, rests))
+    finest = math.radians(friction.finest_deg)
+    return [Friction(static * f, table.friction * f, finest, reached) for f, reached in zip(factors, rests)]
 
 
 def _rests(irregular: float, rng) -> tuple[float, ...]:

@@ -35,8 +35,9 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
              **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")}}
     slip = np.sum((point - touch.point_mm[..., None, :]) * each.direction, axis=-1)
     d_y, d_z = _deflection(problem, vector, touch, point)
+    alpha = _angle_to_normal(_force(curves, touch, arc, d_y, d_z), each, point, beta)
     frame = {"slip": slip, "longitudinal_slip": arc - touch.arc_mm[..., None], "d_y": d_y, "d_z": d_z, "arc": arc,
-             "phi": np.arctan2(d_z, d_y), "alpha": _force_angle(curves, each, touch, arc, point, d_y, d_z, beta),
+             "phi": np.arctan2(d_z, d_y), "alpha": alpha,
              **{name: point[..., k] for k, name in enumerate("xyz")}}
     return Measured(whisk, frame)
 
@@ -62,21 +63,23 @@ def _deflection(problem: Problem, vector, touch: FirstTouch, point):
     return -sine * away[..., 0] + cosine * away[..., 1], -away[..., 2]
 
 
-def _force_angle(curves: Curves, axis: BarAxis, touch: FirstTouch, arc, point, d_y, d_z, beta):
-    """Angle (…, f) between the contact's force, across the whisker, and its normal; |beta| - |phi| where psi = 0.
-
-    The force on the whisker points the way it was bent, from the virtual point to the contact.
-    """
+def _force(curves: Curves, touch: FirstTouch, arc, d_y, d_z):
+    """Way (…, f, 3) in which the contact's force on the whisker points, across it: that in which it was bent, from the
+    virtual point to the contact."""
     _, tangent = curves.at(arc[..., None])
     along = tangent[..., 0, :] / np.linalg.norm(tangent[..., 0, :], axis=-1, keepdims=True)
     cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
     bent = np.stack([sine * d_y, -cosine * d_y, d_z], axis=-1)
-    bent = bent - np.sum(bent * along, axis=-1, keepdims=True) * along
+    return bent - np.sum(bent * along, axis=-1, keepdims=True) * along
+
+
+def _angle_to_normal(force, axis: BarAxis, point, beta):
+    """Angle (…, f) between the contact's force and its normal, uphill: |beta| - |phi| where psi = 0."""
     away = point - axis.point_mm
     normal = away - np.sum(away * axis.direction, axis=-1, keepdims=True) * axis.direction
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    uphill = -np.sum(bent * axis.direction, axis=-1) * np.where(beta >= 0, 1.0, -1.0)[..., None]
-    return np.arctan2(uphill, np.sum(bent * normal, axis=-1))
+    uphill = -np.sum(force * axis.direction, axis=-1) * np.where(beta >= 0, 1.0, -1.0)[..., None]
+    return np.arctan2(uphill, np.sum(force * normal, axis=-1))
 
 
 @dataclass(frozen=True)
