@@ -29,7 +29,7 @@ _LAST = 1e-6  # of a Newton step, in parts
 
 
 @dataclass(frozen=True)
-class State:
+class ContactState:
     """One equilibrium in contact. Vectors in the rig frame except `force_hub_N`. `share`: force along the bar over
     the normal force (its size). `heading_rad`: direction of the material's motion, 0 along the bar. `status` is
     held, sliding or tip.
@@ -62,26 +62,31 @@ class Contact:
     def __init__(self, rod: Rod, bar: Bar):
         self.rod, self.bar, self.elastica = rod, bar, Elastica(rod)
 
-    def touching(self, touch: Touch) -> State:
+    def touching(self, touch: Touch) -> ContactState:
         """The state at first touch, no force yet."""
         tangent = np.array([1.0, 0, 0]) + self.rod.rest.slope(touch.arc_mm)
         status = "tip" if touch.arc_mm >= self.rod.length_mm else "held"
-        return State(touch.motor_rad, np.zeros(3), touch.arc_mm, touch.point_mm,
+        return ContactState(touch.motor_rad, np.zeros(3), touch.arc_mm, touch.point_mm,
                      _turn(touch.motor_rad) @ tangent, 0.0, status)
 
-    def hold(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip: bool = False) -> State:
+    def hold(
+        self, motor_rad: float, old: ContactState, guess: np.ndarray, friction: float, tip: bool = False
+    ) -> ContactState:
         """Equilibrium at which the material has not moved along the bar since `old`, friction being what the cone
         leaves.
         """
         return self._solve(motor_rad, old, guess, Held(friction), tip)
 
     def slide(
-        self, motor_rad: float, old: State, guess: np.ndarray, heading_rad: float, friction: float, tip: bool = False
-    ) -> State:
+        self, motor_rad: float, old: ContactState, guess: np.ndarray, heading_rad: float, friction: float,
+        tip: bool = False,
+    ) -> ContactState:
         """Equilibrium on the edge of the cone, the force against the motion since `old`."""
         return self._solve(motor_rad, old, np.append(guess, heading_rad), Sliding(friction), tip)
 
-    def ease(self, motor_rad: float, old: State, guess: np.ndarray, friction: float, tip: bool = False) -> State:
+    def ease(
+        self, motor_rad: float, old: ContactState, guess: np.ndarray, friction: float, tip: bool = False
+    ) -> ContactState:
         """Sliding where no heading is at hand (the motor has just turned back): friction first as soft as oil, then
         ever stiffer, until it gives way by no more than 10 nm."""
         for give_mm in np.geomspace(1.0, GIVE_MM, 16):
@@ -89,7 +94,7 @@ class Contact:
             guess = state.unknowns
         return state
 
-    def foot_side(self, state: State) -> float:
+    def foot_side(self, state: ContactState) -> float:
         """Positive where the bar's nearest point lies behind the contact along the whisker, negative ahead of it."""
         return float((state.point_mm - self.bar.foot_mm(state.point_mm)) @ state.tangent)
 
@@ -153,7 +158,7 @@ class _Here:
     shear: np.ndarray
     motion: np.ndarray
 
-    def state(self, motor_rad, unknowns, step, status) -> State:
+    def state(self, motor_rad, unknowns, step, status) -> ContactState:
         """The solution after Newton's last step: the pose follows to first order, what is left is the step squared."""
         point, tangent = (v - by @ step[:4] for v, by in ((self.pose.point, self.pose.point_by),
                                                           (self.pose.tangent, self.pose.tangent_by)))
@@ -164,7 +169,7 @@ class _Here:
         if self.press < 0 or (sliding and onward < _BACKWARDS_MM):
             raise ArithmeticError("a contact that pulls, or friction along the motion")
         share = abs(self.shear[0]) / self.press
-        return State(motor_rad, unknowns[:3], float(unknowns[3]), point, tangent, share, status,
+        return ContactState(motor_rad, unknowns[:3], float(unknowns[3]), point, tangent, share, status,
                      heading, float(self.motion[1]), self.pose.angle)
 
 
@@ -174,7 +179,7 @@ class _Problem:
 
     contact: Contact
     turn: np.ndarray
-    old: State
+    old: ContactState
     law: Sliding | Oiled | Held
     tip: bool
 
@@ -239,7 +244,7 @@ class _Problem:
         raise ArithmeticError("no way towards a contact found")
 
 
-def moments_Nmm(state: State) -> tuple[float, float]:
+def moments_Nmm(state: ContactState) -> tuple[float, float]:
     """(m_y, m_z) that the base exerts on the whisker, in the hub frame: −(P × F)."""
     point = _turn(-state.motor_rad) @ state.point_mm
     moment = -cross(point, state.force_hub_N)

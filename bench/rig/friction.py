@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rig.bar import Bar, Touch, turned
-from bench.rig.contact import Contact, State
+from bench.rig.contact import Contact, ContactState
 from bench.rig.rod import Rod
 
 _ON_THE_CONE, _CLOSE_RAD = 1e-4, 1e-6
@@ -54,7 +54,7 @@ class March:
         """The coefficient that the present rest reaches."""
         return self.friction.at_rest(self.rest)
 
-    def along(self, path_rad: Iterable[float]) -> tuple[np.ndarray, list[State | None]]:
+    def along(self, path_rad: Iterable[float]) -> tuple[np.ndarray, list[ContactState | None]]:
         """Motor angles and states met on the way through the angles of `path_rad`; a jump yields two states at one
         angle.
 
@@ -65,7 +65,7 @@ class March:
         angles = [motor if state is None else state.motor_rad for motor, state in met]
         return np.array(angles), [state for _, state in met]
 
-    def _go(self, motor_rad) -> list[State | None]:
+    def _go(self, motor_rad) -> list[ContactState | None]:
         """Step to a motor angle; the states met on the way, the last one at that angle."""
         if motor_rad <= self.touch.motor_rad + _NO_PUSH_RAD or self.passed:
             self.state, self.before = self.contact.touching(self.touch), None

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bench.rig.marched import MarchedWhisk
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, ring
-from bench.rig.whisk import Whisk
 
 _TICK_S = 5e-4
 
 
-def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[Whisk], times_s: np.ndarray) -> np.ndarray:
+def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
     """(n, 2): m_y, m_z in the hub frame at times, without vibration."""
     motor, moments = stroke.angle_rad(times_s), np.zeros((len(times_s), 2))
     for whisk, start, turn, end in _periods(stroke, whisks):
@@ -22,7 +22,7 @@ def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[Whisk], times_s: np.ndarra
     return moments
 
 
-def ringing_Nmm(stroke: Stroke, whisks: Sequence[Whisk], times_s: np.ndarray, damping: float) -> np.ndarray:
+def ringing_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray, damping: float) -> np.ndarray:
     """(n, 2): the free mode rung by the motor's ramps, the propped one by touch and by every jump of stick–slip."""
     rod, total = whisks[0].rod, np.zeros((len(times_s), 2))
     free = Mode.of(rod)
@@ -41,7 +41,7 @@ def ringing_Nmm(stroke: Stroke, whisks: Sequence[Whisk], times_s: np.ndarray, da
     return total
 
 
-def _periods(stroke, whisks) -> Iterator[tuple[Whisk, float, float, float]]:
+def _periods(stroke, whisks) -> Iterator[tuple[MarchedWhisk, float, float, float]]:
     """Each whisk with its beginning, its turning back and its end; together they are the whole recording."""
     starts = [0.0, *(start for start, _ in stroke.forward[1:])]
     for whisk, start, end, (_, turn) in zip(whisks, starts, [*starts[1:], math.inf], stroke.forward):

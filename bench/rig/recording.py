@@ -10,10 +10,10 @@ from bench.rig import build
 from bench.rig.bar import Bar, Touch, first_touch
 from bench.rig.friction import Friction
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
+from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.rod import Rod
 from bench.rig.stroke import Stroke
-from bench.rig.whisk import Whisk
 
 _STEP_RAD = math.radians(0.1)
 _RESTS = 500  # more than a stroke of 25° has teeth of 0.05°
@@ -44,7 +44,7 @@ class Recording:
     bar: Bar
     touch: Touch
     stroke: Stroke
-    whisks: tuple[Whisk, ...]
+    whisks: tuple[MarchedWhisk, ...]
     frames: Frames
     signals: np.ndarray
 
@@ -56,8 +56,9 @@ class Recording:
         stroke = _stroke(protocol, run, touch)
         frames = _frames(protocol, run, touch, stroke)
         frictions = _frictions(protocol, run.table, len(stroke.forward), rng)
-        march = partial(Whisk.run, rod, bar, touch=touch, end_rad=float(stroke.angles_rad.max()), step_rad=_STEP_RAD,
-                        stops_rad=frames.motor_rad[(frames.whisk == 0) & ~frames.back], back=bool(stroke.back))
+        end_rad, stops_rad = float(stroke.angles_rad.max()), frames.motor_rad[(frames.whisk == 0) & ~frames.back]
+        march = partial(MarchedWhisk.run, rod, bar, touch=touch, end_rad=end_rad, step_rad=_STEP_RAD,
+                        stops_rad=stops_rad, back=bool(stroke.back))
         made = {friction: march(friction) for friction in dict.fromkeys(frictions)}  # whisks of one friction are alike
         whisks = tuple(made[friction] for friction in frictions)
         return cls(run, rod, bar, touch, stroke, whisks, frames, _signals(protocol, run, stroke, whisks, rng))

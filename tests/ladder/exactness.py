@@ -20,9 +20,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.rig.protocol import MotorTable, PicturesTable, WhiskerTable
 from tests.ladder.scenes import STEP_DEG, Scene, Sigmas, as_problem, begin, draw_scene, line_points
+from tests.scenes.model_scenes import bar_middle
 from vision.fit.problem import BAR, Problem, State, curves_of
 from vision.fit.quantities import Measured, measure
-from vision.fit.solve import bar_middle, solve
+from vision.fit.solve import solve
 from vision.geometry.centreline import Curves
 from vision.geometry.silhouette import normals
 from vision.lines.points import LinePoints, Observed

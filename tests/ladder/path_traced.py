@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.ladder.bar_scenes import read_scene
 from tests.ladder.coverage import COLUMNS, QUANTITIES, Seen, row_of, summary
 from tests.ladder.rows import all_rows
+from tests.ladder.scenes import Truth
 from vision.bar.one_view import widest_angle_rad
 from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
@@ -28,16 +29,6 @@ from vision.truth.trial_pictures import TrialPictures
 ROOT = Path(__file__).resolve().parents[2]
 FAR_SIGMAS = 4.0
 _STANDARD = VisionSettings()
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """Of one whisk, rad and mm; slip (f,) of each frame, NaN before touch."""
-
-    touch: float
-    d_x: float
-    beta: float
-    slip: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

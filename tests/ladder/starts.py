@@ -94,6 +94,11 @@ def looked_twice(background, frames, off_px: float, phase_rad: float) -> Traced:
     return trace(cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0)), KNOTS, seen.blur_px)
 
 
+def whole_sigma_px(traced: Traced) -> np.ndarray:
+    """Sigma (s,) of each piece alone, what it shares with others included."""
+    return np.hypot(traced.located.sigma_px, np.linalg.norm(traced.located.shared_px, axis=1))
+
+
 def errors(traced: Traced) -> np.ndarray:
     """Distance (s,) of each piece from the axis, px."""
     column, heights = np.arange(SHAPE[1]), np.array(axis_heights())
@@ -115,8 +120,8 @@ def main() -> None:
             first = np.concatenate([errors(looked_once(*one, *off)) for one in pictures])
             located = [looked_twice(*one, *off) for one in pictures]
             error = np.concatenate([errors(one) for one in located])
-            own, sigma = (np.concatenate([getattr(one.located, key) for one in located])
-                          for key in ("sigma_px", "whole_sigma_px"))
+            own = np.concatenate([one.located.sigma_px for one in located])
+            sigma = np.concatenate([whole_sigma_px(one) for one in located])
             begin = error if begin is None else begin
             moved = np.abs(error - begin) / sigma
             print(f"{name:<20}{start:<38}{len(error):>6}{_rms(first):>10.3f}{_rms(error):>8.3f}{np.median(own):>8.3f}"

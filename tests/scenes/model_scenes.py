@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from vision.fit.problem import Problem, State, bar_axis, curves_of
-from vision.fit.solve import bar_middle
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Bar, Rods, Wire
-from vision.geometry.silhouette import normals
+from vision.geometry.silhouette import normals, outline
 from vision.lines.points import LinePoints, Observed
 
 WIRE = Wire("cylinder", 100.0, 1.0)
@@ -74,6 +73,13 @@ def with_points(problem, state, rng=None, sigma=0.05):
         place = np.linspace(-25.0, 25.0, 20)
         seen.append(Observed(-1, number, _points(bar_middle(problem, view, state.vector, place), place, sigma, rng)))
     return replace(problem, seen=seen)
+
+
+def bar_middle(problem, camera, vector, place_mm):
+    """Middle (n, 2) of the bar's outline in a camera, at places (n,) along its axis."""
+    axis = bar_axis(problem, vector)
+    points = axis.point_mm + place_mm[:, None] * axis.direction
+    return outline(camera, points, np.broadcast_to(axis.direction, points.shape), problem.rods.bar.radius_mm)[0]
 
 
 def _points(px, place, sigma, rng):

@@ -21,12 +21,12 @@ import cv2
 from bench.rig import build
 from bench.rig.bar import Bar, first_touch
 from bench.rig.friction import Friction
+from bench.rig.marched import MarchedWhisk
 from bench.rig.parts import Job, Part, frames_of
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
 from bench.rig.rod import Rod
 from bench.rig.simulate import make
-from bench.rig.whisk import Whisk
 
 
 def cpu_s(work, repeats: int = 5) -> float:
@@ -46,7 +46,7 @@ def whisk_s(beta_deg: float, static: float, kinetic: float, back: bool) -> float
                      whisker_radius_mm=0.5)  # fmt: skip
     touch, step = first_touch(rod, bar, 0.04, 60.0), math.radians(0.1)
     end, friction = touch.motor_rad + 60 * step, Friction(static, kinetic)
-    return cpu_s(lambda: Whisk.run(rod, bar, friction, touch, end, step_rad=step, back=back))
+    return cpu_s(lambda: MarchedWhisk.run(rod, bar, friction, touch, end, step_rad=step, back=back))
 
 
 def frame_s(protocol_name: str, trial: int, camera: int) -> tuple[float, int]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, Priors, Sightings, State, predict
+from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, BundleState, Priors, Sightings, predict
 from vision.geometry.rotation import pose_difference
 
 _GLOBAL = N_CAMERA + N_BOARD
@@ -27,7 +27,7 @@ class Solution:
     """The state of least cost, its residuals (n, 2) px (seen − predicted), and the covariance (16 C + 3
     squared) of the global parameters with all view poses marginalised; rows of held parameters are 0."""
 
-    state: State
+    state: BundleState
     residual_px: np.ndarray
     covariance: np.ndarray
     cost: float
@@ -77,7 +77,7 @@ class _Normal:
 
 
 def _normal_equations(
-    state: State, seen: Sightings, corners_mm: np.ndarray, priors: Priors, width: float
+    state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors, width: float
 ) -> _Normal:
     px, J = predict(state, seen, corners_mm)
     residual = seen.px - px
@@ -105,7 +105,7 @@ def _shot_blocks(weighed: np.ndarray, starts: np.ndarray) -> np.ndarray:
     return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
 
 
-def _without_instants(blocks: np.ndarray, state: State, seen: Sightings, priors: Priors):
+def _without_instants(blocks: np.ndarray, state: BundleState, seen: Sightings, priors: Priors):
     """Eliminates each picture's instant from its block (25 × 26 or 37 × 38, the last column being the gradient)."""
     starts = seen.shot_starts()
     camera, view = seen.camera[starts], seen.view[starts]
@@ -123,7 +123,7 @@ def _without_instants(blocks: np.ndarray, state: State, seen: Sightings, priors:
     return shots, blocks - lost / weight[:, None, None], float(np.sum(information * late**2))
 
 
-def _columns(state: State, camera: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _columns(state: BundleState, camera: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where a picture's parameters stand among the globals (s, 19) and among the views' (s, 6 or 18)."""
     size = N_CAMERA * len(state.lens)
     own = N_CAMERA * camera[:, None] + np.arange(N_CAMERA)
@@ -135,7 +135,7 @@ def _columns(state: State, camera: np.ndarray, view: np.ndarray) -> tuple[np.nda
     return np.concatenate([own, shared], axis=1), poses
 
 
-def _assemble(blocks: np.ndarray, shots: _Shots, state: State) -> tuple[np.ndarray, ...]:
+def _assemble(blocks: np.ndarray, shots: _Shots, state: BundleState) -> tuple[np.ndarray, ...]:
     """Adds each picture's block where its parameters stand."""
     columns, poses, m = shots.columns, shots.poses, _GLOBAL
     size, n = N_CAMERA * len(state.lens) + N_BOARD, N_VIEW * len(state.T_world_board)
@@ -151,7 +151,7 @@ def _assemble(blocks: np.ndarray, shots: _Shots, state: State) -> tuple[np.ndarr
     return A, a, B, C, c
 
 
-def _with_priors(parts, shots: _Shots, cost: float, residual, state: State, priors: Priors) -> _Normal:
+def _with_priors(parts, shots: _Shots, cost: float, residual, state: BundleState, priors: Priors) -> _Normal:
     """Adds the observations beside the pictures, and takes out what is held."""
     A, a, B, C, c = parts
     weight = 1.0 / priors.sigma**2
@@ -232,8 +232,8 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     )
 
 
-def solve(
-    state: State,
+def adjust_bundle(
+    state: BundleState,
     seen: Sightings,
     corners_mm: np.ndarray,
     priors: Priors,
@@ -262,7 +262,7 @@ def solve(
     return _solution(state, normal, priors, iteration, done or fall < _NEARLY_AT_REST)
 
 
-def _solution(state: State, normal: _Normal, priors: Priors, iterations: int, done: bool) -> Solution:
+def _solution(state: BundleState, normal: _Normal, priors: Priors, iterations: int, done: bool) -> Solution:
     covariance = np.zeros((len(priors.free),) * 2)
     if np.isfinite(normal.cost) and priors.free.any():
         reduced, *_ = _eliminate(normal, normal.C, priors.free)

@@ -57,7 +57,7 @@ class Sightings:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class BundleState:
     """All parameters. lens (C, 9); T_camera_world (C, 3, 4); T_world_board (V, 3, 4); board (3,):
     BOARD_COLUMNS; clock (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
     trajectory: the views in time, along which the board moves between pictures of one view; None where cameras are
@@ -84,7 +84,7 @@ class State:
         per_camera[:, :9], per_camera[:, CLOCK] = self.lens, self.clock
         return np.concatenate([per_camera.ravel(), self.board])
 
-    def stepped(self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray) -> "State":
+    def stepped(self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray) -> "BundleState":
         """Moved by (16 C + 3,), (V, 6) and (V, C)."""
         cameras = global_step[:-N_BOARD].reshape(-1, N_CAMERA)
         return replace(
@@ -124,7 +124,7 @@ class Priors:
     late_sigma_s: np.ndarray | None = None
 
 
-def predict(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def predict(state: BundleState, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pixels (n, 2) and their Jacobian (n, 2, 25 or 37).
 
     Its columns: the seeing camera's 16, the board's 3, the view's 6; with a trajectory also the 6 of the view before
@@ -140,7 +140,7 @@ def predict(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.n
     return px, J
 
 
-def _printed(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _printed(state: BundleState, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Board points (n, 3) in the board frame and d point / d (scale, warp_x, warp_y) (n, 3, 3).
 
     Warp after mrcal: z = warp_x (1 − x²) + warp_y (1 − y²), x and y from −1 to 1 over the corners.
@@ -154,7 +154,7 @@ def _printed(state: State, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.
     return points[seen.corner], by_board[seen.corner]
 
 
-def _predict_one(state: State, camera: int, seen: Sightings, points, by_board, paths):
+def _predict_one(state: BundleState, camera: int, seen: Sightings, points, by_board, paths):
     T_board, T_camera = state.T_world_board[seen.view], state.T_camera_world[camera]
     turned = np.einsum("nij,nj->ni", T_board[:, :, :3], points)
     motion = _motion(state, camera, seen, paths)
@@ -202,14 +202,14 @@ class _Paths:
     inverse: np.ndarray
 
     @staticmethod
-    def of(state: State) -> "_Paths | None":
+    def of(state: BundleState) -> "_Paths | None":
         if state.trajectory is None:
             return None
         paths = state.trajectory.paths(state.T_world_board)
         return _Paths(paths, np.linalg.inv(left_jacobian(paths[:, :, :3])))
 
 
-def _motion(state: State, camera: int, seen: Sightings, board: _Paths | None) -> _Motion:
+def _motion(state: BundleState, camera: int, seen: Sightings, board: _Paths | None) -> _Motion:
     n = len(seen)
     if board is None:
         still, eye = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))

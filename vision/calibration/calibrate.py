@@ -29,8 +29,8 @@ from vision.boards.sufficiency import (
     tilt_deg,
     without_strays,
 )
-from vision.calibration.adjust import solve
-from vision.calibration.bundle import N_CAMERA, POSE, Priors, State
+from vision.calibration.adjust import adjust_bundle
+from vision.calibration.bundle import N_CAMERA, POSE, BundleState, Priors
 from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
@@ -148,7 +148,7 @@ def calibrate_alone(
     """One camera by itself, the world being the camera's frame. rough: robustly, as a start for more."""
     lens = first_lens(views, board.corners_mm, size_px)
     poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
-    state = State(lens[None], np.eye(3, 4)[None], poses)
+    state = BundleState(lens[None], np.eye(3, 4)[None], poses)
     priors = lens_priors(1, len(views))
     priors.free[POSE] = False
     seen = gather([(0, k, view) for k, view in enumerate(views)])
@@ -158,7 +158,7 @@ def calibrate_alone(
 def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Settled, list[str]]:
     """With a warped board where that lowers the cost, at the flat board's noise, by more than chance would."""
     priors = allow_warp(flat.priors)
-    warped = solve(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, priors, tolerance=1e-6)
+    warped = adjust_bundle(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, priors, tolerance=1e-6)
     if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []
     settled = settle(warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1)

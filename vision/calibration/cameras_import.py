@@ -14,7 +14,7 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import check_lens, check_rig_view
-from vision.calibration.bundle import N_CAMERA, State
+from vision.calibration.bundle import N_CAMERA, BundleState
 from vision.calibration.calibrate import as_cameras
 from vision.calibration.corner_noise import settle
 from vision.calibration.first_guess import board_pose
@@ -93,7 +93,7 @@ def place_on_rig(
         check_rig_view(camera.name, rig_views.get(camera.name), board)
     T_board_rig = invert_transform(T_rig_board)
     poses = [compose(board_pose(rig_views[c.name], board.corners_mm, c.lens), T_board_rig) for c in cameras]
-    state = State(np.array([c.lens for c in cameras]), np.array(poses), np.asarray(T_rig_board)[None])
+    state = BundleState(np.array([c.lens for c in cameras]), np.array(poses), np.asarray(T_rig_board)[None])
     seen = gather([(k, 0, rig_views[c.name]) for k, c in enumerate(cameras)])
     settled = settle(state, seen, board.corners_mm, _poses_only(len(cameras)))
     return as_cameras(cameras.names, {c.name: c.size_px for c in cameras}, settled)

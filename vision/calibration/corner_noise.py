@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.calibration.adjust import Solution, solve
-from vision.calibration.bundle import Priors, Sightings, State, predict
+from vision.calibration.adjust import Solution, adjust_bundle
+from vision.calibration.bundle import BundleState, Priors, Sightings, predict
 from vision.geometry.errors import Refused
 
 # One Gaussian corner in 25 000 lies beyond (two axes): exp(-4.5² / 2).
@@ -51,7 +51,7 @@ class Settled:
 
 
 def settle(
-    state: State,
+    state: BundleState,
     seen: Sightings,
     corners_mm: np.ndarray,
     priors: Priors,
@@ -70,7 +70,7 @@ def settle(
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
     for _ in range(rounds or (_ROUNDS_MOVING if moving else _ROUNDS)):
         weighed = _weighed(seen, error)
-        solution = solve(state, weighed, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4)
+        solution = adjust_bundle(state, weighed, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4)
         _require_finite(solution)
         state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
         priors = _with_lateness(priors, state, seen) if moving else priors
@@ -82,7 +82,7 @@ def settle(
     for _ in range(2):
         error = _error_by_mean(solution.residual_px, seen, kept, error, priors)
         used = _weighed(seen, error).chosen(kept)
-        solution = solve(state, used, corners_mm, priors)
+        solution = adjust_bundle(state, used, corners_mm, priors)
         state = solution.state
         solution = replace(solution, residual_px=seen.px - predict(state, seen, corners_mm)[0])
     return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error, priors)
@@ -93,7 +93,7 @@ def _require_finite(solution: Solution) -> None:
         raise Refused("the views contradict each other from the start: is this the board as described?")
 
 
-def _with_lateness(priors: Priors, state: State, seen: Sightings) -> Priors:
+def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Priors:
     """Each camera's scatter of instants as the instants found have it; of pictures that give their view its time, none.
 
     A camera with few others keeps the scatter of all.

@@ -16,7 +16,7 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import fixes_pose, without_strays
-from vision.calibration.adjust import Solution, solve
+from vision.calibration.adjust import Solution, adjust_bundle
 from vision.calibration.bundle import predict
 from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, has_pose
@@ -122,7 +122,7 @@ def _alone_px(camera: Camera, alone: Alone, is_held: Sequence[bool], board: Boar
     layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
     priors = lens_priors(1, len(held))
     even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
-    return _rms(solve(layout.first, even, board.corners_mm, _held(priors)).residual_px)
+    return _rms(adjust_bundle(layout.first, even, board.corners_mm, _held(priors)).residual_px)
 
 
 def _poses(cameras: Cameras) -> np.ndarray:
@@ -145,7 +145,7 @@ def _fit_boards(layout: Layout, calibration: Calibration, board: Board) -> Solut
     even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
     first = replace(layout.first, board=calibration.board)
     priors = _held(lens_priors(len(layout.first.lens), len(layout.index)))
-    return solve(first, even, board.corners_mm, priors)
+    return adjust_bundle(first, even, board.corners_mm, priors)
 
 
 def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board, *, fit_instants: bool) -> Solution:
@@ -156,11 +156,11 @@ def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board, *,
     first = replace(layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory)
     if not fit_instants:
         even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
-        return solve(first, even, board.corners_mm, priors)
+        return adjust_bundle(first, even, board.corners_mm, priors)
     error = np.array([report.error_px for report in calibration.report])
     seen = replace(layout.seen, sigma_px=np.hypot(layout.seen.sigma_px, error[layout.seen.camera]))
     priors = replace(priors, late_sigma_s=timing.scatter_s)
-    return solve(first, seen, board.corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-5)
+    return adjust_bundle(first, seen, board.corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-5)
 
 
 def _still(layout: Layout, fitted: Solution, board: Board) -> np.ndarray:

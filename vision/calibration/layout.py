@@ -11,7 +11,7 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import Sightings, State
+from vision.calibration.bundle import BundleState, Sightings
 from vision.calibration.first_guess import board_pose, chain_cameras, most_central
 from vision.geometry.board import Board
 from vision.geometry.errors import Refused
@@ -41,7 +41,7 @@ class Layout:
     shared. index (V,): of each view in its camera's series, -1 for the board on the rig."""
 
     seen: Sightings
-    first: State
+    first: BundleState
     trajectory: Trajectory | None
     index: np.ndarray
 
@@ -89,7 +89,7 @@ def lay_out(
         boards.append(compose(invert_transform(T_camera_world[best[0]]), best[3]))
         shots += [(c, len(boards) - 1, view) for c, _, view, _ in group]
     lenses = np.array([alone.lens for alone in cameras.values()])
-    state = State(lenses, np.asarray(T_camera_world), np.array(boards))
+    state = BundleState(lenses, np.asarray(T_camera_world), np.array(boards))
     index = np.array([-1] * len(blank) + [group[0][1] for group in groups])
     if not together:
         return Layout(gather(shots), state, None, index)

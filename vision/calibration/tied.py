@@ -13,7 +13,7 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import MOST_ERROR_PX
 from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, Priors, State
+from vision.calibration.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, BundleState, Priors
 from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.layout import Alone, Layout, lay_out, looked_at_once, place_cameras
 from vision.calibration.views import MeasuredPose
@@ -152,7 +152,7 @@ def lens_priors(n_cameras: int, n_views: int) -> Priors:
     return Priors(free, mean, sigma, np.ones(n_views, dtype=bool))
 
 
-def _priors(first: State, board: Board, on_rig: MeasuredPose | None) -> Priors:
+def _priors(first: BundleState, board: Board, on_rig: MeasuredPose | None) -> Priors:
     """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the square.
 
     Without a rig board the first camera is the world's frame.

@@ -32,7 +32,6 @@ from vision.fit.problem import (
     rest_shape,
     wire_modes,
 )
-from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves, centrelines
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.newton import cauchy_weights
@@ -108,12 +107,6 @@ def _over_sigma(points: LinePoints, px, jacobian, off: slice, modes, vector):
     jacobian[:, off] = modes
     residual = np.sum(points.normal * (px - points.px), axis=1) + modes @ vector[off]
     return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
-
-
-def bar_middle(problem: Problem, camera: Camera, vector: np.ndarray, place_mm: np.ndarray) -> np.ndarray:
-    """Middle (…, n, 2) of the bar's outline in one camera, at places (n,) along its axis; vector (…, size)."""
-    one, other = _bar_edges(problem, camera, vector, place_mm, 0.0)
-    return 0.5 * (one + other)
 
 
 def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np.ndarray, np.ndarray]:

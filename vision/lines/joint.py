@@ -51,8 +51,8 @@ class Task:
     blur_sigma: float = BLUR_SIGMA
 
 
-def solve(task: Task, shift_px: np.ndarray | None = None, robust: np.ndarray | None = None, damped: float = _DAMPED,
-          most: int = _MOST_STEPS) -> Solved:
+def solve_jointly(task: Task, shift_px: np.ndarray | None = None, robust: np.ndarray | None = None,
+                  damped: float = _DAMPED, most: int = _MOST_STEPS) -> Solved:
     """The most probable positions, shading and blur; begins with these shifts (s,) and weights (s,) of the pieces.
 
     The last step is taken without looking again: what is told of the pieces is as it was before it.

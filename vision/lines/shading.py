@@ -232,12 +232,6 @@ class Located:
     shared_px: np.ndarray | None = None
     widened_px2: np.ndarray | None = None
 
-    @property
-    def whole_sigma_px(self) -> np.ndarray:
-        """Sigma (s,) of each piece alone, what it shares with others included."""
-        shared = 0.0 if self.shared_px is None else np.linalg.norm(self.shared_px, axis=1)
-        return np.hypot(self.sigma_px, shared)
-
 
 def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
     """Gauss–Newton on the position of each piece with the rod's shading known, background gain and offset free.

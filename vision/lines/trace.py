@@ -11,7 +11,7 @@ from vision.geometry.rods import Wire
 from vision.geometry.silhouette import outline
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.binned import binned, without
-from vision.lines.joint import BLUR_SIGMA, Task, solve
+from vision.lines.joint import BLUR_SIGMA, Task, solve_jointly
 from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
 from vision.pictures.view import View
@@ -76,11 +76,11 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
     pixels, but for the last where this is the last look.
     """
     rough, blurred = binned(pieces, _BIN_PX)
-    solved = solve(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma))
+    solved = solve_jointly(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma))
     blur_px = without(solved.blur_px, blurred)
     if last:
         task = Task(pieces, terms, knots, blur_px, blur_sigma)
-        solved = solve(task, solved.shift_px, solved.robust, damped=0.0, most=_LAST_STEPS)
+        solved = solve_jointly(task, solved.shift_px, solved.robust, damped=0.0, most=_LAST_STEPS)
         blur_px = solved.blur_px
     located = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px,
                     solved.widened_px2)

@@ -9,10 +9,10 @@ from bench.rig.bar import Bar, first_touch
 from bench.rig.friction import Friction
 from bench.rig.gauges import Gauges
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
+from bench.rig.marched import MarchedWhisk
 from bench.rig.rod import Rod
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, ring
-from bench.rig.whisk import Whisk
 
 WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
@@ -115,7 +115,8 @@ def whisked(friction, back=False, beta_deg=60.0, whisks=1, ramp_s=0.0):
     touch = first_touch(WIRE, bar, 0.04, 60.0)
     stroke = Stroke.plan(touch.motor_rad - 0.05, touch.motor_rad + 0.07, math.radians(10), whisks=whisks, back=back,
                          ramp_s=ramp_s)
-    whisk = Whisk.run(WIRE, bar, friction, touch, float(stroke.angles_rad.max()), step_rad=math.radians(0.1), back=back)
+    end_rad = float(stroke.angles_rad.max())
+    whisk = MarchedWhisk.run(WIRE, bar, friction, touch, end_rad, step_rad=math.radians(0.1), back=back)
     return stroke, (whisk,) * whisks
 
 

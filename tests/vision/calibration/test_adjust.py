@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_recording, moving_board, noisy_view_at
-from vision.calibration.adjust import solve
+from vision.calibration.adjust import adjust_bundle
 from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, Sightings, State, predict
+from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, BundleState, Sightings, predict
 from vision.calibration.calibrate import calibrate_alone, calibrate_cameras
 from vision.calibration.tied import lens_priors
 from vision.calibration.views import BoardViews, MeasuredPose
@@ -26,7 +26,7 @@ def a_state(moving):
     cameras = np.array([np.eye(3, 4), np.column_stack([exp_rotation([0.1, 0.3, 0]), [10, 20, 30]])])
     one = [1000, 1010, 640, 360, -0.2, 0.1, 1e-3, -1e-3, 0.05]
     other = [900, 910, 600, 350, 0.1, 0.1, 1e-3, 2e-3, 0.05]
-    return State(
+    return BundleState(
         np.array([one, other]),
         cameras,
         boards,
@@ -126,7 +126,7 @@ def test_more_iterations_change_nothing_at_rest():
     priors = lens_priors(1, 6)
     priors.free[9:15] = False
     seen = settled.seen.chosen(settled.kept)
-    again = solve(settled.solution.state, seen, BOARD.corners_mm, replace(priors), tolerance=1e-14)
+    again = adjust_bundle(settled.solution.state, seen, BOARD.corners_mm, replace(priors), tolerance=1e-14)
     sigma = np.sqrt(np.diag(again.covariance)[:9])
     assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
 

@@ -58,7 +58,7 @@ def test_a_line_forgets_where_it_was_looked_for(rng, off_px, phase_rad):
     """
     pictures = starts.drawn(starts.SCENES["flat, bright wire"], rng)
     near, far = (starts.looked_twice(*pictures, *start) for start in ((0.0, 0.0), (off_px, phase_rad)))
-    sigma = far.located.whole_sigma_px
+    sigma = starts.whole_sigma_px(far)
     assert np.sqrt(np.mean(starts.errors(far) ** 2)) < 3 * np.sqrt(np.mean(sigma**2)) < 0.06
     assert np.sqrt(np.mean((starts.errors(far) - starts.errors(near)) ** 2 / sigma**2)) < 0.2
 

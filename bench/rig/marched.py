@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from bench.rig.bar import Bar, Touch, turned, unloaded
-from bench.rig.contact import State, moments_Nmm
+from bench.rig.contact import ContactState, moments_Nmm
 from bench.rig.elastica import Elastica
 from bench.rig.friction import Friction, March
 from bench.rig.rod import Rod
@@ -21,10 +21,10 @@ class Instants:
     point_mm: np.ndarray  # (n, 3)
     arc_mm: np.ndarray
     moment_Nmm: np.ndarray  # (n, 2): m_y, m_z
-    states: tuple[State | None, ...]
+    states: tuple[ContactState | None, ...]
 
     @classmethod
-    def of(cls, path_rad: np.ndarray, states: Sequence[State | None]) -> "Instants":
+    def of(cls, path_rad: np.ndarray, states: Sequence[ContactState | None]) -> "Instants":
         """What a path of motor angles and the states on it (None while free) tell."""
         free = np.full(3, np.nan), np.nan, (0.0, 0.0)
         rows = [free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s)) for s in states]
@@ -45,13 +45,13 @@ class Instants:
         at, knots = self._way * motor_rad, self._way * self.motor_rad
         return int(np.searchsorted(knots, at + 1e-9, side="right")) - 1
 
-    def state_at(self, motor_rad: float) -> State | None:
+    def state_at(self, motor_rad: float) -> ContactState | None:
         """The state at one of the stops (after a jump there, if any); None where nothing is pushed."""
         row = self.row_at(motor_rad)
         state = self.states[row] if row >= 0 else None
         return state if state is not None and state.force_hub_N.any() else None
 
-    def state_between(self, motor_rad: float) -> State | None:
+    def state_between(self, motor_rad: float) -> ContactState | None:
         """The state at any angle: force and arc on straight lines between instants."""
         row = self.row_at(motor_rad)
         if row < 0 or self.states[row] is None:
@@ -69,7 +69,7 @@ class Instants:
 
 
 @dataclass(frozen=True, eq=False)
-class Whisk:
+class MarchedWhisk:
     """The mechanics of one whisk. `forward` begins at touch, `back` (None without a back stroke) ends there."""
 
     rod: Rod
@@ -118,7 +118,7 @@ class Whisk:
         motor = self.touch.motor_rad + np.asarray(theta_rad)
         return np.interp(motor, self.forward.motor_rad, self.slip_mm(self.forward.point_mm), right=np.nan)
 
-    def centreline_mm(self, motor_rad: float, state: State | None, arc_mm: np.ndarray) -> np.ndarray:
+    def centreline_mm(self, motor_rad: float, state: ContactState | None, arc_mm: np.ndarray) -> np.ndarray:
         """Points (n, 3) of the whisker at arc lengths (n,) in the rig frame, bent by the force of `state` or free."""
         if state is None or not state.force_hub_N.any():
             return unloaded(self.rod, motor_rad, arc_mm)[0]
