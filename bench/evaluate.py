@@ -25,7 +25,7 @@ from bench.trials.estimates import estimators
 from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
 
 DONE, DOUBTFUL = 0, 1
-_MOST_NAMED = 8
+_MOST_NAMED = 8  # names in one line
 
 
 def evaluate(

@@ -35,10 +35,11 @@ def numbers(folders: list[str] | None = None) -> Iterator[Number]:
     """Constants whose value has a number in it, module by module."""
     for path in sorted((ROOT / "vision").glob("*/*.py")):
         if folders is None or path.parent.name in folders:
-            yield from _of_module(path)
+            yield from numbers_of(path, ROOT / "vision")
 
 
-def _of_module(path: Path) -> Iterator[Number]:
+def numbers_of(path: Path, package: Path) -> Iterator[Number]:
+    """Constants of one module whose value has a number in it."""
     text = path.read_text()
     lines = text.splitlines()
     for node in ast.parse(text).body:
@@ -47,8 +48,8 @@ def _of_module(path: Path) -> Iterator[Number]:
         value = ast.unparse(node.value)
         is_number = [isinstance(n, ast.Constant) and type(n.value) in (int, float) for n in ast.walk(node.value)]
         named = ast.unparse(node.targets[0])
-        if any(is_number) and named.isupper() and not re.search(r"[\"']|\brange\(|zeros\(|full\(", value):
-            place = path.relative_to(ROOT / "vision").as_posix()
+        if any(is_number) and named.isupper() and not re.search(r"[\"']|__file__|\brange\(|zeros\(|full\(", value):
+            place = path.relative_to(package).as_posix()
             yield Number(place, named, value, _comment(lines, node))
 
 

@@ -17,7 +17,7 @@ from contextlib import contextmanager, nullcontext
 from tqdm import tqdm
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_LOOK_FOR_PARENT_S = 1.0
+_LOOK_FOR_PARENT_S = 1.0  # s: so long a worker may outlive a run that was killed
 
 
 class Workers:

@@ -22,12 +22,12 @@ from vision.pictures.files import Frames, read_picture
 
 # A series longer than this is sampled in runs of neighbours, which tell how the board moved.
 _MOST_FRAMES = 120
-_RUN = 3
+_RUN = 3  # pictures: one before and one after tell how the board moved meanwhile
 # Beyond so many frames of the trials, the rig board's mean corner gains nothing (0.01 px).
 _MOST_TRIAL_FRAMES = 40
 # A camera whose rig board stands this far elsewhere in a trial was knocked in between.
 _MOVED_PX = 0.5
-_SAMPLES = 4
+_SAMPLES = 4  # pictures from which a wrong setting is told
 
 
 @dataclass(frozen=True, eq=False)

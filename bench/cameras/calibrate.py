@@ -25,7 +25,7 @@ from vision.geometry.lens import LENS_TERMS
 HOLD_EVERY = 4
 # A distortion term this many sigmas from zero is one that the views ask for.
 _ASKED_SIGMAS = 2.0
-_MOST_LEFT_OUT = 0.1
+_MOST_LEFT_OUT = 0.1  # of a camera's corners: a tenth beyond 4.5 sigma is no noise. Set by eye
 # Bars stand beyond this share of the whisker, and are looked at by so much on either side of it.
 _NEAREST_BAR, _BAR_REACH_MM = 0.4, 20.0
 _NOT_PLACED = (

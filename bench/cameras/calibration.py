@@ -28,6 +28,7 @@ from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
 from vision.pictures.files import read_picture
 
+# Sigmas, px: a camera whose board stands farther elsewhere than both was moved. Set by eye.
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
 _FEWEST_FOR_MEDIAN, _MOST_FOR_MEDIAN = 5, 9  # trials: in fewer the bar stands before a place too often
 

@@ -29,7 +29,7 @@ COLUMNS = (
 _FIRST_RAD = np.radians(0.95)  # nearer to touch the window of a moment is shorter, and (10) mostly noise
 _APART_RAD = np.radians(0.95)  # windows of half a degree to either side share no sample
 _FEWEST = 6  # angles, for four numbers
-_HELD_SIGMAS = 2.0
+_HELD_SIGMAS = 2.0  # a slip angle within so many of its own is none: 95 % of whisks that are held
 TOO_FEW = f"needs moments at {_FEWEST} pushing angles a degree apart: push further"
 
 

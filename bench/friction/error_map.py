@@ -27,7 +27,7 @@ COLUMNS = (
     *("error_percent", "error_sd_percent", "predicted_percent"),
 )
 _BETA_DEG, _ALPHA_DEG = 5.0, 2.5  # sizes of a cell; slopes of 0, 5, 10 … lie in the middles of theirs
-_STEEPEST_DEG = 82.5
+_STEEPEST_DEG = 82.5  # °: the map's edge, the upper end of the cell of 80°
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ from estimator.friction import Contacts, alpha_from_tilts, confidence, most_cons
 from estimator.uncertainty import Z_95
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
-_FEWEST = 3
+_FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a slope
+# rad: the best of these is then refined
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
 

@@ -13,7 +13,7 @@ from estimator.friction import FrictionFit, Pushes, fit_alpha
 # From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
 # many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
 _MANY = 8
-_SAME_SLOPE_DEG = 2.5
+_SAME_SLOPE_DEG = 2.5  # °: half of the step of 5° that a protractor sets
 _FITTED = {"m_y": "m_y_Nmm", "m_z": "m_z_Nmm", "d_x": "d_x_mm", "theta": "theta_rad"}  # fields of Pushes and of Felt
 
 

@@ -16,7 +16,7 @@ from bench.session.whisker import Whisker
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-U95 = 1.96
+U95 = 1.96  # half an interval of 95 % of the normal distribution, in sigmas
 NOT_MEASURED = "not measured"
 _MOST_NAMED = 6  # trials or whisks; more names than that have no room on the page
 _LEAST_POINTS = 4  # for a curvature beside a line, with something left over

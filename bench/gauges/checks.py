@@ -10,7 +10,7 @@ from bench.gauges.matrix import GaugeMatrix
 from bench.gauges.readings import Pairs
 
 _CHANNELS = "yz"
-_HEARD_SIGMAS = 8.0
+_HEARD_SIGMAS = 8.0  # a channel within so many of its own noise throughout hears nothing. Set by eye
 _LEAST_UNSATURATED = 0.2  # of the samples; a whisk that saturates late can still be used
 
 

@@ -14,7 +14,7 @@ from bench.gauges.felt import Stroke
 from estimator import noise
 from estimator.signal import Touch
 
-_GUARD_RAD = np.radians(0.1)
+_GUARD_RAD = np.radians(0.1)  # rad before felt touch, beyond what that is uncertain by. Set by eye
 _ROUNDS = 10  # of weights and excess; after five nothing changes that matters
 
 

@@ -16,7 +16,7 @@ from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_
 from vision.truth.records import FrameTruth
 from vision.truth.value import UNKNOWN, Value
 
-_GUARD_RAD = np.radians(0.2)
+_GUARD_RAD = np.radians(0.2)  # rad before felt touch, beyond what that is uncertain by. Set by eye
 _LEAST_FREE = 50  # samples
 # Of the paper's 800 Hz filter ahead of the converter, taken as of fourth order (Butterworth): 0.52 ms. The session does
 # not say which filter it had.

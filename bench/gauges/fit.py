@@ -12,7 +12,7 @@ from bench.gauges.readings import Pairs
 # Below this share of the stronger direction, the weaker one is not known to the per cent that is wanted: a mount that
 # was turned by 6° instead of 90°, or one slope only.
 _LEAST_DIRECTION = 0.1
-_ROUNDS = 5
+_ROUNDS = 5  # in which the weights follow the coefficients. Set by eye
 _CHANCE = 0.01  # that sound residuals are taken for too large
 _SQUARE_DEG = 20.0  # a follicle turned by 0° or 90° within this reads one channel at a time
 

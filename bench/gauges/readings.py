@@ -21,11 +21,13 @@ from estimator.signal import Touch
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
 _FRICTION, _FRICTION_SIGMA = 0.2, 0.4 / np.sqrt(12.0)
-_LEAST_THETA_RAD = np.radians(0.3)
+_LEAST_THETA_RAD = np.radians(0.3)  # rad: nearer to touch its error counts too much. Set by eye
 _NOMINAL_SHARE = 0.01  # a distance set by a ruler
+# °: up to here the moments of a nominal distance are those of no slip to half a percent (1 − cos)
 _NOMINAL_SLOPE_DEG = 5.0
+# rad: a stroke's usual range, where no frame tells the angles
 _NOMINAL_THETA_RAD = np.radians(np.linspace(1.0, 4.0, 6))
-_MOST_HALF_WINDOW_RAD = np.radians(0.5)
+_MOST_HALF_WINDOW_RAD = np.radians(0.5)  # rad: as the estimators average over (estimator.signal.HALF_WINDOW_RAD)
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from bench.session.signals import Signals, forward_strokes
 from bench.session.strokes import without_spikes
 from bench.session.trial import Trial
 
-_GUARD_RAD = np.radians(0.2)
-_LEAST_SAMPLES = 20
-_ANGLES = 15
-_HALF_WINDOW_RAD = np.radians(0.15)
+_GUARD_RAD = np.radians(0.2)  # rad before felt touch, beyond what that is uncertain by. Set by eye
+_LEAST_SAMPLES = 20  # of a mean or a way back: fewer tell no level beyond the noise. Set by eye
+_ANGLES = 15  # between a tenth and nine tenths of the push: the largest of so many is the hysteresis
+_HALF_WINDOW_RAD = np.radians(0.15)  # rad: a line is straight over twice that. Set by eye
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 
 _BLOCKS = 10  # of a recording; their means scatter by hum and drift as well as by noise
-_LEAST_SIGMAS = 3.0
+_LEAST_SIGMAS = 3.0  # a weight that is felt by less tells no scale
 
 
 @dataclass(frozen=True)

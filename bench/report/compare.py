@@ -22,7 +22,7 @@ DONE, CHANGED = 0, 1
 _MATTERS_SIGMAS = 1.0
 # Of another day's whisk, by chance once in 370.
 _STANDS_OUT_SIGMAS = 3.0
-_MOST_SHOWN = 20
+_MOST_SHOWN = 20  # lines in a terminal
 _DEGREES = math.degrees(1.0)
 _SEEN: tuple[tuple[str, float, Callable[[SeenWhisk], Value]], ...] = (
     ("d_x_mm", 1.0, lambda s: s.d_x_mm),

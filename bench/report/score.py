@@ -22,8 +22,8 @@ _AT_TOUCH = (
     ("beta_deg", "beta_deg"),
     ("psi_deg", "psi_deg"),
 )
-_SLIP_THETA_DEG = 3.0
-_WITHIN_95 = 1.959964
+_SLIP_THETA_DEG = 3.0  # °: the pushing angle at which truth files give the slip (slip_at_3deg_mm)
+_WITHIN_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
+_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]  # JPEG's, of 100
 
 
 def write_picture(path: Path, picture: np.ndarray) -> None:

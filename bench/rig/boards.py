@@ -10,7 +10,7 @@ import numpy as np
 from bench.rig.board import Board
 from bench.rig.camera import Camera
 
-_GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
+_GOLDEN_RAD = math.pi * (3 - math.sqrt(5))  # rad: the golden angle, by which views lean to all sides evenly
 
 
 def poses(board: Board, camera: Camera, count: int, rng: np.random.Generator) -> list[np.ndarray]:

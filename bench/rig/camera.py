@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.polynomial import chebyshev
 
-_DEGREE = 13
+_DEGREE = 13  # of the Chebyshev series of the lens's inverse
 
 
 @dataclass(frozen=True, eq=False)

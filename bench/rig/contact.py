@@ -24,7 +24,7 @@ from bench.rig.rod import Rod
 
 _PARTS = 0.5 ** np.arange(8)
 _ACROSS = np.array([0.0, 1.0, 0.0])
-_BACKWARDS_MM = -1e-9
+_BACKWARDS_MM = -1e-9  # mm: less is rounding
 _LAST = 1e-6  # of a Newton step, in parts
 
 

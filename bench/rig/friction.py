@@ -10,6 +10,7 @@ from bench.rig.bar import Bar, Touch, turned
 from bench.rig.contact import Contact, ContactState
 from bench.rig.rod import Rod
 
+# Share of the coefficient at rest, rad: where the search for the cone's edge ends.
 _ON_THE_CONE, _CLOSE_RAD = 1e-4, 1e-6
 _NO_PUSH_RAD = 1e-7  # below this (5 nm at 50 mm) there is no force to speak of
 

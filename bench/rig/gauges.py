@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-OVERSAMPLED = 4
+OVERSAMPLED = 4  # times the sampling rate, ahead of the filter against aliases
 
 
 @dataclass(frozen=True, eq=False)

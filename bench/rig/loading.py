@@ -9,7 +9,7 @@ from bench.rig.marched import MarchedWhisk
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, ring
 
-_TICK_S = 5e-4
+_TICK_S = 5e-4  # s: over which the motor's speed, and its changes, are taken
 
 
 def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from bench.rig.camera import Camera
 from bench.rig.light import Light, Material, round_shade
 from bench.rig.window import Window
 
-_GAUSS = 0.5 / np.sqrt(3)
+_GAUSS = 0.5 / np.sqrt(3)  # Gauss–Legendre's two points across a sample
 
 
 @dataclass(frozen=True, eq=False)

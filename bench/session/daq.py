@@ -17,8 +17,8 @@ from bench.session.strict_toml import values
 from bench.session.table import Table, read_table
 
 _TIME, _FRAME = "time_s", "frame_V"
-_MOST_BYTES = 1 << 31
-_MOST_LISTED = 8
+_MOST_BYTES = 1 << 31  # bytes: no larger file is read at once
+_MOST_LISTED = 8  # names in one line
 
 
 @dataclass(frozen=True)

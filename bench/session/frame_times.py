@@ -17,7 +17,7 @@ from vision.pictures.files import Frames
 
 FRAME, TIME = "frame", "time_s"
 _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame
-_RATE_TOLERANCE = 1e-3
+_RATE_TOLERANCE = 1e-3  # of the interval stated, beyond the steps in which times are written. Set by eye
 _CLOCK_STEP_S = 1e-3  # times are written to a millisecond or better
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 
-_MOST_NAMED = 3
+_MOST_NAMED = 3  # names in one line
 
 
 def check_inside(session: Path, doubts: Doubts) -> None:

@@ -12,7 +12,7 @@ PASCALS, MEGAPASCALS = ("pascals", 1e-9), ("megapascals", 1e-3)
 MILLISECONDS, MICROSECONDS = ("milliseconds", 1e-3), ("microseconds", 1e-6)
 MILLIVOLTS = ("millivolts", 1e-3)
 
-_PROTRACTOR_DEG = 5.0
+_PROTRACTOR_DEG = 5.0  # °: what people set slopes in
 
 
 @dataclass(frozen=True)

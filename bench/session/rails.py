@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import label
 
-_LEAST_RUN = 3
+_LEAST_RUN = 3  # samples: two equal ones are an ADC's steps, three at an extreme a rail
 _FAR = 0.5  # of the channel's range, from its level at the start: noise without an ADC stands still at zero too
 
 

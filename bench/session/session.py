@@ -23,11 +23,11 @@ from vision.pictures.files import natural_order
 
 FORMAT = 1
 MANIFEST = "session.toml"
-NMM2_PER_NM2 = 1e6
+NMM2_PER_NM2 = 1e6  # N·mm² in a N·m²
 # Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.
 _ROTATION_TOLERANCE = 2e-3
 _NEAREST_BOARD_MM = 0.5  # a board's origin this near to the whisker's base is a board placed in metres
-_FARTHEST_BOARD_MM = 5000.0
+_FARTHEST_BOARD_MM = 5000.0  # mm: no bench is larger; written in another unit
 
 
 @dataclass(frozen=True)

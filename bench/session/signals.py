@@ -15,8 +15,8 @@ from bench.session.trial import Trial
 TIME, MOTOR = "time_s", "motor_deg"
 VOLTS, MOMENTS = ("y_V", "z_V"), ("m_y_Nmm", "m_z_Nmm")
 
-SAMPLING_STEP = Window(1e-6, 0.05, (MILLISECONDS, MICROSECONDS))
-VOLTAGE = Window(-30.0, 30.0, (MILLIVOLTS,))
+SAMPLING_STEP = Window(1e-6, 0.05, (MILLISECONDS, MICROSECONDS))  # s: 1 MHz to 20 Hz
+VOLTAGE = Window(-30.0, 30.0, (MILLIVOLTS,))  # V: what a DAQ's input takes
 MOMENT = Window(-1e5, 1e5, (("N um", 1e-3), ("nN m", 1e-3)))
 _TURN_DEG = 360.0
 _STILL_DEG = 0.02  # less is an encoder that stands still

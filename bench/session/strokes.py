@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import median_filter
 
-SMALLEST_STROKE_RAD = np.radians(0.3)
+SMALLEST_STROKE_RAD = np.radians(0.3)  # rad: less is a motor that settles, or its encoder's steps. Set by eye
 # Of the largest stroke: a shorter one is kept (a recording may start mid-stroke), a settling motor is not.
 _SMALLEST_SHARE = 0.2
 # A turn counts when the motor goes back by this share of its range, or by so many times its jitter.

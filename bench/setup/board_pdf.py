@@ -19,7 +19,7 @@ MM_PER_INCH = 25.4
 # What stands around the board: rulers on the left and below, with the words below them.
 _LEFT_MM, _RIGHT_MM, _TOP_MM, _BELOW_MM = 22.0, 10.0, 10.0, 34.0
 _RULER_MM = 8.0  # from the board's edge: the white around a board helps to find it
-_A4_MM = (210.0, 297.0)
+_A4_MM = (210.0, 297.0)  # mm: ISO 216
 _LARGEST = 4  # formats beyond A4: A3, A2, A1, A0
 _INK = rig.Ink(white=1.0, black=0.0)
 MARKER_SHARE = 11.0 / 15.0  # of the square: the marker's white frame is then as wide as its modules

@@ -17,11 +17,11 @@ from bench.records.trial import SeenWhisk
 from estimator.beam import Beam
 from vision.truth.records import FrameTruth
 
-_LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3
+_LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3  # mm, frames: less slip, or fewer frames, show neither rest nor jump. Set by eye
 _FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
 _REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it the contact rests
 _LONGEST_JUMP = 2  # intervals between frames
-_SIGMAS = 3.0
+_SIGMAS = 3.0  # a rest is told from free slip where they differ by so many
 _JUMP_SIGMAS = 6.0  # in thousands of samples noise reaches 4
 _WINDOW_RAD, _WINDOW_S, _FEWEST, _MOST = np.radians(0.12), 0.012, 4, 40
 _GUARD = 3  # samples at a jump that the gauges' own filter smears

@@ -24,7 +24,7 @@ from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
 
 NO_PICTURES = "no pictures"
-_MOST_DEFLECTIONS = 12
+_MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
 _FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
 _MOST_NAMED = 5  # frames in a line
 _SAME = tuple({f.name for f in fields(SeenWhisk)} & {f.name for f in fields(WhiskTruth)} - {"status", "overlay"})

@@ -94,7 +94,7 @@ def follow(grey: np.ndarray, start_px: Sequence[float], end_px: Sequence[float],
         pieces = _pieces(grey, curve, width, piece_px, noise)
         traced = trace(pieces, _knots(pieces), width.blur_px, _BLUR_SIGMA, _EVEN)
         points, _ = to_points(traced)
-        contrast = np.median(traced.found.contrast) / np.sqrt(max(traced.misfit, 1.0))
+        contrast = np.median(traced.located.contrast) / np.sqrt(max(traced.misfit, 1.0))
         _refuse_nothing(len(points), contrast, start_px, end_px)
         points = points.select(np.argsort(points.place))
         curve = _smooth(points.px, np.maximum(points.sigma_px, _LEAST_SIGMA_PX), curve)

@@ -12,7 +12,7 @@ from bench.trials.clocks import shared_touch
 from vision.fit.uncertainty import CAUSES
 from vision.truth.value import Value
 
-_LEAST_SHOWN_PERCENT = 0.5
+_LEAST_SHOWN_PERCENT = 0.5  # rounds to 0 %
 
 
 def truth_lines(results: Iterable[TrialResult]) -> Iterator[str]:
