@@ -22,6 +22,7 @@ _DISTURBED_RATIO = 1.8
 # Blur or contrast away from the board's median by more than this factor is another thing than a printed
 # corner.
 _ODD_FACTOR = 2.0
+_BRIGHTEST_PERCENT = 99.9  # of the pixels: what is beyond are glints, not the board's white
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def to_8_bit(grey: np.ndarray) -> np.ndarray:
     """Deeper pictures stretched to their own range: a 12-bit camera fills only a sixteenth of 16 bits."""
     if grey.dtype == np.uint8:
         return grey
-    brightest = np.percentile(grey[::4, ::4], 99.9)
+    brightest = np.percentile(grey[::4, ::4], _BRIGHTEST_PERCENT)
     return np.clip(grey * (255.0 / max(brightest, 1.0)), 0, 255).astype(np.uint8)
 
 

@@ -12,6 +12,7 @@ from vision.geometry.board import Board
 # A setting is believed where it finds at least this share of the board's corners, and far more than the one entered.
 _LEAST_SHARE = 0.3
 _CLEARLY_MORE = 2.0
+_NEARLY_MOST, _SEVERAL = 0.7, 2  # of the markers of the best dictionary; markers. Set by eye
 
 
 def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
@@ -77,8 +78,8 @@ def _dictionaries_seen(greys: Sequence[np.ndarray], board: Board) -> list[str]:
     """Dictionaries of which several markers are seen, the smallest of each kind that holds the board's markers."""
     counts = {name: _marker_count(greys, name) for name in _dictionaries() if name != board.dictionary}
     most = max(counts.values(), default=0)
-    fitting = [n for n, count in counts.items() if count > 0.7 * most > 2 and _size(n) >= board.marker_count]
-    return sorted(fitting, key=_size)[:3]
+    plain = [name for name, count in counts.items() if count > _NEARLY_MOST * most > _SEVERAL]
+    return sorted((name for name in plain if _size(name) >= board.marker_count), key=_size)[:3]
 
 
 def _dictionaries() -> list[str]:

@@ -16,6 +16,8 @@ from vision.geometry.errors import Refused
 
 # Beyond this many sigmas from the rig picture's corner, a frame's corner is another thing.
 _DISTURBED_SIGMA = 4.0
+_DISTURBED_MEDIANS = 2.5  # of the median miss, where that is the larger. Set by eye
+_FEWEST_CORNERS = 6  # twelve coordinates for the six parameters of a motion
 
 
 def mean_view(rig_view: Corners, frames: Sequence[Corners]) -> Corners:
@@ -49,10 +51,10 @@ def camera_moved(
     that motion does to them, root mean square. Corners that do not follow the rest (hidden, disturbed) are
     left out. Raises Refused with fewer than six corners.
     """
-    if len(corners) < 6:
+    if len(corners) < _FEWEST_CORNERS:
         raise Refused(
-            f"camera {camera.name}: {len(corners)} corners of the rig board in view, 6 are needed to tell "
-            "whether it moved"
+            f"camera {camera.name}: {len(corners)} corners of the rig board in view, {_FEWEST_CORNERS} are needed to "
+            "tell whether it moved"
         )
     points = board.corners_mm[corners.ids] @ T_rig_board[:, :3].T + T_rig_board[:, 3]
     px, _, by_camera = camera.project_with_jacobians(points)
@@ -62,7 +64,7 @@ def camera_moved(
     for _ in range(3):
         motion, covariance = _least_squares(J[kept], off[kept], sigma[kept])
         miss = np.linalg.norm(off - J @ motion, axis=1) / sigma
-        kept = miss < max(_DISTURBED_SIGMA, 2.5 * np.median(miss))
+        kept = miss < max(_DISTURBED_SIGMA, _DISTURBED_MEDIANS * np.median(miss))
     return _rms_and_sigma(J, motion, covariance)
 
 

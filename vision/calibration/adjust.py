@@ -20,6 +20,9 @@ _RIDGE = 1e-10
 # Where iterations run out while the cost still falls, but by less than this share a step, the rest is below a tenth of
 # a sigma.
 _NEARLY_AT_REST = 1e-4
+# Levenberg–Marquardt: damping at first, the least and the most; what a step that helps, or not, makes of it.
+_DAMPED, _LEAST_DAMPED, _MOST_DAMPED = 1e-4, 1e-12, 1e8
+_EASED, _STIFFENED = 0.1, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,7 +250,7 @@ def adjust_bundle(
     tolerance: relative fall of the cost at which it is done.
     """
     normal = _normal_equations(state, seen, corners_mm, priors, width)
-    damping, done, iteration, fall = 1e-4, False, 0, np.inf
+    damping, done, iteration, fall = _DAMPED, False, 0, np.inf
     while not done and iteration < max_iterations and np.isfinite(normal.cost):
         iteration += 1
         tried = state.stepped(*_solve_step(normal, priors, damping))
@@ -255,10 +258,10 @@ def adjust_bundle(
         if trial.cost <= normal.cost * (1 + 1e-13):
             fall = (normal.cost - trial.cost) / (1e-12 + normal.cost)
             done = fall <= tolerance
-            state, normal, damping = tried, trial, max(damping * 0.1, 1e-12)
+            state, normal, damping = tried, trial, max(damping * _EASED, _LEAST_DAMPED)
         else:
-            damping *= 10.0
-            done = damping > 1e8
+            damping *= _STIFFENED
+            done = damping > _MOST_DAMPED
     return _solution(state, normal, priors, iteration, done or fall < _NEARLY_AT_REST)
 
 

@@ -29,6 +29,9 @@ _ROUNDS, _ROUNDS_MOVING = 2, 5
 _MIN_SHOT = 4
 # Fewer instants than these give no scatter.
 _MIN_LATE = 8
+_LEAST_LATE_SHARE = 0.02  # of all cameras' lateness: a camera is never taken as exactly on time
+_LEAST_FREEDOM = 0.1  # of the residuals, however many parameters are fitted
+_HALVINGS = 50  # of a bisection: beyond rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +108,7 @@ def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Prior
     overall = np.nanmean(squared)
     of = [squared[loose & (camera == c)] for c in range(len(priors.late_sigma_s))]
     sigma = np.sqrt([np.mean(s) if len(s) >= _MIN_LATE else overall for s in of])
-    return replace(priors, late_sigma_s=np.maximum(sigma, 0.02 * np.sqrt(overall)))
+    return replace(priors, late_sigma_s=np.maximum(sigma, _LEAST_LATE_SHARE * np.sqrt(overall)))
 
 
 def _weighed(seen: Sightings, error_px: np.ndarray) -> Sightings:
@@ -134,7 +137,7 @@ def _error_by_mean(
     squared = np.sum(residual**2, axis=1)
     parameters = priors.free.sum() + 6 * priors.view_free.sum()
     parameters += len(seen.shot_starts()) if priors.late_sigma_s is not None else 0
-    left = max(1.0 - parameters / max(2 * kept.sum(), 1), 0.1)
+    left = max(1.0 - parameters / max(2 * kept.sum(), 1), _LEAST_FREEDOM)
     return np.array(
         [_match(squared[rows] / left, seen.sigma_px[rows]) for rows in _by_camera(seen, kept, len(error))]
     )
@@ -149,7 +152,7 @@ def _match(squared: np.ndarray, sigma: np.ndarray) -> float:
     if not len(squared) or np.mean(squared / (2 * sigma**2)) <= 1:
         return 0.0
     low, high = 0.0, float(np.mean(squared))
-    for _ in range(50):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if np.mean(squared / (2 * (sigma**2 + middle))) > 1:
             low = middle

@@ -23,6 +23,7 @@ FALSE_ALARM = 1e-3
 _MOST_ALONG_SIGMA_MM = 0.05
 # Beyond this a swing's word on the axis is none: a narrow fan may lean any way about the whisker.
 _MOST_AXIS_SIGMA_DEG = 3.0
+_OVER = 1.2  # of what is asked for: a fifth over
 _COMPONENTS = ("w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
 
 
@@ -98,8 +99,8 @@ def check_swing_suffices(made: Placement) -> None:
     if along <= _MOST_ALONG_SIGMA_MM:
         return
     width = np.degrees(made.width_rad)
-    # An apex is fixed as the fan is wide, and as the root of its frames, of which a wider one has more. A fifth over.
-    needed = np.ceil(1.2 * width * (along / _MOST_ALONG_SIGMA_MM) ** (2 / 3))
+    # An apex is fixed as the fan is wide, and as the root of its frames, of which a wider one has more.
+    needed = np.ceil(_OVER * width * (along / _MOST_ALONG_SIGMA_MM) ** (2 / 3))
     raise Refused(
         f"the free strokes are what places the rig, and {width:.1f} degrees fix the centre of rotation to {along:.2f} "
         f"mm along the whisker; {_MOST_ALONG_SIGMA_MM} mm is needed: record free strokes of about {needed:.0f} "

@@ -12,6 +12,7 @@ import numpy as np
 
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.solve import Linear, linear_at
+from vision.geometry.robust import robust_sigma
 
 _SURE_SIGMAS = 4.0  # one sound frame in 30 000
 _FEWEST = 3  # frames: of fewer the median may be that of a jump
@@ -63,5 +64,5 @@ def _excess(problem: Problem, linear: Linear, frame: int, move) -> tuple[float, 
 def _surely_above(variance, sigma) -> np.ndarray:
     """What a variance (t,) is above the median one, where that is more than noise and the others' scatter; else 0."""
     above = variance - np.median(variance)
-    scatter = np.median(np.abs(above)) / 0.6745
+    scatter = robust_sigma(above)
     return np.where(above > _SURE_SIGMAS * np.hypot(sigma, scatter), above, 0.0)

@@ -31,6 +31,8 @@ _MEDIAN_OF = 11  # frames: more would not make what stands still clearer
 _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
 _BESIDE_BAR_PX = 8.0
+_REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)  # sigmas: of the Cauchy weights, round by round
+_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 0.5  # of a frame's points; no whisker bends farther in a stroke
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: BarAxis, motor_ra
         raise Refused("no whisker is seen where the motor angle says it should be")
     nothing = np.zeros(len(motor), dtype=bool)
     problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
-    state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=(20.0, 10.0, 5.0, 3.0, 2.0, 2.0))
+    state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=_REST_SCALES)
     return state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
 
 
@@ -153,10 +155,10 @@ def _fit_bend(model: _Model, bend, seen: Sequence[LinePoints], pull, rounds: int
     sure = np.concatenate([points.sigma_px for points in seen]) ** -2.0
     for _ in range(rounds):
         left, jacobian = model.slopes(bend, seen)
-        weight = sure * cauchy_weights(left, 2.0)
+        weight = sure * cauchy_weights(left, _CAUCHY_PX)
         normal = jacobian.T @ (weight[:, None] * jacobian) + pull
         change = np.linalg.solve(normal, jacobian.T @ (weight * left) + pull @ bend)
-        bend = np.clip(bend - change, -0.5, 0.5)
+        bend = np.clip(bend - change, -_MOST_BEND_RAD, _MOST_BEND_RAD)
         if np.max(np.abs(change)) < _STILL_RAD:
             break
     return bend

@@ -12,6 +12,7 @@ import numpy as np
 
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.solve import linear_at
+from vision.geometry.robust import robust_sigma
 from vision.lines.points import Observed
 
 _CLIP_SIGMAS = 3.0  # of the camera's scatter: an outlier is not what all share
@@ -66,7 +67,7 @@ def _of_wire(problem: Problem, values: Sequence, camera: int) -> list:
 
 
 def _sigma_px(residuals: Sequence[np.ndarray]) -> float:
-    return float(np.median(np.abs(np.concatenate(residuals)))) / 0.6745 if residuals else 0.0
+    return robust_sigma(np.concatenate(residuals)) if residuals else 0.0
 
 
 def _scatter(problem: Problem, residuals: Sequence[np.ndarray], camera: int) -> Scatter:

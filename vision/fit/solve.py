@@ -41,6 +41,8 @@ from vision.lines.points import LinePoints, Observed
 LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
 _ALIKE = 1000.0  # steps of differences (0.1 mm, 1 mrad; bends 10 mrad): so near the slopes are what they were
 _STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
+_SCALES = (30.0, 10.0, *[LAST_SCALE] * 4)  # sigmas: wide while the state is still off by many of them
+_LONGEST_RAD = 0.3  # bend in one step: the rod's shape is not linear beyond
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,7 @@ def robust_weights(linear: Linear, scale: float) -> np.ndarray:
 
 
 def solve(problem: Problem, state: State, *,
-          scales: Sequence[float] = (30.0, 10.0, *[LAST_SCALE] * 4)) -> tuple[State, np.ndarray]:
+          scales: Sequence[float] = _SCALES) -> tuple[State, np.ndarray]:
     """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say; ends early once it stands still.
 
     Returns the state and its covariance (size, size) from noise and priors alone.
@@ -195,7 +197,7 @@ def solve(problem: Problem, state: State, *,
         root = np.sqrt(robust_weights(linear, scale))
         jacobian = linear.jacobian * root[:, None]
         step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
-        step = step * min(1.0, 0.3 / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
+        step = step * min(1.0, _LONGEST_RAD / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break

@@ -13,6 +13,8 @@ FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that 
 _SURE_BEND_RAD = np.radians(0.25)
 _STEP = 1e-5  # mm and rad, of differences
 _TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
+_STARTS_PER_FRAME = 10  # of the hinge: finer than frames tell
+_SURE_SIGMAS, _LEAST_MARGIN_RAD = 3.0, np.radians(0.02)  # from touch, within which frames are left undecided
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def _hinge(motor_rad, bend_rad) -> float:
     """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
     towards = np.median(bend_rad[-max(2, len(bend_rad) // 3):], axis=0)
     bend = bend_rad @ (towards / max(np.linalg.norm(towards), 1e-12))
-    starts = np.linspace(motor_rad[0], motor_rad[-2], 10 * len(motor_rad))
+    starts = np.linspace(motor_rad[0], motor_rad[-2], _STARTS_PER_FRAME * len(motor_rad))
     rises = np.maximum(motor_rad - starts[:, None], 0.0)
     slopes = np.sum(rises * bend, axis=1) / np.sum(rises**2, axis=1)
     return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
@@ -89,7 +91,7 @@ def _hinge(motor_rad, bend_rad) -> float:
 def frames_by_touch(motor_rad: np.ndarray, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
     """The same once touch is known to sigma: frames within three sigma of it are left undecided, but for the first two:
     they are free if touch comes after them."""
-    margin = max(3.0 * sigma_rad, np.radians(0.02))
+    margin = max(_SURE_SIGMAS * sigma_rad, _LEAST_MARGIN_RAD)
     free = motor_rad < touch_rad - margin
     free[:FEWEST_FREE] |= motor_rad[:FEWEST_FREE] < touch_rad
     return motor_rad > touch_rad + margin, free

@@ -17,6 +17,7 @@ from vision.geometry.rods import Wire
 
 REST_POWERS = 4  # offset, slope, curvature and change of curvature, each across (y) and along the axis (z)
 _NODES = 41
+_LEAST_FORWARD2 = 0.01  # squared: a tangent that would turn back goes on at 84 degrees instead
 
 
 def tangent_growth(arc_mm: float | np.ndarray, contact_mm: float | np.ndarray, wire: Wire) -> np.ndarray:
@@ -91,7 +92,7 @@ def centrelines(
     sine = np.where(turn > 1e-12, np.sin(turn * growth) / np.maximum(turn, 1e-12), growth)
     aside = aside + sine[..., None] * np.asarray(bend_rad)[..., None, :]
     tangents = np.empty((*aside.shape[:-1], 3))
-    tangents[..., 0] = np.sqrt(np.maximum(1.0 - aside[..., 0] ** 2 - aside[..., 1] ** 2, 0.01))
+    tangents[..., 0] = np.sqrt(np.maximum(1.0 - aside[..., 0] ** 2 - aside[..., 1] ** 2, _LEAST_FORWARD2))
     tangents[..., 1:] = aside
     points = _simpson() @ tangents * arc[1]
     points[..., 1:] += np.asarray(rest_mm)[..., None, :, 0]

@@ -42,6 +42,7 @@ def _across(vectors, axis: BarAxis) -> np.ndarray:
 
 
 _ROUNDS_FROM_NODE, _ROUNDS_FROM_NEAR = 4, 2
+_OUTLINE_MM = 60.0  # to either side of its point, where a bar may hide the wire
 
 
 def closest_arc(curves: Curves, axis: BarAxis, near_mm: np.ndarray | None = None) -> np.ndarray:
@@ -92,7 +93,7 @@ def shifted_axis(axis: BarAxis, across: np.ndarray, vector: np.ndarray) -> BarAx
 
 
 def outline_of_bar(camera: Camera, axis: BarAxis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middle (m, 2) and half-width (m,) of the bar in one camera, 60 mm to either side of its point."""
-    place = np.linspace(-60.0, 60.0, 121)
+    """Middle (m, 2) and half-width (m,) of the bar in one camera, _OUTLINE_MM to either side of its point."""
+    place = np.linspace(-_OUTLINE_MM, _OUTLINE_MM, 121)
     points = axis.point_mm + place[:, None] * axis.direction
     return outline(camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm)

@@ -10,6 +10,7 @@ The nine lens parameters are fx fy cx cy k1 k2 p1 p2 k3. With a = x/z, b = y/z, 
 import numpy as np
 
 LENS_TERMS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+_MOST_STEPS = 30  # Newton's, which end before
 
 
 def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
@@ -87,7 +88,7 @@ def unproject(px: np.ndarray, lens: np.ndarray, tolerance_px: float = 1e-9) -> n
     target = (px - lens[2:4]) / lens[:2]
     ab = target.copy()
     tolerance = tolerance_px / min(lens[:2])
-    for _ in range(30):
+    for _ in range(_MOST_STEPS):
         miss = distort(ab, lens[4:]) - target
         if not np.any(np.abs(miss) > tolerance):
             break

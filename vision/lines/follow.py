@@ -18,6 +18,7 @@ from scipy.optimize import minimize
 from skimage.graph import route_through_array
 
 from vision.geometry.errors import Refused
+from vision.geometry.robust import robust_sigma
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.points import LinePoints
 from vision.lines.shading import Knots, fit_shading, locate, wave_prior
@@ -41,6 +42,9 @@ _LEAST_SIGMA_PX = 0.05  # of a point when a curve is laid through, so that it do
 _RADII_PX, _BLURS_PX = (0.3, 12.0), (0.4, 4.0)
 _FEWEST = 5
 _LEAST_CONTRAST = 3.0  # of a piece, over its noise
+_FIRST_PX = 0.8  # half-widths and blur before any is known
+_LEVEL_BLUR_PX = 1.5  # of the grey level that a pixel's noise is told of
+_CLEAR_BLURS = 1.5  # beyond the edge, where a line's own light has ended
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ def follow(grey: np.ndarray, start_px: Sequence[float], end_px: Sequence[float],
     grey = np.asarray(grey, dtype=float)
     noise = noise_of(grey) if noise is None else noise
     path = _cheapest_path(-grey if dark else grey, start_px, end_px)
-    curve, width = _smooth(path, np.full(len(path), _PATH_SIGMA_PX)), _Width(0.8, 0.8, 1.0)
+    curve, width = _smooth(path, np.full(len(path), _PATH_SIGMA_PX)), _Width(_FIRST_PX, _FIRST_PX, 1.0)
     for _ in range(_ROUNDS):
         width = _best_width(_pieces(grey, curve, width, piece_px, noise), width)
         pieces = _pieces(grey, curve, width, piece_px, noise)
@@ -117,7 +121,7 @@ def scatter_of(points: LinePoints) -> float:
     share = 1.0 / np.prod(apart, axis=2)  # weights of the third divided difference
     sigma = np.lib.stride_tricks.sliding_window_view(points.sigma_px, 4)
     z = np.sum(share * off, axis=1) / np.sqrt(np.sum((share * sigma) ** 2, axis=1))
-    return float(np.median(np.abs(z)) / 0.6745)
+    return robust_sigma(z)
 
 
 def noise_of(grey: np.ndarray) -> Noise:
@@ -126,7 +130,7 @@ def noise_of(grey: np.ndarray) -> Noise:
     Medians in classes of equal grey, so that edges and lines do not count (Immerkær's filter, 1996).
     """
     ripple = np.abs(convolve(grey, np.outer([1, -2, 1], [1, -2, 1]) / 6.0))
-    return noise_by_level(gaussian_filter(grey, 1.5)[1:-1, 1:-1], ripple[1:-1, 1:-1])
+    return noise_by_level(gaussian_filter(grey, _LEVEL_BLUR_PX)[1:-1, 1:-1], ripple[1:-1, 1:-1])
 
 
 def _refuse_nothing(count: int, contrast: float, start_px, end_px) -> None:
@@ -211,7 +215,7 @@ def _by_direction(curve) -> list[slice]:
 
 def _from_sides(pieces: Pieces, width: _Width) -> Pieces:
     """Pieces whose background is a ramp across, and behind a thick line a step too, fitted to their two sides."""
-    outside = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + 1.5 * width.blur_px
+    outside = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + _CLEAR_BLURS * width.blur_px
     columns = [np.ones_like(pieces.offset_px), pieces.offset_px]
     if width.hides:
         columns.append(np.sign(pieces.offset_px))

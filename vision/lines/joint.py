@@ -19,6 +19,7 @@ BLUR_SIGMA = 0.5  # of the logarithm of the blur: pixels say much more, where th
 _MOST_STEPS, _LONGEST_PX, _LONGEST_LOG = 40, 0.7, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
+_STIFFER, _EASIER, _UNDAMPED = 10.0, 5.0, 1e-2  # what a step makes of it; of _DAMPED, below which there is none
 # What a step may still gain in chi² by what all share, which it moves by a seventh of a sigma at most, and in the mean
 # by a piece's own position, which it moves by 0.03 sigma: pieces that tell nothing wander on for ever.
 _SETTLED, _SETTLED_EACH = 0.02, 1e-3
@@ -68,11 +69,11 @@ def solve_jointly(task: Task, shift_px: np.ndarray | None = None, robust: np.nda
             break
         there = here.moved(step, by_blur)
         if there.misfit > here.misfit:
-            damped = max(10.0 * damped, _DAMPED)
+            damped = max(_STIFFER * damped, _DAMPED)
             if damped > _MOST_DAMPED:
                 break
             continue
-        damped = damped / 5.0 if damped > 1e-2 * _DAMPED else 0.0
+        damped = damped / _EASIER if damped > _UNDAMPED * _DAMPED else 0.0
         here = there.weighted()
         arrow = _Arrow(task, here)
     return arrow.solved(damped)

@@ -15,6 +15,7 @@ _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equa
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
 # alike, moved all lines by half a pixel, and by a quarter of one from end to end.
 _LIT_ALIKE_RAD = np.radians(8.0)
+_LONGEST_PX = 0.7  # a step: beyond, a thin rod's edge is another's
 
 
 @dataclass(frozen=True)
@@ -242,6 +243,6 @@ def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 
     for _ in range(rounds):
         slopes = Equations(pieces.moved(shift), shading.blur_px, waves.shape[1]).linearised(waves)
         power = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER)
-        shift = np.clip(shift + np.clip(slopes.gram[:, 0, 2] / power, -0.7, 0.7), -limit_px, limit_px)
+        shift = np.clip(shift + np.clip(slopes.gram[:, 0, 2] / power, -_LONGEST_PX, _LONGEST_PX), -limit_px, limit_px)
     chi2 = slopes.gram[:, 2, 2] / pieces.freedom
     return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, slopes.contrast)

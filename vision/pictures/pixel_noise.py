@@ -4,6 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.geometry.robust import robust_sigma
+
+_CLASSES = 12  # of grey levels: enough for a line over them
+_LEAST_VARIANCE = 0.1  # grey levels²: that of rounding is 1/12
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -33,13 +38,13 @@ def measure_noise(first: np.ndarray, second: np.ndarray) -> Noise:
 
 def noise_by_level(level: np.ndarray, deviation: np.ndarray) -> Noise:
     """Noise from absolute deviations at grey levels (both of any one shape), by medians in classes of equal grey."""
-    edges = np.unique(np.quantile(level, np.linspace(0, 1, 13)))
+    edges = np.unique(np.quantile(level, np.linspace(0, 1, _CLASSES + 1)))
     classes = np.digitize(level, edges[1:-1])
-    rows = [(np.median(level[classes == k]), (np.median(deviation[classes == k]) / 0.6745) ** 2, np.sum(classes == k))
+    rows = [(np.median(level[classes == k]), robust_sigma(deviation[classes == k]) ** 2, np.sum(classes == k))
             for k in range(max(len(edges) - 1, 1)) if np.any(classes == k)]
     middle, variance, count = np.array(rows).T
     if len(middle) > 1 and np.ptp(middle) >= 1.0:
-        gain, floor = np.polyfit(middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, 0.1))
+        gain, floor = np.polyfit(middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, _LEAST_VARIANCE))
         if gain > 0:
-            return Noise(max(float(floor), 0.1), float(gain))
-    return Noise(max(float(np.average(variance, weights=count)), 0.1), 0.0)
+            return Noise(max(float(floor), _LEAST_VARIANCE), float(gain))
+    return Noise(max(float(np.average(variance, weights=count)), _LEAST_VARIANCE), 0.0)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from scipy import fft
 
+from vision.geometry.robust import robust_sigma
 from vision.pictures.change import HALF
 
 SEEN = 20.0  # peak over scatter: twice the largest of 150 pairs of pictures that show different scenes
@@ -51,7 +52,7 @@ def texture(picture: np.ndarray) -> np.ndarray:
     """What `likeness` compares: edges and texture of a picture (h, w) at half its resolution, none beyond measure."""
     grey = np.ascontiguousarray(picture[::HALF, ::HALF], dtype=np.float32)
     fine = cv2.GaussianBlur(grey, (0, 0), _FINE_PX) - cv2.GaussianBlur(grey, (0, 0), _COARSE_PX)
-    scale = float(np.median(np.abs(fine))) / 0.6745
+    scale = robust_sigma(fine)
     window = cv2.createHanningWindow(fine.shape[::-1], cv2.CV_32F)
     return window * np.clip(fine / max(scale, 1e-3), -_MOST_SIGMAS, _MOST_SIGMAS)
 

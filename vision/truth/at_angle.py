@@ -9,6 +9,7 @@ from vision.truth.value import FIELDS, Value, WhileTouching
 _WINDOW_RAD = np.radians(1.6)
 _JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
 _BEYOND_RAD = np.radians(0.3)
+_FEWEST_FOR_PARABOLA = 5  # frames: two more than it has coefficients
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,7 +114,7 @@ def _near(x) -> np.ndarray:
 
 
 def _degree(count: int) -> int:
-    return min(2 if count >= 5 else 1, count - 1)
+    return min(2 if count >= _FEWEST_FOR_PARABOLA else 1, count - 1)
 
 
 def _combine(smooth: Smooth, name: str, weights, slope_weights):

@@ -21,6 +21,7 @@ _DOUBTED_SLOPE_SIGMA_RAD = np.radians(3.0)
 _MOST_SLOPE_SIGMA_RAD = np.radians(20.0)
 # Nor beyond this one of slip: in one view, with slip known to 5 mm, slope was 24 degrees off at a stated 0.04.
 _MOST_SLIP_SIGMA_MM = 1.0
+_DRAWN_MM = 40.0  # of the bar, to either side of its point
 _VECTORS = ("x", "y", "z")
 
 
@@ -142,7 +143,7 @@ def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, d
     """Per frame and camera: wire, the bar's two edges (m, 2) and the contact (2,) in pixels."""
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
     axis = bar_axis(fitted.problem, fitted.state.vector)
-    place = np.linspace(-40.0, 40.0, 81)
+    place = np.linspace(-_DRAWN_MM, _DRAWN_MM, 81)
     along = axis.point_mm + place[:, None] * axis.direction
     drawn: dict = {}
     for k, f in enumerate(fitted.frames):
