@@ -18,7 +18,7 @@ from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
 from vision.pictures.files import read_picture
 
-_MOST_TRIALS, _MOST_PICTURES = 3, 11
+_MOST_TRIALS, _MOST_PICTURES = 3, 11  # trials and pictures of each: a median over them. Set by eye
 _UNCONFIRMED = 0.05  # of one trial alone
 _MOST_SCATTER = 0.1  # at the right scale six sessions scatter by 0.014 at most, at wrong ones by 0.1 to 0.3
 

@@ -22,8 +22,8 @@ from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
 from bench.rig.linear import solved
 from bench.rig.rod import Rod
 
-_PARTS = 0.5 ** np.arange(8)
-_ACROSS = np.array([0.0, 1.0, 0.0])
+_PARTS = 0.5 ** np.arange(8)  # of a Newton step, tried in turn until one helps
+_ACROSS = np.array([0.0, 1.0, 0.0])  # (3,): way across the whisker where no force tells one
 _BACKWARDS_MM = -1e-9  # mm: less is rounding
 _LAST = 1e-6  # of a Newton step, in parts
 

@@ -11,7 +11,7 @@ from bench.rig.light import Light
 from bench.rig.window import Window
 
 _NEVER = 1e-5  # 1/mm
-_ROOT_2PI = np.float32(np.sqrt(2 * np.pi))
+_ROOT_2PI = np.float32(np.sqrt(2 * np.pi))  # of the normal density, as wide as the samples
 
 
 @dataclass(frozen=True, eq=False)

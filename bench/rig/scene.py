@@ -15,8 +15,9 @@ from bench.rig.tube import Tube
 from bench.rig.window import Window
 
 HUB_FRONT_MM = 5.0  # how far the hub reaches along the whisker
+# mm: corners of the hub's block, its own axes
 _HUB_LOW, _HUB_HIGH = np.array([-17.0, -9.0, -6.0]), np.array([HUB_FRONT_MM, 9.0, 7.0])
-_BLOCK_HALF = np.array([9.0, 9.0, 7.0])
+_BLOCK_HALF = np.array([9.0, 9.0, 7.0])  # mm: half the bar's block, each way
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
 
 

@@ -17,7 +17,7 @@ from bench.rig.rod import Rod
 
 # Each vanishes at the base with its slope; a unit of length is the whisker's.
 _CLAMPED = [Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1]) for k in range(14)]
-_BENT = [shape.deriv(2) for shape in _CLAMPED]
+_BENT = [shape.deriv(2) for shape in _CLAMPED]  # their curvatures, by which a vibrating rod bends at its clamp
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from vision.geometry.errors import Refused
 from vision.geometry.rotation import nearest_rotation
 from vision.pictures.files import natural_order
 
-FORMAT = 1
+FORMAT = 1  # of session.toml; another one is refused
 MANIFEST = "session.toml"
 NMM2_PER_NM2 = 1e6  # N·mm² in a N·m²
 # Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.

@@ -18,7 +18,7 @@ VOLTS, MOMENTS = ("y_V", "z_V"), ("m_y_Nmm", "m_z_Nmm")
 SAMPLING_STEP = Window(1e-6, 0.05, (MILLISECONDS, MICROSECONDS))  # s: 1 MHz to 20 Hz
 VOLTAGE = Window(-30.0, 30.0, (MILLIVOLTS,))  # V: what a DAQ's input takes
 MOMENT = Window(-1e5, 1e5, (("N um", 1e-3), ("nN m", 1e-3)))
-_TURN_DEG = 360.0
+_TURN_DEG = 360.0  # °: an encoder that wraps does so by a turn
 _STILL_DEG = 0.02  # less is an encoder that stands still
 _SMALL_RANGE_DEG = 0.5  # no whisk is so short, and any usual one is, in radians
 # A motor's mean speed over a stroke may differ from the nominal one by this factor without raising a doubt.
