@@ -89,6 +89,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     scored."""
     from bench.report.against_theta import write_against_theta
     from bench.report.figures import write_figures
+    from bench.report.ledger import write_ledger
     from bench.report.page.write import write_report
     from bench.report.paper import write_paper_figures
     from bench.report.record import record_of, write_record
@@ -98,13 +99,14 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     drawn = evaluation.settings.figures
     by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
+    needed = write_ledger(out, results, evaluation.session.whisker)
     figures = [
         *(write_figures(evaluation, pool) if drawn else []),
         *of_theta,
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
-    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta)
+    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta, needed)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
     write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
