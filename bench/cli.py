@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bench.base.errors import BadInput
 from bench.cli_results import add_compare, add_report, add_view
-from bench.cli_seeing import add_seeing, add_tradeoff, seeing_of
+from bench.cli_seeing import add_seeing, add_tradeoff, add_watch, seeing_of, watch
 from bench.cli_setup import add_board, add_new
 from bench.options import BAD_INPUT, DONE, DOUBTFUL, FAULT_OF_OURS, INTERRUPTED, add_figure_format
 from bench.options import add_out as _add_out
@@ -111,6 +111,7 @@ def _add_evaluate(verbs) -> None:
         "else to half a frame)",
     )
     add_seeing(verb)
+    add_watch(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -144,6 +145,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     given["seeing"] = seeing_of(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
+    if options.watch is not None:
+        return watch(options, Settings(**given))
     told = {"progress": sys.stderr.isatty(), "announce": print}
     formats = options.figure_format
     run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)

@@ -24,6 +24,34 @@ def add_seeing(verb: argparse.ArgumentParser) -> None:
     how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
 
 
+def add_watch(verb: argparse.ArgumentParser) -> None:
+    """`--watch` of `evaluate`."""
+    verb.add_argument(
+        "--watch",
+        type=float,
+        nargs="?",
+        const=2.0,
+        metavar="S",
+        help="while the session is recorded: evaluate each trial that is complete, looking every S seconds (2), until "
+        "Ctrl-C",
+    )
+
+
+def watch(options: argparse.Namespace, settings) -> int:
+    """`evaluate --watch`. Raises BadInput for a time that is none."""
+    from bench.base.errors import BadInput
+    from bench.watch import watch as watched
+
+    if not 0 < options.watch <= 3600:
+        raise BadInput(f"--watch {options.watch:g}: must be above 0 and at most 3600 s")
+    told = {"progress": sys.stderr.isatty(), "figure_formats": options.figure_format, "announce": _at_once}
+    return watched(options.session, options.out, settings, every_s=options.watch, workers=options.workers, **told)
+
+
+def _at_once(line: str) -> None:
+    print(line, flush=True)
+
+
 def seeing_of(options: argparse.Namespace):
     """The settings of `--preset` or `--settings`."""
     from bench.trials.seeing import STANDARD, by_preset, from_file

@@ -1,6 +1,6 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -37,19 +37,21 @@ def evaluate(
     progress: bool = False,
     figure_formats: Sequence[str] = (),
     announce: Callable[[str], object] = print,
+    trials: Collection[str] | None = None,
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
-    figure_formats: of figures for a paper, beside the others; announce: is given the summary.
+    figure_formats: of figures for a paper, beside the others; announce: is given the summary. trials: names of those
+    that the session is taken to have; None: all.
     """
     estimators(settings.estimators)
     check_outside(out, session_path)
     doubts = Doubts()
-    session = checked_session(session_path, doubts)
-    trials = judged(session)
-    _require_some(trials, settings)
+    session = checked_session(session_path, doubts, trials)
+    recorded = judged(session)
+    _require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
-        calibration, units = placed_units(session, trials, out, settings, pool, doubts)
+        calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         whole = finished(evaluated(chosen, pool), session.whisker, settings)
