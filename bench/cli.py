@@ -11,6 +11,7 @@ from pathlib import Path
 
 from bench.base.errors import BadInput
 from bench.cli_results import add_compare, add_report, add_view
+from bench.cli_robot import add_robot
 from bench.cli_seeing import add_seeing, add_tradeoff, add_watch, seeing_of, watch
 from bench.cli_setup import add_board, add_new
 from bench.options import BAD_INPUT, DONE, DOUBTFUL, FAULT_OF_OURS, INTERRUPTED, add_figure_format
@@ -77,7 +78,7 @@ def make_parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     first = (add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
     looking = (add_report, add_compare, add_view)
-    for add_verb in (*first, *looking, add_tradeoff, _add_figures, _add_simulate, _add_info):
+    for add_verb in (*first, *looking, add_tradeoff, add_robot, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)
     return parser
 

@@ -161,7 +161,7 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
-    readout, missing = _readout(unit, kind)
+    readout, missing = readout_of(unit, kind)
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
@@ -227,7 +227,7 @@ def _kinetic(
     return None if found is None else felt_at(found)
 
 
-def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
+def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, str]:
     """How channels become moments, or why they cannot."""
     if kind == "Nmm":
         return Readout.bare(), ""

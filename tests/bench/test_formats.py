@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import tradeoff
+from bench import robot_trade, tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import curved, error_map, explained, soft, tables
@@ -54,6 +54,7 @@ CSV = {
     "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,
+    "robot_trade.csv": robot_trade.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 
