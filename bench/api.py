@@ -40,7 +40,7 @@ from bench.trials.seeing import STANDARD, by_preset
 
 TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature"),
+    *("against_theta", "compliance", "curvature", "ledger"),
 )
 Folder = Path | str
 

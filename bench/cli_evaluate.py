@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from bench.cli_seeing import add_seeing, seeing_of
+from bench.cli_seeing import add_seeing, add_watch, seeing_of, watch
 from bench.options import DONE, DOUBTFUL, Verbs, add_figure_format, add_out, add_session, add_verb, add_workers
 
 
@@ -39,6 +39,7 @@ def add_evaluate(verbs: Verbs) -> None:
         "else to half a frame)",
     )
     add_seeing(verb)
+    add_watch(verb)
     verb.add_argument(
         "--gauges-from-all",
         action="store_true",
@@ -72,6 +73,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     given["seeing"] = seeing_of(options)
     if "estimators" in given:
         given["estimators"] = tuple(given["estimators"])
+    if options.watch is not None:
+        return watch(options, Settings(**given))
     told = {"progress": sys.stderr.isatty(), "announce": print}
     formats = options.figure_format
     run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)

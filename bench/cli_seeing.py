@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from bench.options import Verbs, add_out, add_session, add_verb, count
 
 if TYPE_CHECKING:
-    from bench.base.settings import Seeing
+    from bench.base.settings import Seeing, Settings
 
 
 def add_seeing(verb: argparse.ArgumentParser) -> None:
@@ -26,6 +26,34 @@ def add_seeing(verb: argparse.ArgumentParser) -> None:
         help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
     )
     how.add_argument("--settings", type=Path, metavar="FILE", help="the same from a TOML file, as tradeoff writes it")
+
+
+def add_watch(verb: argparse.ArgumentParser) -> None:
+    """`--watch` of `evaluate`."""
+    verb.add_argument(
+        "--watch",
+        type=float,
+        nargs="?",
+        const=2.0,
+        metavar="S",
+        help="while the session is recorded: evaluate each trial that is complete, looking every S seconds (2), until "
+        "Ctrl-C",
+    )
+
+
+def watch(options: argparse.Namespace, settings: "Settings") -> int:
+    """`evaluate --watch`. Raises BadInput for a time that is none."""
+    from bench.base.errors import BadInput
+    from bench.watch import watch as watched
+
+    if not 0 < options.watch <= 3600:
+        raise BadInput(f"--watch {options.watch:g}: must be above 0 and at most 3600 s")
+    told = {"progress": sys.stderr.isatty(), "figure_formats": options.figure_format, "announce": _at_once}
+    return watched(options.session, options.out, settings, every_s=options.watch, workers=options.workers, **told)
+
+
+def _at_once(line: str) -> None:
+    print(line, flush=True)
 
 
 def seeing_of(options: argparse.Namespace) -> "Seeing":

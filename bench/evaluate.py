@@ -1,6 +1,6 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -37,19 +37,21 @@ def evaluate(
     progress: bool = False,
     figure_formats: Sequence[str] = (),
     announce: Callable[[str], object] = print,
+    trials: Collection[str] | None = None,
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
-    figure_formats: of figures for a paper, beside the others; announce: is given the summary.
+    figure_formats: of figures for a paper, beside the others; announce: is given the summary. trials: names of those
+    that the session is taken to have; None: all.
     """
     estimators(settings.estimators)
     check_outside(out, session_path)
     doubts = Doubts()
-    session = checked_session(session_path, doubts)
-    trials = judged(session)
-    _require_some(trials, settings)
+    session = checked_session(session_path, doubts, trials)
+    recorded = judged(session)
+    _require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
-        calibration, units = placed_units(session, trials, out, settings, pool, doubts)
+        calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
         gauges, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         whole = finished(evaluated(chosen, pool), session.whisker, settings)
@@ -89,6 +91,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     scored."""
     from bench.report.against_theta import write_against_theta
     from bench.report.figures import write_figures
+    from bench.report.ledger import write_ledger
     from bench.report.page.write import write_report
     from bench.report.paper import write_paper_figures
     from bench.report.record import record_of, write_record
@@ -98,13 +101,14 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     drawn = evaluation.settings.figures
     by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
+    needed = write_ledger(out, results, evaluation.session.whisker)
     figures = [
         *(write_figures(evaluation, pool) if drawn else []),
         *of_theta,
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
-    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta)
+    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta, needed)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
     write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)

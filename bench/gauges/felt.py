@@ -49,12 +49,14 @@ def touch_on_the_way_back(signals: Signals) -> Value:
 
 @dataclass(frozen=True)
 class Stroke:
-    """One forward stroke: time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered."""
+    """One forward stroke: time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered; drift
+    (n, 2) that was taken out of both, None where none was."""
 
     time_s: np.ndarray
     motor_rad: np.ndarray
     channels: np.ndarray
     filtered: np.ndarray
+    drift: np.ndarray | None = None
 
     @property
     def saturated(self) -> int:
@@ -65,6 +67,13 @@ class Stroke:
     def speed_rad_s(self) -> float:
         """Mean speed of the motor over the stroke."""
         return float(np.ptp(self.motor_rad) / np.ptp(self.time_s))
+
+    @property
+    def with_drift(self) -> "Stroke":
+        """The stroke as it was before the drift was taken out."""
+        if self.drift is None:
+            return self
+        return replace(self, channels=self.channels + self.drift, filtered=self.filtered + self.drift, drift=None)
 
     def touch(self) -> Touch:
         """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
@@ -116,7 +125,7 @@ def _levelled(stroke: Stroke, time_s, motor_rad, channels) -> Stroke:
         return stroke
     (start, zero), (end, returned) = ((t.mean(), np.nanmean(c, axis=0)) for t, c in (before, after))
     drift = np.outer(stroke.time_s - start, (returned - zero) / (end - start))
-    return replace(stroke, channels=stroke.channels - drift, filtered=stroke.filtered - drift)
+    return replace(stroke, channels=stroke.channels - drift, filtered=stroke.filtered - drift, drift=drift)
 
 
 def _lowpass(channels, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
 from vision.fit.beam_check import BeamCheck
+from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
@@ -88,6 +89,7 @@ class SeenWhisk:
     base: BaseLines | None = None
     beam: BeamCheck | None = None
     turns: Turns | None = None
+    refinements: dict[str, LeftOut] = field(default_factory=dict)
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
@@ -181,6 +183,14 @@ class FeltAt:
     estimates: tuple[EstimateRow, ...] = ()
 
 
+@dataclass(frozen=True)
+class WithDrift:
+    """Felt touch and d_x by (10) with the drift left in that shows from before touch to after the way back."""
+
+    touch_felt_rad: float
+    d_x_est_mm: float
+
+
 @dataclass(frozen=True, eq=False)
 class FeltWhisk:
     """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle, phases, estimates.
@@ -190,7 +200,7 @@ class FeltWhisk:
     those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
     elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
     moments and estimates at other pushing angles, up to the stroke's end. kinetic: as on the kinetic cone, where the
-    moments alone show that the contact sticks and slips.
+    moments alone show that the contact sticks and slips. with_drift: None where no drift was taken out.
     """
 
     whisk: int = 0
@@ -210,6 +220,7 @@ class FeltWhisk:
     one_factor: tuple[EstimateRow, ...] = ()
     by_theta: tuple[FeltAt, ...] = ()
     kinetic: FeltAt | None = None
+    with_drift: WithDrift | None = None
 
     @property
     def has_moments(self) -> bool:

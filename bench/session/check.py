@@ -1,6 +1,6 @@
 """What can be checked of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 
 from bench.base.doubts import Doubts
@@ -16,13 +16,15 @@ from vision.pictures.files import VIDEO_SUFFIXES, Frames, picture_size, pictures
 Size = tuple[int, int]
 
 
-def checked_session(path: Path | str, doubts: Doubts | None = None) -> Session:
+def checked_session(
+    path: Path | str, doubts: Doubts | None = None, trials: Collection[str] | None = None
+) -> Session:
     """`load_session`, and every trial's signals, frame times and picture sizes read once.
 
     Raises BadInput at the first thing that is wrong; with a collecting `doubts` only where session.toml is.
     """
     doubts = doubts or Doubts()
-    session = load_session(path, doubts)
+    session = load_session(path, doubts, trials=trials)
     for trial in session.trials:
         check_recording(trial, doubts)
     check_sizes(session, doubts)

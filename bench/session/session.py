@@ -1,6 +1,6 @@
 """A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,10 +72,16 @@ class Session:
         raise BadInput(f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}", file="trials")
 
 
-def load_session(path: Path | str, doubts: Doubts | None = None, *, lenses_known: bool = False) -> Session:
+def load_session(
+    path: Path | str,
+    doubts: Doubts | None = None,
+    *,
+    lenses_known: bool = False,
+    trials: Collection[str] | None = None,
+) -> Session:
     """Read the manifests and find every file of a session. Signals and frames are not read here.
 
-    lenses_known: board views of each camera are not asked for.
+    lenses_known: board views of each camera are not asked for. trials: names of those that are read; None: all.
 
     Raises BadInput at the first thing that is wrong; with a collecting `doubts`, reads on where it can.
     """
@@ -84,9 +90,9 @@ def load_session(path: Path | str, doubts: Doubts | None = None, *, lenses_known
     whisker, bar = _whisker(keys.whisker), keys.bar
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
-    trials = _trials(path, keys, doubts)
+    found = _trials(path, keys, doubts, trials)
     with doubts.guard():
-        _check_whole(trials, whisker, bar)
+        _check_whole(found, whisker, bar)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
@@ -98,10 +104,10 @@ def load_session(path: Path | str, doubts: Doubts | None = None, *, lenses_known
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
         T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
         gauges=_gauges(keys.gauges),
-        camera_names=_camera_names(board_sources, trials),
+        camera_names=_camera_names(board_sources, found),
         board_sources=board_sources,
         rig_pictures=single_pictures(path / "boards" / "rig", "boards/rig"),
-        trials=trials,
+        trials=found,
         cameras_toml=_if_there(path / "cameras.toml"),
         gauges_toml=_if_there(path / "gauges.toml"),
     )
@@ -180,12 +186,14 @@ def _gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
     return GivenGauges(**exact | given)
 
 
-def _trials(path: Path, keys: manifest.SessionKeys, doubts: Doubts) -> tuple[Trial, ...]:
+def _trials(
+    path: Path, keys: manifest.SessionKeys, doubts: Doubts, names: Collection[str] | None
+) -> tuple[Trial, ...]:
     found, daq = [], None
     with doubts.guard():
         daq = daq_file(keys.signals, MANIFEST)
     for entry in visible(path / "trials"):
-        if entry.is_dir():
+        if entry.is_dir() and (names is None or entry.name in names):
             with doubts.guard():
                 found.append(load_trial(entry, keys, doubts, daq))
     return tuple(found)

@@ -54,11 +54,16 @@ class SharedTouch:
         return float(row @ self.values), float(np.sqrt(row @ self.covariance @ row))
 
     @property
+    def tells_clock(self) -> bool:
+        """Whether speeds or directions tell a clock from a zero."""
+        low, high = self.speeds_rad_s
+        return high - low >= _ALIKE * abs(high)
+
+    @property
     def line(self) -> str:
         """For the summary."""
-        low, high = self.speeds_rad_s
-        if high - low < _ALIKE * abs(high):
-            late, sigma = np.degrees(self.at(high))
+        if not self.tells_clock:
+            late, sigma = np.degrees(self.at(self.speeds_rad_s[1]))
             return (
                 f"felt − seen, by {_strokes(self.whisks, self.back)} together: {late:+.3f} ± {sigma:.3f}°; at one "
                 "speed and in one direction a clock is not told from a zero"

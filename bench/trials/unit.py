@@ -29,6 +29,7 @@ from bench.records.trial import (
     TrialFacts,
     TrialResult,
     WhiskerFacts,
+    WithDrift,
 )
 from bench.session.session import Session
 from bench.session.signals import Signals, read_signals
@@ -40,12 +41,14 @@ from bench.trials.gate import kinetic_end
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from estimator.beam import Beam
+from estimator.builtin import ESTIMATORS
 from estimator.signal import NOT_REACHED, Touch
 from estimator.whisk import Whisk
 from vision.truth.value import NAN, UNKNOWN
 
 NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
 SATURATED = "the gauges are at their rail at the pushing angle: raise their range, or ask for a smaller --theta-deg"
+_TEN = "with_friction"  # equation (10)
 OWN_GAUGES = "not judged: without this trial the gauges are not known"
 
 
@@ -158,7 +161,7 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
-    readout, missing = _readout(unit, kind)
+    readout, missing = readout_of(unit, kind)
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
     status = whisk if isinstance(whisk, str) else missing
@@ -182,6 +185,7 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
         kinetic=_kinetic(stroke, touch, readout, usable, estimates),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         one_factor=_one_factor(unit, kind, stroke),
+        with_drift=_with_drift(unit, stroke, readout),
     )
 
 
@@ -217,13 +221,13 @@ def _kinetic(
     stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, estimates: tuple[EstimateRow, ...]
 ) -> FeltAt | None:
     """The whisk on the kinetic cone, where its moments show teeth; no picture and no manifest has a part in it."""
-    given = next(row for row in estimates if row.estimator == "with_friction")
+    given = next(row for row in estimates if row.estimator == _TEN)
     moments = (stroke.channels - touch.offset) @ readout.matrix.T
     found = kinetic_end(stroke.time_s, stroke.motor_rad - touch.motor_rad, moments, whisk, given)
     return None if found is None else felt_at(found)
 
 
-def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
+def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, str]:
     """How channels become moments, or why they cannot."""
     if kind == "Nmm":
         return Readout.bare(), ""
@@ -231,6 +235,18 @@ def _readout(unit: Unit, kind: str) -> tuple[Readout | None, str]:
         return None, NO_GAUGES
     fitted = unit.gauges.for_trial(unit.trial.name)
     return (Readout.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
+
+
+def _with_drift(unit: Unit, stroke: Stroke, readout: Readout) -> WithDrift | None:
+    """Touch and (10) of the stroke as recorded; None where nothing was taken out of it."""
+    if stroke.drift is None:
+        return None
+    beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
+    touch, whisk = felt_whisk(stroke.with_drift, readout, unit.drift_rate, beam, theta_rad)
+    if isinstance(whisk, str):
+        return WithDrift(touch.motor_rad, NAN)
+    (row,) = answers(whisk, {_TEN: ESTIMATORS[_TEN]}, unit.settings)
+    return WithDrift(touch.motor_rad, row.d_x_est_mm.value)
 
 
 def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from bench import tradeoff
+from bench import robot_trade, tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import curved, error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
-from bench.report import against_theta, assembly, compare, figure_8
+from bench.report import against_theta, assembly, compare, figure_8, ledger
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
@@ -50,9 +50,11 @@ CSV = {
     "compliance.csv": soft.COLUMNS,
     "curvature.csv": curved.COLUMNS,
     "against_theta.csv": against_theta.COLUMNS,
+    "ledger.csv": ledger.COLUMNS,
     "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,
+    "robot_trade.csv": robot_trade.COLUMNS,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 

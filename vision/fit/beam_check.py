@@ -18,13 +18,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import chdtrc
 
-from vision.fit.problem import CONTACT_SIGMA_MM, WANDER_PX, Problem, State, bar_axis, bends, curves_of, wandering
+from vision.fit.problem import WANDER_PX, Problem, State, bends, curves_of, wandering
 from vision.fit.quantities import Jacobians, Measured
+from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
 from vision.fit.uncertainty import camera_rows
 from vision.geometry.centreline import Curves, rotation_z
-from vision.geometry.contact import BarAxis, clearance
-from vision.lines.points import Observed
 
 # Chance by which a wire that is a beam departs from it so far, a whisk.
 FALSE_ALARM = 1e-3
@@ -112,18 +111,16 @@ def _departure(problem: Problem, state: State, frame: int):
     root = np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     moves = _moves(problem, state, curves)
-    by_departure, by_wander = _line_rows(problem, curves, moves)
-    on_bar, slip_by = _contact_rows(problem, state, curves, moves, frame)
+    on_bar, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
 
     def fill(*parts: np.ndarray) -> np.ndarray:
         return _filled(len(root), *parts) * root
 
-    own = np.hstack([linear.jacobian * root, fill(by_wander)])
+    own = np.hstack([linear.jacobian * root, fill(_wander_rows(problem))])
     prior = np.eye(own.shape[1])[problem.size :] / WANDER_PX
-    cameras = fill(camera_rows(problem, state))
-    departure, spread, follows = _beside(
-        own, prior, fill(by_departure, on_bar), linear.residual * root[:, 0], cameras, problem.cameras.covariance
-    )
+    rows, cameras = fill(by_lines(problem, curves, moves), on_bar), fill(camera_rows(problem, state))
+    residual, of_cameras = linear.residual * root[:, 0], problem.cameras.covariance
+    departure, spread, follows = _beside(own, prior, rows, residual, cameras, of_cameras)
     return departure, spread, follows[: problem.size], slip_by
 
 
@@ -158,36 +155,10 @@ def _moves(problem: Problem, state: State, curves: Curves) -> Curves:
     return Curves(curves.arc_mm, points, tangents)
 
 
-def _line_rows(problem: Problem, curves: Curves, moves: Curves) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the line points' residuals by the departure (n, k), and by each camera's wandering (n, w)."""
-    departure, wander = [], []
-    for seen in problem.seen:
-        on_wire = seen.frame >= 0
-        per_camera = np.kron(np.arange(len(problem.cameras)) == seen.camera, wandering(problem, seen)) * on_wire
-        wander.append(per_camera / seen.points.sigma_px[:, None])
-        moved = _across_line(problem, seen, curves, moves) if on_wire else np.zeros((len(seen.points), KNOTS))
-        departure.append(moved / seen.points.sigma_px[:, None])
-    return np.concatenate(departure), np.concatenate(wander)
-
-
-def _across_line(problem: Problem, seen: Observed, curves: Curves, moves: Curves) -> np.ndarray:
-    """How far (n, k) each departure moves the line across itself in the picture, px."""
-    place, frame = seen.points.place, seen.frame
-    points, _ = Curves(curves.arc_mm, curves.points_mm[frame], curves.tangents[frame]).at(place)
-    moved, _ = Curves(curves.arc_mm, moves.points_mm[:, frame], moves.tangents[:, frame]).at(place)
-    _, by_point, _ = problem.cameras.cameras[seen.camera].project_with_jacobians(points)
-    return np.einsum("ni,nij,knj->nk", seen.points.normal, by_point, moved)
-
-
-def _contact_rows(problem: Problem, state: State, curves: Curves, moves: Curves, frame: int):
-    """Derivatives of the touching frames' residuals (t, k), and of the slip in one frame (k,), by the departure."""
-    axis = bar_axis(problem, state.vector)
-    points, tangents = (
-        np.concatenate([still[None], still + _STEP_MM_PER_RAD * moved])
-        for still, moved in ((curves.points_mm, moves.points_mm), (curves.tangents, moves.tangents))
-    )
-    wide = BarAxis(*(np.broadcast_to(part, (*points.shape[:2], 3)) for part in (axis.point_mm, axis.direction)))
-    distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), wide)
-    by_departure = (distance[1:] - distance[0]) / _STEP_MM_PER_RAD / CONTACT_SIGMA_MM
-    slip = (contact[1:, frame] - contact[0, frame]) @ axis.direction / _STEP_MM_PER_RAD
-    return by_departure[:, problem.touching].T, slip
+def _wander_rows(problem: Problem) -> np.ndarray:
+    """Derivatives (n, w) of the line points' residuals by each camera's wandering."""
+    return np.concatenate([
+        np.kron(np.arange(len(problem.cameras)) == seen.camera, wandering(problem, seen)) * (seen.frame >= 0)
+        / seen.points.sigma_px[:, None]
+        for seen in problem.seen
+    ])  # fmt: skip

@@ -40,7 +40,7 @@ def uncertainty(problem: Problem, state: State, answer: np.ndarray) -> Uncertain
     the wire, and too wide for what does not, so that their errors are propagated as they are.
     """
     by_row = answer @ weighted_jacobian(problem, state).T
-    by_camera = _by_lens(problem, state, answer)
+    by_camera = by_lens(problem, state, answer)
     return Uncertainty(answer, by_row @ _alike(problem, by_row).T, by_camera @ problem.cameras.covariance @ by_camera.T)
 
 
@@ -56,7 +56,7 @@ def _alike(problem: Problem, rows) -> np.ndarray:
     return found
 
 
-def _by_lens(problem: Problem, state: State, answer) -> np.ndarray:
+def by_lens(problem: Problem, state: State, answer: np.ndarray) -> np.ndarray:
     """Derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
 
     They answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees, and with W as in
@@ -98,7 +98,7 @@ def _by_placement(problem: Problem, state: State, answer, gradient) -> float:
     cameras = problem.cameras
     if cameras.placement is None:
         return float("nan")
-    by = gradient @ _by_lens(problem, state, answer) @ cameras.by_placement
+    by = gradient @ by_lens(problem, state, answer) @ cameras.by_placement
     return float(by @ cameras.placement @ by)
 
 

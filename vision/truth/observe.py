@@ -16,6 +16,7 @@ from vision.bar.search import see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -107,12 +108,19 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
     truth, unexplained = to_whisk(whisk, fitted), [looks.doubt(name) for name, looks in whisk.light.items()]
     beam = _beam(fitted) if whisk.settings.check_beam else None
+    without = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk.views, whisk.rods, *stroke, whisk.motor, fitted.frames, whisk.light, whisk.settings)
     status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *unexplained, *whisk.left_out]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
-    return replace(truth, base=base_lines(*stroke, fitted.uncertainty.lens), beam=beam, turns=turns, status=status)
+    base = base_lines(*stroke, fitted.uncertainty.lens)
+    return replace(truth, base=base, beam=beam, turns=turns, refinements=without, status=status)
+
+
+def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:
+    fit = Fit(fitted.problem, fitted.state, fitted.uncertainty.answer, fitted.measured, fitted.by_parameter)
+    return left_out(fit, whisk.light)
 
 
 def _beam(fitted: FittedWhisk) -> BeamCheck:

@@ -8,6 +8,7 @@ from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
 from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
+from bench.report.ledger import Entry, ledger_lines
 from bench.report.run import Section
 from bench.report.summary.doubts import frame_lines, light_lines, taken_as_exact, whisk_doubts
 from bench.report.summary.errors import contact_lines, error_lines
@@ -19,7 +20,7 @@ from bench.trials.compare import Judged, judge
 
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature"),
+    *("against_theta", "compliance", "curvature", "ledger"),
 )
 
 
@@ -39,15 +40,19 @@ class Summary:
 
 
 def summary_of(
-    evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str], by_theta: Sequence[AtTheta] = ()
+    evaluation: Evaluation,
+    scores: Sequence[str],
+    figures: Sequence[str],
+    by_theta: Sequence[AtTheta] = (),
+    needed: Sequence[Entry] = (),
 ) -> Summary:
     """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta:
-    errors against θ."""
+    errors against θ; needed: which refinements are."""
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
     judged = judge(evaluation.results)
     said = verdict(evaluation.session, evaluation.results, judged, evaluation.settings, len(doubtful))
     said = (*said, *gauges_of_all(evaluation.gauges), *looked_at(evaluation.results, evaluation.settings))
-    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta)
+    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta, needed)
     return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))
 
 
@@ -58,6 +63,7 @@ def _sections(
     scores: Sequence[str],
     figures: Sequence[str],
     by_theta: Sequence[AtTheta],
+    needed: Sequence[Entry],
 ) -> Iterator[Section]:
     results, settings = evaluation.results, evaluation.settings
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
@@ -70,6 +76,7 @@ def _sections(
     yield _titled("Friction angle α (± one sigma)", friction)
     yield _titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)])
     yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
+    yield _titled("Only what the scene requires: the effect of leaving it out (ledger.csv)", ledger_lines(needed))
     yield _titled("Cameras", evaluation.calibration.notes)
     yield _titled("Light from one side", light_lines(results))
     yield _titled("Frames", frame_lines(results))
