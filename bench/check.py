@@ -33,11 +33,11 @@ _FRAME_LOOKS = 5  # of a trial: exposure and scene
 _MOST_SATURATED = 0.1  # of a channel's samples in a stroke
 
 
-def check(path: Path, progress: bool) -> int:
+def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
     """Print refusals and notes. Returns the exit code: 2 where there is a refusal, 1 where a note, else 0."""
     doubts = Doubts(stop_at_first=False)
     with doubts.guard():
-        session = checked_session(path, doubts)
+        session = checked_session(path, doubts, follow_links=follow_links)
         find_damage(session, doubts, each=partial(tqdm, desc="pictures", disable=not progress, leave=False))
         look_ahead(session, doubts)
     for line in doubts.refusals:

@@ -15,6 +15,7 @@ from bench.cli_seeing import add_seeing, add_tradeoff, seeing_of
 from bench.cli_setup import add_board, add_new
 from bench.options import BAD_INPUT, DONE, DOUBTFUL, FAULT_OF_OURS, INTERRUPTED, add_figure_format
 from bench.options import add_out as _add_out
+from bench.options import add_recorded as _add_recorded
 from bench.options import add_session as _add_session
 from bench.options import add_verb as _add
 from bench.options import add_workers as _add_workers
@@ -90,7 +91,7 @@ def _add_evaluate(verbs) -> None:
         "true distance and slip of every whisk, the estimates beside them, and their errors",
         "whisker-bench evaluate fixtures/small-session --out demo-out --workers 2",
     )
-    _add_session(verb)
+    _add_recorded(verb)
     _add_out(verb, "OUT", "folder for tables, figures and the summary")
     verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
     verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
@@ -139,7 +140,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
-    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures", "follow_links")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     given["seeing"] = seeing_of(options)
     if "estimators" in given:
@@ -160,7 +161,7 @@ def _add_calibrate(verbs) -> None:
         "calibrate the cameras from boards/ and place them in the rig, with their uncertainty",
         "whisker-bench calibrate cameras fixtures/small-session --out cameras.toml",
     )
-    _add_session(cameras)
+    _add_recorded(cameras)
     _add_out(cameras, "FILE", "cameras.toml to write; its covariance goes beside it as .npz")
     cameras.add_argument(
         "--lenses",
@@ -175,7 +176,7 @@ def _add_calibrate(verbs) -> None:
         "calibrate the gauges against the deflection seen, with a certificate",
         "whisker-bench calibrate gauges fixtures/small-session --out gauges.toml",
     )
-    _add_session(gauges)
+    _add_recorded(gauges)
     _add_out(gauges, "FILE", "gauges.toml to write; the certificate goes beside it as .pdf")
     gauges.add_argument("--all", action="store_true", help='all trials, not only those marked purpose = "gauge"')
     _add_workers(gauges)
@@ -190,13 +191,15 @@ def _calibrate_gauges(options: argparse.Namespace) -> int:
         every_trial=options.all,
         workers=options.workers,
         progress=sys.stderr.isatty(),
+        follow_links=options.follow_links,
     )
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
     from bench.cameras.calibrate import calibrate_cameras_command
 
-    return calibrate_cameras_command(options.session, options.out, options.lenses)
+    links = options.follow_links
+    return calibrate_cameras_command(options.session, options.out, options.lenses, follow_links=links)
 
 
 def _add_check(verbs) -> None:
@@ -207,13 +210,13 @@ def _add_check(verbs) -> None:
         "list everything that is wrong or doubtful in a session, without evaluating it",
         "whisker-bench check fixtures/small-session",
     )
-    _add_session(verb)
+    _add_recorded(verb)
 
 
 def _check(options: argparse.Namespace) -> int:
     from bench.check import check
 
-    return check(options.session, progress=sys.stderr.isatty())
+    return check(options.session, progress=sys.stderr.isatty(), follow_links=options.follow_links)
 
 
 _MAPS = {

@@ -45,7 +45,7 @@ def evaluate(
     estimators(settings.estimators)
     check_outside(out, session_path)
     doubts = Doubts()
-    session = checked_session(session_path, doubts)
+    session = checked_session(session_path, doubts, follow_links=settings.follow_links)
     trials = judged(session)
     _require_some(trials, settings)
     with lock_output(out), Workers(workers, progress) as pool:

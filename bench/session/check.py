@@ -16,13 +16,13 @@ from vision.pictures.files import VIDEO_SUFFIXES, Frames, picture_size, pictures
 Size = tuple[int, int]
 
 
-def checked_session(path: Path | str, doubts: Doubts | None = None) -> Session:
+def checked_session(path: Path | str, doubts: Doubts | None = None, *, follow_links: bool = False) -> Session:
     """`load_session`, and every trial's signals, frame times and picture sizes read once.
 
     Raises BadInput at the first thing that is wrong; with a collecting `doubts` only where session.toml is.
     """
     doubts = doubts or Doubts()
-    session = load_session(path, doubts)
+    session = load_session(path, doubts, follow_links=follow_links)
     for trial in session.trials:
         check_recording(trial, doubts)
     check_sizes(session, doubts)
