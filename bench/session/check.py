@@ -1,10 +1,12 @@
 """What can be checked of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.results import hash_of_files
 from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import forward_strokes, read_signals
@@ -26,7 +28,22 @@ def checked_session(path: Path | str, doubts: Doubts | None = None, *, follow_li
     for trial in session.trials:
         check_recording(trial, doubts)
     check_sizes(session, doubts)
+    for line in _copies(session):
+        doubts.note(line)
     return session
+
+
+def _copies(session: Session) -> Iterator[str]:
+    """A line on trials whose signals are those of another: noise is never the same twice."""
+    alike: dict[str, list[Trial]] = {}
+    sizes = Counter(trial.signals_path.stat().st_size for trial in session.trials)
+    for trial in session.trials:
+        if sizes[trial.signals_path.stat().st_size] > 1:
+            alike.setdefault(hash_of_files([trial.signals_path]), []).append(trial)
+    for trials in alike.values():
+        if len(trials) > 1:
+            names = ", ".join(trial.name for trial in trials)
+            yield f"trials {names} have one and the same {trials[0].signals_path.name}: all but one have another's"
 
 
 def check_recording(trial: Trial, doubts: Doubts) -> None:
