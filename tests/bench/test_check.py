@@ -46,7 +46,8 @@ def test_a_fault_of_a_trial(small_copy, fault, expected):
 
 def test_signals_of_another_trial(small_copy):
     FAULTS["another trial's signals"](small_copy)
-    assert "trials b30_3, b60_4 have one and the same signals.csv: all but one have another's" in found(small_copy).notes
+    said = "trials b30_3, b60_4 have one and the same signals.csv: all but one have another's"
+    assert said in found(small_copy).notes
 
 
 DICTIONARY = 'is not found, but one with dictionary = "DICT_5X5_50" is'
