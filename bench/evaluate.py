@@ -40,7 +40,7 @@ def evaluate(
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
-    figure_formats: of figures for a paper, beside the others; announce: is given the summary.
+    figure_formats: of figures for a paper, beside the others; announce: is given what is to be seen at a glance.
     """
     estimators(settings.estimators)
     check_outside(out, session_path)
@@ -64,7 +64,7 @@ def evaluate(
         recordings = {unit.trial.name: unit.files for unit in chosen}
         found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
         summary = report(Evaluation(session, out, settings, *found), pool, figure_formats)
-    announce(summary.text.rstrip())
+    announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
 
 

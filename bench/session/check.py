@@ -12,6 +12,7 @@ from bench.session.session import Session, load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from vision.calibration.cameras_file import read_cameras
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.pictures.files import VIDEO_SUFFIXES, Frames, picture_size, pictures_in
 
@@ -81,7 +82,7 @@ def _check_clock(trial: Trial, signals_s, frames_s, doubts: Doubts) -> None:
         hint = "Are the frames' times in milliseconds?" if in_ms else "They must be times of one clock."
         raise BadInput(f"{found}. {hint}", file=f"trials/{trial.name}")
     if outside:
-        doubts.note(f"trials/{trial.name}: {outside} frames were taken while no signals were ({found})")
+        doubts.note(f"trials/{trial.name}: {counted(outside, 'frame')} taken while no signals were ({found})")
 
 
 def check_sizes(session: Session, doubts: Doubts) -> None:

@@ -12,6 +12,7 @@ from bench.session.footage import declared_rate_Hz, decoded_count, frame_count, 
 from bench.session.signals import Signals
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.pictures.files import Frames
 
@@ -107,7 +108,7 @@ def _common(trial: Trial) -> FrameTimes:
     _check_rate(table[TIME], trial, shown)
     doubts += tuple(_header_rates(table[TIME], trial, trial.camera_sources, shown))
     if repeats:
-        doubts = (*doubts, f"{shown}: {repeats} repeated rows dropped")
+        doubts = (*doubts, f"{shown}: {counted(repeats, 'repeated row')} dropped")
     pictures = {camera: np.arange(len(table)) for camera in trial.camera_sources}
     return FrameTimes(table[TIME], "frames.csv", pictures, doubts=doubts)
 
@@ -230,8 +231,9 @@ def _check_count(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str,
         return (f"{trial.shown(source.name)}: the video cannot be opened: truncated or damaged",)
     found = decoded_count(source)
     if found == rows:
-        return (f"{trial.shown(source.name)}: the header declares {declared} frames, {found} are there",)
-    raise BadInput(f"has {rows} rows, camera {camera} has {found} frames; there must be a row a frame", file=shown)
+        return (f"{trial.shown(source.name)}: the header declares {counted(declared, 'frame')}, there are {found}",)
+    unlike = f"has {counted(rows, 'row')}, camera {camera} has {counted(found, 'frame')}"
+    raise BadInput(f"{unlike}; there must be a row a frame", file=shown)
 
 
 def _one_count(counts: Mapping[str, int], trial: Trial) -> int:

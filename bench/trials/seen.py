@@ -17,6 +17,7 @@ from bench.session.trial import Trial
 from bench.trials.consistency import cone_doubt, slope_doubt, turns_doubt, width_doubt
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
 from vision.truth.observe import observe_trial
@@ -138,7 +139,8 @@ def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
         lost = times.lost_in(place)
         if lost:
             at = ", ".join(f"{time_s:.3f}" for time_s, _ in lost[:_MOST_NAMED])
-            yield f"whisk {number}: {sum(count for _, count in lost)} frames were dropped by all cameras (after {at} s)"
+            frames = counted(sum(count for _, count in lost), "frame")
+            yield f"whisk {number}: {frames} dropped by all cameras (after {at} s)"
 
 
 def whisk_record(

@@ -51,10 +51,10 @@ def differences(found: dict[str, bytes], wanted: dict[str, bytes]) -> list[str]:
     return sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
 
 
-def _descendants(pid: int) -> list[int]:
-    """Processes that a run started (Linux)."""
-    text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
-    return [int(child) for child in text.split()]
+def _workers(pid: int) -> list[int]:
+    """Processes that a run works by (Linux)."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
 def killed(session: Path, out: Path, after_s: float, rng: np.random.Generator) -> str:
@@ -63,8 +63,7 @@ def killed(session: Path, out: Path, after_s: float, rng: np.random.Generator) -
     time.sleep(after_s)
     if run.poll() is not None:
         return "nothing, it had ended"
-    workers = _descendants(run.pid)
-    victim = int(rng.choice([run.pid, *workers]))
+    victim = int(rng.choice([run.pid, *_workers(run.pid)]))
     with suppress(ProcessLookupError):
         os.kill(victim, signal.SIGKILL)
     said = run.communicate()[1].decode()
