@@ -16,7 +16,7 @@ WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
 demo: $(VENV)/ready
 	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
 	if [ $$code -gt 1 ]; then exit $$code; fi; \
-	echo; echo "Open $(CURDIR)/demo-out/report.html; figures, tables and this summary are beside it."
+	echo; echo "Open $(CURDIR)/demo-out/report.html; figures and tables are beside it."
 
 test: $(VENV)/ready-for-tests
 	$(BIN)/python -m pytest -q

@@ -116,6 +116,7 @@ def evaluate(
     figures: bool = True,
     preset: str = STANDARD,
     accuracy_mm: float | None = None,
+    follow_links: bool = False,
     workers: int = 1,
     figure_formats: Sequence[str] = (),
 ) -> Run:
@@ -135,6 +136,7 @@ def evaluate(
         figures=figures,
         seeing=by_preset(preset),
         accuracy_mm=accuracy_mm,
+        follow_links=follow_links,
     )
     return evaluate_with(Path(session), Path(out), settings, workers, figure_formats)
 

@@ -28,7 +28,13 @@ from bench.trials.unit import see_unit
 
 
 def calibrate_gauges_command(
-    session: Path, out: Path, *, every_trial: bool = False, workers: int = 1, progress: bool = False
+    session: Path,
+    out: Path,
+    *,
+    every_trial: bool = False,
+    workers: int = 1,
+    progress: bool = False,
+    follow_links: bool = False,
 ) -> int:
     """Calibrate, write `out` (TOML) and its certificate beside it as PDF, print it.
 
@@ -36,7 +42,7 @@ def calibrate_gauges_command(
     Raises BadInput.
     """
     doubts = Doubts()
-    loaded = checked_session(session, doubts)
+    loaded = checked_session(session, doubts, follow_links=follow_links)
     certificate = calibrate_gauges(
         loaded, chosen_trials(loaded, every_trial), doubts, workers=workers, progress=progress
     )

@@ -13,6 +13,7 @@ from bench.base.settings import Settings
 from bench.base.threads import in_threads
 from bench.gauges.checks import check_alive
 from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauges_file import given_gauges
 from bench.session.check import checked_session, find_damage
 from bench.session.footage import frame_count, read_frames
@@ -24,8 +25,9 @@ from bench.trials.scene import evenly_exposed, other_scene
 from bench.trials.seen import dropped
 from vision.boards.corners import MIN_CORNERS, find_corners
 from vision.boards.diagnosis import why_not_found
-from vision.boards.sufficiency import fixes_pose
+from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.fit.touch import FEWEST_FREE
+from vision.geometry.counted import counted
 from vision.pictures.files import read_picture
 
 _BOARD_LOOKS = 2  # pictures of a series: a board that is in none of them is in few
@@ -33,19 +35,19 @@ _FRAME_LOOKS = 5  # of a trial: exposure and scene
 _MOST_SATURATED = 0.1  # of a channel's samples in a stroke
 
 
-def check(path: Path, progress: bool) -> int:
+def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
     """Print refusals and notes. Returns the exit code: 2 where there is a refusal, 1 where a note, else 0."""
     doubts = Doubts(stop_at_first=False)
     with doubts.guard():
-        session = checked_session(path, doubts)
+        session = checked_session(path, doubts, follow_links=follow_links)
         find_damage(session, doubts, each=partial(tqdm, desc="pictures", disable=not progress, leave=False))
         look_ahead(session, doubts)
-    for line in doubts.refusals:
+    for line in dict.fromkeys(doubts.refusals):
         print(f"bad: {line}")
-    for line in doubts.notes:
+    for line in dict.fromkeys(doubts.notes):
         print(f"doubtful: {line}")
     if not (doubts.refusals or doubts.notes):
-        print(f"{session.name}: {len(session.trials)} trials, nothing wrong or doubtful")
+        print(f"{session.name}: {counted(len(session.trials), 'trial')}, nothing wrong or doubtful")
     return 2 if doubts.refusals else 1 if doubts.notes else 0
 
 
@@ -58,23 +60,42 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
     with doubts.guard():
         given_gauges(session)
     rig = {name: read_picture(picture) for name, picture in session.rig_pictures.items()}
+    pushes: list[np.ndarray] = []
     for trial in (trial for trial in session.trials if trial.purpose != "weight"):
         with doubts.guard():
             signals = read_signals(trial)
             strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
+            if trial.purpose == "gauge" and signals.kind == "V":
+                pushes += _pushes(strokes)
             for line in [*_of_gauges(signals, strokes), *_of_strokes(trial, signals, strokes), *_of_scene(trial, rig)]:
                 doubts.note(f"trials/{trial.name}: {line}")
+    if pushes and not in_two_directions(np.array(pushes)) and given_gauges(session) is None:
+        doubts.note(f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}")
+
+
+def _pushes(strokes: Sequence[Stroke]) -> Iterator[np.ndarray]:
+    """Volts (2,) that each stroke's push gives at the usual angle, where it gets there."""
+    for stroke in strokes:
+        touch = stroke.touch()
+        at = None if touch.status else stroke.at(Settings().theta_rad, touch)
+        if at is not None and not at.status:
+            yield at.values
 
 
 def _check_boards(session: Session, name: str) -> None:
     """Raises BadInput where a camera's board is not found as entered, or not on the rig."""
     source = session.board_sources[name]
-    chosen = np.unique(np.linspace(0, frame_count(source) - 1, _BOARD_LOOKS).astype(int)).tolist()
+    count = frame_count(source)
+    if count < MIN_VIEWS:
+        few = f"has {counted(count, 'view')}, {MIN_VIEWS} are the least and 15 are good"
+        raise BadInput(few, file=f"boards/{name}")
+    chosen = np.unique(np.linspace(0, count - 1, _BOARD_LOOKS).astype(int)).tolist()
     greys = [grey for grey in read_frames(source, chosen).values() if grey is not None]
     found = list(in_threads(lambda grey: fixes_pose(find_corners(grey, session.board), session.board), greys))
     if not any(found):
         reason = why_not_found(greys, session.board)
-        raise BadInput(reason or f"the board is found in none of {len(greys)} pictures", file=f"boards/{name}")
+        none = f"the board is found in none of {counted(len(greys), 'picture')}"
+        raise BadInput(reason or none, file=f"boards/{name}")
     picture = session.rig_pictures.get(name)
     grey = None if picture is None else read_picture(picture)
     if grey is not None and len(find_corners(grey, session.board)) < MIN_CORNERS:
@@ -109,8 +130,9 @@ def _of_strokes(trial: Trial, signals: Signals, strokes: Sequence[Stroke]) -> It
         if theta_deg < usual_deg:
             yield f"whisk {number} goes {theta_deg:.1f}° past touch, {usual_deg:g}° is the usual --theta-deg"
         motor = signals.motor_at(times.time_s[times.frames_in(signals, forward_strokes(signals)[number])])
-        if len(motor) and np.sum(motor < touch.motor_rad) < FEWEST_FREE:
-            yield f"whisk {number} has {np.sum(motor < touch.motor_rad)} frames before touch, {FEWEST_FREE} are needed"
+        free = int(np.sum(motor < touch.motor_rad))
+        if len(motor) and free < FEWEST_FREE:
+            yield f"whisk {number} has {counted(free, 'frame')} before touch, {FEWEST_FREE} are needed"
 
 
 def _of_scene(trial: Trial, rig: dict[str, np.ndarray | None]) -> Iterator[str]:

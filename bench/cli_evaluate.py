@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from bench.cli_seeing import add_seeing, add_watch, seeing_of, watch
-from bench.options import DONE, DOUBTFUL, Verbs, add_figure_format, add_out, add_session, add_verb, add_workers
+from bench.options import DONE, DOUBTFUL, Verbs, add_figure_format, add_out, add_recorded, add_verb, add_workers
 
 
 def add_evaluate(verbs: Verbs) -> None:
@@ -18,7 +18,7 @@ def add_evaluate(verbs: Verbs) -> None:
         "true distance and slip of every whisk, the estimates beside them, and their errors",
         "whisker-bench evaluate fixtures/small-session --out demo-out --workers 2",
     )
-    add_session(verb)
+    add_recorded(verb)
     add_out(verb, "OUT", "folder for tables, figures and the summary")
     verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
     verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
@@ -68,7 +68,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
-    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures", "follow_links")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     given["seeing"] = seeing_of(options)
     if "estimators" in given:
@@ -90,13 +90,13 @@ def add_check(verbs: Verbs) -> None:
         "list everything that is wrong or doubtful in a session, without evaluating it",
         "whisker-bench check fixtures/small-session",
     )
-    add_session(verb)
+    add_recorded(verb)
 
 
 def _check(options: argparse.Namespace) -> int:
     from bench.check import check
 
-    return check(options.session, progress=sys.stderr.isatty())
+    return check(options.session, progress=sys.stderr.isatty(), follow_links=options.follow_links)
 
 
 def add_calibrate(verbs: Verbs) -> None:
@@ -110,7 +110,7 @@ def add_calibrate(verbs: Verbs) -> None:
         "calibrate the cameras from boards/ and place them in the rig, with their uncertainty",
         "whisker-bench calibrate cameras fixtures/small-session --out cameras.toml",
     )
-    add_session(cameras)
+    add_recorded(cameras)
     add_out(cameras, "FILE", "cameras.toml to write; its covariance goes beside it as .npz")
     cameras.add_argument(
         "--lenses",
@@ -125,7 +125,7 @@ def add_calibrate(verbs: Verbs) -> None:
         "calibrate the gauges against the deflection seen, with a certificate",
         "whisker-bench calibrate gauges fixtures/small-session --out gauges.toml",
     )
-    add_session(gauges)
+    add_recorded(gauges)
     add_out(gauges, "FILE", "gauges.toml to write; the certificate goes beside it as .pdf")
     gauges.add_argument("--all", action="store_true", help='all trials, not only those marked purpose = "gauge"')
     add_workers(gauges)
@@ -140,10 +140,12 @@ def _calibrate_gauges(options: argparse.Namespace) -> int:
         every_trial=options.all,
         workers=options.workers,
         progress=sys.stderr.isatty(),
+        follow_links=options.follow_links,
     )
 
 
 def _calibrate_cameras(options: argparse.Namespace) -> int:
     from bench.cameras.calibrate import calibrate_cameras_command
 
-    return calibrate_cameras_command(options.session, options.out, options.lenses)
+    links = options.follow_links
+    return calibrate_cameras_command(options.session, options.out, options.lenses, follow_links=links)

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.options import Verbs, add_out, add_session, add_verb, count
+from bench.options import Verbs, add_out, add_recorded, add_verb, count
 
 if TYPE_CHECKING:
     from bench.base.settings import Seeing, Settings
@@ -72,7 +72,7 @@ def add_tradeoff(verbs: Verbs) -> None:
         "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
         "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
     )
-    add_session(verb)
+    add_recorded(verb)
     add_out(verb, "OUT", "folder for the table, the plot and the settings files")
     verb.add_argument("--trials", default="*", metavar="PATTERN", help="only trials of such names (default: all)")
     verb.add_argument("--repeats", type=count, default=2, metavar="N", help="how often each is timed (default 2)")
@@ -84,5 +84,5 @@ def _tradeoff(options: argparse.Namespace) -> int:
     single_thread()
     from bench.tradeoff import tradeoff
 
-    progress = sys.stderr.isatty()
-    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, progress=progress)
+    how = {"progress": sys.stderr.isatty(), "follow_links": options.follow_links}
+    return tradeoff(options.session, options.out, trials=options.trials, repeats=options.repeats, **how)

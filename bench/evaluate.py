@@ -41,13 +41,13 @@ def evaluate(
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
-    figure_formats: of figures for a paper, beside the others; announce: is given the summary. trials: names of those
-    that the session is taken to have; None: all.
+    figure_formats: of figures for a paper, beside the others; announce: is given what is to be seen at a glance.
+    trials: names of those that the session is taken to have; None: all.
     """
     estimators(settings.estimators)
     check_outside(out, session_path)
     doubts = Doubts()
-    session = checked_session(session_path, doubts, trials)
+    session = checked_session(session_path, doubts, trials, follow_links=settings.follow_links)
     recorded = judged(session)
     _require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
@@ -66,7 +66,7 @@ def evaluate(
         recordings = {unit.trial.name: unit.files for unit in chosen}
         found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
         summary = report(Evaluation(session, out, settings, *found), pool, figure_formats)
-    announce(summary.text.rstrip())
+    announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
 
 

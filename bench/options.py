@@ -31,6 +31,17 @@ def add_session(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("session", type=Path, metavar="SESSION", help="folder of the recorded session")
 
 
+def add_recorded(verb: argparse.ArgumentParser) -> None:
+    """SESSION as it was recorded, and where its pictures may lie."""
+    add_session(verb)
+    verb.add_argument(
+        "--follow-links",
+        action="store_true",
+        help="cameras' folders, pictures and videos may be links that lead out of the session, to another disk; only "
+        "where you know who made them",
+    )
+
+
 def add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
     """--out, which must be given."""
     verb.add_argument("--out", type=Path, required=True, metavar=metavar, help=what)

@@ -70,13 +70,15 @@ class Trade:
         return dict(zip(COLUMNS, values))
 
 
-def tradeoff(path: Path, out: Path, *, trials: str = "*", repeats: int = 2, progress: bool = False) -> int:
+def tradeoff(
+    path: Path, out: Path, *, trials: str = "*", repeats: int = 2, progress: bool = False, follow_links: bool = False
+) -> int:
     """Write tradeoff.csv, tradeoff.png and .svg, and a settings file for each setting on the front into `out`.
 
     Returns 0. Raises BadInput.
     """
     doubts, settings = Doubts(), Settings(trials=trials)
-    session = checked_session(path, doubts)
+    session = checked_session(path, doubts, follow_links=follow_links)
     if not any(settings.takes(trial.name) and trial.camera_sources for trial in judged(session)):
         raise BadInput(f"--trials {trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:

@@ -59,16 +59,16 @@ def small_copy(small_session, tmp_path) -> Path:
 
 @pytest.fixture
 def as_video():
-    """A function (folder, suffix, fourcc) that puts a video in place of a folder of pictures."""
+    """A function (folder, suffix, fourcc, rate_Hz) that puts a video in place of a folder of pictures."""
     return _as_video
 
 
-def _as_video(folder: Path, suffix: str, fourcc: str):
+def _as_video(folder: Path, suffix: str, fourcc: str, rate_Hz: float = 20.0):
     import cv2
 
     pictures = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted(folder.iterdir())]
     video, size = folder.with_suffix(suffix), pictures[0].shape[::-1]
-    writer = cv2.VideoWriter(str(video), cv2.VideoWriter_fourcc(*fourcc), 20.0, size, False)
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter_fourcc(*fourcc), rate_Hz, size, False)
     for picture in pictures:
         writer.write(picture)
     writer.release()

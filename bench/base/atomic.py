@@ -14,6 +14,7 @@ except ImportError:  # not on Windows; there two runs on one folder are the user
     fcntl = None
 
 LOCK = ".lock"
+_UNFINISHED = ".unfinished-"  # begins the name of a file that is being written
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
@@ -26,18 +27,21 @@ def write_whole(path: Path, data: str | bytes) -> None:
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path beside `path`, of the same suffix, for writers that want one.
 
-    It becomes `path` on leaving; where the block raises, nothing is left of it.
+    It becomes `path` on leaving; where the block raises, nothing is left of it. Raises OSError, with `path`, where it
+    cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=_UNFINISHED, suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)
     try:
         yield temporary
         temporary.chmod(0o666 & ~_umask())
         os.replace(temporary, path)
-    except BaseException:
+    except BaseException as problem:
         temporary.unlink(missing_ok=True)
+        if isinstance(problem, OSError):  # a full disk names no file
+            problem.filename, problem.filename2 = str(path), None
         raise
 
 
@@ -51,7 +55,7 @@ def _umask() -> int:
 def lock_output(folder: Path) -> Iterator[None]:
     """Hold `folder` (made as needed) for one run. Raises BadInput where another run holds it.
 
-    The lock ends with the process, however that ends.
+    The lock ends with the process, however that ends. What a killed run left unfinished is removed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / LOCK).open("a+") as lock:
@@ -59,6 +63,8 @@ def lock_output(folder: Path) -> Iterator[None]:
         lock.truncate(0)
         lock.write(f"{os.getpid()}\n")
         lock.flush()
+        for left in folder.rglob(f"{_UNFINISHED}*"):
+            left.unlink(missing_ok=True)
         yield
 
 

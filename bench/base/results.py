@@ -3,7 +3,8 @@
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -47,12 +48,18 @@ def hash_of_files(paths: Iterable[Path]) -> str:
     """Hash of names and contents of files and of all files below folders; truth files do not count."""
     digest = hashlib.blake2b(digest_size=16)
     for path in sorted(set(paths)):
-        for file in [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file()):
+        for file in [path] if path.is_file() else sorted(_below(path)):
             if file.name not in _TRUTH_FILES and not file.name.startswith("."):
                 digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
                 with file.open("rb") as content:  # a video may be larger than the memory
                     digest.update(hashlib.file_digest(content, hashlib.blake2b).digest())
     return digest.hexdigest()
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """All files, those in linked folders too."""
+    for place, _, names in os.walk(folder, followlinks=True):
+        yield from (file for file in (Path(place) / name for name in names) if file.is_file())
 
 
 @lru_cache

@@ -38,7 +38,8 @@ class Settings:
     clock_sigma_s: how well the cameras' clock is known against the motor's; None goes by where frame times come from
     (`FrameTimes.clock_sigma_s`). gauges_from_all: every trial that can, calibrates the gauges. trials: pattern of the
     names of those that are evaluated. figures: whether any is drawn. seeing: how hard pictures are looked at; with
-    accuracy_mm each whisk by the first preset by which d_x's stated sigma is no more. Raises BadInput out of range.
+    accuracy_mm each whisk by the first preset by which d_x's stated sigma is no more. follow_links: pictures may lie
+    outside of the session. Raises BadInput out of range.
     """
 
     theta_deg: float = 3.0
@@ -52,6 +53,7 @@ class Settings:
     figures: bool = True
     seeing: Seeing = field(default_factory=Seeing)
     accuracy_mm: float | None = None
+    follow_links: bool = False
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)

@@ -12,12 +12,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 
 from tqdm import tqdm
 
+from bench.base.errors import BadInput
+
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _LOOK_FOR_PARENT_S = 1.0  # s: so long a worker may outlive a run that was killed
+_KILLED = (
+    "a worker process was killed, by the system where memory ran out; what was finished is kept: the same command goes "
+    "on from there, with fewer --workers if need be"
+)
 
 
 class Workers:
@@ -53,8 +60,11 @@ class Workers:
                 yield place, result
         elif tasks:
             pool = self._started()
-            places = {pool.submit(job, task): place for place, task in enumerate(tasks)}
-            yield from ((places[future], future.result()) for future in as_completed(places))
+            try:
+                places = {pool.submit(job, task): place for place, task in enumerate(tasks)}
+                yield from ((places[future], future.result()) for future in as_completed(places))
+            except BrokenProcessPool:
+                raise BadInput(_KILLED) from None
 
     def _started(self) -> ProcessPoolExecutor:
         if self._pool is None:

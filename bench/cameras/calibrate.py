@@ -34,13 +34,15 @@ _NOT_PLACED = (
 )
 
 
-def calibrate_cameras_command(session: Path, out: Path, lenses: Path | None = None) -> int:
+def calibrate_cameras_command(
+    session: Path, out: Path, lenses: Path | None = None, *, follow_links: bool = False
+) -> int:
     """Calibrates, writes `out` (TOML) and its .npz, prints the report. Returns 0, or 1 where something is doubtful.
 
     lenses: a camera TOML of caliscope or aniposelib to take the lenses from; the session then only places the cameras.
     Raises BadInput or Refused, saying what to record, before anything is written.
     """
-    loaded = load_session(session, lenses_known=lenses is not None)
+    loaded = load_session(session, lenses_known=lenses is not None, follow_links=follow_links)
     if lenses is not None:
         return _write(out, place_imported(loaded, lenses), [f"lenses as in {lenses.name}, taken as exact"], [])
     views = read_board_views(loaded)

@@ -24,6 +24,7 @@ from vision.boards.static_board import camera_moved
 from vision.calibration.cameras_file import read_cameras
 from vision.calibration.place import Placement, placed
 from vision.geometry.camera import Cameras
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
 from vision.pictures.files import read_picture
@@ -99,7 +100,8 @@ def on_the_rig(
     first = first_look(session, cameras)
     T_world_rig = invert_transform(first.T_rig_world)
     there = replace(by_first_look(), step=np.append(log_rotation(T_world_rig[:, :3]), T_world_rig[:, 3]))
-    note = f"T_rig_board is missing: a first look at {first.strokes} strokes says where whisker and motor are."
+    strokes = counted(first.strokes, "stroke")
+    note = f"T_rig_board is missing: a first look at {strokes} says where whisker and motor are."
     T_rig_board = None if T_world_board is None else compose(first.T_rig_world, T_world_board)
     return placed(cameras, Placement(np.zeros(6), np.zeros((6, 6))), there), T_rig_board, note
 

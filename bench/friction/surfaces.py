@@ -9,6 +9,7 @@ from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import slope_deg
 from estimator.beam import Beam
 from estimator.friction import FrictionFit, Pushes, fit_alpha
+from vision.geometry.counted import counted
 
 # From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
 # many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
@@ -121,11 +122,12 @@ def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
     """A line a surface and speed: the fitted α, or why there is none."""
     for surface in fitted:
         if surface.fit is None:
-            yield f"{surface.title}: {len(surface.felt)} whisks do not hold it (two slopes above α are needed)"
+            count = counted(len(surface.felt), "whisk")
+            yield f"{surface.title}: {count} cannot hold it (two slopes above α are needed)"
             continue
         alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
         doubt = f"; {surface.fit.status}" if surface.fit.status else ""
-        yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {len(surface.felt)} whisks{doubt}"
+        yield f"{surface.title}: α = {alpha:.2f} ± {sigma:.2f}° over {counted(len(surface.felt), 'whisk')}{doubt}"
 
 
 def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | None], Felt]]:

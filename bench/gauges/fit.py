@@ -14,6 +14,7 @@ from bench.gauges.readings import Pairs
 _LEAST_DIRECTION = 0.1
 _ROUNDS = 5  # in which the weights follow the coefficients. Set by eye
 _CHANCE = 0.01  # that sound residuals are taken for too large
+RECORD = "record gauge trials with the follicle unturned and turned by 90° (follicle_roll_deg = 90)"
 _SQUARE_DEG = 20.0  # a follicle turned by 0° or 90° within this reads one channel at a time
 
 
@@ -28,9 +29,7 @@ def fit_gauges(pairs: Sequence[Pairs]) -> Gauges:
     fitted = fit_matrix(pairs)
     if fitted is None:
         raise Undetermined(
-            f"the gauge trials do not fix both channels ({_recorded(pairs)}); record gauge trials with the "
-            "follicle unturned and turned by 90° (follicle_roll_deg = 90)",
-            file="trials",
+            f"the gauge trials do not fix both channels ({_recorded(pairs)}); {RECORD}", file="trials"
         )
     check_channels(fitted)
     full_scale = np.abs(np.concatenate([p.moments for p in pairs])).max(axis=0)
@@ -76,9 +75,12 @@ def leave_out(pairs: Sequence[Pairs], fitted: GaugeMatrix) -> dict[str, GaugeMat
 
 def fixes_matrix(pairs: Sequence[Pairs]) -> bool:
     """Do the moments point in two directions?"""
-    if not pairs:
-        return False
-    weak, strong = np.sqrt(np.maximum(np.linalg.eigvalsh(sum(p.moments.T @ p.moments for p in pairs)), 0.0))
+    return bool(pairs) and in_two_directions(np.concatenate([p.moments for p in pairs]))
+
+
+def in_two_directions(vectors: np.ndarray) -> bool:
+    """Do vectors (n, 2), moments or the volts of them, fix a matrix?"""
+    weak, strong = np.sqrt(np.maximum(np.linalg.eigvalsh(vectors.T @ vectors), 0.0))
     return bool(weak > _LEAST_DIRECTION * strong)
 
 

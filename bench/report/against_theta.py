@@ -16,6 +16,7 @@ from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.tables import write_table
 from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import is_sound
+from vision.geometry.counted import counted
 
 TABLE, FIGURE = "against_theta.csv", "against_theta.png"
 COLUMNS = (
@@ -82,7 +83,7 @@ def theta_lines(rows: Sequence[AtTheta], theta_deg: float) -> Iterator[str]:
         beside = f"; at {theta_deg:g}° {here[0].error_rms_percent:.2f} %" if here and here[0] != least else ""
         yield (
             f"{label_of(name)}: least error at θ = {least.theta_deg:g}°, {least.error_rms_percent:.2f} % RMS over "
-            f"{least.whisks} whisks, {least.error_sigma_percent:.2f} % stated{beside}"
+            f"{counted(least.whisks, 'whisk')}, {least.error_sigma_percent:.2f} % stated{beside}"
         )
 
 

@@ -15,6 +15,7 @@ from bench.report.figure_8 import COLUMNS, figure_8, rows
 from estimator.beam import Beam
 
 TABLE = "whisks.csv"
+_AGAIN = "evaluate the session again into this folder"
 # A whisker's length, diameter and stiffness are written down alike on all days; this allows for rounding.
 _SAME_WHISKER = 1e-3
 # Fig. 8 is of one distance. |m| is scaled to it as 1/d_x, which takes out what a ruler leaves, not another set-up.
@@ -57,12 +58,18 @@ def _beam(whisker: WhiskerFacts) -> Beam:
 
 
 def read_run(out: Path) -> list[TrialResult]:
-    """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run."""
+    """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run, or
+    another one was stopped half-way in the same folder."""
     if not (out / TABLE).is_file():
         raise BadInput(f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out)
     results = [_result(out, trial) for trial in _trials(out / TABLE)]
     if not results:
         raise BadInput(f"holds no whisk ({TABLE} has no rows)", file=out)
+    said = (read_result(out / "run.json") or {}).get("results", {})
+    other = next((r.trial.name for r in results if r.hash != said.get(r.trial.name, r.hash)), None)
+    if other is not None:
+        found = f"trials/{other}.json is of a later run, which was not finished"
+        raise BadInput(f"{found}; {_AGAIN}", file=out)
     return results
 
 
@@ -71,18 +78,18 @@ def _trials(table: Path) -> list[str | None]:
         with table.open(newline="", encoding="utf-8") as file:
             return list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
     except (UnicodeDecodeError, csv.Error) as problem:
-        raise BadInput(f"is damaged ({problem}); evaluate the session again into this folder", file=table) from None
+        raise BadInput(f"is damaged ({problem}); {_AGAIN}", file=table) from None
 
 
 def _result(out: Path, trial: str | None) -> TrialResult:
     path = out / "trials" / f"{trial}.json"
-    kept, again = read_result(path), "evaluate the session again into this folder"
+    kept = read_result(path)
     if not kept:
-        raise BadInput(f"{path.relative_to(out)} is not there or damaged; {again}", file=out)
+        raise BadInput(f"{path.relative_to(out)} is not there or damaged; {_AGAIN}", file=out)
     try:
         return from_plain(TrialResult, kept)
     except ValueError:
-        raise BadInput(f"{path.relative_to(out)} is of an older version; {again}", file=out) from None
+        raise BadInput(f"{path.relative_to(out)} is of an older version; {_AGAIN}", file=out) from None
 
 
 def _check_given_once(runs: Sequence[tuple[Path, list[TrialResult]]]) -> None:

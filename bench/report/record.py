@@ -34,6 +34,7 @@ def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) 
         _cameras(calibration),
         _board(session, calibration),
         dict(evaluation.recordings),
+        {result.trial.name: result.hash for result in evaluation.results},
         versions(),
     )
 

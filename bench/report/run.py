@@ -40,7 +40,7 @@ class BoardFacts:
 @dataclass(frozen=True, eq=False)
 class RunRecord:
     """verdict, doubts and sections: as the summary has them; figures: names of the pictures in the folder; recordings:
-    hash of each trial's files, by name; versions: by distribution."""
+    hash of each trial's files, by name; results: of each trial's result; versions: by distribution."""
 
     session: str
     whisker: Whisker
@@ -53,6 +53,7 @@ class RunRecord:
     cameras: tuple[CameraFacts, ...] = ()
     board: BoardFacts | None = None
     recordings: dict[str, str] = field(default_factory=dict)
+    results: dict[str, str] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
 
     def lines(self, title: str) -> tuple[str, ...]:

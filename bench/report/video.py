@@ -55,8 +55,9 @@ def write_video(
     if not (math.isfinite(rate_Hz) and 0.1 <= rate_Hz <= 240.0):
         raise BadInput(f"--rate-Hz is {rate_Hz:g}; from 0.1 to 240 is allowed")
     source = _session_folder(out) if session is None else session
-    recorded = load_session(source, lenses_known=True).trial(trial)
-    cameras = {c.name: c for c in read_record(out).cameras if c.name in recorded.camera_sources}
+    record = read_record(out)
+    recorded = load_session(source, lenses_known=True, follow_links=record.settings.follow_links).trial(trial)
+    cameras = {c.name: c for c in record.cameras if c.name in recorded.camera_sources}
     if not cameras:
         raise BadInput("has no pictures of this trial; give --session", file=source)
     pictures = _frames(recorded, cameras, result)

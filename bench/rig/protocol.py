@@ -271,7 +271,7 @@ def load(protocol: str | Path) -> Protocol:
     except OSError as problem:
         known = ", ".join(sorted(p.stem for p in FOLDER.glob("*.toml")))
         raise BadInput(f"cannot be read ({problem.strerror}); the built-in protocols are {known}", file=path) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
         raise BadInput(f"is not TOML: {problem}", file=path) from None
     try:
         found = msgspec.convert(tables, Protocol)

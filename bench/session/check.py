@@ -1,15 +1,18 @@
 """What can be checked of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.results import hash_of_files
 from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from vision.calibration.cameras_file import read_cameras
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.pictures.files import VIDEO_SUFFIXES, Frames, picture_size, pictures_in
 
@@ -17,18 +20,33 @@ Size = tuple[int, int]
 
 
 def checked_session(
-    path: Path | str, doubts: Doubts | None = None, trials: Collection[str] | None = None
+    path: Path | str, doubts: Doubts | None = None, trials: Collection[str] | None = None, *, follow_links: bool = False
 ) -> Session:
     """`load_session`, and every trial's signals, frame times and picture sizes read once.
 
     Raises BadInput at the first thing that is wrong; with a collecting `doubts` only where session.toml is.
     """
     doubts = doubts or Doubts()
-    session = load_session(path, doubts, trials=trials)
+    session = load_session(path, doubts, trials=trials, follow_links=follow_links)
     for trial in session.trials:
         check_recording(trial, doubts)
     check_sizes(session, doubts)
+    for line in _copies(session):
+        doubts.note(line)
     return session
+
+
+def _copies(session: Session) -> Iterator[str]:
+    """A line on trials whose signals are those of another: noise is never the same twice."""
+    alike: dict[str, list[Trial]] = {}
+    sizes = Counter(trial.signals_path.stat().st_size for trial in session.trials)
+    for trial in session.trials:
+        if sizes[trial.signals_path.stat().st_size] > 1:
+            alike.setdefault(hash_of_files([trial.signals_path]), []).append(trial)
+    for trials in alike.values():
+        if len(trials) > 1:
+            names = ", ".join(trial.name for trial in trials)
+            yield f"trials {names} have one and the same {trials[0].signals_path.name}: all but one have another's"
 
 
 def check_recording(trial: Trial, doubts: Doubts) -> None:
@@ -66,7 +84,7 @@ def _check_clock(trial: Trial, signals_s, frames_s, doubts: Doubts) -> None:
         hint = "Are the frames' times in milliseconds?" if in_ms else "They must be times of one clock."
         raise BadInput(f"{found}. {hint}", file=f"trials/{trial.name}")
     if outside:
-        doubts.note(f"trials/{trial.name}: {outside} frames were taken while no signals were ({found})")
+        doubts.note(f"trials/{trial.name}: {counted(outside, 'frame')} taken while no signals were ({found})")
 
 
 def check_sizes(session: Session, doubts: Doubts) -> None:

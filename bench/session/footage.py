@@ -54,6 +54,14 @@ def decoded_count(source: Path) -> int:
     return len(pictures_in(source)) if source.is_dir() else Video(source).decoded_count
 
 
+def declared_rate_Hz(source: Path) -> float:
+    """Frames a second as a video's header states it; 0 where it does not, or cannot be opened."""
+    try:
+        return Video(source).rate_Hz
+    except Refused:
+        return 0.0
+
+
 def visible(folder: Path) -> list[Path]:
     """What lies in a folder, in natural order, without hidden files; nothing where there is no folder."""
     if not folder.is_dir():

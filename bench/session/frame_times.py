@@ -1,6 +1,6 @@
 """When each frame of a trial was taken, on the signals' clock, and which picture of each camera it is."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,16 +8,19 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session.daq import DaqFile, frame_edges, read_daq
-from bench.session.footage import decoded_count, frame_count, read_frames
+from bench.session.footage import declared_rate_Hz, decoded_count, frame_count, read_frames
 from bench.session.signals import Signals
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.pictures.files import Frames
 
 FRAME, TIME = "frame", "time_s"
 _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame
 _RATE_TOLERANCE = 1e-3  # of the interval stated, beyond the steps in which times are written. Set by eye
+# A header's rate is nominal: crystals are right to 1e-4, a computer's timers to some 1e-3.
+_HEADER_TOLERANCE = 1e-2
 _CLOCK_STEP_S = 1e-3  # times are written to a millisecond or better
 
 
@@ -103,8 +106,9 @@ def _common(trial: Trial) -> FrameTimes:
     table, repeats = _read(trial.folder / "frames.csv", shown)
     doubts = tuple(d for camera in trial.camera_sources for d in _check_count(trial, camera, len(table), shown))
     _check_rate(table[TIME], trial, shown)
+    doubts += tuple(_header_rates(table[TIME], trial, trial.camera_sources, shown))
     if repeats:
-        doubts = (*doubts, f"{shown}: {repeats} repeated rows dropped")
+        doubts = (*doubts, f"{shown}: {counted(repeats, 'repeated row')} dropped")
     pictures = {camera: np.arange(len(table)) for camera in trial.camera_sources}
     return FrameTimes(table[TIME], "frames.csv", pictures, doubts=doubts)
 
@@ -116,6 +120,7 @@ def _merged(trial: Trial) -> FrameTimes:
         shown = trial.shown(_own(camera))
         table, _ = _read(trial.folder / _own(camera), shown)
         doubts += _check_count(trial, camera, len(table), shown)
+        doubts += _header_rates(table[TIME], trial, (camera,), shown)
         times[camera] = table[TIME]
     time_s, picture, spread_s = merge_times(times)
     return FrameTimes(time_s, "frames_<camera>.csv", picture, spread_s, tuple(doubts))
@@ -156,7 +161,8 @@ def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:
         found = f"channel {daq.channels['frame_V'].channel} rises {len(edges_s)} times, the cameras have {count} frames"
         raise BadInput(f"{found}; there must be an edge a frame", file=shown)
     picture = {camera: np.arange(count) for camera in trial.camera_sources}
-    return FrameTimes(edges_s, "edges of a DAQ channel", picture)
+    doubts = tuple(_header_rates(edges_s, trial, trial.camera_sources, shown))
+    return FrameTimes(edges_s, "edges of a DAQ channel", picture, doubts=doubts)
 
 
 def _steady(trial: Trial) -> FrameTimes:
@@ -225,8 +231,9 @@ def _check_count(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str,
         return (f"{trial.shown(source.name)}: the video cannot be opened: truncated or damaged",)
     found = decoded_count(source)
     if found == rows:
-        return (f"{trial.shown(source.name)}: the header declares {declared} frames, {found} are there",)
-    raise BadInput(f"has {rows} rows, camera {camera} has {found} frames; there must be a row a frame", file=shown)
+        return (f"{trial.shown(source.name)}: the header declares {counted(declared, 'frame')}, there are {found}",)
+    unlike = f"has {counted(rows, 'row')}, camera {camera} has {counted(found, 'frame')}"
+    raise BadInput(f"{unlike}; there must be a row a frame", file=shown)
 
 
 def _one_count(counts: Mapping[str, int], trial: Trial) -> int:
@@ -241,12 +248,32 @@ def _check_rate(time_s: np.ndarray, trial: Trial, shown: str) -> None:
     """A stated frame rate must be that of the times, over their longest run without a gap."""
     if trial.frame_rate_Hz is None or len(time_s) < 3:
         return
-    steps = np.diff(time_s)
-    usual = steps[steps < _DROPPED_STEPS * np.median(steps)]
+    usual = _usual_steps(time_s)
     stated_s, found_s = 1.0 / trial.frame_rate_Hz, float(usual.mean())
     if abs(found_s - stated_s) > _RATE_TOLERANCE * stated_s + _CLOCK_STEP_S / len(usual):
         found = f"frames come at {1 / found_s:.6g} Hz, trial.toml says frame_rate_Hz = {trial.frame_rate_Hz:g}"
         raise BadInput(f"{found}; mend the wrong one (or take frame_rate_Hz out)", file=shown)
+
+
+def _usual_steps(time_s: np.ndarray) -> np.ndarray:
+    """Steps between frames of which none was dropped, s."""
+    steps = np.diff(time_s)
+    return steps[steps < _DROPPED_STEPS * np.median(steps)]
+
+
+def _header_rates(time_s: np.ndarray, trial: Trial, cameras: Iterable[str], shown: str) -> Iterator[str]:
+    """A line on each video whose header states another rate than the times, where trial.toml does not settle it."""
+    videos = {source.name: source for source in map(trial.camera_sources.get, cameras) if not source.is_dir()}
+    if trial.frame_rate_Hz is not None or len(time_s) < 3:
+        return
+    found_Hz = 1.0 / float(_usual_steps(time_s).mean())
+    for name, source in videos.items():
+        stated_Hz = declared_rate_Hz(source)
+        if stated_Hz and abs(stated_Hz / found_Hz - 1.0) > _HEADER_TOLERANCE:
+            yield (
+                f"{shown}: frames come at {found_Hz:.4g} Hz, the header of {name} says {stated_Hz:.4g} Hz; the times "
+                "are taken: where they are right, say so by frame_rate_Hz in trial.toml, or in [trial] of session.toml"
+            )
 
 
 def _shown(trial: Trial) -> str:

@@ -78,15 +78,17 @@ def load_session(
     *,
     lenses_known: bool = False,
     trials: Collection[str] | None = None,
+    follow_links: bool = False,
 ) -> Session:
     """Read the manifests and find every file of a session. Signals and frames are not read here.
 
     lenses_known: board views of each camera are not asked for. trials: names of those that are read; None: all.
+    follow_links: pictures and videos may lie elsewhere.
 
     Raises BadInput at the first thing that is wrong; with a collecting `doubts`, reads on where it can.
     """
     path, doubts = Path(path), doubts or Doubts()
-    keys = _read_manifest(path, doubts)
+    keys = _read_manifest(path, doubts, follow_links)
     whisker, bar = _whisker(keys.whisker), keys.bar
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
@@ -115,12 +117,12 @@ def load_session(
     return session
 
 
-def _read_manifest(path: Path, doubts: Doubts) -> manifest.SessionKeys:
+def _read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.SessionKeys:
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
     if not (path / MANIFEST).is_file():
         raise BadInput(f"there is no {MANIFEST} in this folder, so it is not a session", file=str(path))
-    check_inside(path, doubts)
+    check_inside(path, doubts, follow_links)
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
+from vision.geometry.counted import counted
 
 _MOST_BYTES = 1 << 29  # two hours at 2 kHz, which as text and numbers fill 4 GB of memory
 
@@ -123,7 +124,7 @@ def _row(cells: list[str], names: list[str], shown: str, row: int) -> list[float
         raise BadInput("values are separated by semicolons; export with commas", file=shown, row=row)
     if len(cells) != len(names):
         hint = " Decimal commas? Export with decimal points." if len(names) < len(cells) <= 2 * len(names) else ""
-        raise BadInput(f"has {len(cells)} values, the header names {len(names)}.{hint}", file=shown, row=row)
+        raise BadInput(f"has {counted(len(cells), 'value')}, the header names {len(names)}.{hint}", file=shown, row=row)
     return [_cell(cell.strip(), name, shown, row) for cell, name in zip(cells, names)]
 
 

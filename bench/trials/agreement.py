@@ -97,7 +97,8 @@ def _causes(slopes: Slopes, matrix: np.ndarray) -> Iterator[tuple[str, int, np.n
         alone = matrix[:, channel] * volts[channel]
         share = _share(slopes, alone, felt - alone)
         if share > 0:
-            said = f"gauge {name} looks slipped, it gives {100 / share:.0f} % of what it should"
+            gives = f"it gives {100 / share:.0f} % of what it should"
+            said = f"gauge {name} looks slipped, {gives}, or drifts while the whisker pushes"
             yield said, 1, felt + (share - 1) * alone
     share = _share(slopes, felt, np.zeros(2))
     if share > 0:

@@ -16,6 +16,7 @@ from scipy.special import chdtrc
 
 from bench.gauges.felt import GAUGE_DELAY_S, motor_speed
 from bench.records.trial import SeenWhisk, TrialResult, whisks
+from vision.geometry.counted import counted
 from vision.truth.value import Value
 
 # Chance by which sound sigmas would show as much: one session in a thousand.
@@ -161,4 +162,4 @@ def shared_doubt(results: Sequence[TrialResult], shared: SharedTouch | None) -> 
 
 
 def _strokes(forward: int, back: int) -> str:
-    return f"{forward} whisks" + (f" and {back} back strokes" if back else "")
+    return counted(forward, "whisk") + (f" and {counted(back, 'back stroke')}" if back else "")

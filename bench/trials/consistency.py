@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from bench.session.trial import Trial
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
-from vision.truth.value import Value
+from vision.truth.value import UNKNOWN, Value
 
 # Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
 LEAST_CHANCE = 1e-4
@@ -21,6 +21,9 @@ _EXPLAINED = 0.001  # of the chance that a cause must leave: its trace is that o
 _PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
 # Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
 _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
+# A whisker leans on a bar within its friction angle of the bar's normal. μ = 1 is more than rubber or coarse sandpaper
+# does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).
+_STEEPEST_FRICTION_RAD = np.radians(45.0)
 _BAR_SIGMA = 0.025  # of how thick a trial's bar looks, in the middle of 35 path-traced scenes; 8 scatter by 0.1 to 0.5
 
 
@@ -150,14 +153,43 @@ def width_doubt(bar_looks: Mapping[str, float], trial: Trial, board: Board | Non
 def slope_doubt(beta: Value, trial: Trial) -> str:
     """The bar's slope as seen against trial.toml's: a sentence where they are apart, '' where they are not, or where
     one of them is not known."""
-    if trial.beta_deg is None or not np.isfinite(beta.value):
+    nominal = nominal_slope(trial)
+    apart = beta.value - nominal.value
+    if not np.isfinite(apart):
         return ""
-    nominal_sigma = np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD
-    apart = beta.value - np.radians(trial.beta_deg)
-    difference = Difference(np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal_sigma**2)]]), 1)
+    difference = Difference(np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal.sigma**2)]]), 1)
     if difference.is_chance:
         return ""
     seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
-    mirrored = replace(difference, values=np.array([beta.value + np.radians(trial.beta_deg)]))
+    mirrored = replace(difference, values=np.array([beta.value + nominal.value]))
     cause = "its sign looks turned" if mirrored.is_chance else "check it, or something else is taken for the bar"
     return f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}"
+
+
+def cone_doubt(phi: Value, beta: Value, what: str) -> str:
+    """Direction of deflection or force against the cone of friction about the bar's normal: a sentence where it leaves
+    even the widest cone, with what would bring it back; '' where it does not, or where one of them is not known."""
+    sigma = float(np.hypot(phi.sigma, beta.sigma))
+    off = _from_normal(phi.value, beta)
+    if not np.isfinite(off) or off <= _STEEPEST_FRICTION_RAD:
+        return ""
+    beyond = Difference(np.array([off - _STEEPEST_FRICTION_RAD]), np.array([[sigma**-2.0]]), 1)
+    if beyond.is_chance:
+        return ""
+    angles = f"φ {what} is {np.degrees(phi.value):.0f}°, {np.degrees(off):.0f}° from the normal of a bar at β = "
+    others = {"y": -phi.value, "z": np.pi - phi.value, "y and z": np.pi + phi.value}
+    within = [name for name, other in others.items() if _from_normal(other, beta) <= _STEEPEST_FRICTION_RAD]
+    cause = f"; {' or '.join(within)} reversed would be within" if within else ""
+    return f"{angles}{np.degrees(beta.value):.0f}°, where no friction holds a whisker (up to μ = 1){cause}"
+
+
+def _from_normal(phi_rad: float, beta: Value) -> float:
+    """How far φ is from the bar's normal, rad, 0 to π."""
+    return abs(float(np.arctan2(np.sin(phi_rad - beta.value), np.cos(phi_rad - beta.value))))
+
+
+def nominal_slope(trial: Trial) -> Value:
+    """β of trial.toml, with a protractor's sigma where none is stated; UNKNOWN where it says nothing."""
+    if trial.beta_deg is None:
+        return UNKNOWN
+    return Value(float(np.radians(trial.beta_deg)), float(np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD))

@@ -14,9 +14,10 @@ from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
-from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
+from bench.trials.consistency import cone_doubt, slope_doubt, turns_doubt, width_doubt
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
+from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar, Rods
 from vision.truth.observe import observe_trial
@@ -74,7 +75,7 @@ def _see(
     for rung in harder:
         looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
     thick, left_out = width_doubt(truth.bar_looks, trial, session.board), scene.left_out.values()
-    odd = [[thick, slope_doubt(one.beta_rad, trial)] for _, one in looked]
+    odd = [[thick, slope_doubt(one.beta_rad, trial), _leaning(one, settings)] for _, one in looked]
     whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
         tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),
@@ -86,6 +87,10 @@ def _see(
         truth.bar_looks,
         _touch_alone(truth.whisks[-1]) if back else None,
     )
+
+
+def _leaning(truth: WhiskTruth, settings: Settings) -> str:
+    return cone_doubt(truth.at(settings.theta_rad).phi_rad, truth.beta_rad, "seen")
 
 
 def _looked_harder(observe: Callable[..., TrialTruth], places, looked, rung, accuracy_mm: float) -> list:
@@ -133,7 +138,8 @@ def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
         lost = times.lost_in(place)
         if lost:
             at = ", ".join(f"{time_s:.3f}" for time_s, _ in lost[:_MOST_NAMED])
-            yield f"whisk {number}: {sum(count for _, count in lost)} frames were dropped by all cameras (after {at} s)"
+            frames = counted(sum(count for _, count in lost), "frame")
+            yield f"whisk {number}: {frames} dropped by all cameras (after {at} s)"
 
 
 def whisk_record(

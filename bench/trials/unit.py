@@ -36,6 +36,7 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import agreement
+from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_end
 from bench.trials.phases import felt_phases, slips
@@ -193,15 +194,20 @@ def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Read
     """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status. Where
     pictures contradict encoder or lengths, they tell nothing of gauges."""
     if seen.deflection is None or seen.contradicted:
-        return replace(felt, apart=seen.contradicted)
+        odd = cone_doubt(felt.phi_felt_rad, nominal_slope(unit.trial), "felt") if seen.deflection is None else ""
+        return replace(felt, apart=seen.contradicted or bool(odd), status=_joined(felt.status, odd))
     whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
         return felt
     own_newtons = not readout.is_gauged or unit.gauges.source != FROM_TRIALS
     found = agreement(pairs, readout.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
-    status = "; ".join(filter(None, [felt.status, found.status]))
+    status = _joined(felt.status, found.status)
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
+
+
+def _joined(*statuses: str) -> str:
+    return "; ".join(filter(None, statuses))
 
 
 def _phases(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, beam: Beam) -> Phases:

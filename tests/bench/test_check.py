@@ -1,5 +1,7 @@
 """`check` finds in seconds what `evaluate` would refuse or doubt after a minute."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -30,7 +32,7 @@ def test_a_sound_session(small_session):
     [
         ("dead gauge", "channel z reads 0 V throughout: at its rail, or not connected"),
         ("saturated gauges", "channel y is at its rail for 50 % of a stroke"),
-        ("frame dropped", "whisk 0: 1 frames were dropped by all cameras (after 0.150 s)"),
+        ("frame dropped", "whisk 0: 1 frame dropped by all cameras (after 0.150 s)"),
         ("camera knocked 6,4 px", "camera low: the scene lies +6, +4 px from where the rig picture has it"),
         ("camera mirrored", "camera low: its frames are mirrored left to right"),
         ("cameras exchanged", "camera high: its frames are those of camera low"),
@@ -42,6 +44,12 @@ def test_a_fault_of_a_trial(small_copy, fault, expected):
     FAULTS[fault](small_copy)
     notes = found(small_copy).notes
     assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
+
+
+def test_signals_of_another_trial(small_copy):
+    FAULTS["another trial's signals"](small_copy)
+    said = "trials b30_3, b60_4 have one and the same signals.csv: all but one have another's"
+    assert said in found(small_copy).notes
 
 
 DICTIONARY = 'is not found, but one with dictionary = "DICT_5X5_50" is'
@@ -59,6 +67,18 @@ def test_a_board_that_is_not_the_one_entered(small_copy, fault, expected):
     refusals = found(small_copy, boards=True).refusals
     assert len(refusals) == 1
     assert refusals[0].startswith("boards/high: ") and expected in refusals[0]
+
+
+def test_too_few_views_of_the_board(small_copy):
+    for picture in sorted((small_copy / "boards" / "low").iterdir())[3:]:
+        picture.unlink()
+    assert "boards/low: has 3 views, 5 are the least and 15 are good" in found(small_copy, boards=True).refusals
+
+
+def test_gauge_trials_that_push_in_one_direction(small_copy):
+    shutil.rmtree(small_copy / "trials" / "gauge_roll90")
+    (note,) = found(small_copy).notes
+    assert note.startswith("trials: the gauge trials push in one direction, which does not fix both channels; record")
 
 
 def test_a_rig_board_that_is_hidden(small_copy):

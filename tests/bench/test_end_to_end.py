@@ -54,7 +54,10 @@ def test_small_session(small_session, tmp_path, capsys):
     assert main(command) in (0, 1)
     first = capsys.readouterr().out
     check(small_session, tmp_path, [("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)])
-    assert "camera high:" in first and "camera low:" in first
+    whole = (tmp_path / "summary.txt").read_text()
+    assert "camera high:" in whole and "camera low:" in whole
+    verdict = whole.split("\n\n")[0]
+    assert first == f"{verdict}\n\nAll of it: {tmp_path / 'report.html'}, {tmp_path / 'summary.txt'}\n"
     assert (tmp_path / "overlays" / "b60_4_0.png").is_file()
     check_keys(tmp_path)
     kept = [*tmp_path.glob("trials/*"), *tmp_path.glob("calibration/*"), *tmp_path.rglob("*.png")]

@@ -13,6 +13,7 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.records.trial import SeenWhisk
 from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
+from tests.faults.interrupted import contents, full_disk
 from tests.scenes.results import table
 
 TRUE_ALPHA = Settings(alpha_est_deg=10.5)
@@ -287,3 +288,23 @@ def test_any_number_of_workers_gives_the_same_bytes(without_pictures, tmp_path):
         run(without_pictures, tmp_path / str(workers), workers=workers)
     for name in ("whisks.csv", "estimates.csv", "summary.txt", "fig8.png"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+@pytest.mark.slow
+def test_a_full_disk_leaves_what_stood_and_is_gone_on_from(without_pictures, tmp_path):
+    """At places all over a run with another setting: each file is the old one or the new one, and the file that could
+    not be written is named."""
+    plain, out = replace(TRUE_ALPHA, figures=False), tmp_path / "out"
+    changed, kept = replace(plain, alpha_est_deg=20.0), []
+    run(without_pictures, out, plain)
+    old = contents(out)
+    for first in (0, 2, 4, 8):
+        with full_disk(first), pytest.raises(OSError, match=str(out)):
+            run(without_pictures, out, changed)
+        kept.append(contents(out))
+    run(without_pictures, out, changed)
+    new = contents(out)
+    assert new != old
+    assert all(data in (old.get(name), new[name]) for one in kept for name, data in one.items())
+    run(without_pictures, tmp_path / "at once", changed)
+    assert {**contents(tmp_path / "at once"), ".session": new[".session"]} == new

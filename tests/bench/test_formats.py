@@ -80,7 +80,7 @@ def test_keys_of_results(steel_signals, exact_vision, tmp_path):
 def test_keys_of_the_run(exact_run):
     record = json.loads((exact_run / "run.json").read_text())
     named = set(documented("run.json"))
-    written = {re.sub(r"^(recordings|versions)\.(.*)$", _by_name, key) for key in keys(record)}
+    written = {re.sub(r"^(recordings|results|versions)\.(.*)$", _by_name, key) for key in keys(record)}
     absent = {"board", "cameras"}  # without pictures
     assert {n for n in named if n.split(".")[0].rstrip("[]") not in absent} == written - absent
     fields = {f"cameras[].{f.name}" for f in dataclasses.fields(CameraFacts)}
@@ -89,7 +89,7 @@ def test_keys_of_the_run(exact_run):
 
 
 def _by_name(match: re.Match) -> str:
-    return f"{match[1]}.<{'trial' if match[1] == 'recordings' else 'distribution'}>"
+    return f"{match[1]}.<{'distribution' if match[1] == 'versions' else 'trial'}>"
 
 
 def test_truth_of_a_simulated_session(tmp_path):

@@ -12,6 +12,7 @@ from bench.base.errors import BadInput
 from bench.session.check import checked_session
 from tests.scenes.faults import FAULTS, TRIAL
 from vision.calibration.cameras_file import read_cameras
+from vision.calibration.cameras_import import import_cameras
 from vision.geometry.errors import Refused
 from vision.pictures.files import picture_size, read_picture
 
@@ -38,6 +39,26 @@ def test_a_link_out_of_the_session(session):
     assert refusal(session).startswith(f"trials/{TRIAL}/low: is a link that leads out of the session")
 
 
+def test_footage_elsewhere_is_followed_where_the_user_says_so(session, tmp_path):
+    FAULTS["folder is a link out"](session)
+    assert "give --follow-links where you know who made it" in refusal(session)
+    one = session / "trials" / TRIAL / "high" / "000003.jpg"
+    shutil.move(one, tmp_path / "one.jpg")
+    one.symlink_to(tmp_path / "one.jpg")
+    assert len(checked_session(session, follow_links=True).trials) == 4
+
+
+def test_nothing_but_footage_is_followed_out(session, tmp_path):
+    (tmp_path / "deep").mkdir()
+    for place in (f"trials/{TRIAL}/signals.csv", "trials/b30_3", f"trials/{TRIAL}/low/000003.jpg"):
+        link = session / place
+        shutil.move(link, tmp_path / link.name)
+        link.symlink_to(tmp_path / link.name if "low" not in place else tmp_path / "deep")
+    with pytest.raises(BadInput) as bad:
+        checked_session(session, follow_links=True)
+    assert str(bad.value).count("leads out of the session; put the files themselves there") == 3
+
+
 def test_a_link_to_nowhere_and_one_in_a_circle(session):
     (session / "trials" / "a").symlink_to("nowhere")
     (session / "trials" / "b").symlink_to("b")
@@ -61,6 +82,13 @@ def test_a_picture_of_absurd_size_is_damaged(session):
     assert read_picture(file) is None
     assert picture_size(file) is None
     checked_session(session)
+
+
+def test_brackets_without_end_in_cameras(tmp_path):
+    (tmp_path / "cameras.toml").write_text("x = " + "[" * 100000)
+    for read in (read_cameras, import_cameras):
+        with pytest.raises(Refused, match="is not TOML"):
+            read(tmp_path / "cameras.toml")
 
 
 @pytest.mark.parametrize("name", ["../cameras.npz", "..", "/etc/passwd", "", 3])

@@ -78,10 +78,10 @@ def prepared(folder: Path) -> tuple[Path, Path]:
 
 
 def doubtful(printed: str) -> list[str]:
-    """Lines of the summary's section of doubts; all where there is no summary."""
+    """Lines on what is doubtful; all where there is no verdict."""
     lines = printed.splitlines()
     if "Doubtful" not in lines:
-        return [] if "Files" in lines else lines
+        return [] if any(line.startswith("All of it: ") for line in lines) else lines
     after = lines[lines.index("Doubtful") + 1 :]
     return after[: after.index("") if "" in after else None]
 

@@ -71,7 +71,7 @@ def read_cameras(path: Path | str) -> Cameras:
 def _parse(path: Path) -> dict:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise Refused(f"is not TOML: {error}") from error
 
 

@@ -45,7 +45,7 @@ def import_cameras(path: Path | str, *, unit_mm: float | None = None) -> Cameras
 def _tables(path: Path) -> dict[str, dict]:
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise Refused(f"{path.name} is not TOML: {error}") from error
     candidates = document.get("cameras", document)
     cameras = {key: t for key, t in candidates.items() if isinstance(t, dict) and "matrix" in t}

@@ -39,11 +39,11 @@ class Camera:
     def __post_init__(self):
         for name, shape in (("matrix", (3, 3)), ("distortion", (5,)), ("T_camera_rig", (3, 4))):
             object.__setattr__(self, name, self._checked(name, shape))
-        object.__setattr__(self, "size_px", tuple(int(n) for n in self.size_px))
         require(
-            len(self.size_px) == 2 and min(self.size_px) > 0,
+            len(self.size_px) == 2 and all(n > 0 and n % 1 == 0 for n in self.size_px),  # NaN and infinity are not
             f"camera {self.name}: size_px = {list(self.size_px)}, must be two counts above 0",
         )
+        object.__setattr__(self, "size_px", tuple(int(n) for n in self.size_px))
         self._check_matrix()
         self._settle_rotation()
 

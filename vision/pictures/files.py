@@ -150,6 +150,12 @@ class Video(Frames):
                 capture.release()
 
     @cached_property
+    def rate_Hz(self) -> float:
+        """Frames a second as the header states it; 0 where it does not."""
+        with self._opened() as capture:
+            return max(0.0, float(capture.get(cv2.CAP_PROP_FPS)))
+
+    @cached_property
     def times_s(self) -> np.ndarray:
         """The container's times of the frames that decode, s; as many as `decoded_count`."""
         times_ms = []

@@ -20,6 +20,7 @@ from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
+from vision.geometry.counted import counted
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
@@ -83,7 +84,7 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
     while True:
         whisk = whisk.without_gaps()
         if len(whisk.frames) < _FEWEST_FRAMES:
-            few = f"{len(whisk.frames)} frames seen by every camera, {_FEWEST_FRAMES} are needed"
+            few = f"{counted(len(whisk.frames), 'frame')} seen by every camera, {_FEWEST_FRAMES} are needed"
             return WhiskTruth(whisk.number, None, status="; ".join([few, *whisk.left_out]))
         try:
             fit = fit_whisk(whisk.views, whisk.cameras, whisk.rods, whisk.bar, whisk.motor, whisk.light, whisk.settings)

@@ -22,6 +22,7 @@ from bench.report.page.plane import (
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
 from bench.report.summary.doubts import SILENT
 from bench.session.whisker import Whisker
+from vision.geometry.counted import counted
 
 SOUND = "sound"
 _DEGREES = math.degrees(1.0)
@@ -55,7 +56,8 @@ def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
     """The card of one whisk. whisks: of the whole session."""
     trial, seen = row.result.trial, row.seen
     said = [trial.surface, "" if trial.speed_deg_s is None else f"{trial.speed_deg_s:g}°/s", trial.purpose]
-    subtitle = ", ".join([*filter(None, said), f"{seen.cameras} cameras, {seen.frames_used} frames"])
+    rests_on = counted(seen.cameras, "camera"), counted(seen.frames_used, "frame")
+    subtitle = ", ".join([*filter(None, said), *rests_on])
     source = picture_source(out, f"overlays/{row.trial}_{seen.whisk}.png", whisks) if seen.overlay else ""
     alt = f"{row.name}: wire, bar and contact as found, drawn on the frames at touch and at θ of every camera"
     plots = sensing_plane(row), slip_over_stroke(row), force_angle_over_stroke(row), moments_over_stroke(row, whisker)

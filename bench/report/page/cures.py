@@ -30,8 +30,10 @@ _CURES = (
     (r"touch felt less seen", "check how frames are stamped, and record strokes at two speeds or with their way back"),
     (r"scatter .* in d_x", "fasten bar and hub: whisks of one recording should give one d_x"),
     (r"dropped|damaged|cannot be read", "record again with a slower frame rate or a faster disk, if it is near touch"),
+    (r"header of .* says", "look which is right; frame_rate_Hz in trial.toml settles it"),
+    (r"one and the same", "find the recordings that belong to these trials, and copy them anew"),
     (r"mended|is a .*, not|speed", "look at the file that is named; where it is meant so, nothing is to be done"),
-    (r"frames were taken while no signals", "start the DAQ before the cameras and stop it after them"),
+    (r"taken while no signals", "start the DAQ before the cameras and stop it after them"),
     (r"no forward stroke", "take the trial out, or let the motor turn forward in it"),
     (r"T_rig_board|square_mm|centre", "measure a square of the board with a caliper, then T_rig_board"),
 )

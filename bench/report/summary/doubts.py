@@ -7,6 +7,7 @@ from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.seen import NO_PICTURES
 from bench.trials.unit import OWN_GAUGES
+from vision.geometry.counted import counted
 
 SILENT = ("", NO_PICTURES, OWN_GAUGES)
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
@@ -21,7 +22,7 @@ def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[str]:
         if parts:
             yield f"{name}: {'; '.join(parts)}"
         if felt.saturated:
-            yield f"{name}: {felt.saturated} saturated samples left out"
+            yield f"{name}: {counted(felt.saturated, 'saturated sample')} left out"
         for answer in felt.estimates:
             if answer.status and answer.estimator not in _EXPECTED:
                 yield f"{name}, {answer.estimator}: {answer.status}"
@@ -34,7 +35,7 @@ def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         for note in filter(_of_light, result.seen.notes):
             notes_of.setdefault(note.split(" sees ")[0], []).append(f"{result.trial.name}: {note}")
     for notes in notes_of.values():
-        yield notes[0] + (f" (and so in {len(notes) - 1} more trials)" if len(notes) > 1 else "")
+        yield notes[0] + (f" (and so in {counted(len(notes) - 1, 'more trial')})" if len(notes) > 1 else "")
 
 
 def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:

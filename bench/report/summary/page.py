@@ -1,7 +1,8 @@
-"""summary.txt: the verdict first, then what it rests on. Also shown in the terminal."""
+"""summary.txt: the verdict first, then what it rests on. The verdict and what is doubtful are shown in the terminal."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
@@ -18,6 +19,8 @@ from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, tr
 from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, verdict
 from bench.trials.compare import Judged, judge
 
+DOUBTFUL = "Doubtful"
+_MOST_ON_SCREEN = 20  # lines: a screen
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
     *("against_theta", "compliance", "curvature", "ledger"),
@@ -35,8 +38,19 @@ class Summary:
     @property
     def text(self) -> str:
         """As summary.txt has it."""
-        titled = (line for s in self.sections for line in (s.title, *(f"  {line}" for line in s.lines), ""))
-        return "\n".join([*self.verdict, "", *titled]).rstrip() + "\n"
+        return "\n".join([*self.verdict, "", *_lines(self.sections)]).rstrip() + "\n"
+
+    def on_screen(self, out: Path) -> str:
+        """What is seen at a glance: the verdict, what is doubtful, and where the rest is."""
+        shown = self.doubtful[:_MOST_ON_SCREEN]
+        more = len(self.doubtful) - len(shown)
+        doubtful = [_titled(DOUBTFUL, [*shown, *([f"and {more} more, in summary.txt"] if more else [])])]
+        rest = f"All of it: {out / 'report.html'}, {out / 'summary.txt'}"
+        return "\n".join([*self.verdict, "", *(_lines(doubtful) if shown else ()), rest])
+
+
+def _lines(sections: Iterable[Section]) -> Iterator[str]:
+    return (line for s in sections for line in (s.title, *(f"  {line}" for line in s.lines), ""))
 
 
 def summary_of(
@@ -80,7 +94,7 @@ def _sections(
     yield _titled("Cameras", evaluation.calibration.notes)
     yield _titled("Light from one side", light_lines(results))
     yield _titled("Frames", frame_lines(results))
-    yield _titled("Doubtful", doubtful)
+    yield _titled(DOUBTFUL, doubtful)
     yield _titled("Score against the truth files of this synthetic session (no result knows them)", scores)
     yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))
     yield _titled("Files", _files(figures))

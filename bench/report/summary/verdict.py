@@ -12,6 +12,7 @@ from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial import TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.compare import Judged
+from vision.geometry.counted import counted
 
 _SIGNIFICANT = 2.0  # sigmas: no whisk beyond this, and the estimator may be right in all
 
@@ -32,9 +33,9 @@ def verdict(
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     pictures = any(trial.camera_sources for trial in session.trials)
     yield (
-        f"{session.name}: truth for {with_truth} of {len(seen)} measured whisks"
+        f"{session.name}: truth for {with_truth} of {counted(len(seen), 'measured whisk')}"
         if pictures
-        else f"{session.name}: no pictures, so no truth; {len(seen)} measured whisks felt"
+        else f"{session.name}: no pictures, so no truth; {counted(len(seen), 'measured whisk')} felt"
     ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
 
 
@@ -92,17 +93,20 @@ def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
     sound, doubtful = ([j for j in judged if j.doubtful == doubt] for doubt in (False, True))
     assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
     if not sound:
-        all_of_them = f"all of its {len(judged)} whisks are doubtful ({_range(judged)})"
+        all_of_them = f"{_all_of(len(judged))} doubtful ({_range(judged)})"
         return f"{label_of(name)}{assumed} has no verdict: {all_of_them}."
     worst = max(sound, key=lambda j: abs(j.error_percent))
     is_significant = any(abs(j.error_percent) > _SIGNIFICANT * j.error_sigma_percent for j in sound)
-    count = f"{len(sound)} whisks" if len(sound) > 1 else "1 whisk"
     not_significant = "" if is_significant else ", not significant"
     left_out = f"; {len(doubtful)} doubtful left out ({_range(doubtful)})" if doubtful else ""
     return (
-        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {count}, most at β = {worst.beta_deg:.1f}° "
-        f"({worst.trial}){not_significant}{left_out}."
+        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {counted(len(sound), 'whisk')}, "
+        f"most at β = {worst.beta_deg:.1f}° ({worst.trial}){not_significant}{left_out}."
     )
+
+
+def _all_of(count: int) -> str:
+    return "its one whisk is" if count == 1 else f"all of its {count} whisks are"
 
 
 def _range(judged: Sequence[Judged]) -> str:

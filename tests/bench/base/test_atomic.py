@@ -8,6 +8,7 @@ import pytest
 
 from bench.base.atomic import lock_output, whole_file, write_whole
 from bench.base.errors import BadInput
+from tests.faults.interrupted import full_disk
 
 
 def test_a_file_is_written_with_its_folders(tmp_path):
@@ -22,6 +23,15 @@ def test_the_old_file_stays_where_writing_fails(tmp_path):
     with pytest.raises(KeyboardInterrupt), whole_file(path) as temporary:
         temporary.write_text("half of the ne")
         raise KeyboardInterrupt
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_a_full_disk_leaves_the_old_file_and_names_it(tmp_path):
+    path = tmp_path / "table.csv"
+    write_whole(path, "old")
+    with full_disk(0), pytest.raises(OSError, match=str(path)):
+        write_whole(path, "new")
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
 
@@ -62,3 +72,13 @@ def test_a_second_run_on_one_output_stops(tmp_path):
         other.wait()
         with lock_output(tmp_path):  # a killed run holds nothing
             pass
+
+
+def test_what_a_killed_run_was_writing_is_swept_by_the_next(tmp_path):
+    (tmp_path / "planes").mkdir()
+    with pytest.raises(ZeroDivisionError), whole_file(tmp_path / "planes" / "a.png") as temporary:
+        left = temporary.read_bytes(), temporary.name
+        raise ZeroDivisionError
+    (tmp_path / "planes" / left[1]).write_bytes(left[0])  # as SIGKILL leaves it
+    with lock_output(tmp_path):
+        assert list((tmp_path / "planes").iterdir()) == []

@@ -54,6 +54,17 @@ def test_truth_files_do_not_count(tmp_path):
     assert hash_of_files([tmp_path]) != before
 
 
+def test_pictures_in_a_linked_folder_count(tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "trial").mkdir()
+    (tmp_path / "trial" / "low").symlink_to(tmp_path / "disk")
+    found = set()
+    for data in ("", "a", "b"):
+        (tmp_path / "disk" / "0.png").write_text(data)
+        found.add(hash_of_files([tmp_path / "trial"]))
+    assert len(found) == 3
+
+
 def test_results_come_back_as_they_went(tmp_path):
     value = 0.1 + 0.2
     write_result(tmp_path / "r.json", {"x": np.float64(value), "n": np.int64(3), "none": math.nan, "a": np.eye(2)})

@@ -56,6 +56,15 @@ def _refuse(_):
     raise BadInput("is wrong", file="signals.csv", row=7)
 
 
+def test_a_killed_process_is_told_in_a_line():
+    with pytest.raises(BadInput, match="a worker process was killed"), Workers(2) as pool:
+        pool.run(_killed, ["x"], "killed")
+
+
+def _killed(_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 _LONG = """
 import os, signal, sys, time
 from bench.base.workers import Workers

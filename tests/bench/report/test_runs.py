@@ -135,6 +135,13 @@ def test_what_is_no_evaluated_run_is_refused(run, tmp_path, small_session):
         pooled([old])
 
 
+def test_results_of_a_later_run_that_was_stopped_are_not_mixed_with_these(run):
+    out = run("monday")
+    (out / "run.json").write_text(json.dumps({"results": {"b0": "monday0", "b30": "monday30", "b60": "before60"}}))
+    with pytest.raises(BadInput, match=r"trials/b60.json is of a later run, which was not finished; evaluate"):
+        pooled([out])
+
+
 def test_results_that_the_tables_do_not_name_are_left_out(run):
     """A trial that was taken out of the session leaves its result behind."""
     out = run("monday")

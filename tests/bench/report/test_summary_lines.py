@@ -15,11 +15,14 @@ from bench.records.trial import (
     WhiskerFacts,
 )
 from bench.report.assembly import beam_rows, budget_rows
+from bench.report.run import Section
+from bench.report.summary.page import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
 from bench.trials.estimates import as_felt
 from estimator.signal import Touch
 from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.uncertainty import CAUSES
+from vision.geometry.counted import counted
 from vision.truth.value import Value
 
 
@@ -67,3 +70,19 @@ def test_beam_and_spline_stand_side_by_side():
     (line,) = beam_lines([made])
     assert "d_x +0.0040 ± 0.0010 mm (t)" in line and "slip -0.1000 ± 0.0200 mm (t)" in line
     assert list(beam_lines([result()])) == []
+
+
+def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
+    doubts = tuple(f"t{k}, whisk 0: slips in jumps" for k in range(30))
+    sections = Section("Cameras", ("camera high: 10 views",)), Section("Doubtful", doubts)
+    shown = Summary(("(2) is wrong.",), doubts, sections).on_screen(tmp_path).splitlines()
+    assert shown[:3] == ["(2) is wrong.", "", "Doubtful"]
+    where = f"All of it: {tmp_path}/report.html, {tmp_path}/summary.txt"
+    assert shown[-3:] == ["  and 10 more, in summary.txt", "", where]
+    assert len(shown) == 26 and not any("camera high" in line for line in shown)
+    assert Summary(("sample.",), (), sections[:1]).on_screen(tmp_path).splitlines()[:2] == ["sample.", ""]
+
+
+@pytest.mark.parametrize(("count", "said"), [(0, "0 frames"), (1, "1 frame"), (2, "2 frames")])
+def test_plurals(count, said):
+    assert counted(count, "frame") == said

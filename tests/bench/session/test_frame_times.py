@@ -87,6 +87,20 @@ def test_container_times_are_doubtful(small_copy, folder, as_video):
     np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=6e-4)  # rounded to 1 ms
 
 
+@pytest.mark.parametrize(
+    ("rate_Hz", "toml", "count"), [(20.0, "", 0), (30.0, "", 2), (30.0, "frame_rate_Hz = 20.0\n", 0)]
+)
+def test_a_header_with_another_rate_is_doubtful_until_settled(small_copy, folder, as_video, rate_Hz, toml, count):
+    """A film of 500 frames a second is often stored to play at 30."""
+    for camera in ("high", "low"):
+        as_video(folder / camera, ".avi", "MJPG", rate_Hz)
+    with (folder / "trial.toml").open("a") as file:
+        file.write(toml)
+    found = times(small_copy)
+    assert (found.source, len(found.doubts)) == ("frames.csv", count)
+    assert all("frames come at 20 Hz, the header of" in doubt and "says 30 Hz" in doubt for doubt in found.doubts)
+
+
 def test_frames_of_a_session_without_pictures(small_copy, folder):
     for camera in ("high", "low"):
         shutil.rmtree(folder / camera)

@@ -56,6 +56,14 @@ def test_what_stands_out_is_named(rng, spoil, said, value, within):
         assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(value, abs=within)
 
 
+def test_a_gauge_that_begins_to_drift_at_touch_is_told(rng):
+    """0.17 V/s at 10°/s: in one whisk a drift that goes on is no other than a gauge that gives more."""
+    drifting = pairs(rng)
+    drifting.volts[:, 0] += 0.17 * THETA / np.radians(10.0)
+    found = agreement(drifting, GAUGES)
+    assert found.chance < LEAST_CHANCE and found.cause.endswith("or drifts while the whisker pushes")
+
+
 def test_sound_whisks_agree_as_often_as_chance_allows(rng):
     """χ² of 2 degrees of freedom over 400 whisks whose errors are as stated, gauges' and distance's included."""
     root = np.linalg.cholesky(GAUGES.covariance)

@@ -1,13 +1,14 @@
 """The encoder and the frames' times against the pictures, and the bar against its diameter: each fault by its cause."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bench.records.trial import FeltWhisk
+from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.session import load_session
-from bench.trials.consistency import slope_doubt, turns_doubt, width_doubt
+from bench.trials.consistency import cone_doubt, nominal_slope, slope_doubt, turns_doubt, width_doubt
 from bench.trials.placing import _by_scale
 from bench.trials.unit import _against_pictures
 from tests.scenes.model_scenes import begun, scene, with_points
@@ -153,3 +154,34 @@ def test_a_slope_is_held_to_its_nominal_one(beta_deg, sigma_deg, nominal, said, 
     found = slope_doubt(beta, trial)
     assert said in found if said else found == ""
     assert slope_doubt(UNKNOWN, trial) == ""
+
+
+def degrees(value, sigma) -> Value:
+    return Value(float(np.radians(value)), float(np.radians(sigma)))
+
+
+@pytest.mark.parametrize(
+    ("phi_deg", "beta_deg", "said"),
+    [
+        (50.0, 60.0, ""),
+        (0.0, 40.0, ""),  # a bar of rubber
+        (-50.0, 60.0, "y reversed would be within"),
+        (130.0, 60.0, "z reversed would be within"),
+        (-130.0, 60.0, "; y and z reversed would be within"),
+        (-60.0, 0.0, ""),  # 15° beyond, with a sigma of 5°
+        (np.nan, 60.0, ""),
+    ],
+)
+def test_a_whisker_leans_within_frictions_cone(phi_deg, beta_deg, said):
+    found = cone_doubt(degrees(phi_deg, 4.0), degrees(beta_deg, 3.0), "felt")
+    assert found.endswith(said) and bool(found) == bool(said)
+
+
+def test_reversed_gauges_are_told_without_a_picture(trial):
+    """By the slope that trial.toml states; what it does not state tells nothing."""
+    felt = FeltWhisk(phi_felt_rad=degrees(-50.0, 0.5))
+    for beta_deg, apart in ((60.0, True), (-60.0, False), (None, False)):
+        unit = SimpleNamespace(trial=replace(trial, beta_deg=beta_deg))
+        found = _against_pictures(felt, unit, None, None, SeenWhisk(0))
+        assert found.apart == apart and ("y reversed" in found.status) == apart
+    assert nominal_slope(trial).sigma == pytest.approx(np.radians(3.0))

@@ -1,0 +1,154 @@
+"""Runs that are killed, and disks that are full, at random moments: what is resumed is what was never disturbed.
+
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/faults/interrupted.py kill|full COUNT [SESSION]
+
+`kill`: an evaluation with two workers, or one of its workers, is killed (SIGKILL) at a random moment, then started
+again: each file of the output must be the same to the byte as without.
+`full`: no byte can be written from a random file on, by a limit on the size of files, which anyone may set. One line
+and exit code 2, each file that stood before stands, and what is resumed is the same to the byte.
+Prints a line each; the exit code is 1 where one of them fails. 10 of the small session take some ten minutes.
+"""
+
+import io
+import itertools
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+SESSION = ROOT / "fixtures" / "small-session"
+ENDED_S = 2.0  # a worker notices within a second that its run was killed
+_OWN = (".lock",)  # holds the run's process id
+
+
+def command(session: Path, out: Path) -> list[str]:
+    """An evaluation with two workers."""
+    return [sys.executable, "-m", "bench.cli", "evaluate", str(session), "--out", str(out), "--workers", "2"]
+
+
+def started(session: Path, out: Path) -> subprocess.Popen:
+    where = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command(session, out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=where)
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """Every file of an output, by name."""
+    files = (path for path in out.rglob("*") if path.is_file() and path.name not in _OWN)
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+
+
+def differences(found: dict[str, bytes], wanted: dict[str, bytes]) -> list[str]:
+    """Names of files that are missing, too many or others."""
+    return sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
+
+
+def _workers(pid: int) -> list[int]:
+    """Processes that a run works by (Linux)."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+def killed(session: Path, out: Path, after_s: float, rng: np.random.Generator) -> str:
+    """What was killed: the run, one of its workers, or nothing where the run had ended."""
+    run = started(session, out)
+    time.sleep(after_s)
+    if run.poll() is not None:
+        return "nothing, it had ended"
+    victim = int(rng.choice([run.pid, *_workers(run.pid)]))
+    with suppress(ProcessLookupError):
+        os.kill(victim, signal.SIGKILL)
+    said = run.communicate()[1].decode()
+    time.sleep(ENDED_S)
+    if victim == run.pid:
+        return "the run"
+    assert run.returncode in (0, 1) or (run.returncode == 2 and said.count("\n") == 1), said
+    return f"a worker (exit {run.returncode})"
+
+
+def kill(count: int, session: Path = SESSION) -> int:
+    """How many of so many killed runs did not come to the same bytes."""
+    rng, bad = np.random.default_rng(9), 0
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.monotonic()
+        out = Path(folder) / "out"  # one name: .session and messages hold none
+        assert started(session, out).wait() in (0, 1)
+        whole_s, wanted = time.monotonic() - start, contents(out)
+        for k in range(count):
+            shutil.rmtree(out)
+            after_s = float(rng.uniform(0.0, whole_s))
+            what = killed(session, out, after_s, rng)
+            stood = len(contents(out)) if out.is_dir() else 0
+            assert started(session, out).wait() in (0, 1)
+            wrong = differences(contents(out), wanted)
+            bad += bool(wrong)
+            told = f"differ: {wrong}" if wrong else f"the same {len(wanted)} files"
+            print(f"{k}: killed {what} after {after_s:.1f} of {whole_s:.1f} s, {stood} files stood; {told}", flush=True)
+    return bad
+
+
+@contextmanager
+def full_disk(first: int, files: int = sys.maxsize):
+    """From the so-many-th file on, for so many files, no byte can be written. Of this process alone."""
+    from bench.base import atomic
+
+    number, made = itertools.count(), atomic.tempfile.mkstemp
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def mkstemp(**how):
+        full = first <= next(number) < first + files
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0 if full else limits[0], limits[1]))
+        return made(**how)
+
+    atomic.tempfile.mkstemp = mkstemp
+    try:
+        yield number
+    finally:
+        atomic.tempfile.mkstemp = made
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def full(count: int, session: Path = SESSION) -> int:
+    """How many of so many runs onto a full disk lost something that stood, or did not go on from there."""
+    from bench import cli
+
+    rng, bad = np.random.default_rng(9), 0
+
+    def run(out: Path) -> tuple[int, str]:
+        """Exit code, and what was said of a fault."""
+        said = io.StringIO()
+        with redirect_stdout(io.StringIO()), redirect_stderr(said):
+            return cli.main(["evaluate", str(session), "--out", str(out)]), said.getvalue().strip()
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        with full_disk(sys.maxsize) as number:
+            run(out)
+        wanted, files = contents(out), next(number)
+        for k in range(count):
+            shutil.rmtree(out)
+            first = int(rng.integers(files))
+            with full_disk(first):
+                code, said = run(out)
+            stood = contents(out)
+            torn = [name for name in stood if stood[name] != wanted.get(name)]
+            run(out)
+            wrong = [*torn, *differences(contents(out), wanted)]
+            bad += bool(wrong) or code != 2 or "\n" in said
+            told = f"differ: {wrong}" if wrong else "resumed to the same bytes"
+            shown = f"exit {code} ({said.replace(folder, '')}), {len(stood)} stood; {told}"
+            print(f"{k}: full from file {first} of {files} on: {shown}", flush=True)
+    return bad
+
+
+if __name__ == "__main__":
+    what, number_of = {"kill": kill, "full": full}[sys.argv[1]], int(sys.argv[2])
+    sys.exit(bool(what(number_of, *map(Path, sys.argv[3:]))))
