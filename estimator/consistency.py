@@ -98,7 +98,7 @@ def most_consistent_alpha(contacts: Contacts, *, curve: str = "line", stiffness:
 
     Distances count as shares of d_x, so that a larger α, which shrinks all of them, is not preferred for
     that. `stiffness` is the spline's: curvature against distance, over the cube of the object's extent. α
-    is NaN where the contacts do not span two slip angles.
+    is NaN where the contacts do not span two slip angles. Raises ValueError for another `curve`.
     """
     if curve not in CURVES:
         raise ValueError(f"curve = {curve!r}: must be one of {', '.join(CURVES)}")

@@ -31,7 +31,7 @@ NoSlip: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # d_x of θ 
 def rotational_compliance(theta: ArrayLike, m_z: ArrayLike) -> Numbers:
     """k_θ of (1), in rad/(N·mm): how far the base turns per moment, from two angles or a whole stroke.
 
-    theta and m_z have the samples along their last axis, two at least (ValueError otherwise). It is one over
+    theta and m_z have the samples along their last axis, two at least (raises ValueError otherwise). It is one over
     the slope of the least-squares line of the moment over the angle, so the angle of touch drops out. NaN
     where the moment does not rise with the angle.
 

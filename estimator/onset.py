@@ -116,7 +116,7 @@ def felt_touch(
 
 
 def columns(motor_rad: ArrayLike, moments: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Motor angles (n,) and moments (n, k) as float arrays; ValueError where the samples do not match."""
+    """Motor angles (n,) and moments (n, k) as float arrays; raises ValueError where the samples do not match."""
     motor = np.asarray(motor_rad, dtype=float)
     samples = np.asarray(moments, dtype=float)
     samples = samples[:, None] if samples.ndim == 1 else samples

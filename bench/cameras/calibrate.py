@@ -61,7 +61,8 @@ def _write(out: Path, cameras: Cameras, lines: list[str], doubts: list[str]) -> 
 
 
 def place_imported(session: Session, lenses: Path) -> Cameras:
-    """Cameras calibrated elsewhere, placed by the board on the rig; in their own world where there is none."""
+    """Cameras calibrated elsewhere, placed by the board on the rig; in their own world where there is none. Raises
+    BadInput where the file holds none, or the board does not place them."""
     if not lenses.is_file():
         raise BadInput("there is no such file", file=str(lenses))
     try:

@@ -84,7 +84,8 @@ def unloaded(rod: Rod, motor_rad: float, arc_mm: float | np.ndarray) -> tuple[np
 def first_touch(rod: Rod, bar: Bar, motor_rad: float, arc_mm: float) -> Touch:
     """Newton's method from a guess for: nearest point of the centreline, at a distance of both radii.
 
-    Where the nearest point lies beyond the end, the tip touches and the arc is the length.
+    Where the nearest point lies beyond the end, the tip touches and the arc is the length. Raises ArithmeticError where
+    the whisker never touches.
     """
     at = np.array([motor_rad, min(arc_mm, rod.length_mm)])
     for _ in range(30):

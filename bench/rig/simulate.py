@@ -95,7 +95,10 @@ def _claim(job):
 
 
 def make(job: Job, part: Part) -> None:
-    """One part, written beside its place under another name and moved there when whole."""
+    """One part, written beside its place under another name and moved there when whole.
+
+    Raises BadInput where the whisker slips off the bar or buckles.
+    """
     unfinished = part.folder.with_name(f".{part.folder.name}.unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.mkdir(parents=True)

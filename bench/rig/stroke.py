@@ -27,7 +27,8 @@ class Stroke:
         pause_s: float = 0.0,
         back: bool = False,
     ) -> "Stroke":
-        """`whisks` strokes from below `low_rad` to above `high_rad`, at constant speed between the two."""
+        """`whisks` strokes from below `low_rad` to above `high_rad`, at constant speed between the two. Raises
+        ValueError for several without a back stroke."""
         knots, forward = [(0.0, low_rad - 0.5 * speed_rad_s * ramp_s, 0.0 if ramp_s else speed_rad_s)], []
         backward = []
         for whisk in range(whisks):

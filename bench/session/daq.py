@@ -74,7 +74,8 @@ def read_daq(path: Path, daq: DaqFile, shown: str) -> Table:
 
 
 def frame_edges(path: Path, daq: DaqFile, time_s: np.ndarray, shown: str) -> np.ndarray:
-    """Times at which the camera's channel rises through the middle of its range, (n,), between samples."""
+    """Times at which the camera's channel rises through the middle of its range, (n,), between samples. Raises BadInput
+    where it has other samples than the rest."""
     channel = daq.channels[_FRAME]
     level = _scaled(_read(path, [channel.channel], shown)[0], channel, shown)
     if len(level) != len(time_s):

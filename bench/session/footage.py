@@ -28,7 +28,7 @@ def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
 
 
 def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
-    """Camera name to its one picture in `folder` (boards/rig)."""
+    """Camera name to its one picture in `folder` (boards/rig). Raises BadInput where a camera has two."""
     pictures: dict[str, Path] = {}
     for entry in visible(folder):
         if entry.suffix.lower() not in PICTURE_SUFFIXES:

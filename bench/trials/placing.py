@@ -35,7 +35,7 @@ def place_rig(
     """The calibration with the cameras in the rig frame of board and free strokes together, and notes on both.
 
     Where T_rig_board is taken as exact, or the cameras were brought along, they stay and only the alarm speaks: a line
-    of `doubts`.
+    of `doubts`. Raises BadInput where neither tells the rig frame.
     """
     if calibration.cameras is None:
         return calibration

@@ -1,6 +1,8 @@
-"""What a public function takes and gives stands at its head: annotations, and a docstring."""
+"""What a public function takes and gives stands at its head: annotations, and a docstring that names the
+errors it raises itself."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,8 +29,12 @@ def lacks(function: ast.FunctionDef) -> Iterator[str]:
     yield from (one.arg for one in named if one.annotation is None and one.arg not in ("self", "cls"))
     if function.returns is None:
         yield "->"
-    if not ast.get_docstring(function):
+    text = ast.get_docstring(function) or ""
+    if not text:
         yield "docstring"
+    raises = (node for node in ast.walk(function) if isinstance(node, ast.Raise) and node.exc is not None)
+    if any(raises) and not re.search("[Rr]aise|[Rr]efuse", text):
+        yield "what it raises"
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: str(folder.relative_to(ROOT)))

@@ -27,7 +27,8 @@ _BRIGHTEST_PERCENT = 99.9  # of the pixels: what is beyond are glints, not the b
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Corners of one board in one picture: ids (n,), px (n, 2), sigma_px (n,) one standard deviation per axis."""
+    """Corners of one board in one picture: ids (n,), px (n, 2), sigma_px (n,) one standard deviation per axis.
+    Refused where these are not as many."""
 
     ids: np.ndarray
     px: np.ndarray

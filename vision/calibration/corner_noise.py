@@ -67,7 +67,8 @@ def settle(
 
     Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's scatter of instants
     begins. error_px (C,): model errors to begin with. rounds: of learning the noise anew, where it is nearly known.
-    rough: robustly and once only, to see how large the errors are.
+    rough: robustly and once only, to see how large the errors are. Raises Refused
+    where no corner agrees with the others.
     """
     moving = state.trajectory is not None
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px

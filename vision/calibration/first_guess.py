@@ -59,7 +59,8 @@ def first_lens(views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[
 
 
 def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """T_camera_board (3, 4) of one view, the better of a plane's two mirrored poses (IPPE)."""
+    """T_camera_board (3, 4) of one view, the better of a plane's two mirrored poses (IPPE). Raises Refused where its
+    corners give none."""
     ab = lens_model.unproject(view.px, lens)
     seen = np.all(np.isfinite(ab), axis=1)
     points = corners_mm[view.ids[seen]]

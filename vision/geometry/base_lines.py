@@ -13,7 +13,8 @@ class BaseLines:
 
     motor_rad (n,); point_mm (n, 3) anywhere on the line and its covariance (n, 3, 3), mm²; direction (n, 3), unit, from
     the base outward, and its covariance (n, 3, 3): errors of each frame by itself. shared_covariance (6, 6): of a turn
-    w about the base and a shift v, rad and mm, that all lines have in common (light on the wire, lenses).
+    w about the base and a shift v, rad and mm, that all lines have in common (light on the wire, lenses). Refused where
+    shapes do not fit.
     """
 
     motor_rad: np.ndarray

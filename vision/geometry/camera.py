@@ -193,7 +193,7 @@ class Cameras:
         return self.cameras[self.index(name)]
 
     def index(self, name: str) -> int:
-        """Place of the camera in the covariance's order; KeyError where there is none."""
+        """Place of the camera in the covariance's order; raises KeyError where there is none."""
         if name not in self.names:
             raise KeyError(f"no camera {name!r}, there are {', '.join(self.names)}")
         return self.names.index(name)

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator
 
+from bench.gauges.certificate import matrix_lines
 from bench.gauges.matrix import GaugeMatrix, Gauges
-
-_U95 = 1.96
 
 
 def gauge_lines(gauges: Gauges | None) -> Iterator[str]:
@@ -22,10 +21,6 @@ def gauge_lines(gauges: Gauges | None) -> Iterator[str]:
 
 
 def _matrix_lines(title: str, gauges: GaugeMatrix | None) -> Iterator[str]:
-    if gauges is None:
-        return
-    if title:
-        yield f"{title}:"
-    for row, sigmas in zip(gauges.matrix, gauges.sigma):
-        cells = [f"{value:9.4f}" + (f" ± {_U95 * sigma:.4f}" if sigma > 0 else "") for value, sigma in zip(row, sigmas)]
-        yield "  " + "   ".join(cells)
+    if gauges is not None:
+        yield from [f"{title}:"] * bool(title)
+        yield from matrix_lines(gauges)
