@@ -58,9 +58,9 @@ def evaluate(
         doubts.notes += filter(None, [whole.doubt])
         write_tables(out, whole.results)
         write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
-        soft = tuple(soft_objects(session, whole.results, settings.alpha_est_rad))
-        write_compliance(out, soft)
         alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)
+        soft = tuple(soft_objects(session, whole.results, *alpha))
+        write_compliance(out, soft)
         shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
         write_curvature(out, shapes)
         recordings = {unit.trial.name: unit.files for unit in chosen}

@@ -65,6 +65,23 @@ def give(d_x: ArrayLike, compliance: ArrayLike, C: ArrayLike) -> Numbers:
 
 
 @elementwise
+def two_distances_moved(
+    d_x: ArrayLike, give: ArrayLike, shift: ArrayLike, C: ArrayLike, near_change: ArrayLike, far_change: ArrayLike
+) -> tuple[Numbers, Numbers]:
+    """(change of d_x in mm, of 1/k in mm/N) of `two_distances` where both compliances change, to first order.
+
+    With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg.
+    """
+    require_positive("C", C, "N·mm²")
+    far = d_x + shift
+    near_by_d, near_by_give = 1 / C - 2 * give / d_x**3, 1 / d_x**2
+    far_by_d, far_by_give = 1 / C - 2 * give / far**3, 1 / far**2
+    determinant = near_by_d * far_by_give - far_by_d * near_by_give
+    d_change = (far_by_give * near_change - near_by_give * far_change) / determinant
+    return d_change, (near_by_d * far_change - far_by_d * near_change) / determinant
+
+
+@elementwise
 def two_distances_spread(
     d_x: ArrayLike,
     give: ArrayLike,
@@ -74,22 +91,16 @@ def two_distances_spread(
     far_sigma: ArrayLike,
     shift_sigma: ArrayLike = 0.0,
 ) -> tuple[Numbers, Numbers]:
-    """(sigma of d_x in mm, sigma of 1/k in mm/N) of `two_distances` by those of both compliances and of the shift.
-
-    With g = 1/k, δk_θ = (1/C − 2 g / d³) δd + δg / d² at both places; the two are solved for δd and δg. The shift
-    moves the farther place alone.
+    """(sigma of d_x in mm, sigma of 1/k in mm/N) of `two_distances` by those of both compliances and of the shift,
+    which err apart from each other. The shift moves the farther place alone.
     """
-    require_positive("C", C, "N·mm²")
     require_sigma("near_sigma", near_sigma)
     require_sigma("far_sigma", far_sigma)
     require_sigma("shift_sigma", shift_sigma)
-    far = d_x + shift
-    near_by_d, near_by_give = 1 / C - 2 * give / d_x**3, 1 / d_x**2
-    far_by_d, far_by_give = 1 / C - 2 * give / far**3, 1 / far**2
-    far_sigma = np.hypot(far_sigma, far_by_d * shift_sigma)
-    determinant = near_by_d * far_by_give - far_by_d * near_by_give
-    d_sigma = np.hypot(far_by_give * near_sigma, near_by_give * far_sigma) / np.abs(determinant)
-    return d_sigma, np.hypot(far_by_d * near_sigma, near_by_d * far_sigma) / np.abs(determinant)
+    by_shift = (1 / C - 2 * give / (d_x + shift) ** 3) * shift_sigma
+    places = (near_sigma, 0.0), (0.0, np.hypot(far_sigma, by_shift))
+    moved = [two_distances_moved(d_x, give, shift, C, *changes) for changes in places]
+    return tuple(np.hypot(*changes) for changes in zip(*moved))
 
 
 def two_distances_sigma(

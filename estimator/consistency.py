@@ -94,7 +94,17 @@ class Consistency:
 
 
 def most_consistent_alpha(contacts: Contacts, *, curve: str = "line", stiffness: float = 1e-3) -> Consistency:
-    """α that minimises the weighted distance of the contact points to their best line or smoothing spline.
+    """`smoothest_alpha` with its sigma and the distance from the curve."""
+    alpha, status = smoothest_alpha(contacts, curve=curve, stiffness=stiffness)
+    if np.isnan(alpha):
+        return Consistency(np.nan, np.nan, np.nan, status)
+    sigma = _jackknife(contacts, alpha, _grid(contacts), curve, stiffness)
+    off = _from_curve(contacts.points(alpha), curve, stiffness, contacts.shares)
+    return Consistency(alpha, sigma, float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), status)
+
+
+def smoothest_alpha(contacts: Contacts, *, curve: str = "line", stiffness: float = 1e-3) -> tuple[float, str]:
+    """(α, any doubt): minimises the weighted distance of the contact points to their best line or smoothing spline.
 
     Distances count as shares of d_x, so that a larger α, which shrinks all of them, is not preferred for
     that. `stiffness` is the spline's: curvature against distance, over the cube of the object's extent. α
@@ -102,20 +112,19 @@ def most_consistent_alpha(contacts: Contacts, *, curve: str = "line", stiffness:
     """
     if curve not in CURVES:
         raise ValueError(f"curve = {curve!r}: must be one of {', '.join(CURVES)}")
-    phi = contacts.phi
     if len(np.unique(contacts.points(0.0).round(6), axis=0)) < FEWEST:
-        return Consistency(np.nan, np.nan, np.nan, TOO_FEW)
-    if not np.ptp(np.abs(np.tan(phi))) > SMALL_SPREAD:
-        return Consistency(np.nan, np.nan, np.nan, ONE_SLOPE)
-
-    grid = np.linspace(0.0, STEEPEST_SHARE * (np.pi / 2 - np.abs(phi).max()), GRID_SIZE)
+        return np.nan, TOO_FEW
+    if not np.ptp(np.abs(np.tan(contacts.phi))) > SMALL_SPREAD:
+        return np.nan, ONE_SLOPE
+    grid = _grid(contacts)
     best = int(np.argmin([_roughness(contacts, alpha, curve, stiffness) for alpha in grid]))
     bracket = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    alpha = _smoothest(contacts, bracket, curve, stiffness)
-    status = AT_BOUND if best in (0, len(grid) - 1) else ""
-    sigma = _jackknife(contacts, alpha, grid, curve, stiffness)
-    off = _from_curve(contacts.points(alpha), curve, stiffness, contacts.shares)
-    return Consistency(alpha, sigma, float(np.sqrt(np.mean(np.sum(off**2, axis=1)))), status)
+    return _smoothest(contacts, bracket, curve, stiffness), AT_BOUND if best in (0, len(grid) - 1) else ""
+
+
+def _grid(contacts):
+    """Friction angles (GRID_SIZE,) up to where the steepest contact would lose its distance."""
+    return np.linspace(0.0, STEEPEST_SHARE * (np.pi / 2 - np.abs(contacts.phi).max()), GRID_SIZE)
 
 
 def _roughness(contacts, alpha, curve, stiffness):

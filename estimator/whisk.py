@@ -55,7 +55,7 @@ class Whisk:
 class EstimatorSettings:
     """What an estimator is told beforehand: the assumed friction cone angle, and how far it is trusted.
 
-    Nobody knows the object: object_reach_mm is how thick it may be (radii of object and whisker together), and
+    object_reach_mm is how thick the object may be (radii of object and whisker together), and
     tilt_sigma_rad how far it may lean along the whisker. Both enter the sigma alone. Who is told its radius has it in
     object_radius_mm, NaN else; whisker_radius_mm is the whisker's own at its base.
     """

@@ -84,24 +84,46 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     """
     if not slips(seen):
         return UNKNOWN
-    y, z = seen.deflection.across_y_mm, seen.deflection.across_z_mm
-    weights = (y - y.mean()) / np.sum((y - y.mean()) ** 2)
-    slope = float(weights @ z)
-    n = len(y)
+    d, weights = seen.deflection, _of_a_line(seen)
+    slope = float(weights @ d.across_z_mm)
+    n = len(weights)
     by_z, by_y = np.eye(2 * n)[0::2], np.eye(2 * n)[1::2]
     through = weights @ (by_z - slope * by_y)  # to first order an error of d_y acts as one of d_z times the slope
-    slope_sigma = float(np.sqrt(through @ seen.deflection.covariance @ through))
-    alpha = abs(seen.beta_rad.value) - abs(np.arctan(slope))
-    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
+    slope_sigma = float(np.sqrt(through @ d.covariance @ through))
+    across = abs(seen.beta_rad.value) - abs(np.arctan(slope))
+    return _of_all_friction(seen, across, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma)))
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, float]:
-    """α = |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip; unknown
+    """α by |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip; unknown
     where the moments are not those of the seen shape."""
     beta, phi = seen.beta_rad, felt.phi_felt_rad
     if not (slips(seen) and np.isfinite(phi.value)) or felt.apart:
         return UNKNOWN
-    return abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma))
+    return _of_all_friction(seen, abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma)))
+
+
+def _of_all_friction(seen: SeenWhisk, across: float, sigma: float) -> tuple[float, float]:
+    """(α, sigma) from the angle |β| − |φ| of the force across the whisker, in which friction along the whisker is none.
+
+    Friction acts against the motion. That heads by h off the bar, since the contact wanders along the whisker too, and
+    where β is little above α by much: tan α = tan(|β| − |φ|) / cos h.
+    """
+    d, weights = seen.deflection, _of_a_line(seen)
+    slip, arc = weights @ d.slip_mm, weights @ d.arc_mm
+    size = np.hypot(slip, arc)
+    cosine, tangent = abs(slip) / size, abs(arc / slip)
+    alpha = np.arctan(np.tan(across) / cosine)
+    slip_sigma = np.sqrt(weights @ d.covariance[0::2, 0::2] @ weights) / np.cos(seen.beta_rad.value)
+    by_across = np.cos(alpha) ** 2 / (np.cos(across) ** 2 * cosine)
+    by_heading = 0.5 * np.sin(2.0 * alpha) * tangent
+    return float(alpha), float(np.hypot(by_across * sigma, by_heading * slip_sigma / size))
+
+
+def _of_a_line(seen: SeenWhisk) -> np.ndarray:
+    """Weights (f,) of the slope of a line over d_y."""
+    y = seen.deflection.across_y_mm
+    return (y - y.mean()) / np.sum((y - y.mean()) ** 2)
 
 
 def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:

@@ -94,11 +94,13 @@ def _answers(
     theta_rad = np.radians(result.theta_deg)
     whisk = _whisk(felt, theta_rad, beam)
     angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
-    runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma) for name, (a, sigma) in angles if np.isfinite(a)]
+    radii_mm, known = _radii_mm(result), ((name, *pair) for name, pair in angles if np.isfinite(pair[0]))
+    runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma, radii_mm) for name, a, sigma in known]
     given = _given(result, felt, theta_rad, beam, doubt)
     if felt.kinetic is not None:
         alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
-        runs.append(answer(KINETIC, with_friction, _whisk(felt.kinetic, theta_rad, beam), alpha, doubt.sigma_rad))
+        kinetic = _whisk(felt.kinetic, theta_rad, beam)
+        runs.append(answer(KINETIC, with_friction, kinetic, alpha, doubt.sigma_rad, radii_mm))
     return (*given, *runs)
 
 
@@ -106,13 +108,17 @@ def _given(
     result: TrialResult, felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam, doubt: Doubt
 ) -> tuple[EstimateRow, ...]:
     """The estimates, those with α_est as given asked again with the session's sigma of it."""
-    whisk = _whisk(felt, theta_rad, beam)
-    radii_mm = 0.5 * result.trial.bar_diameter_mm, 0.5 * result.whisker.diameter_mm
+    whisk, radii_mm = _whisk(felt, theta_rad, beam), _radii_mm(result)
 
     def again(a: EstimateRow) -> EstimateRow:
         return answer(a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, doubt.sigma_rad, radii_mm)
 
     return tuple(again(a) if a.estimator in ASSUMING else _rescaled(a, doubt.part) for a in felt.estimates)
+
+
+def _radii_mm(result: TrialResult) -> tuple[float, float]:
+    """Of the bar, NaN where the manifest does not say, and of the whisker's base."""
+    return 0.5 * result.trial.bar_diameter_mm, 0.5 * result.whisker.diameter_mm
 
 
 def _rescaled(row: EstimateRow, part: float) -> EstimateRow:

@@ -19,11 +19,14 @@ from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.friction.explained import by_10
 from bench.records.trial import TrialResult, whisks
 from bench.session.whisker import Whisker
-from estimator.friction import Contacts, alpha_from_tilts, confidence, most_consistent_alpha
+from estimator.consistency import smoothest_alpha
+from estimator.distance import felt_slip_angle
+from estimator.friction import Contacts, alpha_from_tilts, confidence
 from estimator.uncertainty import Z_95
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
 _FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a slope
+_BEARS_NOTHING = 1e-6  # of the largest change: a recording without which the fit is the same, to rounding
 # rad: the best of these is then refined
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
@@ -41,22 +44,29 @@ class Way:
 
 @dataclass(frozen=True)
 class Contact:
-    """What a robot has of one whisk: nominal slope and distance (NaN where not given), and what was felt."""
+    """What a robot has of one whisk: nominal slope and distance (NaN where not given), and what was felt.
+
+    shared_Nmm (k, 2): what (m_y, m_z) change by at one sigma of each cause that all whisks have in common.
+    """
 
     beta_rad: float
     d_x_nominal_mm: float
     theta_rad: float
     m_y_Nmm: float
     m_z_Nmm: float
-    phi_rad: float
     phi_sigma_rad: float
+    shared_Nmm: np.ndarray
     trial: str = ""
 
-    def steeper(self) -> "Contact":
-        """The same with a slip angle that is larger by its sigma, and as large a moment."""
-        steep, m = abs(self.phi_rad) + self.phi_sigma_rad, np.hypot(self.m_y_Nmm, self.m_z_Nmm)
-        phi = float(np.copysign(steep, self.phi_rad))
-        return replace(self, phi_rad=phi, m_y_Nmm=float(m * np.sin(phi)), m_z_Nmm=float(m * np.cos(phi)))
+    @property
+    def phi_rad(self) -> float:
+        """The slip angle (8)."""
+        return felt_slip_angle(self.m_y_Nmm, self.m_z_Nmm)
+
+    def moved(self, cause: int) -> "Contact":
+        """The same with one of the shared causes off by its sigma."""
+        m_y, m_z = (float(m) for m in (self.m_y_Nmm, self.m_z_Nmm) + self.shared_Nmm[cause])
+        return replace(self, m_y_Nmm=m_y, m_z_Nmm=m_z)
 
 
 def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[Contact]:
@@ -68,8 +78,8 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
             float(np.radians(result.theta_deg)),
             felt.m_y_Nmm.value,
             felt.m_z_Nmm.value,
-            felt.phi_felt_rad.value,
             felt.phi_felt_rad.sigma,
+            felt.shared_Nmm,
             result.trial.name,
         )
         for result, _, felt in whisks(results)
@@ -91,7 +101,7 @@ def by_tilting(of_surface: Sequence[Contact]) -> Way:
         fit = alpha_from_tilts([c.beta_rad for c in some], [c.phi_rad for c in some], phi_sigma=sigma)
         return fit.alpha_rad, fit.status
 
-    return _by_recordings("tilting", found, known)
+    return _by_recordings("tilting", found, known, 2)
 
 
 def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
@@ -104,7 +114,7 @@ def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
         return Way("consistency", np.nan, np.nan, "the whisks do not span two slip angles")
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return Way("consistency", np.nan, np.nan, "a whisk is no push against an object")
-    return _by_recordings("consistency", lambda some: _least_scatter(some, whisker), of_surface)
+    return _by_recordings("consistency", lambda some: _least_scatter(some, whisker), of_surface, 2)
 
 
 def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
@@ -118,7 +128,7 @@ def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
         return Way("smoothness", np.nan, np.nan, "needs whisks at two nominal distances (d_x_mm) or more")
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return Way("smoothness", np.nan, np.nan, "a whisk is no push against an object")
-    return _by_recordings("smoothness", lambda some: _smoothest(some, whisker), of_surface)
+    return _by_recordings("smoothness", lambda some: _smoothest(some, whisker), of_surface, 3)
 
 
 def _smoothest(some: Sequence[Contact], whisker: Whisker) -> tuple[float, str]:
@@ -126,28 +136,40 @@ def _smoothest(some: Sequence[Contact], whisker: Whisker) -> tuple[float, str]:
     heights = np.array([c.d_x_nominal_mm for c in some])
     beam = whisker.beam
     at = Contacts(*felt, beam.C_Nmm2, np.zeros(len(some)), heights, taper_per_mm=beam.taper / beam.length_mm)
-    found = most_consistent_alpha(at)
-    return found.alpha_rad, found.status
+    return smoothest_alpha(at)
 
 
-def _by_recordings(name: str, found: Callable[[Sequence[Contact]], tuple[float, str]], known: Sequence[Contact]) -> Way:
+def _by_recordings(
+    name: str, found: Callable[[Sequence[Contact]], tuple[float, str]], known: Sequence[Contact], unknowns: int
+) -> Way:
     """α that `found` makes of contacts (α or NaN, a status), with its sigma; NaN where that has a status.
 
     Whisks of one recording share a bar that was set up once, and are no independent repeats: each recording is left out
-    in turn (delete-group jackknife), Student's t for so few of them. What all share, the gauges' part of φ, comes on
-    top: all slip angles steeper by their sigma.
+    in turn. What all whisks share comes on top, one cause after another. unknowns: what `found` fits, α among it.
     """
     alpha, status = found(known)
     trials = list(dict.fromkeys(c.trial for c in known))
-    if status or len(trials) < _FEWEST:
-        return Way(name, np.nan, np.nan, status or f"needs {_FEWEST} recordings or more to say how well it is known")
+    if status or len(trials) <= unknowns:
+        few = f"needs {unknowns + 1} recordings or more to say how well it is known"
+        return Way(name, np.nan, np.nan, status or few)
     without = [found([c for c in known if c.trial != trial]) for trial in trials]
     if any(why for _, why in without):
         return Way(name, np.nan, np.nan, f"rests on one recording: without it, {next(w for _, w in without if w)}")
-    freedom = len(trials) - 1
-    own = np.sqrt(freedom * np.var([a for a, _ in without])) * stdtrit(freedom, 0.975) / Z_95
-    shared = found([c.steeper() for c in known])[0] - alpha
-    return Way(name, alpha, float(np.hypot(own, shared if np.isfinite(shared) else 0.0)))
+    changes = np.array([a for a, _ in without]) - alpha
+    shared = [found([c.moved(k) for c in known])[0] - alpha for k in range(len(known[0].shared_Nmm))]
+    return Way(name, alpha, float(np.hypot(_own_sigma(changes, unknowns), np.linalg.norm(np.nan_to_num(shared)))))
+
+
+def _own_sigma(changes: np.ndarray, unknowns: int) -> float:
+    """Sigma of a fit from what leaving out each recording changes it by, as half a 95 % interval over 1.96.
+
+    A recording left out moves the fit by more than it had pulled it, 1/(1 − h), by its leverage h, p/n in the mean of p
+    unknowns. So the sum of the squares is n/(n − p) times the variance, with n − p degrees of freedom for Student's t
+    (after MacKinnon & White, J. Econometrics 29, 1985: HC2 in place of HC3). Of n, those count that bear on it.
+    """
+    n = np.count_nonzero(np.abs(changes) > _BEARS_NOTHING * np.abs(changes).max())
+    freedom = max(n - unknowns, 1)
+    return float(np.sqrt(freedom / max(n, 1) * np.sum(changes**2)) * stdtrit(freedom, 0.975) / Z_95)
 
 
 def _distances(some: Sequence[Contact], alphas_rad, whisker: Whisker) -> np.ndarray:

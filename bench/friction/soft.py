@@ -19,6 +19,7 @@ from bench.session.whisker import Whisker
 from bench.trials.compare import is_sound
 from estimator import compliance, first_order
 from estimator.uncertainty import Z_95, model_share
+from vision.truth.value import Value
 
 COLUMNS = (
     *("surface", "speed_deg_s", "near_nominal_mm", "far_nominal_mm", "whisks_near", "whisks_far", "shift_mm"),
@@ -34,13 +35,15 @@ NO_PUSH = "no distance explains both compliances"
 
 @dataclass(frozen=True)
 class Place:
-    """Whisks at one nominal distance: mean compliance k_θ with sigma, rad/(N·mm), of so many whisks."""
+    """Whisks at one nominal distance: mean compliance k_θ with its own sigma, rad/(N·mm), of so many whisks; what it
+    changes by at one sigma of each cause that all whisks have in common, (k,)."""
 
     nominal_mm: float
     nominal_sigma_mm: float
     compliance: float
     sigma: float
     whisks: int
+    shared: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -66,14 +69,16 @@ class Soft:
         return (middle, low, high) if np.isfinite(self.give_mm_N) else (np.nan,) * 3
 
 
-def soft_objects(session: Session, results: Sequence[TrialResult], alpha_est_rad: float) -> list[Soft]:
-    """A row for each two neighbouring nominal distances of a surface and speed."""
-    found = []
+def soft_objects(
+    session: Session, results: Sequence[TrialResult], alpha_est_rad: float, sigma_rad: float
+) -> list[Soft]:
+    """A row for each two neighbouring nominal distances of a surface and speed; sigma_rad: of alpha_est."""
+    found, alpha_est = [], Value(alpha_est_rad, sigma_rad)
     for panel in dict.fromkeys(r.trial.panel for r in results if r.trial.purpose == "measure"):
         mine = [r for r in results if r.trial.purpose == "measure" and r.trial.panel == panel]
         places = [place for place in _places(session, mine) if place is not None]
         facts, theta = mine[0].trial, float(np.radians(mine[0].theta_deg))
-        found += [softness(session.whisker, facts, *pair, theta, alpha_est_rad) for pair in pairwise(places)
+        found += [softness(session.whisker, facts, *pair, theta, alpha_est) for pair in pairwise(places)
                   if pair[1].nominal_mm - pair[0].nominal_mm >= _LEAST_SHIFT_MM]  # fmt: skip
     return found
 
@@ -83,14 +88,16 @@ def _places(session: Session, results: Sequence[TrialResult]) -> Iterator[Place 
     nominal = {r.trial.d_x_nominal_mm for r in results}
     for d_x in sorted(d for d in nominal if np.isfinite(d)):
         there = [r for r in results if r.trial.d_x_nominal_mm == d_x]
-        rows = [_compliance(r, felt) for r, seen, felt in whisks(there) if is_sound(seen, felt) and _is_held(felt)]
         sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there)
-        yield _place(d_x, sigma_mm, np.array(rows)) if rows else None
+        rows = [_compliance(r, felt) for r, seen, felt in whisks(there) if is_sound(seen, felt) and _is_held(felt)]
+        yield _place(d_x, sigma_mm, *map(np.array, zip(*rows))) if rows else None
 
 
-def _place(d_x: float, sigma_mm: float, rows: np.ndarray) -> Place:
-    """Mean of compliances and sigmas (n, 2). Gauges are common to them: their number makes the sigma no less."""
-    return Place(d_x, sigma_mm, float(rows[:, 0].mean()), float(np.sqrt(np.mean(rows[:, 1] ** 2))), len(rows))
+def _place(d_x: float, sigma_mm: float, compliances: np.ndarray, sigmas: np.ndarray, shared: np.ndarray) -> Place:
+    """The mean of n whisks: compliances and their own sigmas (n,), what all have in common (n, k)."""
+    n = len(compliances)
+    own = float(np.sqrt(np.sum(sigmas**2))) / n
+    return Place(d_x, sigma_mm, float(compliances.mean()), own, n, shared.mean(axis=0))
 
 
 def _is_held(felt: FeltWhisk) -> bool:
@@ -98,40 +105,52 @@ def _is_held(felt: FeltWhisk) -> bool:
     return felt.has_moments and abs(phi.value) <= _HELD_SIGMAS * phi.sigma
 
 
-def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float]:
-    """k_θ = θ/m_z and its sigma."""
+def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float, np.ndarray]:
+    """k_θ = θ/m_z, its own sigma, and what it changes by with each shared cause (k,)."""
     theta, m_z = float(np.radians(result.theta_deg)), felt.m_z_Nmm
-    shares = np.array([felt.theta_sigma_rad / theta, m_z.sigma / m_z.value])
+    k, shared = theta / m_z.value, felt.shared_Nmm[:, 1] / m_z.value
+    of_moment = (m_z.sigma / m_z.value) ** 2 - shared @ shared
     mixed = felt.theta_moment_covariance_at[1] / (theta * m_z.value)
-    return theta / m_z.value, theta / m_z.value * float(np.sqrt(max(shares @ shares - 2 * mixed, 0.0)))
+    own = (felt.theta_sigma_rad / theta) ** 2 + of_moment - 2 * mixed
+    return k, k * float(np.sqrt(max(own, 0.0))), -k * shared
 
 
-def softness(whisker: Whisker, trial: TrialFacts, near: Place, far: Place, theta_rad: float, alpha_rad: float) -> Soft:
-    """What two places tell, whose whisks are those of `trial` but for the distance; alpha_rad: as assumed."""
+def softness(whisker: Whisker, trial: TrialFacts, near: Place, far: Place, theta_rad: float, alpha_est: Value) -> Soft:
+    """What two places tell, whose whisks are those of `trial` but for the distance; alpha_est: rad, as assumed."""
     described = trial.surface, trial.speed_deg_s, near, far
     if whisker.shape != "cylinder":
         return Soft(*described, *(np.nan,) * 4, NO_CYLINDER)
     C, shift = whisker.C_Nmm2, far.nominal_mm - near.nominal_mm
     reach = 0.5 * float(np.nan_to_num(trial.bar_diameter_mm) + whisker.diameter_mm)
-    (k_near, near_sigma), (k_far, far_sigma) = (_corrected(p, C, reach, theta_rad, alpha_rad) for p in (near, far))
+    k_near, k_far = (_corrected(place, C, reach, theta_rad, alpha_est.value) for place in (near, far))
     d_x, _ = compliance.two_distances(k_near, k_far, shift, C)
     if not np.isfinite(d_x):
         return Soft(*described, *(np.nan,) * 4, NO_PUSH)
     give = compliance.give(d_x, k_near, C)
     shift_sigma = float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))
-    sigmas = compliance.two_distances_spread(d_x, give, shift, C, near_sigma, far_sigma, shift_sigma)
+    own = compliance.two_distances_spread(d_x, give, shift, C, near.sigma, far.sigma, shift_sigma)
+    left = _left(theta_rad, alpha_est) / C
+    alike = (np.append(place.shared, left * place.nominal_mm) for place in (near, far))
+    shared = compliance.two_distances_moved(d_x, give, shift, C, *alike)
+    sigmas = [float(np.hypot(*pair)) for pair in zip(own, np.linalg.norm(shared, axis=1))]
     status = NOT_SOFT if give <= Z_95 * sigmas[1] else ""
-    return Soft(*described, float(d_x), float(sigmas[0]), float(give), float(sigmas[1]), status)
+    return Soft(*described, float(d_x), sigmas[0], float(give), sigmas[1], status)
 
 
-def _corrected(place: Place, C: float, reach: float, theta: float, alpha_rad: float) -> tuple[float, float]:
-    """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`), and its sigma with what
-    is left of that. reach: radii of bar and whisker together, mm."""
-    d_x = place.nominal_mm
-    share = first_order.rolling(theta, reach, 0.0, alpha_rad, d_x, 1.0)
+def _corrected(place: Place, C: float, reach: float, theta: float, alpha_rad: float) -> float:
+    """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`). reach: radii of bar and
+    whisker together, mm."""
+    share = first_order.rolling(theta, reach, 0.0, alpha_rad, place.nominal_mm, 1.0)
     share += first_order.HELD_SHARE * first_order.dragging(theta, alpha_rad)
-    left = model_share(theta, 0.0, alpha_rad, d_x, held_spread=first_order.HELD_SPREAD)
-    return place.compliance - share * d_x / C, float(np.hypot(place.sigma, left * d_x / C))
+    return place.compliance - share * place.nominal_mm / C
+
+
+def _left(theta: float, alpha_est: Value) -> float:
+    """What is left of that, as a share of the distance, at both places alike: the contact is the same, and so is α."""
+    alpha = alpha_est.value
+    share = model_share(theta, 0.0, alpha, 1.0, held_spread=first_order.HELD_SPREAD)
+    by_alpha = first_order.dragging(theta, alpha + alpha_est.sigma) - first_order.dragging(theta, alpha)
+    return float(np.hypot(share, first_order.HELD_SHARE * by_alpha))
 
 
 def write_compliance(out: Path, found: Sequence[Soft]) -> None:

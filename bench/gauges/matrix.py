@@ -30,10 +30,19 @@ class GaugeMatrix:
         """In another unit of stiffness."""
         return GaugeMatrix(factor * self.matrix, factor**2 * self.covariance)
 
+    def changes_at(self, volts: np.ndarray) -> np.ndarray:
+        """(4, 2): what the moment of `volts` (2,) changes by at one sigma of each of four independent causes.
+
+        The causes are the rows of the covariance's symmetric root, and so the same for all `volts`.
+        """
+        variances, axes = np.linalg.eigh(self.covariance)
+        root = axes * np.sqrt(np.maximum(variances, 0.0)) @ axes.T
+        return root @ np.kron(np.eye(2), np.asarray(volts)[None, :]).T
+
     def covariance_at(self, volts: np.ndarray) -> np.ndarray:
         """Covariance (2, 2) that the coefficients' uncertainty gives the moment of `volts` (2,)."""
-        rows = np.kron(np.eye(2), np.asarray(volts)[None, :])
-        return rows @ self.covariance @ rows.T
+        changes = self.changes_at(volts)
+        return changes.T @ changes
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ class WhiskerFacts:
 @dataclass(frozen=True, eq=False)
 class Deflection:
     """Where the contact lies in the hub's axes while touching, seen from the unbent whisker: (f,) each, and the joint
-    covariance (2f, 2f) of across z, y frame by frame."""
+    covariance (2f, 2f) of across z, y frame by frame. slip_mm: along the bar; arc_mm: along the whisker."""
 
     theta_rad: np.ndarray
     motor_rad: np.ndarray
@@ -55,6 +55,7 @@ class Deflection:
     along_mm: np.ndarray
     across_y_mm: np.ndarray
     across_z_mm: np.ndarray
+    arc_mm: np.ndarray
     covariance: np.ndarray
 
 
@@ -196,7 +197,8 @@ class FeltWhisk:
     """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle, phases, estimates.
 
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
-    (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle. agreement_chi2: of the moments with
+    (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle; shared_Nmm (k, 2): what the moments
+    change by at one sigma of each cause that all whisks have in common. agreement_chi2: of the moments with
     those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
     elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
     moments and estimates at other pushing angles, up to the stroke's end. kinetic: as on the kinetic cone, where the
@@ -211,6 +213,7 @@ class FeltWhisk:
     theta_sigma_rad: float = NAN
     covariance_at: np.ndarray | None = None
     theta_moment_covariance_at: np.ndarray | None = None
+    shared_Nmm: np.ndarray | None = None
     status: str = ""
     saturated: int = 0
     agreement_chi2: float = NAN

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
 
 from bench.base.drawing import colour_of, is_drawn, label_of, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
@@ -104,7 +104,7 @@ def write_against_theta(
 
 def figure(rows: Sequence[AtTheta]) -> Figure:
     """RMS error solid, stated sigma dashed, as if α_est were right dotted; a ring where the error is least."""
-    drawing = Figure(figsize=(6.4, 4.6), layout="constrained")
+    drawing = Figure(figsize=(5.6, 4.8), layout="constrained")
     axes = drawing.subplots()
     for number, name in enumerate(dict.fromkeys(row.estimator for row in rows)):
         mine, colour = [row for row in rows if row.estimator == name and row.whisks], colour_of(name, number)
@@ -116,13 +116,22 @@ def figure(rows: Sequence[AtTheta]) -> Figure:
         if least is not None:
             axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=9, mfc="none", mec=colour)
     axes.plot([], [], "--", lw=1.0, color="0.4", label="stated sigma")
-    axes.plot([], [], ":", lw=1.0, color="0.4", label="as if α_est were right")
+    axes.plot([], [], ":", lw=1.0, color="0.4", label="sigma, α$_{est}$ exact")
     axes.plot([], [], "o", ms=9, mfc="none", mec="0.4", label="least error")
-    axes.set(xscale="log", yscale="log", xlabel="pushing angle θ  [°]", ylabel="RMS error of d$_x$  [%]")
+    axes.set(xscale="log", yscale="log", xlabel="pushing angle θ  [°]", ylabel="error of d$_x$, its sigma  [%]")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(ScalarFormatter())
+        axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
     axes.set_xticks([t for t in (0.2, 0.5, 1, 2, 3, 5, 10, 20) if t <= max(row.theta_deg for row in rows)])
     axes.grid(alpha=0.25, which="major")
-    drawing.legend(loc="outside lower center", ncols=3)
+    _legend(drawing, axes)
     return drawing
+
+
+def _legend(drawing: Figure, axes: Axes, styles: int = 3) -> None:
+    """A column of estimators, and one of what the last lines, the `styles`, stand for; the shorter one is filled up."""
+    entries = list(zip(*axes.get_legend_handles_labels()))
+    columns, blank = (entries[:-styles], entries[-styles:]), (axes.plot([], [], " ")[0], "")
+    most = max(map(len, columns))
+    filled = [entry for column in columns for entry in [*column, *[blank] * (most - len(column))]]
+    drawing.legend(*zip(*filled), loc="outside lower center", ncols=2)

@@ -38,6 +38,8 @@ def figure_8(fitted: Sequence[Surface]) -> Figure:
         axes.set_ylabel("|m|  [EI/m]")
     for axes in grid[1::2, 0]:
         axes.set_ylabel("slip angle φ  [°]")
+    named = {label: line for axes in grid.flat for line, label in zip(*axes.get_legend_handles_labels())}
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -103,21 +105,16 @@ def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
         m, phi = _fitted(surface, SLOPES_DEG)
         alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
         line = {"color": colour_of("with_friction"), "lw": 1.4}
-        top.plot(SLOPES_DEG, m, **line, label=f"(13), (14): α = {alpha:.2f} ± {sigma:.2f}°")
+        top.plot(SLOPES_DEG, m, **line, label="(13), (14) with the fitted α")
         bottom.plot(SLOPES_DEG, phi, **line)
+        held = f"α = {alpha:.2f} ± {sigma:.2f}°\n"
+    else:
+        held = ""
     top.set_title(f"{letter} {surface.title}", loc="left")
-    top.legend(loc="lower left", handlelength=1.4)
     top.set_ylim(bottom=0)
     bottom.set(xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""), xlim=(-2, 82), ylim=(-3, 82))
-    top.annotate(
-        f"|m| scaled to d$_x$ = {surface.common_d_x_mm:.1f} mm",
-        (0.97, 0.95),
-        xycoords="axes fraction",
-        fontsize=7,
-        color="0.35",
-        ha="right",
-        va="top",
-    )
+    told = f"{held}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm"
+    top.annotate(told, (0.04, 0.04), xycoords="axes fraction", fontsize=7, color="0.25", va="bottom", linespacing=1.5)
 
 
 def _what(points: Sequence[Point]) -> str:

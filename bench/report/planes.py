@@ -12,6 +12,8 @@ from bench.records.trial import SeenTrial, SeenWhisk, TrialResult
 
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
 _MARGIN_MM = 2.2
+_LEAST_DEG, _ROOM_DEG = 3.0, 25.0  # of an angle that is drawn, and of one that its name fits into
+_LEG = {"fontsize": 9, "color": "0.25"}
 
 
 def draw_planes(result: TrialResult, friction: tuple[float, str], out: Path, stamp: str) -> list[str]:
@@ -42,7 +44,8 @@ def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: t
     virtual = contact + np.array([at.d_y_mm.value, -at.d_z_mm.value])
     _draw_bar(axes, result.seen, along, normal)
     _draw_cone(axes, contact, normal, friction, float(np.linalg.norm(virtual - contact)))
-    _draw_whisker(axes, result.seen, contact, virtual, path, along - 0.4 * normal)
+    onward = along if contact @ along >= 0 else -along
+    _draw_whisker(axes, result.seen, contact, virtual, path, onward, normal)
     _draw_angles(axes, whisk, contact, virtual, result.seen.wire_radius_mm)
     _draw_slip(axes, contact, normal)
     points = np.array([np.zeros(2), contact, virtual])
@@ -102,9 +105,10 @@ def _draw_cone(axes: Axes, contact, normal, friction: tuple[float, str], size: f
     axes.plot(*zip(contact, contact + reach * normal), color="0.4", lw=0.8, ls="--", zorder=2)
 
 
-def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path, beside) -> None:
-    """beside (2,): where P stands from the contact, in the bar, where no cone and no slip are."""
+def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path, onward, normal) -> None:
+    """onward (2,): the way of the slip. P stands that way and in the bar, where no cone and no slip are."""
     radius = seen.wire_radius_mm
+    at_p = (radius + 0.28) * (onward - 0.5 * normal) / np.linalg.norm(onward - 0.5 * normal)
     for place, fill in ((np.zeros(2), "white"), (contact, _WIRE)):
         axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
     axes.add_patch(Circle(virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
@@ -119,12 +123,12 @@ def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path, beside) -
     axes.plot(*zip(contact, contact + 0.5 * (contact - virtual)), color=_FORCE, lw=0.8, zorder=4)
     axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force on the whisker")
     for place, name, shift in (
-        (np.zeros(2), "P$_0$", (-0.5, -0.75)),
-        (contact, "P", beside),
+        (np.zeros(2), "P$_0$", -(radius + 0.32) * onward),
+        (contact, "P", at_p),
         (virtual, "V", (0.55, -0.55)),
     ):
         axes.annotate(name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6)
-    axes.legend(loc="upper left", fontsize=7)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7)
 
 
 def _draw_slip(axes: Axes, contact, normal) -> None:
@@ -145,25 +149,29 @@ def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual, radius_mm: floa
     """β between z and the bar at P0, φ between −y and the deflection at V, and the two legs of the deflection."""
     beta, phi = np.degrees(whisk.beta_rad.value), np.degrees(whisk.at.phi_rad.value)
     corner = np.array([contact[0], virtual[1]])
+    side = 1.0 if contact[1] >= virtual[1] else -1.0
     axes.plot(*zip(virtual, corner, contact), color="0.35", lw=0.8, ls=":", zorder=2)
-    axes.annotate("d$_y$", 0.5 * (virtual + corner) + [0, -0.32], ha="center", fontsize=9, color="0.25")
-    if abs(contact[1] - virtual[1]) > 0.4:
-        beside = 0.5 * (corner + contact) + [-0.35, 0]
-        below = corner + np.array([0.15, -0.35 * np.sign(contact[1] - virtual[1])])  # where a circle hides the leg
-        place = beside if abs(contact[1] - virtual[1]) > 2.6 * radius_mm else below
-        axes.annotate("d$_z$", place, ha="center", va="center", fontsize=9, color="0.25")
-    if abs(phi) > 3.0:
-        size = min(1.6, 0.9 * abs(virtual[0] - contact[0]))
-        low, high = sorted((180.0, 180.0 - phi))
-        axes.add_patch(Arc(virtual, 2 * size, 2 * size, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
-        middle = np.radians(180.0 - 0.5 * phi)
-        axes.annotate("φ", virtual + 1.25 * size * np.array([np.cos(middle), np.sin(middle)]), ha="center", va="center")
+    axes.annotate("d$_y$", 0.5 * (virtual + corner) - [0, 0.25 * side], ha="center", va="center", **_LEG)
+    if abs(contact[1] - virtual[1]) > 0.4:  # its label stands beside what the circle leaves of the leg
+        free = max(abs(contact[1] - virtual[1]) - radius_mm, 0.3)
+        axes.annotate("d$_z$", corner + np.array([-0.12, 0.5 * side * free]), ha="right", va="center", **_LEG)
+    if abs(phi) > _LEAST_DEG:
+        _draw_angle(axes, virtual, min(1.6, 0.9 * abs(virtual[0] - contact[0])), 180.0, 180.0 - phi, "φ")
     axes.plot([0, 0], [0, 2.0], color="0.35", lw=0.8, ls=":", zorder=2)
-    if abs(beta) > 3.0:
-        low, high = sorted((90.0, 90.0 - beta))
-        axes.add_patch(Arc((0, 0), 3.2, 3.2, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
-        middle = np.radians(90.0 - 0.25 * beta)  # beside the dimension line of σ
-        axes.annotate("β", 1.95 * np.array([np.cos(middle), np.sin(middle)]), ha="center", va="center")
+    if abs(beta) > _LEAST_DEG:
+        _draw_angle(axes, np.zeros(2), 1.6, 90.0, 90.0 - beta, "β")
+
+
+def _draw_angle(axes: Axes, corner, radius_mm: float, first_deg: float, last_deg: float, name: str) -> None:
+    """An arc from one direction to another; its name within, or past its end where there is no room."""
+    low, high = sorted((first_deg, last_deg))
+    axes.add_patch(Arc(corner, 2 * radius_mm, 2 * radius_mm, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
+    if high - low > _ROOM_DEG:
+        way, at = np.radians(0.5 * (first_deg + last_deg)), 0.72 * radius_mm
+    else:
+        way, at = np.radians(last_deg + np.copysign(9.0, last_deg - first_deg)), radius_mm
+    place = corner + at * np.array([np.cos(way), np.sin(way)])
+    axes.annotate(name, place, ha="center", va="center", zorder=6)
 
 
 def _values(whisk: SeenWhisk) -> str:

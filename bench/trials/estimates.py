@@ -23,8 +23,8 @@ from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 from vision.truth.value import Value
 
-# What a robot allows for in an object that it does not know: as thick as the paper's bar of 6 mm, with the whisker of
-# 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
+# What a robot allows for in an object that it is told nothing of: as thick as the paper's bar of 6 mm, with the whisker
+# of 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
 OBJECT_REACH_MM = 3.5
 TILT_SIGMA_RAD = np.radians(5.0)  # rad, one sigma: how upright a bar is set by eye
 UNTOLD = (math.nan, 0.0)  # radii of bar and whisker where nobody says
@@ -83,10 +83,17 @@ class Readout:
 
     def covariance(self, channels: np.ndarray, of_channels: np.ndarray) -> np.ndarray:
         """Covariance (2, 2) of the moments of `channels` (2,): from the channels', the gauges' and the turn's."""
-        back = to_follicle(self.roll_rad).T
+        shared = self._shared(channels)
+        return self.matrix @ of_channels @ self.matrix.T + shared.T @ shared
+
+    def shared_Nmm(self, whisk: Whisk) -> np.ndarray:
+        """(5, 2): what a whisk's moments at the wanted angle change by at one sigma of each cause that all whisks of a
+        session have in common: four of the gauges, and the follicle's turn."""
+        return self._shared(np.linalg.solve(self.matrix, [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]))
+
+    def _shared(self, channels: np.ndarray) -> np.ndarray:
         by_roll = to_follicle(self.roll_rad + np.pi / 2).T @ self.gauges.matrix @ channels * self.roll_sigma_rad
-        of_gauges = back @ self.gauges.covariance_at(channels) @ back.T
-        return self.matrix @ of_channels @ self.matrix.T + of_gauges + np.outer(by_roll, by_roll)
+        return np.vstack([self.gauges.changes_at(channels) @ to_follicle(self.roll_rad), by_roll])
 
 
 def felt_whisk(
@@ -187,7 +194,8 @@ def answer(
 
     radii_mm: of the bar, NaN where nobody says, and of the whisker's base.
     """
-    told = EstimatorSettings(alpha_est_rad, float(sigma_rad), OBJECT_REACH_MM, TILT_SIGMA_RAD, *radii_mm)
+    reach_mm = OBJECT_REACH_MM if math.isnan(radii_mm[0]) else sum(radii_mm)
+    told = EstimatorSettings(alpha_est_rad, float(sigma_rad), reach_mm, TILT_SIGMA_RAD, *radii_mm)
     exact, doubted = (
         _asked(name, estimator, whisk, one) for one in (replace(told, alpha_est_sigma_rad=0.0), told)
     )

@@ -164,7 +164,8 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         return None
     chosen = np.unique(np.linspace(0, len(smooth.theta_rad) - 1, _MOST_DEFLECTIONS).round().astype(int))
     theta, d_y, d_z = smooth.theta_rad[chosen], smooth.values["d_y"][chosen], smooth.values["d_z"][chosen]
-    x, y, _ = truth.frames.point_mm.value[truth.frames.touching][chosen].T
+    frames = truth.frames
+    x, y, _ = frames.point_mm.value[frames.touching][chosen].T
     touch, d_x = truth.touch_rad.value, truth.d_x_mm.value
     towards = np.cos(touch) * x + np.sin(touch) * y - d_x
     by_y = np.cos(theta)[:, None] * smooth.jacobians["d_y"][chosen]
@@ -176,6 +177,7 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         along_mm=d_x / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
         across_y_mm=d_y * np.cos(theta) + towards * np.sin(theta),
         across_z_mm=d_z,
+        arc_mm=frames.arc_mm[frames.touching][chosen],
         covariance=jacobian @ smooth.covariance @ jacobian.T,
     )
 

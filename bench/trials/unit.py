@@ -175,6 +175,7 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
+    felt = replace(felt, shared_Nmm=readout.shared_Nmm(usable))
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     asked, radii_mm = estimators(unit.settings.estimators), _radii_mm(unit)
     answered = partial(answers, asked=asked, settings=unit.settings, radii_mm=radii_mm)

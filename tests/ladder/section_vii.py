@@ -24,10 +24,12 @@ from bench.records.trial import TrialFacts
 from bench.report.score import Score
 from bench.session.whisker import Whisker
 from tests.ladder.estimates_montecarlo import E_GPA, push, rod_and_beam
+from vision.truth.value import Value
 
 SLOPES_DEG, D_X_MM, THETA_RAD = (-60, -45, -30, 0, 30, 45, 60), 60.0, np.radians(3.0)
 SCATTER_DEG, SCATTER_MM, GAUGE_SHARE, NOISE_NMM, WHISKS = 0.4, 0.4, 0.004, 0.02, 3
-SHIFT_MM, SHIFT_SIGMA_MM, ALPHA_EST_DEG = 20.0, 0.1, 12.0  # of the base, along the whisker; α as assumed
+SHIFT_MM, SHIFT_SIGMA_MM = 20.0, 0.1  # of the base, along the whisker
+ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG = 12.0, 5.0  # as assumed
 WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=E_GPA)
 
 
@@ -42,8 +44,8 @@ def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> 
         for _ in range(WHISKS):
             m_y, m_z = gauges @ exact + NOISE_NMM * rng.normal(size=2)
             sigma = np.hypot(GAUGE_SHARE, NOISE_NMM / np.hypot(m_y, m_z))
-            phi = float(np.arctan2(m_y, m_z))
-            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, phi, sigma, f"b{beta_deg}")
+            shared = GAUGE_SHARE * np.kron(np.eye(2), [[m_y], [m_z]])
+            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, sigma, shared, f"b{beta_deg}")
 
 
 def two_places(stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Soft:
@@ -54,10 +56,11 @@ def two_places(stiffness: float, alpha_deg: float, rng: np.random.Generator) -> 
     for nominal in (near, near + SHIFT_MM):
         d_x = nominal + SHIFT_SIGMA_MM / np.sqrt(2.0) * rng.normal()
         _, (_, exact) = push(rod, 0.0, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD, stiffness)
-        m_z, sigma = gauge * exact + NOISE_NMM * rng.normal(), np.hypot(GAUGE_SHARE * exact, NOISE_NMM)
-        places.append(Place(nominal, SHIFT_SIGMA_MM / np.sqrt(2.0), THETA_RAD / m_z, THETA_RAD / m_z**2 * sigma, 1))
+        m_z = gauge * exact + NOISE_NMM * rng.normal()
+        k, shared = THETA_RAD / m_z, np.array([GAUGE_SHARE])
+        places.append(Place(nominal, SHIFT_SIGMA_MM / np.sqrt(2.0), k, k / m_z * NOISE_NMM, 1, k * shared))
     facts = TrialFacts("soft", "measure", "soft", 10.0, bar_diameter_mm=6.0)
-    return softness(WHISKER, facts, *places, THETA_RAD, np.radians(ALPHA_EST_DEG))
+    return softness(WHISKER, facts, *places, THETA_RAD, Value(*np.radians([ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG])))
 
 
 def soft_study(count: int, seed: int) -> Score:

@@ -27,7 +27,7 @@ def deflection(d_x, beta):
     size = d_x * theta * np.cos(beta) / np.cos(beta - phi)
     y, z = size * np.cos(phi), size * np.sin(phi)
     rows = {"theta_rad": theta, "slip_mm": z / max(np.cos(beta), 1e-9), "across_y_mm": y, "across_z_mm": z}
-    rows |= {"motor_rad": theta, "along_mm": np.full(4, d_x)}
+    rows |= {"motor_rad": theta, "along_mm": np.full(4, d_x), "arc_mm": np.full(4, d_x)}
     return rows | {"covariance": 1e-6 * np.eye(8)}
 
 
@@ -39,6 +39,7 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
     felt |= {"touch_felt_sigma_rad": 1e-4, "theta_sigma_rad": 1e-4}
     felt |= {"phi_felt_rad": np.arctan2(m_y, m_z), "phi_felt_sigma_rad": PHI_SIGMA, "one_factor": [], "status": ""}
     felt |= {"covariance_at": 4e-4 * np.eye(2), "theta_moment_covariance_at": np.zeros(2)}
+    felt |= {"shared_Nmm": np.zeros((1, 2))}
     given = {"estimator": "with_friction", "alpha_est_rad": np.radians(10.0), "d_x_est_sigma_mm": 0.1, "status": ""}
     given |= {"d_x_est_mm": with_friction(THETA, m_y, m_z, np.radians(10.0), C), "beta_est_rad": 0.0}
     seen = {"whisk": 0, "d_x_mm": d_x, "d_x_sigma_mm": 0.01, "beta_rad": beta, "beta_sigma_rad": np.radians(0.1)}

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 from bench.base.settings import Settings
-from bench.friction.alphas import mean_alpha
+from bench.friction.alphas import felt_friction, mean_alpha, seen_friction
 from bench.friction.runs import FITTED, SEEN, _rescaled, with_runs
-from bench.friction.section_vii import Contact, by_consistency, by_smoothness, by_tilting, weights
+from bench.friction.section_vii import Contact, _own_sigma, by_consistency, by_smoothness, by_tilting, weights
 from bench.friction.tables import alpha_lines, friction_of, write_friction
 from bench.records.trial import EstimateRow
 from bench.report.assembly import estimate_rows
@@ -19,6 +20,7 @@ from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import ALPHA, PHI_SIGMA, THETA, WHISKER, C, result
 from vision.truth.value import Value
 
+NOTHING_SHARED = np.zeros((1, 2))
 SLOPES = (30, 45, 60, 70)
 
 
@@ -91,8 +93,7 @@ def test_every_way_finds_the_friction_angle(tmp_path):
 
 def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
-    phi = np.arctan2(m_y, m_z), PHI_SIGMA
-    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, *phi, f"b{beta_deg}")
+    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, PHI_SIGMA, NOTHING_SHARED, f"b{beta_deg}")
 
 
 def test_ways_say_what_they_lack():
@@ -105,6 +106,26 @@ def test_confidence_falls_with_the_slip_angle():
     shares = weights([0.0, 0.3, 0.6], np.radians(10.0))
     assert shares[0] == 1.0
     assert np.all(np.diff(shares) < 0)
+
+
+def test_friction_along_the_whisker_counts():
+    """A contact that wanders along the whisker as far as along the bar: tan α = √2 tan(|β| − |φ|)."""
+    (seen,), (felt,) = (part.whisks for part in (result(60.0).seen, result(60.0).felt))
+    assert seen_friction(seen)[0] == pytest.approx(ALPHA, abs=1e-6)
+    wandering = replace(seen, deflection=replace(seen.deflection, arc_mm=60.0 - seen.deflection.slip_mm))
+    expected = np.arctan(np.sqrt(2.0) * np.tan(ALPHA))
+    for straight, found in zip((seen_friction(seen), felt_friction(seen, felt)),
+                               (seen_friction(wandering), felt_friction(wandering, felt))):  # fmt: skip
+        assert found[0] == pytest.approx(expected, abs=1e-6)
+        assert found[1] > straight[1]
+
+
+def test_what_a_recording_left_out_changes_is_a_sigma():
+    """Of a mean, with p = 1: the sigma of the mean; of a fit with as many unknowns as recordings but one, t of 1."""
+    values = np.array([1.0, 2.0, 4.0, 7.0, 7.5])
+    changes = np.array([np.delete(values, k).mean() for k in range(5)]) - values.mean()
+    assert _own_sigma(changes, 1) == pytest.approx(values.std(ddof=1) / np.sqrt(5.0) * stdtrit(4, 0.975) / Z_95)
+    assert _own_sigma(np.array([0.1, -0.1, 0.1, 0.0]), 2) == pytest.approx(0.1 * stdtrit(1, 0.975) / Z_95)
 
 
 def test_mean_does_not_shrink_a_shared_sigma():
@@ -150,7 +171,7 @@ def along(beta_deg: float, d_x: float, whisker: Whisker) -> Contact:
     """A contact of a bar at this slope and distance, in a recording of its own."""
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(whisker.beam.as_cylinder_mm(d_x), THETA, beta, ALPHA, whisker.beam.C_Nmm2)
-    return Contact(beta, d_x, THETA, m_y, m_z, np.arctan2(m_y, m_z), 1e-3, f"b{beta_deg:g}")
+    return Contact(beta, d_x, THETA, m_y, m_z, 1e-3, NOTHING_SHARED, f"b{beta_deg:g}")
 
 
 def test_ones_own_estimate_takes_the_sessions_sigma_of_alpha():

@@ -14,9 +14,11 @@ from bench.rig.simulate import simulate
 from bench.session.whisker import Whisker
 from estimator.compliance import compliance_on_soft_object
 from tests.scenes.rig_sessions import protocol_file
+from vision.truth.value import Value
 
 WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
 FACTS = TrialFacts("soft", "measure", "sponge", 10.0)
+NOTHING_SHARED, FRICTIONLESS = np.zeros(1), Value(0.0, 0.0)
 PROTOCOL = """
 name = "soft"
 [gauges]
@@ -38,12 +40,12 @@ d_x_scatter_mm = 0.0
 def places(stiffness: float, sigma: float = 1e-6) -> list[Place]:
     C = WHISKER.C_Nmm2
     each = ((d, compliance_on_soft_object(d, stiffness, C) if np.isfinite(stiffness) else d / C) for d in (45.0, 65.0))
-    return [Place(d, 0.0, float(k), sigma, 1) for d, k in each]
+    return [Place(d, 0.0, float(k), sigma, 1, NOTHING_SHARED) for d, k in each]
 
 
 def test_two_places_tell_the_stiffness_to_what_is_corrected():
     """At θ = 1e-4 what (2) leaves out is nothing."""
-    found = softness(WHISKER, FACTS, *places(0.5), 1e-4, 0.0)
+    found = softness(WHISKER, FACTS, *places(0.5), 1e-4, FRICTIONLESS)
     assert found.give_mm_N == pytest.approx(2.0, abs=1e-3)
     k, low, high = found.stiffness_N_mm
     assert low < k < high and k == pytest.approx(0.5, rel=1e-3)
@@ -51,7 +53,7 @@ def test_two_places_tell_the_stiffness_to_what_is_corrected():
 
 
 def test_a_rigid_object_is_only_stiffer_than_something():
-    found = softness(WHISKER, FACTS, *places(np.inf, sigma=2e-5), 1e-4, 0.0)
+    found = softness(WHISKER, FACTS, *places(np.inf, sigma=2e-5), 1e-4, FRICTIONLESS)
     assert found.status == NOT_SOFT
     _, low, high = found.stiffness_N_mm
     assert 0 < low < np.inf and high == np.inf
@@ -61,10 +63,10 @@ def test_a_rigid_object_is_only_stiffer_than_something():
 
 def test_what_no_distance_explains_has_no_stiffness():
     near, far = places(0.5)
-    found = softness(WHISKER, FACTS, Place(45.0, 0.0, 1e-9, 1e-6, 1), far, 0.05, 0.0)
+    found = softness(WHISKER, FACTS, Place(45.0, 0.0, 1e-9, 1e-6, 1, NOTHING_SHARED), far, 0.05, FRICTIONLESS)
     assert found.status == NO_PUSH and np.isnan(found.stiffness_N_mm).all()
     cone = Whisker("cone", 100.0, 1.0, youngs_modulus_GPa=60.0)
-    assert softness(cone, FACTS, near, far, 0.05, 0.0).status == NO_CYLINDER
+    assert softness(cone, FACTS, near, far, 0.05, FRICTIONLESS).status == NO_CYLINDER
     assert list(soft_lines([found])) == []
 
 

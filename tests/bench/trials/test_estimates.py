@@ -8,10 +8,11 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke
 from bench.gauges.matrix import GaugeMatrix
-from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import Readout, answer, answers, as_felt, estimators, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
-from estimator.whisk import Estimate
+from estimator.builtin import with_friction
+from estimator.whisk import Estimate, Whisk
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
 BEAM = Beam(8835.7, 100.0)
@@ -67,6 +68,28 @@ def test_gauges_and_turn_add_to_the_moments_covariance():
     m_y, m_z = MATRIX @ volts
     turn = np.radians(1.0) * np.array([-m_z, m_y])
     assert added == pytest.approx(1e-2 * (volts @ volts) * np.eye(2) + np.outer(turn, turn))
+
+
+def test_what_whisks_share_is_the_part_of_gauges_and_turn():
+    """Channels that are exact leave nothing but these; a whisk twice as strong has twice the change, cause by cause."""
+    spread = np.diag([0.02, 0.01, 0.03, 0.02]) ** 2
+    readout = Readout(GaugeMatrix(MATRIX, spread), np.radians(20.0), np.radians(0.5), True)
+    channels = np.array([0.3, 0.8])
+    weak, strong = (Whisk(*(np.zeros(0),) * 4, THETA, *(k * readout.matrix @ channels), np.zeros((2, 2)), 0.0, BEAM)
+                    for k in (1.0, 2.0))  # fmt: skip
+    shared = readout.shared_Nmm(weak)
+    assert np.allclose(shared.T @ shared, readout.covariance(channels, np.zeros((2, 2))))
+    assert np.allclose(readout.shared_Nmm(strong), 2.0 * shared)
+
+
+def test_sigma_of_10_holds_how_thick_the_object_is_said_to_be(rng):
+    """−θ R/d_x cos β (½ − ⅛) at R = 20.5 mm: 0.34 % of d_x at β = 60°, beyond all else of this whisk."""
+    _, whisk = felt_whisk(stroke(rng, noise=1e-5), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+    untold, thin, thick = (answer("with_friction", with_friction, whisk, ALPHA, 0.0, (radius, 0.5)).d_x_est_mm.sigma
+                           for radius in (np.nan, 3.0, 20.0))  # fmt: skip
+    assert untold == pytest.approx(thin)
+    rolling = 60.0 * THETA * 0.375 * np.cos(BETA) / 60.0
+    assert np.sqrt(thick**2 - thin**2) == pytest.approx(rolling * np.sqrt(20.5**2 - 3.5**2), rel=0.02)
 
 
 def test_no_touch_is_a_reason(rng):
