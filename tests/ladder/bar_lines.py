@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.ladder.lines import FINE, NOISE, coverage, squares
-from vision.bar.line import measure_bars
+from vision.bar.line import BarLine, measure_bars
 from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
@@ -80,6 +80,12 @@ def noisy_view(shade, behind, angle: float, across_mm: float, rng) -> View:
     return View(camera, frames, background, Noise(NOISE**2, 0.0))
 
 
+def measured(view: View, axis: BarAxis) -> BarLine:
+    """The bar's line, from a coarse one."""
+    coarse = measure_bars([view], axis, RADIUS_MM, {}, VisionSettings())
+    return measure_bars([view], axis, RADIUS_MM, {}, VisionSettings(), coarse)[view.camera.name]
+
+
 def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:
     """Error across the bar of the line's two points, and what is stated of them, px."""
     angle, across_mm = rng.uniform(0.9, 2.2), rng.uniform(-2.0, 2.0)
@@ -88,7 +94,7 @@ def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:
     off_mm, off_rad = rng.uniform(-0.5, 0.5) * AWAY_MM / FOCAL_PX, rng.uniform(-0.004, 0.004)
     direction = np.array([np.cos(angle + off_rad), np.sin(angle + off_rad), 0.0])
     axis = BarAxis((across_mm + off_mm) * normal, direction)
-    found = measure_bars([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name]
+    found = measured(view, axis)
     return (found.points.px - CENTRE) @ normal[:2] - np.mean(edges_px(across_mm)), found.points.sigma_px
 
 

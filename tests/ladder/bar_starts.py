@@ -45,8 +45,10 @@ def starts(axis: BarAxis, camera: Camera, rng: np.random.Generator) -> list[BarA
 def moves(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping,
           rng: np.random.Generator) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """By camera: how far off the line is (starts + 1, 2), px, and its sigma; without those that see too little."""
-    found = [measure_bars(views, start, radius_mm, wires_px, VisionSettings())
-             for start in starts(axis, views[0].camera, rng)]
+    found = []
+    for start in starts(axis, views[0].camera, rng):
+        coarse = measure_bars(views, start, radius_mm, wires_px, VisionSettings())
+        found.append(measure_bars(views, start, radius_mm, wires_px, VisionSettings(), coarse))
     rows = []
     for view in views:
         lines: list[BarLine] = [one[view.camera.name] for one in found if view.camera.name in one]

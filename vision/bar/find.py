@@ -171,18 +171,23 @@ def _across(seen: Clear, px, tangent) -> np.ndarray:
 
 
 def climb(starts: np.ndarray, first_step: np.ndarray, score: Callable) -> tuple[np.ndarray, np.ndarray]:
-    """Best hypotheses (n, k) and their scores (n,): from each start to the best neighbour, by ever smaller steps."""
+    """Best hypotheses (n, k) and their scores (n,): from each start to the best neighbour, by ever smaller steps.
+
+    A neighbour differs in two numbers at most.
+    """
     size = len(first_step)
-    steps = first_step * np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * size, indexing="ij"), axis=-1).reshape(-1, size)
-    best, part = starts, np.ones(len(starts))
+    steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * size, indexing="ij"), axis=-1).reshape(-1, size)
+    steps = first_step * steps[np.sum(steps != 0.0, axis=1) <= 2]
+    best, part = starts.copy(), np.ones(len(starts))
     highest = np.full(len(starts), -np.inf)
     for _ in range(_MOST_CLIMBS):
-        around = best[:, None] + part[:, None, None] * steps
-        scores = score(around.reshape(-1, size)).reshape(len(best), -1)
-        chosen, rows = np.argmax(scores, axis=1), np.arange(len(best))
-        better = scores[rows, chosen]
-        part = np.where(better > highest + 1e-3, part, 0.5 * part)
-        best, highest = around[rows, chosen], better
-        if np.all(part < 0.5**_SHRINKS):
+        going = np.flatnonzero(part >= 0.5**_SHRINKS)
+        if not len(going):
             break
+        around = best[going, None] + part[going, None, None] * steps
+        scores = score(around.reshape(-1, size)).reshape(len(going), -1)
+        chosen, rows = np.argmax(scores, axis=1), np.arange(len(going))
+        better = scores[rows, chosen]
+        part[going] = np.where(better > highest[going] + 1e-3, part[going], 0.5 * part[going])
+        best[going], highest[going] = around[rows, chosen], better
     return best, highest

@@ -9,7 +9,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import outline
-from vision.lines.bands import Pieces, cut_pieces, read_band
+from vision.lines.bands import Band, Pieces, cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots, fit_shading, locate
 from vision.pictures.view import View
@@ -34,10 +34,17 @@ def bar_pieces(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wi
     if not np.any(np.isfinite(radius)):
         raise Refused(f"camera {view.camera.name} would have the bar behind it: check T_camera_rig")
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
-    band = read_band(grey, view.background, middle, place, radius, half)
+    band = _from_whole(read_band(grey, view.background, middle, place, radius, half), settings.bar_piece_px)
     pieces = cut_pieces([band], settings.bar_piece_px, view.noise)
     in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
     return pieces.select(in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
+
+
+def _from_whole(band: Band, length_px: int) -> Band:
+    """The band from a pixel on whose number is a multiple of a piece's length: pieces do not move with the axis."""
+    steps = band.foot_px[:, int(np.argmin(np.abs(np.ptp(band.foot_px, axis=0) - len(band.place) + 1)))]
+    first = int(-steps[0] % length_px)
+    return Band(*(getattr(band, name)[first:] for name in band.__dataclass_fields__))
 
 
 def bar_knots(settings: VisionSettings) -> Knots:
@@ -82,6 +89,6 @@ def rims_of(pieces: Pieces, placed: Pieces) -> Pieces:
 def at_arms(pieces: Pieces) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half-width (2,), by parabolas."""
     order, place = np.argsort(pieces.place), np.array([-ARM_MM, ARM_MM])
-    known = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order]
-    there = np.stack([np.polyval(np.polyfit(pieces.place[order], column, 2), place) for column in known.T], axis=1)
+    columns = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order].T
+    there = np.stack([np.polyval(np.polyfit(pieces.place[order], column, 2), place) for column in columns], axis=1)
     return place, there[:, :2], there[:, 2:4], there[:, 4]

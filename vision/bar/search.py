@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.bar.axis import settle_axis
 from vision.bar.find import Clear, clear_edges, find_bars
-from vision.bar.line import FAR_PX, NEAR_PX, BarLine, measure_bars
+from vision.bar.line import FAR_PX, NEAR_PX, BarLine, find_lines
 from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -64,11 +64,12 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
     wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
 
     def settled(axis: BarAxis, off_px: float) -> SeenBar:
-        lines = measure_bars(views, axis, rods.bar.radius_mm, wires, settings, off_px=off_px)
+        lines = find_lines(views, axis, rods.bar.radius_mm, wires, settings, off_px)
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
-    likely = max((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), key=lambda one: one.clearness)
+    found = [settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)]
+    likely = max((settled(one.axis, NEAR_PX) for one in found), key=lambda one: one.clearness)
     farther = settled(likely.axis, FAR_PX)  # a bar whose rims are dark, found by its highlight
     best = settled(max(likely, farther, key=lambda one: one.clearness).axis, NEAR_PX)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:

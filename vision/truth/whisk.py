@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from vision.bar.edges import measure_edges
-from vision.bar.line import measure_bars
+from vision.bar.line import BarLine, measure_bars
 from vision.bar.one_view import seen_from_one_side
 from vision.bar.search import SeenBar, of_mean
 from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
@@ -78,14 +78,15 @@ def _fitted_to(views, cameras: Cameras, rods: Rods, bar: SeenBar, motor: Mapping
                light: dict[str, WireAppearance], settings: VisionSettings, edges: Collection[str], *, by_onset: bool):
     """`fit_whisk` with touch by the frames that touch, or by the onset of bending."""
     motor, look = _first_look(views, cameras, rods, bar.axis, motor, by_onset)
+    lines: dict[str, BarLine] = {}
     for _ in range(settings.rounds):
-        seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=False)
+        seen = _trace_all(views, rods, look, motor, light, lines, settings, edges=edges, last=False)
         if edges and not by_onset and len({one.camera for one in seen if one.frame >= 0}) < 2:
             raise Refused("a single camera sees wire and bar")
         problem, state, answer = _fit(seen, cameras, rods, look, motor, by_onset)
         _check_scatter(problem, state)
         look = _next_look(problem, state, answer, look, motor, by_onset)
-    seen = _trace_all(views, rods, look, motor, light, settings, edges=edges, last=True)
+    seen = _trace_all(views, rods, look, motor, light, lines, settings, edges=edges, last=True)
     return *_fit(seen, cameras, rods, look, motor, by_onset), list(motor)
 
 
@@ -202,13 +203,13 @@ def _begin(problem: Problem, look: _Look) -> State:
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
 
-def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: VisionSettings, *,
-               edges: Collection[str], last: bool) -> list[Observed]:
-    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time. edges: see
-    `_resolved_by_edges`."""
+def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, lines: dict[str, BarLine],
+               settings: VisionSettings, *, edges: Collection[str], last: bool) -> list[Observed]:
+    """Line points of wire and bar in all cameras. light: each camera's blur, found the first time; lines: the bar's,
+    as measured the time before. edges: see `_resolved_by_edges`."""
     wires = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
              for view in views}
-    bar = _trace_bar(views, rods, look.axis, wires, settings, edges=edges, last=last)
+    bar = _trace_bar(views, rods, look.axis, wires, lines, settings, edges)
     seen = []
     for number, view in enumerate(views):
         seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
@@ -220,8 +221,8 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, settings: Vis
     return seen
 
 
-def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings, *, edges: Collection[str],
-               last: bool) -> list[dict[int, LinePoints]]:
+def _trace_bar(views, rods: Rods, axis: BarAxis, wires, lines: dict[str, BarLine], settings: VisionSettings,
+               edges: Collection[str]) -> list[dict[int, LinePoints]]:
     """Per camera the points of the bar's middle (side 0), or of its two edges where these are seen and are to tell how
     far away it is."""
     if edges:
@@ -230,7 +231,9 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings
                                                  wires[view.camera.name], settings) for view in asked}
     else:
         asked, found = views, {}
-    lines = measure_bars(asked, axis, rods.bar.radius_mm, wires, settings)
+    measured = measure_bars(asked, axis, rods.bar.radius_mm, wires, settings, lines)
+    lines.clear()
+    lines.update(measured)
     middles = {name: {0: line.points} for name, line in lines.items() if line.is_bar}
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 

@@ -1,0 +1,160 @@
+"""Where a straight bar lies, by the evidence of its stretches: a posterior of shift and tilt, all else mixed over.
+
+The lens blur, and how smooth the light round the bar is, are numbers of the whole camera. Neither is chosen: a bar
+whose edge is dim may lie a fifth of a pixel elsewhere under another blur.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from vision.bar.evidence import STEP_PX, Evidence, Profiles, evidence, profiles
+from vision.bar.pieces import ARM_MM
+from vision.lines.bands import Pieces
+
+STRETCHES = 6
+_WITHIN_SIGMAS = 4.0  # a next look reaches as far
+# Of a next look: least and most that it reaches, px; and in the logarithm of the blur.
+_LINE_PX, _LOG_BLUR = (0.25, 2.0), (0.1, 0.5)
+_BLURS_PX = 0.6, 0.85, 1.2, 1.7  # of a first look
+_ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
+_SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
+_LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by blur
+_APART_PX = 0.1  # lines of a wide window: farther apart they step over a peak
+_NEXT_BLURS = 4  # of a next look
+_LONGEST_PX = 3.0
+_STRETCH_ARM = 1.5  # the outermost stretch's place, over ARM_MM
+_MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hole in the bench says anything
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where a line is looked for: up to so far off (2,), px, in the middle and over ARM_MM; under lens blurs (n,), px;
+    and whether all kinds of light are looked at, or the roughest only."""
+
+    most_px: np.ndarray
+    blurs_px: np.ndarray
+    all_light: bool = True
+
+    @property
+    def lines(self) -> int:
+        """How many lines are tried, by shift and by tilt."""
+        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / _APART_PX)))
+
+    @classmethod
+    def after(cls, one: "Posterior") -> "Window":
+        """The next, about a posterior."""
+        most = np.clip(_WITHIN_SIGMAS * np.sqrt(np.diag(one.covariance)), *_LINE_PX)
+        wide = np.clip(np.hypot(_WITHIN_SIGMAS * one.log_blur_sigma, one.log_blur_step), *_LOG_BLUR)
+        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Of shift and tilt over ARM_MM (2,), px, under one transfer curve: mean, covariance; minus twice the log evidence
+    (k,) of each stretch at its best, by how much that is overstated (k,), and minus twice the log of how much room
+    there is about the best; how much more probable a bar is than none, how clearly it is one, and what share of the
+    lines that were possible still are; mean and sigma of the logarithm of the blur, and the step in which it was looked
+    at."""
+
+    line: np.ndarray
+    covariance: np.ndarray
+    least: np.ndarray
+    temper: np.ndarray
+    room: float
+    for_bar: float
+    clearness: float
+    unresolved: float
+    blur_px: float
+    log_blur_sigma: float
+    log_blur_step: float
+
+
+def first_look(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
+    """The posterior about a line (2,) that may be reach_px off, under coarse blurs."""
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), all_light=False), gamma, 1)
+
+
+def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
+    """The posterior about another one, at so many positions for each step across."""
+    return _look(pieces, before.line, Window.after(before), gamma, positions)
+
+
+def roughly(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
+    """The posterior of one quick look, good enough to tell a bar from what is none."""
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array([_ROUGH_BLUR_PX]), all_light=False), 1.0, 1)
+
+
+def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
+    """The most probable line (2,) by blurred pictures, up to off_px off."""
+    window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), all_light=False)
+    seen = profiles(pieces, STRETCHES, off_px, 1.0)
+    lines, _, misfit, *_ = _over_lines([evidence(seen, off_px, _FAR_BLUR_PX, all_light=False)], seen, window)
+    return lines[np.argmin(misfit[:, 0, 0])]
+
+
+def moved(pieces: Pieces, line: np.ndarray) -> Pieces:
+    """The pieces seen from a line (2,)."""
+    return pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
+
+
+def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) -> Posterior:
+    """Over lines within a window about one (2,)."""
+    reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
+    seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
+    under = [evidence(seen, reach_px, blur_px, positions, window.all_light) for blur_px in window.blurs_px]
+    lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
+    chance = np.exp(-0.5 * (misfit - misfit.min()))
+    total = chance.sum()
+    of_line, of_blur = chance.sum(axis=(1, 2)) / total, chance.sum(axis=(0, 1)) / total
+    mean, log_blur = of_line @ lines, float(of_blur @ log_blurs)
+    away, step = lines - mean, float(np.max(np.diff(log_blurs), initial=0.0))
+    cell = float(np.prod(2.0 * window.most_px / (window.lines - 1))) * max(step, 1e-300)
+    best, covariance = _best(under), (of_line * away.T) @ away
+    unresolved = float(3.0 * np.sqrt(np.linalg.det(covariance)) / np.prod(window.most_px))  # 1 of a flat one
+    return Posterior(line + mean, covariance, least, temper, -2.0 * np.log(total * cell),
+                     float(np.sum((best.of_none - best.least) / temper)), best.clearness, unresolved,
+                     np.exp(log_blur), float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)), step)
+
+
+def _best(under: Sequence[Evidence]) -> Evidence:
+    """By the blur with the most evidence."""
+    return min(under, key=lambda one: one.least.sum())
+
+
+def _overstated(one: Evidence, seen: Profiles) -> np.ndarray:
+    """By how much (k,) the evidence of each stretch is: noise goes together as far as pieces show it; what is left
+    beyond noise is light that no such model has, and goes together as far as the lens blurs it: exp(-x² / 4 blur²).
+    """
+    smeared = 2.0 * np.sqrt(np.pi) * one.blur_px / STEP_PX
+    return seen.alike + max(seen.alike, smeared) * np.maximum(one.misfit - 1.0, 0.0)
+
+
+def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
+    """Lines (n, 2), shift and tilt in px; logarithms of blurs (b,); minus twice the log probability (n, r, b) of each
+    under each kind of light and blur; minus twice the log evidence (k,) at the best of these, as it stands; and by how
+    much (k,) that is overstated.
+
+    Where the stretches' own middles lie on no line to their sigmas, these are taken to be as much larger.
+    """
+    ends = [np.linspace(-most, most, window.lines) for most in window.most_px]
+    lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
+    logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
+    temper = _overstated(_best(under), seen)
+    own = np.stack([one.of_bar for one in under], axis=-1) / temper[:, None, None, None]
+    if len(logs) > 2 and np.max(np.diff(logs)) < _SPLINE:
+        log_blurs = np.linspace(logs[0], logs[-1], _BLURS)
+        own = CubicSpline(logs, own, axis=-1)(log_blurs)
+    shift, shape = under[0].shift_px, (len(lines), own.shape[2], len(log_blurs))
+    own = own.reshape(len(seen), len(shift), -1)
+    least, against = own.min(axis=1), np.empty((len(seen), len(lines), own.shape[-1]))
+    for each, place_mm, curve, low in zip(against, seen.place_mm, own, least):
+        there = np.clip(lines @ [1.0, place_mm / ARM_MM], shift[0], shift[-1])
+        each[:] = np.maximum(CubicSpline(shift, curve - low)(there), 0.0)
+    against = -2.0 * np.logaddexp(-0.5 * against, -0.5 * _MOST)
+    total = against.sum(axis=0)
+    total = least.sum(axis=0) + total / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
+    line, other = np.unravel_index(np.argmin(total), total.shape)
+    return lines, log_blurs, total.reshape(shape), temper * (least[:, other] + against[:, line, other]), temper
