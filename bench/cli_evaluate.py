@@ -20,24 +20,7 @@ def add_evaluate(verbs: Verbs) -> None:
     )
     add_recorded(verb)
     add_out(verb, "OUT", "folder for tables, figures and the summary")
-    verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
-    verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
-    verb.add_argument(
-        "--alpha-est-sigma-deg",
-        type=float,
-        metavar="X",
-        help="how far that may be off, one sigma (default: by the spread of the session's surfaces, 5 without any)",
-    )
-    verb.add_argument(
-        "--cutoff-Hz", type=float, metavar="X", help="of the low-pass ahead of one's own estimators (0.5 a deg/s)"
-    )
-    verb.add_argument(
-        "--clock-sigma-s",
-        type=float,
-        metavar="X",
-        help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
-        "else to half a frame)",
-    )
+    _add_numbers(verb)
     add_seeing(verb)
     add_watch(verb)
     verb.add_argument(
@@ -59,6 +42,28 @@ def add_evaluate(verbs: Verbs) -> None:
     add_workers(verb)
 
 
+def _add_numbers(verb: argparse.ArgumentParser) -> None:
+    """What the estimators assume."""
+    verb.add_argument("--theta-deg", type=float, metavar="X", help="pushing angle of the estimates (default 3)")
+    verb.add_argument("--alpha-est-deg", type=float, metavar="X", help="friction angle that (10) assumes (default 10)")
+    verb.add_argument(
+        "--alpha-est-sigma-deg",
+        type=float,
+        metavar="X",
+        help="how far that may be off, one sigma (default: by the spread of the session's surfaces, 5 without any)",
+    )
+    verb.add_argument(
+        "--cutoff-Hz", type=float, metavar="X", help="of the low-pass ahead of one's own estimators (0.5 a deg/s)"
+    )
+    verb.add_argument(
+        "--clock-sigma-s",
+        type=float,
+        metavar="X",
+        help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
+        "else to half a frame)",
+    )
+
+
 def _evaluate(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
@@ -75,9 +80,9 @@ def _evaluate(options: argparse.Namespace) -> int:
         given["estimators"] = tuple(given["estimators"])
     if options.watch is not None:
         return watch(options, Settings(**given))
-    told = {"progress": sys.stderr.isatty(), "announce": print}
+    shown = {"progress": sys.stderr.isatty(), "announce": print}
     formats = options.figure_format
-    run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)
+    run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **shown)
     return DOUBTFUL if run.doubtful else DONE
 
 
