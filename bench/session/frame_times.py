@@ -1,6 +1,6 @@
 """When each frame of a trial was taken, on the signals' clock, and which picture of each camera it is."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from vision.pictures.files import Frames
 FRAME, TIME = "frame", "time_s"
 _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame
 _RATE_TOLERANCE = 1e-3
+_MOST_NAMED = 5  # frames in a line
 _CLOCK_STEP_S = 1e-3  # times are written to a millisecond or better
 
 
@@ -91,6 +92,15 @@ def read_trial(
         read = read_frames(source, place.values())
         frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
     return frames
+
+
+def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
+    """A line for each whisk with gaps between its frames' times."""
+    for number, place in enumerate(places):
+        lost = times.lost_in(place)
+        if lost:
+            at = ", ".join(f"{time_s:.3f}" for time_s, _ in lost[:_MOST_NAMED])
+            yield f"whisk {number}: {sum(count for _, count in lost)} frames were dropped by all cameras (after {at} s)"
 
 
 def _own(camera: str) -> str:
