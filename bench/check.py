@@ -17,12 +17,11 @@ from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauges_file import given_gauges
 from bench.session.check import checked_session, find_damage
 from bench.session.footage import frame_count, read_frames
-from bench.session.frame_times import frame_times, read_trial
+from bench.session.frame_times import dropped, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.scene import evenly_exposed, other_scene
-from bench.trials.seen import dropped
 from vision.boards.corners import MIN_CORNERS, find_corners
 from vision.boards.diagnosis import why_not_found
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose

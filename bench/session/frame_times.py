@@ -21,6 +21,7 @@ _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped
 _RATE_TOLERANCE = 1e-3  # of the interval stated, beyond the steps in which times are written. Set by eye
 # A header's rate is nominal: crystals are right to 1e-4, a computer's timers to some 1e-3.
 _HEADER_TOLERANCE = 1e-2
+_MOST_NAMED = 5  # frames in a line
 _CLOCK_STEP_S = 1e-3  # times are written to a millisecond or better
 
 
@@ -94,6 +95,16 @@ def read_trial(
         read = read_frames(source, place.values())
         frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
     return frames
+
+
+def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
+    """A line for each whisk with gaps between its frames' times."""
+    for number, place in enumerate(places):
+        lost = times.lost_in(place)
+        if lost:
+            at = ", ".join(f"{time_s:.3f}" for time_s, _ in lost[:_MOST_NAMED])
+            frames = counted(sum(count for _, count in lost), "frame")
+            yield f"whisk {number}: {frames} dropped by all cameras (after {at} s)"
 
 
 def _own(camera: str) -> str:

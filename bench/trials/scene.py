@@ -3,12 +3,15 @@ exchanged, a lens cap, an exposure that changed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.cameras.calibration import SessionCalibration, moved_cameras
 from bench.session.session import Session
 from vision.pictures.scene import Likeness, exposures, is_blank, likeness, texture
+
+if TYPE_CHECKING:
+    from bench.cameras.calibration import SessionCalibration
 
 Pictures = Mapping[int, np.ndarray]
 # Twice what sound scenes show, where a lit wire moves through the dark (0.028 in 54 scenes). Five of eleven frames 10 %
@@ -38,9 +41,11 @@ class StillScene:
 
 
 def still_scene(
-    session: Session, calibration: SessionCalibration, frames: Mapping[str, Pictures]
+    session: Session, calibration: "SessionCalibration", frames: Mapping[str, Pictures]
 ) -> StillScene:
     """A trial's frames, held to the pictures of the scene without rods."""
+    from bench.cameras.calibration import moved_cameras  # with all of the calibration: `check` does without
+
     kept, left_out, notes = {}, {}, []
     for name, pictures in frames.items():
         doubt = other_scene(name, pictures, calibration.background) if pictures else ""

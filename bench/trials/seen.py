@@ -10,14 +10,13 @@ from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
-from bench.session.frame_times import FrameTimes, frame_times, read_trial
+from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
 from bench.trials.consistency import cone_doubt, slope_doubt, turns_doubt, width_doubt
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
-from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar, Rods
 from vision.truth.observe import observe_trial
@@ -130,16 +129,6 @@ def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
             yield f"camera {name} dropped {dropped} of {len(times)} frames"
         if damaged:
             yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
-
-
-def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
-    """A line for each whisk with gaps between its frames' times."""
-    for number, place in enumerate(places):
-        lost = times.lost_in(place)
-        if lost:
-            at = ", ".join(f"{time_s:.3f}" for time_s, _ in lost[:_MOST_NAMED])
-            frames = counted(sum(count for _, count in lost), "frame")
-            yield f"whisk {number}: {frames} dropped by all cameras (after {at} s)"
 
 
 def whisk_record(

@@ -36,6 +36,14 @@ def test_help_imports_nothing_heavy():
     assert not {"numpy", "cv2", "scipy", "matplotlib", "msgspec"} & set(modules)
 
 
+def test_a_look_at_a_session_imports_no_solver(small_session):
+    """Of the second that `check` takes to start, half was scipy.optimize and what imports it."""
+    code = f"import sys; from bench.cli import main; main(['check', {str(small_session)!r}]); print(*sys.modules)"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    heavy = {"scipy.optimize", "scipy.interpolate", "scipy.integrate", "scipy.stats", "matplotlib", "skimage", "jinja2"}
+    assert "nothing wrong or doubtful" in said and not heavy & set(said.split())
+
+
 @pytest.mark.parametrize("arguments", [[], ["no-such-verb"], ["check"], ["check", "x", "--no-such-option"]])
 def test_wrong_usage_is_exit_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as done:

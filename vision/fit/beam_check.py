@@ -15,7 +15,6 @@ a chi² (the test of Hausman, Econometrica 46, 1251, 1978).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.special import chdtrc
 
 from vision.fit.problem import WANDER_PX, Problem, State, bends, curves_of, wandering
@@ -147,6 +146,8 @@ def _beside(own, prior, rows, residual, cameras, covariance):
 
 def _moves(problem: Problem, state: State, curves: Curves) -> Curves:
     """What a unit of each departure moves the centrelines by: points and tangents (k, f, m, 3) per mm/rad."""
+    from scipy.interpolate import CubicSpline  # with all of scipy.optimize: a look at a session does without
+
     knots = np.linspace(0.0, problem.wire.length_mm, KNOTS + 1)
     spline = CubicSpline(knots, np.eye(KNOTS + 1)[:, 1:], bc_type="natural")
     bent = np.concatenate([np.zeros((len(problem.motor_rad), 1)), bends(problem, state.vector)], axis=1)

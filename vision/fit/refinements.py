@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from vision.fit.problem import BAR, REACH, Problem, State, bar_axis, bends, curves_of
 from vision.fit.quantities import Jacobians, Measured, measure
@@ -22,7 +21,7 @@ from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
 from vision.fit.uncertainty import by_lens
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
-from vision.geometry.centreline import REST_POWERS, Curves, rotation_z, tangent_growth
+from vision.geometry.centreline import REST_POWERS, Curves, rotation_z, simpson, tangent_growth
 from vision.geometry.contact import BarAxis, closest_arc
 from vision.geometry.rods import Wire
 from vision.lines.one_sided import WireAppearance
@@ -111,7 +110,7 @@ def _in_rig(problem: Problem, curves: Curves, of_tangents: Sequence[np.ndarray])
     """Moves of the centrelines by those of their tangents in the hub's frame (f, m, 3) each."""
     turned = np.swapaxes(rotation_z(problem.motor_rad), -1, -2)
     tangents = np.stack(of_tangents) @ turned
-    return Curves(curves.arc_mm, cumulative_simpson(tangents, x=curves.arc_mm, axis=-2, initial=0.0), tangents)
+    return Curves(curves.arc_mm, simpson() @ tangents * curves.arc_mm[1], tangents)
 
 
 def _small_angles(problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray) -> np.ndarray:
@@ -145,10 +144,11 @@ def _tension(problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray
     contact, taper = arcs_mm[:, None], problem.wire.taper_per_mm
     growth = tangent_growth(arc, contact, problem.wire)
     softness = np.where(arc < contact, np.maximum(1.0 - taper * arc, 1e-3) ** -4.0, 0.0)
-    per_force = cumulative_simpson(softness * (contact - arc), x=arc, axis=-1)[:, -1:]
-    across = turn * cumulative_simpson(growth, x=arc, axis=-1, initial=0.0)
+    integral = simpson().T * arc[1]
+    per_force = (softness * (contact - arc) @ integral)[:, -1:]
+    across = turn * (growth @ integral)
     at_contact = np.array([np.interp(a, arc, row) for a, row in zip(arcs_mm, across)])[:, None]
-    gained = -turn / per_force * cumulative_simpson(softness * (at_contact - across), x=arc, axis=-1, initial=0.0)
+    gained = -turn / per_force * (softness * (at_contact - across) @ integral)
     way = bend / np.maximum(turn, 1e-12)
     return np.concatenate([np.zeros((*gained.shape, 1)), gained[..., None] * way[:, None]], axis=-1)
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from vision.geometry.camera import Camera
 from vision.geometry.rods import Wire
@@ -94,15 +93,17 @@ def centrelines(
     tangents = np.empty((*aside.shape[:-1], 3))
     tangents[..., 0] = np.sqrt(np.maximum(1.0 - aside[..., 0] ** 2 - aside[..., 1] ** 2, _LEAST_FORWARD2))
     tangents[..., 1:] = aside
-    points = _simpson() @ tangents * arc[1]
+    points = simpson() @ tangents * arc[1]
     points[..., 1:] += np.asarray(rest_mm)[..., None, :, 0]
     turned = np.swapaxes(rotation_z(motor_rad), -1, -2)
     return Curves(arc, points @ turned, tangents @ turned)
 
 
 @lru_cache
-def _simpson() -> np.ndarray:
-    """The matrix (m, m) that integrates values at the nodes, one apart, from the first node to each."""
+def simpson() -> np.ndarray:
+    """The matrix (m, m) that integrates values at the nodes of a curve, one apart, from the first node to each."""
+    from scipy.integrate import cumulative_simpson  # with all of scipy.optimize: a look at a session does without
+
     return cumulative_simpson(np.eye(_NODES), dx=1.0, axis=0, initial=0.0)
 
 
