@@ -39,6 +39,12 @@ def add_evaluate(verbs: Verbs) -> None:
     verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
     verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
     add_figure_format(verb)
+    verb.add_argument(
+        "--nwb",
+        type=Path,
+        metavar="FILE",
+        help="signals, tables and tracks as Neurodata Without Borders too, for archives (extra `nwb`)",
+    )
     add_workers(verb)
 
 
@@ -70,7 +76,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     single_thread()
     from bench.api import evaluate_with
     from bench.base.settings import Settings
+    from bench.report.nwb import check_nwb, write_nwb
 
+    if options.nwb is not None:
+        check_nwb(options.nwb, options.session)
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
     names = (*numbers, "estimators", "gauges_from_all", "trials", "figures", "follow_links")
@@ -83,6 +92,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     shown = {"progress": sys.stderr.isatty(), "announce": print}
     formats = options.figure_format
     run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **shown)
+    if options.nwb is not None:
+        write_nwb(options.nwb, run.out, options.session)
     return DOUBTFUL if run.doubtful else DONE
 
 

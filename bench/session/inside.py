@@ -11,10 +11,10 @@ from pathlib import Path, PurePath
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from vision.pictures.files import PICTURE_SUFFIXES, VIDEO_SUFFIXES
+from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES
 
 _MOST_NAMED = 3  # names in one line
-_FOOTAGE = PICTURE_SUFFIXES | VIDEO_SUFFIXES
+_FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
 # Where a camera's folder stands, in parts of the path within the session: boards/<camera>, trials/<trial>/<camera>.
 _CAMERA_AT = {"boards": 2, "trials": 3}
 
@@ -81,7 +81,7 @@ def _is_footage(target: Path, name: PurePath) -> bool:
     return {name.suffix.lower(), target.suffix.lower()} <= _FOOTAGE
 
 
-def check_outside(out: Path, session: Path) -> None:
+def check_outside(out: Path, session: Path, option: str = "--out") -> None:
     """Raises BadInput where results would be written into the session: it is what was recorded, and stays so."""
     if out.resolve().is_relative_to(session.resolve()):
-        raise BadInput(f"--out {out} lies in the session, which is never written to; give a folder outside of it")
+        raise BadInput(f"{option} {out} lies in the session, which is never written to; give a folder outside of it")

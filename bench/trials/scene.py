@@ -48,7 +48,7 @@ def still_scene(
 
     kept, left_out, notes = {}, {}, []
     for name, pictures in frames.items():
-        doubt = other_scene(name, pictures, calibration.background) if pictures else ""
+        doubt = other_scene(name, pictures, calibration.background) if pictures else "none of its frames can be read"
         if doubt:
             left_out[name] = f"camera {name} was left out: {doubt}"
         else:
