@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from bench.cli_plan import add_plan
 from bench.cli_results import add_compare, add_report, add_view
 from bench.cli_seeing import add_seeing, add_tradeoff, seeing_of
 from bench.cli_setup import add_board, add_new
@@ -75,7 +76,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    first = (add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
+    first = (add_plan, add_new, add_board, _add_check, _add_calibrate, _add_evaluate)
     looking = (add_report, add_compare, add_view)
     for add_verb in (*first, *looking, add_tradeoff, _add_figures, _add_simulate, _add_info):
         add_verb(verbs)

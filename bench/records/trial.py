@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
 from vision.fit.beam_check import BeamCheck
+from vision.fit.line_noise import LineNoise
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
@@ -88,6 +89,7 @@ class SeenWhisk:
     base: BaseLines | None = None
     beam: BeamCheck | None = None
     turns: Turns | None = None
+    lines: dict[str, LineNoise] = field(default_factory=dict)
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None

@@ -13,6 +13,7 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import curved, error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
+from bench.plan import written
 from bench.report import against_theta, assembly, compare, figure_8
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
@@ -53,6 +54,8 @@ CSV = {
     "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,
+    "plan.csv": written.COLUMNS,
+    "changes.csv": written.CHANGES,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vision.fit.beam_check import BeamCheck
+from vision.fit.line_noise import LineNoise
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
@@ -36,7 +37,7 @@ class WhiskTruth:
     d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
     overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
     the frames before touch. beam: the same by a curve that is no beam. turns: the whisker's turn in each frame of the
-    fit beyond the motor's.
+    fit beyond the motor's. lines: what each camera's lines are worth.
     """
 
     whisk: int
@@ -55,6 +56,7 @@ class WhiskTruth:
     base: BaseLines | None = None
     beam: BeamCheck | None = None
     turns: Turns | None = None
+    lines: dict[str, LineNoise] = field(default_factory=dict)
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""
