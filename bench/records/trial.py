@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
 from vision.fit.beam_check import BeamCheck
+from vision.fit.line_noise import LineNoise
 from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
@@ -91,6 +92,7 @@ class SeenWhisk:
     beam: BeamCheck | None = None
     turns: Turns | None = None
     refinements: dict[str, LeftOut] = field(default_factory=dict)
+    lines: dict[str, LineNoise] = field(default_factory=dict)
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None

@@ -6,12 +6,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]  # JPEG's, of 100
+JPEG_QUALITY = 95  # of 100
 
 
 def write_picture(path: Path, picture: np.ndarray) -> None:
     """One file; the kind follows from its name. Raises OSError where it cannot be written."""
-    done, data = cv2.imencode(path.suffix, picture, _QUALITY if path.suffix == ".jpg" else [])
+    settings = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY] if path.suffix == ".jpg" else []
+    done, data = cv2.imencode(path.suffix, picture, settings)
     if not done:
         raise OSError(f"{path}: OpenCV cannot write this picture")
     path.write_bytes(data.tobytes())

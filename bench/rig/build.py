@@ -30,8 +30,11 @@ def gauges(protocol: Protocol) -> Gauges:
 
 
 def cameras(protocol: Protocol) -> list[Camera]:
-    """The cameras of a protocol, in its order."""
-    return [Camera.looking(c.name, size_px=c.size_px, focal_px=c.focal_px, aspect=c.aspect, distortion=c.distortion,
+    """The cameras of a protocol, in its order. Raises ValueError where one has no place."""
+    nowhere = [c.name for c in protocol.cameras if c.position_mm is None]
+    if nowhere:
+        raise ValueError(f"camera {nowhere[0]} has no position_mm; `whisker-bench plan` finds one")
+    return [Camera.looking(c.name, size_px=c.size_px, focal_px=c.focal, aspect=c.aspect, distortion=c.distortion,
                            position_mm=np.array(c.position_mm), target_mm=np.array(c.target_mm),
                            roll_rad=math.radians(c.roll_deg), centre_px=c.centre_px) for c in protocol.cameras]
 

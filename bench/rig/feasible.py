@@ -15,6 +15,9 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
     names = [c.name for c in protocol.cameras]
     if len(set(names)) < len(names) or "rig" in names:
         raise BadInput(f"cameras need names of their own, none of them 'rig'; found {names}", file=path)
+    for camera in protocol.cameras:
+        if (camera.focal_mm is None) != (camera.pixel_um is None):
+            raise BadInput(f"camera {camera.name}: focal_mm and pixel_um go together", file=path)
     for run in protocol.runs():
         _check_run(protocol, run, path)
 

@@ -106,11 +106,11 @@ def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterat
     studio, frames = job.studios[camera], recording.frames
     setting = studio.setting(recording.bar, recording.bar.foot_mm(recording.touch.point_mm))
     for number, (_, motor, whisk, back) in enumerate(frames):
-        moments = _moments(job.protocol, studio, recording, recording.whisks[whisk], motor, back)
+        moments = moments_of(job.protocol, studio, recording, recording.whisks[whisk], motor, back)
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
 
 
-def _moments(protocol, studio, recording, whisk, motor, back):
+def moments_of(protocol, studio, recording, whisk, motor, back):
     """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
     pictures, length = protocol.pictures, recording.rod.length_mm
     swept = np.radians(recording.run.speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0

@@ -61,14 +61,21 @@ class CameraTable(Table, kw_only=True):
     """One [[cameras]] of a protocol."""
 
     name: Name
-    position_mm: Three
+    position_mm: Three | None = None  # `plan` looks for a place where there is none
     target_mm: Three = (55.0, 0.0, 0.0)
     roll_deg: float = 0.0
     focal_px: Positive = 2000.0
+    focal_mm: Positive | None = None  # instead of focal_px, with pixel_um
+    pixel_um: Positive | None = None
     aspect: Positive = 1.0012
     size_px: Size = (1280, 720)
     centre_px: Pair | None = None
     distortion: tuple[float, float, float, float, float] = (-0.1, 0.1, 0.0, 0.0, 0.0)
+
+    @property
+    def focal(self) -> float:
+        """Focal length, px."""
+        return 1000.0 * self.focal_mm / self.pixel_um if self.focal_mm and self.pixel_um else self.focal_px
 
 
 class LightTable(Table):

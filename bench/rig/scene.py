@@ -18,6 +18,7 @@ HUB_FRONT_MM = 5.0  # how far the hub reaches along the whisker
 # mm: corners of the hub's block, its own axes
 _HUB_LOW, _HUB_HIGH = np.array([-17.0, -9.0, -6.0]), np.array([HUB_FRONT_MM, 9.0, 7.0])
 _BLOCK_HALF = np.array([9.0, 9.0, 7.0])  # mm: half the bar's block, each way
+_BLOCK_UP_MM = 52.0  # along the bar from where it is touched
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
 
 
@@ -101,13 +102,10 @@ class Scene:
         post = Tube.straight([-6, 0, -18], [-6, 0, looks.floor_z_mm], 11.0, looks.dark)
         post.draw(window, radiance, looks.light)
         Tube.straight([-6, 0, -4], [-6, 0, -19], 3.0, looks.dark).draw(window, radiance, looks.light)
-        up, down = middle_mm + 52 * bar.axis, middle_mm - self._reach_down(bar, middle_mm) * bar.axis
-        Tube.straight(down, up, bar.radius_mm, looks.bar).draw(window, radiance, looks.light)
+        down, block = middle_mm - self._reach_down(bar, middle_mm) * bar.axis, _block(bar, middle_mm)
+        Tube.straight(down, block.origin_mm, bar.radius_mm, looks.bar).draw(window, radiance, looks.light)
         print_ = marker(self.board.dictionary, self._marker(_BLOCK_MARKER), 10.0, looks.ink)
-        front = np.array([0.0, -1.0, 0.0]) - bar.axis * -bar.axis[1]
-        front /= np.linalg.norm(front)
-        axes = np.column_stack([np.cross(front, bar.axis), front, bar.axis])
-        Box(-_BLOCK_HALF, _BLOCK_HALF, axes, up, 0.1).draw(window, radiance, looks.light, print_, (1, 1))
+        block.draw(window, radiance, looks.light, print_, (1, 1))
 
     def _reach_down(self, bar, middle):
         """To the board, but no further than a rod of this length would."""
@@ -140,6 +138,19 @@ class Scene:
         """Pixels (n, 2) between which all that moves lies."""
         corners = np.concatenate([p.corners_mm() for _, p in self.hub(motor_rad).faces()])
         return np.concatenate([camera.project(corners), *whisker.silhouette(camera)])
+
+
+def _block(bar: Bar, middle_mm: np.ndarray) -> Box:
+    """The block that holds a bar at its upper end."""
+    front = np.array([0.0, -1.0, 0.0]) - bar.axis * -bar.axis[1]
+    front /= np.linalg.norm(front)
+    axes = np.column_stack([np.cross(front, bar.axis), front, bar.axis])
+    return Box(-_BLOCK_HALF, _BLOCK_HALF, axes, middle_mm + _BLOCK_UP_MM * bar.axis, 0.1)
+
+
+def block_corners_mm(bar: Bar, middle_mm: np.ndarray) -> np.ndarray:
+    """Corners (24, 3) of the block that holds a bar whose middle is near a point, face by face."""
+    return np.concatenate([plate.corners_mm() for _, plate in _block(bar, middle_mm).faces()])
 
 
 def floor_and_wall(window: Window, looks: Looks) -> np.ndarray:

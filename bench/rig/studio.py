@@ -70,6 +70,11 @@ class Setting:
     def __init__(self, studio: Studio, radiance: np.ndarray, seen: np.ndarray):
         self._studio, self._radiance, self._seen = studio, radiance, seen
 
+    @property
+    def empty(self) -> np.ndarray:
+        """The scene without whisker and hub."""
+        return self._studio.cropped(self._seen)
+
     def brightness(self, moments: list[Moment]) -> np.ndarray:
         """One exposure, the mean over its moments (one where nothing moves far)."""
         studio, blur = self._studio, self._studio.sensor.blur_px

@@ -13,6 +13,7 @@ from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import curved, error_map, explained, soft, tables
 from bench.gauges.gauges_file import FileKeys
+from bench.plan import written
 from bench.report import against_theta, assembly, compare, figure_8, ledger
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
@@ -55,6 +56,8 @@ CSV = {
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,
     "robot_trade.csv": robot_trade.COLUMNS,
+    "plan.csv": written.COLUMNS,
+    "changes.csv": written.CHANGES,
     "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
 }
 

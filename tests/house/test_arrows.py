@@ -22,6 +22,7 @@ FOLDERS = {
         "friction",
         "report",
         "theory",
+        "plan",
         "",
     ),
 }

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vision.fit.beam_check import BeamCheck
+from vision.fit.line_noise import LineNoise
 from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
@@ -38,6 +39,7 @@ class WhiskTruth:
     overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
     the frames before touch. beam: the same by a curve that is no beam. turns: the whisker's turn in each frame of the
     fit beyond the motor's. refinements: what the truth would be without each part of the model, by name.
+    fit beyond the motor's. lines: what each camera's lines are worth.
     """
 
     whisk: int
@@ -57,6 +59,7 @@ class WhiskTruth:
     beam: BeamCheck | None = None
     turns: Turns | None = None
     refinements: dict[str, LeftOut] = field(default_factory=dict)
+    lines: dict[str, LineNoise] = field(default_factory=dict)
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""

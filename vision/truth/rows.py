@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vision.fit.line_noise import line_noise
 from vision.fit.problem import bar_axis, curves_of
 from vision.fit.uncertainty import variance_by_cause
 from vision.geometry.camera import Camera
@@ -36,7 +37,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     truth = _at_touch(fitted, touch, beta) | {"smooth": _smooth(fitted)} if is_known else {}
     return WhiskTruth(whisk.number, frames, cameras=len(whisk.views), frames_used=len(fitted.frames),
                       status="; ".join(filter(None, reasons)), overlay=_overlay(whisk, fitted),
-                      budget=_budget(fitted), **truth)
+                      budget=_budget(fitted), lines=line_noise(fitted.problem), **truth)
 
 
 def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:

@@ -29,15 +29,15 @@ from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points,
 from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
-_BESIDE_BAR_PX = 4.0
+BESIDE_BAR_PX = 4.0
 # Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
 # another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
 # What changes slowly over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 _FREE_SHARED = 4.0
 _MOST_SCATTER_PX = 0.7  # where a wire is seen at all its points lie on one line to a tenth of a pixel
-_NEVER_TOUCHES = "the whisker never touches"
-_STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
+NEVER_TOUCHES = "the whisker never touches"
+STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 
 @dataclass(frozen=True)
@@ -106,16 +106,16 @@ def _first_look(views, cameras, rods: Rods, axis: BarAxis, motor: Mapping[int, f
     sights = [Sight.of(view, rods, axis, list(motor)) for view in views]
     rest = find_rest(sights, cameras, axis, early)
     coarse = follow_bends(sights, axis, rest, motor)
-    motor = motor if by_onset else _near_touch(motor, coarse)
+    motor = motor if by_onset else near_touch(motor, coarse)
     angles, bend = np.array(list(motor.values())), np.array([coarse[f] for f in motor])
     touching, free = frames_that_touch(angles, bend)
     if by_onset:  # a bend along the sight is not seen at first
         free = np.arange(len(angles)) < len(early)
         touching = touching & ~free
     elif not np.any(touching):
-        raise Refused(_NEVER_TOUCHES)
+        raise Refused(NEVER_TOUCHES)
     if np.sum(~touching) < FEWEST_FREE:
-        raise Refused(_STARTS_TOUCHING)
+        raise Refused(STARTS_TOUCHING)
     arcs = np.array([contact_arc(rest, b, m, axis, rods.wire) for b, m in zip(bend, angles)])
     curves = {f: one_curve(rest, b, a, m, rods.wire) for f, b, a, m in zip(motor, bend, arcs, angles)}
     return motor, _Look(axis, rest, bend, arcs, curves, touching, free)
@@ -141,9 +141,9 @@ def _next_look(problem: Problem, state: State, answer, look: _Look, motor: Mappi
     if not by_onset:
         touching, free = frames_by_touch(problem.motor_rad, *touch_and_sigma(problem, state.vector, answer))
         if np.sum(free) < FEWEST_FREE:
-            raise Refused(_STARTS_TOUCHING)
+            raise Refused(STARTS_TOUCHING)
         if not np.any(touching):
-            raise Refused(_NEVER_TOUCHES)
+            raise Refused(NEVER_TOUCHES)
     return _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
                  state.arcs_mm, _fitted(problem, state, motor), touching, free)
 
@@ -157,7 +157,7 @@ def _check_scatter(problem: Problem, state: State) -> None:
         raise Misled(problem.cameras.names[worst], found)
 
 
-def _near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> dict[int, float]:
+def near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> dict[int, float]:
     """The frames from a little before the first that surely touches."""
     angles = np.array(list(motor.values()))
     touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
@@ -175,7 +175,7 @@ def free_stroke(views: Sequence[View], rods: Rods, problem: Problem, state: Stat
     rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
     curves = {f: one_curve(rest, np.zeros(2), rods.wire.length_mm, angle, rods.wire) for f, angle in free.items()}
     seen = [one for number, view in enumerate(views)
-            for one in _trace_wire(number, view, rods, axis, free, curves, light, settings)]
+            for one in trace_wire(number, view, rods, axis, free, curves, light, settings)]
     nothing = np.zeros(len(free), dtype=bool)
     alone = replace(problem, motor_rad=np.array(list(free.values())), touching=nothing, bent=nothing, seen=seen)
     there = State(state.vector[:problem.first_bend], np.full(len(free), 0.5 * rods.wire.length_mm))
@@ -212,7 +212,7 @@ def _trace_all(views, rods: Rods, look: _Look, motor, light: dict, lines: dict[s
     bar = _trace_bar(views, rods, look.axis, wires, lines, settings, edges)
     seen = []
     for number, view in enumerate(views):
-        seen += _trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
+        seen += trace_wire(number, view, rods, look.axis, motor, look.curves, light, settings, last=last)
         seen += [Observed(-1, number, points, side) for side, points in bar[number].items()]
     for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
@@ -238,11 +238,11 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, lines: dict[str, BarLine
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
 
-def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
+def trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
                 settings: VisionSettings, *, last: bool = True) -> list[Observed]:
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
-    pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
+    pieces = pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
     if len(pieces) == 0:
         return []
     knots = Knots.of_turning(np.arange(NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)

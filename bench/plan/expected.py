@@ -1,0 +1,131 @@
+"""The truth that a whisk would have, with its sigmas: the fit and the covariance of `evaluate` on predicted lines."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.plan.sight import Hides, Sight, bar_points, blank_view, curves_of, nothing_hides, sight_of, wire_points
+from bench.plan.staged import Staged
+from vision.bar.one_view import seen_from_one_side
+from vision.fit.line_noise import LineNoise
+from vision.fit.problem import BAR, REST, Problem, State
+from vision.fit.solve import solve, weighted_jacobian
+from vision.fit.touch import FEWEST_FREE, frames_by_touch, touch_and_sigma
+from vision.fit.touch_by_onset import touch_by_onset
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import resting_lines
+from vision.geometry.errors import Refused
+from vision.geometry.settings import VisionSettings
+from vision.truth.records import WhiskTruth
+from vision.truth.rows import to_whisk
+from vision.truth.whisk import NEVER_TOUCHES, STARTS_TOUCHING, near_touch
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+
+_USUAL = VisionSettings()
+_EARLY = 7  # the first of so many parts of a stroke is taken as free where only the onset of bending tells touch
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What a whisk would give: its truth (values as staged, sigmas as expected; without any where `status` says why),
+    what each camera has in sight, and the fit, None where there is none."""
+
+    truth: WhiskTruth
+    sights: Mapping[str, Sight]
+    fitted: FittedWhisk | None = None
+
+
+def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], hides: Hides = nothing_hides,
+             settings: VisionSettings = _USUAL) -> Expected:
+    """A whisk seen by cameras whose lines are worth so much."""
+    facing = [camera.name for camera in cameras if _faces(camera, staged)]
+    if not facing:
+        return Expected(WhiskTruth(0, None, status="all cameras have the whisker behind them"), {})
+    cameras, curves = cameras.subset(facing), curves_of(staged, near_frames(staged))
+    sights = {camera.name: sight_of(camera, staged, curves, settings, hides) for camera in cameras}
+    try:
+        fitted = _fitted(staged, cameras, lines, sights, curves)
+    except Refused as reason:
+        return Expected(WhiskTruth(0, None, cameras=len(cameras), status=str(reason)), sights)
+    except np.linalg.LinAlgError:
+        return Expected(WhiskTruth(0, None, cameras=len(cameras), status="the fit of wire and bar does not settle"),
+                        sights)
+    every = range(len(staged.motor_rad))
+    views = tuple(blank_view(camera, every) for camera in cameras)
+    whisk = WhiskPictures(0, every, staged.time_s, staged.motor_rad, views, cameras, staged.rods, None, settings)
+    return Expected(to_whisk(whisk, fitted), sights, fitted)
+
+
+def near_frames(staged: Staged) -> list[int]:
+    """The frames that make the truth."""
+    return list(near_touch(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad))))
+
+
+def _faces(camera, staged: Staged) -> bool:
+    span = [np.min(staged.motor_rad), np.max(staged.motor_rad)]
+    return bool(np.all(np.isfinite(resting_lines(camera, staged.rods.wire, span))))
+
+
+def _fitted(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], sights: Mapping[str, Sight],
+            curves) -> FittedWhisk:
+    """The fit to the predicted lines. Raises Refused where there is none."""
+    frames, seen = list(curves), []
+    for number, camera in enumerate(cameras):
+        noise = lines.get(camera.name)
+        if noise is not None and np.isfinite(noise.wire_px):
+            seen += wire_points(sights[camera.name], number, curves, noise.wire_px)
+        if noise is not None:
+            seen += bar_points(camera, number, staged.axis, staged.rods, noise.bar_px)
+    for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
+                       ("bar clear of the wire", any(one.frame < 0 for one in seen))):
+        if not there:
+            raise Refused(f"no camera shows enough of the {rod}")
+    touches = staged.motor_rad[frames] > staged.touch.motor_rad
+    if not np.any(touches):
+        raise Refused(NEVER_TOUCHES)
+    alike = [lines[name].alike if name in lines else 0.0 for name in cameras.names]
+    problem = Problem(cameras, staged.rods, staged.axis, staged.motor_rad[frames], touches, touches, seen, alike=alike)
+    by_edges = any(one.side for one in seen)
+    few = by_edges and len({one.camera for one in seen if one.frame >= 0}) < 2
+    parted = _by_onset if seen_from_one_side(cameras, staged.axis) or few else _by_clearance
+    problem, state = parted(problem, staged, frames)
+    return FittedWhisk.of(problem, state, _answer(problem, state), frames)
+
+
+def _answer(problem: Problem, state: State) -> np.ndarray:
+    """How the parameters answer the observations, (size, size)."""
+    rows = weighted_jacobian(problem, state)
+    return np.linalg.inv(rows.T @ rows)
+
+
+def state_of(problem: Problem, staged: Staged, frames: Sequence[int]) -> State:
+    """The parameters as staged."""
+    vector = np.zeros(problem.size)
+    vector[BAR:BAR + REST] = np.ravel(staged.rest_mm)
+    vector[problem.first_bend:] = staged.bend_rad[frames][problem.bent].ravel()
+    return State(vector, staged.arc_mm[frames])
+
+
+def _by_clearance(problem: Problem, staged: Staged, frames: Sequence[int]) -> tuple[Problem, State]:
+    """The problem with the frames parted as the fit would know them to touch, and the state."""
+    state = state_of(problem, staged, frames)
+    touch = touch_and_sigma(problem, state.vector, _answer(problem, state))
+    touching, free = frames_by_touch(problem.motor_rad, *touch)
+    if np.sum(free) < FEWEST_FREE:
+        raise Refused(STARTS_TOUCHING)
+    if not np.any(touching):
+        raise Refused(NEVER_TOUCHES)
+    problem = replace(problem, touching=touching, bent=~free)
+    return problem, state_of(problem, staged, frames)
+
+
+def _by_onset(problem: Problem, staged: Staged, frames: Sequence[int]) -> tuple[Problem, State]:
+    """The same where only the onset of bending tells when the whisker touches."""
+    angles = problem.motor_rad
+    early = angles <= angles[0] + (angles[-1] - angles[0]) / _EARLY
+    early[:FEWEST_FREE] = True
+    problem = replace(problem, touching=problem.touching & ~early, bent=~early)
+    state = state_of(problem, staged, frames)
+    problem, state = touch_by_onset(problem, state, _answer(problem, state))
+    return problem, solve(problem, state)[0]

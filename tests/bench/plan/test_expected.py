@@ -1,0 +1,102 @@
+"""What a bench would give: sigmas as the fit has them, and why there is no truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.plan.expected import expected
+from bench.plan.outlook import QUANTITIES, outlook
+from bench.plan.painted import Clamp
+from bench.plan.sight import curves_of, sight_of
+from bench.plan.tries import looking
+from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
+from vision.geometry.camera import Cameras
+from vision.geometry.settings import VisionSettings
+
+THETA_RAD = np.radians(3.0)
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    protocol = protocol_of(tmp_path_factory.mktemp("bench"))
+    return staged_of(protocol), cameras_of(protocol)
+
+
+def of(staged, cameras, noise=LINES):
+    lines = dict.fromkeys(cameras.names, noise)
+    found = expected(staged, cameras, lines, Clamp.of(staged))
+    return found, outlook(found, lines, THETA_RAD)
+
+
+def moved(camera, staged, place_mm):
+    return looking(camera, camera.name, np.array(place_mm, dtype=float), staged.touch.point_mm)
+
+
+def test_values_are_those_staged(bench):
+    staged, cameras = bench
+    found, row = of(staged, cameras)
+    bar = staged.whisk.bar
+    assert found.truth.d_x_mm.value == pytest.approx(staged.touch.d_x_mm, abs=1e-6)
+    assert found.truth.touch_rad.value == pytest.approx(staged.touch.motor_rad, abs=1e-7)
+    assert found.truth.beta_rad.value == pytest.approx(bar.slope(staged.touch.motor_rad)[0], abs=1e-9)
+    # the beam of the fit is one of small angles: within 0.3 µm of the exact rod, and of its contact (docs/truth.md)
+    slip = float(staged.whisk.slip_at(THETA_RAD))
+    assert found.truth.at(THETA_RAD).slip_mm.value == pytest.approx(slip, abs=0.005)
+    assert row.has_truth and not row.status
+
+
+def test_sigmas_grow_with_the_lines(bench):
+    """Lines twice as uncertain make each sigma larger, and none more than twice as large: priors stay."""
+    for wider in (replace(LINES, wire_px=2.0 * LINES.wire_px),
+                  replace(LINES, bar_px=LINES.bar_px * np.array([1.0, 2.0, 2.0]))):
+        _, before = of(*bench)
+        _, after = of(*bench, wider)
+        ratios = np.array([after.sigma[name] / before.sigma[name] for name in QUANTITIES])
+        assert np.all(ratios > 1.0) and np.all(ratios < 2.0)
+
+
+def test_limits_name_the_largest_part(bench):
+    _, row = of(*bench, replace(LINES, bar_px=LINES.bar_px * np.array([1.0, 10.0, 10.0])))
+    cause, part = row.limits["d_x_mm"]
+    assert cause == "bar" and 0.5 < part <= 1.0
+
+
+def test_cameras_along_the_bar_give_no_truth(bench):
+    """Two cameras in one plane through the bar do not tell its slope."""
+    staged, cameras = bench
+    axis, contact = staged.axis.direction, staged.touch.point_mm
+    aside = np.cross(axis, [1.0, 0.0, 0.0])
+    places = [contact + 350.0 * (np.cos(a) * axis + np.sin(a) * aside) for a in np.radians([8.0, 14.0])]
+    both = Cameras(tuple(moved(camera, staged, place) for camera, place in zip(cameras, places)))
+    _, row = of(staged, both)
+    assert not row.has_truth and row.status
+    assert [sentence for sentence in row.obstacles if "looks along the bar (8 deg" in sentence]
+
+
+def test_a_whisker_outside_the_picture_is_said(bench):
+    staged, cameras = bench
+    high = cameras["high"]
+    away = replace(high, matrix=high.matrix + np.array([[0, 0, 700.0], [0, 0, 0], [0, 0, 0]]))
+    _, row = of(staged, Cameras((away, cameras["low"])))
+    assert any("camera high" in sentence and "outside its picture" in sentence for sentence in row.obstacles)
+
+
+def test_the_clamp_hides_what_it_stands_before(bench):
+    """From above, along the bar, its clamp covers the contact; with the clamp gone nothing is hidden."""
+    staged, cameras = bench
+    place = staged.touch.point_mm + 350.0 * staged.axis.direction
+    above = moved(cameras["high"], staged, place)
+    curves = curves_of(staged, range(4))
+    behind = sight_of(above, staged, curves, VisionSettings(), Clamp.of(staged))
+    open_ = sight_of(above, staged, curves, VisionSettings())
+    assert behind.hidden > 0.05 and open_.hidden == 0.0
+    assert len(behind.pieces) < len(open_.pieces)
+
+
+def test_a_stroke_that_starts_touching_has_no_truth(bench):
+    staged, cameras = bench
+    late = staged.motor_rad > staged.touch.motor_rad
+    parts = ("motor_rad", "time_s", "bend_rad", "arc_mm")
+    _, row = of(replace(staged, **{name: getattr(staged, name)[late] for name in parts}), cameras)
+    assert not row.has_truth and "touches from the start" in row.status
