@@ -30,6 +30,9 @@ from bench.base.drawing import style
 from bench.base.settings import Settings
 from bench.base.tables import read_table
 from bench.evaluate import evaluate as _evaluate
+from bench.plan.run import Options
+from bench.plan.run import plan as _plan
+from bench.plan.written import Plan
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
 from bench.report.paper import session_figures
@@ -153,6 +156,20 @@ def evaluate_with(
 def read(out: Folder) -> Run:
     """A run that was evaluated before. Raises BadInput where the folder is none."""
     return Run(Path(out), read_record(Path(out)))
+
+
+def plan(
+    what: Folder,
+    out: Folder,
+    *,
+    theta_deg: float = 3.0,
+    changes: bool = True,
+    workers: int = 1,
+) -> Plan:
+    """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does: a row a trial, with expected
+    sigmas, limits and changes. Raises BadInput."""
+    quiet = logging.getLogger(__name__).info
+    return _plan(Path(what), Path(out), Options(theta_deg, changes), workers=workers, announce=quiet)
 
 
 def report(out: Folder, figure_formats: Sequence[str] = ()) -> list[Path]:

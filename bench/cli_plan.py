@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 
 from bench.base.errors import BadInput
-from bench.options import DONE, add_verb, add_workers
+from bench.options import DONE, DOUBTFUL, Verbs, add_verb, add_workers
 
 
-def add_plan(verbs) -> None:
+def add_plan(verbs: Verbs) -> None:
     """`plan`."""
     verb = add_verb(
         verbs,
@@ -28,12 +28,6 @@ def add_plan(verbs) -> None:
     verb.add_argument("--out", type=Path, metavar="OUT", help="folder for plan.txt, plan.csv, plan.json, plan.png")
     verb.add_argument("--example", action="store_true", help="print a RIG.toml to begin with")
     verb.add_argument("--theta-deg", type=float, default=3.0, metavar="X", help="of slip, φ and α (default 3)")
-    verb.add_argument(
-        "--scatter-px",
-        type=float,
-        metavar="X",
-        help="how points of the wire scatter beyond those of painted pictures (default 0.026, as in a lab)",
-    )
     verb.add_argument("--no-changes", action="store_false", dest="changes", help="try no change: sigmas alone, sooner")
     add_workers(verb)
 
@@ -49,6 +43,6 @@ def _plan(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
-    given = {} if options.scatter_px is None else {"scatter_px": options.scatter_px}
-    wanted = Options(options.theta_deg, changes=options.changes, **given)
-    return plan(options.what, options.out, wanted, workers=options.workers, progress=sys.stderr.isatty())
+    wanted = Options(options.theta_deg, options.changes)
+    made = plan(options.what, options.out, wanted, workers=options.workers, progress=sys.stderr.isatty())
+    return DOUBTFUL if made.doubtful else DONE

@@ -28,9 +28,7 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> Non
 
 
 # Columns that hold text, and whole numbers that are never missing; all others are numbers.
-TEXT = ("trial", "surface", "estimator", "beta_from", "record", "kind", "notes", "status", "purpose", "change",
-        "refinement", "verdict")
-TEXT += ("best_change", "obstacles", *(f"{name}_limited_by" for name in ("d_x", "touch", "beta", "slip", "phi", "alpha")))
+TEXT = ("trial", "surface", "estimator", "beta_from", "record", "kind", "notes", "status", "refinement", "verdict")
 WHOLE = ("whisk", "whisks", "frame", "touching", "cameras", "frames_used")
 WHOLE += ("rests_seen", "jumps_seen", "rests_felt", "jumps_felt")
 

@@ -1,7 +1,7 @@
 """What the cameras of a rig that does not stand yet would show, and what lines in such pictures are worth."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
@@ -36,9 +36,6 @@ from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.truth.whisk import trace_wire
 
-# How points of a wire in a lab's pictures scatter beyond those in painted ones, px: shadows, light that the bench sends
-# back, what is behind. The median camera of 53 path-traced scenes (tests/ladder/plans.py).
-LAB_SCATTER_PX = 0.026
 _FEWEST_CORNERS = 6
 _USUAL = VisionSettings()
 
@@ -109,18 +106,15 @@ class Painter:
         encoded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
         return cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE)
 
-    def lines(self, staged: Staged, cameras: Cameras, scatter_px: float = LAB_SCATTER_PX,
-              settings: VisionSettings = _USUAL) -> dict[str, LineNoise]:
-        """What the tracer states of lines in a trial's painted pictures, once their scatter about the fit is seen; the
-        wire's points scatter by so much besides."""
+    def lines(self, staged: Staged, cameras: Cameras, settings: VisionSettings = _USUAL) -> dict[str, LineNoise]:
+        """What the tracer states of lines in a trial's painted pictures, once their scatter about the fit is seen."""
         curves = curves_of(staged, near_frames(staged))
         still = [self.setting(number, staged) for number in range(len(self.cameras))]
         bars, seen = self._bars(staged, cameras, still, curves, settings), []
         for number, setting in enumerate(still):
             seen += self._wire(number, staged, setting, curves, settings)
             seen += bar_points(self.cameras[number], number, staged.axis, staged.rods, bars[self.cameras[number].name])
-        found = line_noise(_scattered(staged, cameras, list(curves), seen))
-        return {name: replace(one, wire_px=float(np.hypot(one.wire_px, scatter_px))) for name, one in found.items()}
+        return line_noise(_scattered(staged, cameras, list(curves), seen))
 
     def _wire(self, number: int, staged: Staged, setting: Setting, curves, settings: VisionSettings) -> list[Observed]:
         """The wire's points as traced in one camera's frames."""

@@ -78,7 +78,6 @@ class RigTask:
     cameras: Cameras
     tries: Sequence[Try]
     theta_rad: float
-    scatter_px: float
 
 
 @lru_cache(maxsize=2)
@@ -108,11 +107,11 @@ def plan_run(task: RigTask) -> Row:
     except ArithmeticError as problem:
         found = f"the whisker slips off or buckles ({problem}); push less far or nearer the base"
         return Row(facts, Outlook(status=found))
-    lines = painter_of(task.protocol).lines(staged, task.cameras, task.scatter_px)
+    lines = painter_of(task.protocol).lines(staged, task.cameras)
 
     def after(one: Try) -> Mapping[str, LineNoise]:
         if one.light:
-            return painter_of(brighter(task.protocol)).lines(staged, task.cameras, task.scatter_px)
+            return painter_of(brighter(task.protocol)).lines(staged, task.cameras)
         return one.lines(lines)
 
     found = outlook(expected(staged, task.cameras, lines, Clamp.of(staged)), lines, task.theta_rad)

@@ -13,7 +13,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.plan.calibration import BoardWork, expected_cameras
-from bench.plan.painted import LAB_SCATTER_PX, Painter
+from bench.plan.painted import Painter
 from bench.plan.picture import Bench, board_outline, painted_views, write_picture
 from bench.plan.recorded import SeenTask, plan_seen, stage_again
 from bench.plan.rows import RigTask, Row, painter_of, plan_run
@@ -31,7 +31,6 @@ from vision.calibration.views import MeasuredPose
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 
-DONE, DOUBTFUL = 0, 1
 _MOST_DRAWN = 12  # bars in a drawing
 _AS_RECORDED = ("Expected: rods and cameras where they were seen, the frames as recorded, an exact beam, and each "
                 "camera's lines worth what they were in that whisk.")
@@ -40,28 +39,24 @@ EXAMPLE = Path(__file__).with_name("example.toml")
 
 @dataclass(frozen=True)
 class Options:
-    """theta_deg: of slip, φ, α. scatter_px: how points of a wire scatter beyond those in painted pictures.
-    changes: whether to try any."""
+    """theta_deg: of slip, φ, α. changes: whether to try any."""
 
     theta_deg: float = 3.0
-    scatter_px: float = LAB_SCATTER_PX
     changes: bool = True
 
     def __post_init__(self):
         if not 0.0 < self.theta_deg <= 25.0:
             raise BadInput(f"--theta-deg {self.theta_deg:g}: above 0, up to 25")
-        if not 0.0 <= self.scatter_px <= 1.0:
-            raise BadInput(f"--scatter-px {self.scatter_px:g}: 0 to 1")
 
 
 def plan(what: Path, out: Path, options: Options, *, workers: int = 1, progress: bool = False,
-         announce: Callable[[str], object] = print) -> int:
-    """Plan a RIG.toml or a SESSION into `out`. Returns 0, or 1 where a trial has no truth; raises BadInput."""
+         announce: Callable[[str], object] = print) -> Plan:
+    """Plan a RIG.toml or a SESSION into the folder `out`. Raises BadInput. announce: is given the text."""
     make = plan_session if what.is_dir() else plan_rig
     with Workers(workers, progress) as pool:
         made = make(what, out, options, pool)
     announce(write_plan(out, made).rstrip())
-    return DOUBTFUL if made.doubtful else DONE
+    return made
 
 
 def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
@@ -84,12 +79,12 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
         raise BadInput(" ".join(str(problem).split()), file=path) from None
     tried = tuple(tries(cameras, work, target, light=True)) if options.changes else ()
     theta, runs = float(np.radians(options.theta_deg)), protocol.runs()
-    tasks = [RigTask(protocol, run, cameras, tried, theta, options.scatter_px) for run in runs]
+    tasks = [RigTask(protocol, run, cameras, tried, theta) for run in runs]
     rows = pool.run(plan_run, tasks, "trials")
     with lock_output(out):
         _draw_rig(out, protocol, painter, cameras, staged)
     return Plan(f"{protocol.name}: {len(runs)} trials planned", tuple(_described(cameras, list(staged.values()))),
-                tuple(rows), options.theta_deg, tuple(_assumed(options.scatter_px, work)), tried)
+                tuple(rows), options.theta_deg, tuple(_assumed(work)), tried)
 
 
 def _staged(protocol: Protocol) -> Iterator[tuple[str, Staged]]:
@@ -109,11 +104,10 @@ def _board_work(painter: Painter) -> BoardWork:
     return BoardWork(painter.board, on_rig, board.views, painter.corner_px())
 
 
-def _assumed(scatter_px: float, work: BoardWork) -> Iterator[str]:
+def _assumed(work: BoardWork) -> Iterator[str]:
     corner = max(work.corner_px.values())
-    yield (f"Taken for granted: light and noise of the file; points of the wire scatter by {scatter_px:g} px beyond "
-           f"those in painted pictures (--scatter-px); {work.views} views of the board a camera, corners to "
-           f"{corner:.3f} px.")
+    yield (f"Taken for granted: light and noise of the file, lines of wire and bar worth what they are in pictures "
+           f"painted so; {work.views} views of the board a camera, corners to {corner:.3f} px.")
     yield ("Changes are tried with lines worth as many pixels as before; a camera that is new, or did not see the bar, "
            "sees it as others do.")
 

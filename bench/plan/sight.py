@@ -1,6 +1,6 @@
 """What each camera has in sight of a whisk: of the wire piece by piece, and of the bar; and what stands in the way."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,13 +41,13 @@ class Sight:
     bar_share: float
 
 
-def blank_view(camera: Camera, frames) -> View:
+def blank_view(camera: Camera, frames: Sequence[int]) -> View:
     """A view with nothing in it, to cut pieces from as those of pictures are cut."""
     blank = np.zeros(camera.size_px[::-1], dtype=np.uint8)
     return View(camera, dict.fromkeys(frames, blank), blank, Noise(1.0, 0.0))
 
 
-def curves_of(staged: Staged, frames) -> dict[int, Curves]:
+def curves_of(staged: Staged, frames: Sequence[int]) -> dict[int, Curves]:
     """The whisker by frame, as vision models it."""
     return {f: one_curve(staged.rest_mm, staged.bend_rad[f], staged.arc_mm[f], staged.motor_rad[f], staged.rods.wire)
             for f in frames}

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.rig import boards, build, papers
 from bench.rig.album import write_frames, write_picture
+from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 from bench.rig.scene import HUB_FRONT_MM
@@ -110,7 +111,9 @@ def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterat
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
 
 
-def moments_of(protocol, studio, recording, whisk, motor, back):
+def moments_of(
+    protocol: Protocol, studio: Studio, recording: Recording, whisk: MarchedWhisk, motor: float, back: bool
+) -> list[Moment]:
     """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
     pictures, length = protocol.pictures, recording.rod.length_mm
     swept = np.radians(recording.run.speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0

@@ -1,4 +1,4 @@
-"""What each camera's lines of wire and bar are worth, in a few numbers: as a fit found them, or for one to be planned."""
+"""What each camera's lines of wire and bar are worth, in a few numbers: as a fit found them, or as one is planned."""
 
 from dataclasses import dataclass
 

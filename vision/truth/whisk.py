@@ -238,8 +238,10 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, lines: dict[str, BarLine
     return [found.get(view.camera.name) or middles.get(view.camera.name, {}) for view in views]
 
 
-def trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
-                settings: VisionSettings, *, last: bool = True) -> list[Observed]:
+def trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor: Mapping[int, float],
+               curves: Mapping[int, Curves], light: dict, settings: VisionSettings, *,
+               last: bool = True) -> list[Observed]:
+    """Line points of the wire in one camera, by frame. light: see `fit_whisk`."""
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))

@@ -62,16 +62,24 @@ def test_limits_name_the_largest_part(bench):
     assert cause == "bar" and 0.5 < part <= 1.0
 
 
-def test_cameras_along_the_bar_give_no_truth(bench):
-    """Two cameras in one plane through the bar do not tell its slope."""
+def in_a_plane(bench, angles_deg):
+    """Both cameras in one plane through the bar, at these angles to it."""
     staged, cameras = bench
-    axis, contact = staged.axis.direction, staged.touch.point_mm
+    axis = staged.axis.direction
     aside = np.cross(axis, [1.0, 0.0, 0.0])
-    places = [contact + 350.0 * (np.cos(a) * axis + np.sin(a) * aside) for a in np.radians([8.0, 14.0])]
-    both = Cameras(tuple(moved(camera, staged, place) for camera, place in zip(cameras, places)))
-    _, row = of(staged, both)
+    places = [staged.foot_mm + 350.0 * (np.cos(a) * axis + np.sin(a) * aside) for a in np.radians(angles_deg)]
+    return Cameras(tuple(moved(camera, staged, place) for camera, place in zip(cameras, places)))
+
+
+def test_cameras_on_one_side_of_the_bar_give_no_truth(bench):
+    """In one plane through the bar they do not tell how it leans in it."""
+    _, row = of(bench[0], in_a_plane(bench, [60.0, 100.0]))
     assert not row.has_truth and row.status
-    assert [sentence for sentence in row.obstacles if "looks along the bar (8 deg" in sentence]
+
+
+def test_a_camera_along_the_bar_is_said(bench):
+    _, row = of(bench[0], in_a_plane(bench, [8.0, 90.0]))
+    assert [sentence for sentence in row.obstacles if "camera high looks along the bar (8 deg" in sentence]
 
 
 def test_a_whisker_outside_the_picture_is_said(bench):
