@@ -1,5 +1,6 @@
 # make demo       evaluates the small session in fixtures/ into ./demo-out (makes .venv first if need be)
 # make test       the default tests;  make test-slow: the long ones;  make lint: ruff
+# make docs:      the documents as a site, in build/site
 # make test-browser: the report in a headless Chromium (apt install chromium)
 # PYTHON=python3.12 make demo   takes another Python (3.11 or newer)
 
@@ -11,7 +12,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --quiet --no-compile --disab
 # As many workers as there are processors.
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
 
-.PHONY: demo test test-slow test-browser lint clean
+.PHONY: demo test test-slow test-browser lint docs clean
 
 demo: $(VENV)/ready
 	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
@@ -30,8 +31,11 @@ test-browser: $(VENV)/ready-for-tests
 lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff check .
 
+docs: $(VENV)/ready-for-docs
+	$(BIN)/mkdocs build --strict --quiet
+
 clean:
-	rm -rf $(VENV) demo-out
+	rm -rf $(VENV) demo-out build/site
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -48,4 +52,9 @@ $(VENV)/ready: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ready-for-tests: $(VENV)/ready
 	@echo "Installing what the tests need into $(VENV)."
 	@$(PIP_INSTALL) -e '.[test]'
+	@touch $@
+
+$(VENV)/ready-for-docs: $(VENV)/ready
+	@echo "Installing what the documents need into $(VENV)."
+	@$(PIP_INSTALL) -e '.[docs]'
 	@touch $@

@@ -11,7 +11,7 @@ from vision.fit.line_noise import LineNoise
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
-from vision.truth.records import FrameTruth
+from vision.truth.records import FrameTruth, WireShape
 from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
 
 
@@ -90,6 +90,8 @@ class SeenWhisk:
     beam: BeamCheck | None = None
     turns: Turns | None = None
     lines: dict[str, LineNoise] = field(default_factory=dict)
+    point_covariance_mm2: np.ndarray | None = None
+    shape: WireShape | None = None
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
