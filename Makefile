@@ -1,5 +1,6 @@
 # make demo       evaluates the small session in fixtures/ into ./demo-out (makes .venv first if need be)
 # make test       the default tests;  make test-slow: the long ones;  make lint: ruff
+# make docs:      the documents as a site, in build/site
 # make test-browser: the report in a headless Chromium (apt install chromium)
 # make test-versions: the small session with the oldest and the newest versions that are allowed, and whether they agree
 # PYTHON=python3.12 make demo   takes another Python (3.11 or newer)
@@ -16,7 +17,7 @@ WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
 NEWEST_PYTHON ?= $(PYTHON)
 SETS := $(VENV)-lowest $(VENV)-newest
 
-.PHONY: demo test test-slow test-browser test-versions lint clean
+.PHONY: demo test test-slow test-browser test-versions lint docs clean
 
 demo: $(VENV)/ready
 	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
@@ -39,8 +40,11 @@ test-versions: $(VENV)/ready $(SETS:=/ready)
 lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff check .
 
+docs: $(VENV)/ready-for-docs
+	$(BIN)/mkdocs build --strict --quiet
+
 clean:
-	rm -rf $(VENV) $(SETS) demo-out versions-out
+	rm -rf $(VENV) $(SETS) demo-out versions-out build/site
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -69,4 +73,9 @@ $(VENV)-lowest/ready: pyproject.toml constraints-lowest.txt
 $(VENV)-newest/ready: pyproject.toml
 	@$(NEWEST_PYTHON) -m venv $(VENV)-newest
 	@$(VENV)-newest/bin/python -m pip install -qq --no-compile --upgrade --upgrade-strategy eager -e .
+	@touch $@
+
+$(VENV)/ready-for-docs: $(VENV)/ready
+	@echo "Installing what the documents need into $(VENV)."
+	@$(PIP_INSTALL) -e '.[docs]'
 	@touch $@

@@ -12,7 +12,7 @@ from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
-from vision.truth.records import FrameTruth
+from vision.truth.records import FrameTruth, WireShape
 from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
 
 
@@ -93,6 +93,8 @@ class SeenWhisk:
     turns: Turns | None = None
     refinements: dict[str, LeftOut] = field(default_factory=dict)
     lines: dict[str, LineNoise] = field(default_factory=dict)
+    point_covariance_mm2: np.ndarray | None = None
+    shape: WireShape | None = None
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None

@@ -20,6 +20,8 @@ from bench.session.frame_times import frame_times
 from bench.session.session import load_session
 from bench.session.trial import Trial
 from vision.geometry.camera import Camera
+from vision.geometry.centreline import one_curve
+from vision.geometry.rods import Wire
 
 FOURCC = {".webm": "VP90", ".avi": "MJPG"}
 _WIDTH_PX = 720  # of each camera's picture
@@ -146,15 +148,27 @@ def _lines(camera: Camera, result: TrialResult, whisk: SeenWhisk, k: int):
         across = seen.bar_radius_mm * sight / np.linalg.norm(sight)
         yield from ((axis + side * across, _BAR) for side in (-1, 1))
     contact = frames.point_mm.value[k] if frames.touching[k] else None
-    yield wire_between(float(frames.motor_rad[k]), contact, result.whisker.length_mm), _WIRE
+    yield _wire(result, whisk, k, contact), _WIRE
     past = frames.point_mm.value[: k + 1][np.asarray(frames.touching[: k + 1], dtype=bool)]
     if len(past) > 1:
         yield past, _TRAIL
 
 
+def _wire(result: TrialResult, whisk: SeenWhisk, k: int, contact_mm: np.ndarray | None) -> np.ndarray:
+    """The whisker (n, 3), mm, as it was fitted in frame k; unbent in frames that are not in the fit."""
+    motor = float(whisk.frames.motor_rad[k])
+    if whisk.shape is None:
+        return wire_between(motor, contact_mm, result.whisker.length_mm)
+    facts, shape = result.whisker, whisk.shape
+    wire = Wire(facts.shape, facts.length_mm, facts.diameter_mm, tip_diameter_mm=facts.tip_diameter_mm)
+    mine = np.flatnonzero(shape.index == whisk.frames.index[k])
+    bend, arc = (shape.bend_rad[mine[0]], shape.arc_mm[mine[0]]) if len(mine) else (np.zeros(2), facts.length_mm)
+    return one_curve(shape.rest_mm, bend, arc, motor, wire).points_mm
+
+
 def wire_between(motor_rad: float, contact_mm: np.ndarray | None, length_mm: float) -> np.ndarray:
     """The whisker (n, 3), mm, drawn as a beam with a point load: clamped at the base along the motor's angle, through
-    the contact (3,), straight beyond it. (A drawing: the truth rests on the curve that was measured.)"""
+    the contact (3,), straight beyond it: where no fitted curve is kept."""
     along = np.array([np.cos(motor_rad), np.sin(motor_rad), 0.0])
     if contact_mm is None:
         return np.linspace(0.0, length_mm, 30)[:, None] * along

@@ -20,6 +20,12 @@ def test_files_and_links_are_there(document):
     assert not [link for link in links if not (document.parent / link).exists()]
 
 
+def test_every_document_is_on_the_site():
+    nav = (ROOT / "mkdocs.yml").read_text().split("\nnav:")[1]
+    named = re.findall(r"([\w]+\.md)$", nav, flags=re.MULTILINE)
+    assert sorted(named) == sorted(path.name for path in (ROOT / "docs").glob("*.md"))
+
+
 def test_every_folder_is_on_the_map():
     text = (ROOT / "docs" / "design.md").read_text()
     drawing = text.split("## The folders and their arrows")[1].split("###")[0]

@@ -32,14 +32,25 @@ class FrameTruth(WhileTouching):
 
 
 @dataclass(frozen=True, eq=False)
+class WireShape:
+    """The wire as fitted, in the terms of `vision.geometry.centreline`: rest_mm (2, 4), and of each frame of the fit
+    its index (f,), bend_rad (f, 2) and arc_mm (f,) of the contact."""
+
+    rest_mm: np.ndarray
+    index: np.ndarray
+    bend_rad: np.ndarray
+    arc_mm: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
     d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
     overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
     the frames before touch. beam: the same by a curve that is no beam. turns: the whisker's turn in each frame of the
-    fit beyond the motor's. refinements: what the truth would be without each part of the model, by name.
-    fit beyond the motor's. lines: what each camera's lines are worth.
+    fit beyond the motor's. refinements: what the truth would be without each part of the model, by name. lines: what each
+    camera's lines are worth. point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit.
     """
 
     whisk: int
@@ -60,6 +71,8 @@ class WhiskTruth:
     turns: Turns | None = None
     refinements: dict[str, LeftOut] = field(default_factory=dict)
     lines: dict[str, LineNoise] = field(default_factory=dict)
+    point_covariance_mm2: np.ndarray | None = None
+    shape: WireShape | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import bar_axis, curves_of
+from vision.fit.problem import bar_axis, bends, curves_of, rest_shape
 from vision.fit.uncertainty import variance_by_cause
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
@@ -11,7 +11,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import normals, outline
 from vision.pictures.scale import full_px
 from vision.truth.at_angle import Smooth
-from vision.truth.records import FrameTruth, WhiskTruth
+from vision.truth.records import FrameTruth, WhiskTruth, WireShape
 from vision.truth.value import FIELDS, Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -37,7 +37,8 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     truth = _at_touch(fitted, touch, beta) | {"smooth": _smooth(fitted)} if is_known else {}
     return WhiskTruth(whisk.number, frames, cameras=len(whisk.views), frames_used=len(fitted.frames),
                       status="; ".join(filter(None, reasons)), overlay=_overlay(whisk, fitted),
-                      budget=_budget(fitted), lines=line_noise(fitted.problem), **truth)
+                      budget=_budget(fitted), lines=line_noise(fitted.problem),
+                      shape=_shape(fitted), **truth)
 
 
 def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:
@@ -47,10 +48,17 @@ def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:
     return Value(touch.value, float(np.hypot(touch.sigma, whisk.settings.clock_sigma_s * speed_rad_s)))
 
 
-def _at_touch(fitted: FittedWhisk, touch: Value, beta: Value) -> dict[str, Value]:
+def _at_touch(fitted: FittedWhisk, touch: Value, beta: Value) -> dict[str, Value | np.ndarray]:
     point = [fitted.of_whisk(name) for name in _VECTORS]
+    by = np.stack([fitted.by_parameter.whisk[name] for name in _VECTORS])
     return {"touch_rad": touch, "d_x_mm": fitted.of_whisk("d_x"), "beta_rad": beta, "psi_rad": fitted.of_whisk("psi"),
-            "point_mm": Value(np.array([p.value for p in point]), np.array([p.sigma for p in point]))}
+            "point_mm": Value(np.array([p.value for p in point]), np.array([p.sigma for p in point])),
+            "point_covariance_mm2": by @ fitted.covariance @ by.T}
+
+
+def _shape(fitted: FittedWhisk) -> WireShape:
+    problem, state = fitted.problem, fitted.state
+    return WireShape(rest_shape(state.vector), np.array(fitted.frames), bends(problem, state.vector), state.arcs_mm)
 
 
 def _speed(time_s, motor_rad, at_rad: float) -> float:

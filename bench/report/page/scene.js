@@ -92,9 +92,9 @@
     const contact = whisk.points[frame];
     put(wire(whisk.motor[frame], contact), { stroke: colour("e1"), wide: true, front: true });
     put(whisk.points.filter(Boolean), { stroke: colour("e4"), wide: true, front: true });
-    const planes = [[0, 1], [1, 2], [2, 0]], axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    const planes = [[0, 1], [1, 2], [2, 0]];
     for (const [a, b] of planes) {
-      const stretched = (k) => add([0, 0, 0], axes[k], scene.factor * whisk.sigma[k]);
+      const stretched = (k) => add([0, 0, 0], whisk.axes[k], scene.factor);
       put(ring(whisk.touch, stretched(a), stretched(b), 1), { stroke: colour("e0"), front: true });
     }
     if (contact) put([contact], { dot: 4, fill: colour("e0"), label: "contact", front: true });

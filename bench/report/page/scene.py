@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.records.trial import BarLine
+from bench.records.trial import BarLine, SeenWhisk
 from bench.report.page.words import Row
 from bench.report.run import BoardFacts, CameraFacts, RunRecord
 
@@ -48,7 +48,7 @@ def _board(board: BoardFacts) -> dict:
 
 
 def _whisk(row: Row) -> dict:
-    """motor: rad; points: contact where it touches, null before; sigma: of the contact at first touch."""
+    """motor: rad; points: contact where it touches, null before; axes: of the ellipsoid of one sigma at first touch."""
     seen, trial = row.seen, row.result.seen
     frames = seen.frames
     chosen = np.unique(np.linspace(0, len(frames.index) - 1, _MOST_FRAMES).round().astype(int))
@@ -59,12 +59,21 @@ def _whisk(row: Row) -> dict:
         "bar": None if trial.bar is None else _bar(trial.bar, seen.point_mm.value),
         "radius": trial.bar_radius_mm,
         "touch": _listed(seen.point_mm.value),
-        "sigma": _listed(seen.point_mm.sigma, 5),
+        "axes": _listed(_ellipsoid(seen), 5),
         "motor": _listed(frames.motor_rad[chosen], 5),
         "theta": _listed(np.degrees(frames.theta_rad.value[chosen]), 3),
         "points": points,
         "slip": _listed(np.nan_to_num(frames.slip_mm.value[chosen])),
     }
+
+
+def _ellipsoid(seen: SeenWhisk) -> np.ndarray:
+    """Its three half-axes (3, 3), mm, a row each, along their own directions; along x, y, z where no covariance is
+    known."""
+    if seen.point_covariance_mm2 is None:
+        return np.diag(seen.point_mm.sigma)
+    variances, directions = np.linalg.eigh(seen.point_covariance_mm2)
+    return np.sqrt(np.maximum(variances, 0.0))[:, None] * directions.T
 
 
 def _bar(bar: BarLine, contact: np.ndarray) -> list:

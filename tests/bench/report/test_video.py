@@ -2,13 +2,21 @@
 
 import json
 import shutil
+from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
+from bench.base.settings import Settings
 from bench.cli import main
-from bench.report.video import wire_between
+from bench.plan.expected import expected
+from bench.records.trial import WhiskerFacts
+from bench.report.video import _wire, wire_between
+from bench.trials.seen import whisk_record
+from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 
 SIZE = (320, 180)
 CAMERA = {
@@ -89,3 +97,24 @@ def test_what_cannot_be_shown_is_one_line(filmed, tmp_path, capsys):
         said = capsys.readouterr().err
         assert said.startswith("whisker-bench: ") and said.count("\n") == 1
     assert not list(tmp_path.glob("*.mp4")) and not (out / "video").exists()
+
+
+def test_the_wire_drawn_is_the_one_that_was_fitted(tmp_path):
+    """Through the contact in a frame of the fit, unbent in one that is not in it."""
+    protocol = protocol_of(tmp_path)
+    staged, cameras = staged_of(protocol), cameras_of(protocol)
+    truth = expected(staged, cameras, dict.fromkeys(cameras.names, LINES)).truth
+    whisk = whisk_record(truth, Settings())
+    result = SimpleNamespace(whisker=WhiskerFacts("cylinder", 100.0, 1.0, 2945.0))
+    last = len(whisk.frames.index) - 1
+    contact = whisk.frames.point_mm.value[last]
+    wire = _wire(result, whisk, last, contact)
+    # nodes are 2.5 mm apart, and the wire bows by less than 0.01 mm between two of them
+    assert np.min(np.linalg.norm(_dense(wire) - contact, axis=1)) < 0.01
+    earlier = replace(whisk, shape=replace(whisk.shape, index=whisk.shape.index + 1000))
+    assert np.allclose(_wire(result, earlier, last, contact)[-1, 2], 0.0, atol=1e-9)
+
+
+def _dense(line):
+    """Points (n, 3) on the straight pieces of a line."""
+    return np.concatenate([a + (b - a) * np.linspace(0.0, 1.0, 500)[:, None] for a, b in pairwise(line)])
