@@ -31,7 +31,7 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str
     if session.whisker is None or session.board is None:
         return [], []
     trials = [t for t in session.trials if t.bar_diameter_mm and set(t.camera_sources) & set(session.rig_pictures)]
-    shares = np.array(list(_seen_over_given(session, cameras, trials[:: max(1, len(trials) // _MOST_TRIALS)])))
+    shares = np.array(list(_seen_over_given(session, cameras, spread(trials, _MOST_TRIALS))))
     if not len(shares):
         return [], []
     # at a wrong scale the bar is not where the whisker would touch it, and another thing may pass for it

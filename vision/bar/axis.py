@@ -7,8 +7,11 @@ import numpy as np
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
 from vision.geometry.newton import cauchy_weights
-from vision.geometry.silhouette import outline
+from vision.geometry.silhouette import edges
 from vision.lines.points import LinePoints
+
+_PRIOR = np.array([5.0, 5.0, 0.5, 0.5])  # mm and rad: keeps what no camera tells as it was
+_STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5])  # mm and rad: of differences; a smaller step of the axis is the last
 
 
 def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints], radius_mm: float,
@@ -17,28 +20,27 @@ def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints]
 
     Where the cameras see the bar from nearly the same side, what they cannot tell stays as it was.
     """
-    across = axis_frame(axis.direction)
-    step = np.array([1e-3, 1e-3, 1e-5, 1e-5])
-    vector = np.zeros(4)
+    across, vector = axis_frame(axis.direction), np.zeros(4)
     for _ in range(rounds):
-        rows = [_axis_rows(axis, across, vector, cameras[name], points, radius_mm, step)
+        rows = [_axis_rows(axis, across, vector, cameras[name], points, radius_mm)
                 for name, points in lines.items() if len(points)]
-        rows.append((-vector / [5.0, 5.0, 0.5, 0.5], np.diag(1.0 / np.array([5.0, 5.0, 0.5, 0.5]))))
-        vector = vector + np.linalg.lstsq(np.concatenate([r[1] for r in rows]),
-                                          np.concatenate([r[0] for r in rows]), rcond=None)[0]
+        rows.append((-vector / _PRIOR, np.diag(1.0 / _PRIOR)))
+        left, jacobian = (np.concatenate(part) for part in zip(*rows))
+        step = np.linalg.lstsq(jacobian, left, rcond=None)[0]
+        vector = vector + step
+        if np.all(np.abs(step) < _STEPS):
+            break
     return upward(shifted_axis(axis, across, vector))
 
 
-def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm, step):
+def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm):
     """What is left between line points and outline over sigma, robustly weighted, and its Jacobian (n, 4)."""
-    def middle(v):
-        moved = shifted_axis(axis, across, v)
-        on_axis = moved.point_mm + points.place[:, None] * moved.direction
-        return outline(camera, on_axis, np.broadcast_to(moved.direction, on_axis.shape), radius_mm)[0]
-
-    here = middle(vector)
+    moved = shifted_axis(axis, across, vector + np.concatenate([np.zeros((1, 4)), np.diag(_STEPS)]))
+    on_axis = moved.point_mm[:, None] + points.place[:, None] * moved.direction[:, None]
+    directions = np.broadcast_to(moved.direction[:, None], on_axis.shape)
+    one, other = edges(camera, on_axis.reshape(-1, 3), directions.reshape(-1, 3), radius_mm)
+    here, *there = 0.5 * (one + other).reshape(*on_axis.shape[:2], 2)
     left = np.sum(points.normal * (points.px - here), axis=1) / points.sigma_px
     weight = np.sqrt(cauchy_weights(left, 5.0))
-    columns = [np.sum(points.normal * (middle(vector + step[k] * np.eye(4)[k]) - here), axis=1) / step[k]
-               for k in range(4)]
+    columns = [np.sum(points.normal * (px - here), axis=1) / step for px, step in zip(there, _STEPS)]
     return left * weight, np.stack(columns, axis=1) / points.sigma_px[:, None] * weight[:, None]

@@ -62,7 +62,7 @@ def coarse_share(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, 
     pieces = bar_pieces(view, grey, axis, radius_mm, wires_px, settings)
     if len(pieces) < FEWEST_PIECES:
         return None
-    found = _sweep(pieces, bar_knots(settings))
+    found = _sweep(pieces, bar_knots(settings), moved=(0, 2))
     widened = 1.0 + found[2] / float(np.median(pieces.radius_px))
     return widened if abs(found[0]) < 0.5 * _SWEEP_MOST_PX[0] else np.inf
 
@@ -80,8 +80,9 @@ def _placed(pieces: Pieces, q) -> Pieces:
     return replace(moved, radius_px=np.maximum(moved.radius_px + q[2] + q[3] * lever, 1.0))
 
 
-def _sweep(pieces: Pieces, knots) -> np.ndarray:
-    """Coordinate descent over shift, tilt, widening and taper with a coarse, blurred model, near the contact."""
+def _sweep(pieces: Pieces, knots, moved: Sequence[int] = (0, 2, 1, 3)) -> np.ndarray:
+    """Coordinate descent over shift, tilt, widening and taper, or those of them that are moved, with a coarse, blurred
+    model, near the contact."""
     near = np.abs(pieces.place) < _SWEEP_REACH_MM
     some, _ = binned(pieces.select(near) if np.sum(near) >= FEWEST_PIECES else pieces, _BIN_PX)
     found = np.zeros(4)
@@ -92,7 +93,7 @@ def _sweep(pieces: Pieces, knots) -> np.ndarray:
     most = np.array([*_SWEEP_MOST_PX, *np.median(pieces.radius_px) * _SWEEP_MOST_SHARE])
     for part in _SWEEP_PARTS:
         for _ in range(2):
-            for k in (0, 2, 1, 3):
+            for k in moved:
                 steps = part * most[k] * np.linspace(-1.0, 1.0, 9)
                 tries = [np.clip(found + step * np.eye(4)[k], -most, most) for step in steps]
                 found = min(tries, key=misfit)

@@ -274,11 +274,12 @@ class Evidence:
         return float(np.median(np.log(np.maximum(self.misfit_of_none, 1.0) / np.maximum(self.misfit, 1.0))))
 
 
-def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1,
-             all_light: bool = True) -> Evidence:
-    """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, in each stretch;
-    under all of `priors`, or the roughest only."""
-    whole = np.arange(-int(np.ceil(reach_px / STEP_PX)), 1 + int(np.ceil(reach_px / STEP_PX)))
+def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
+             every: int = 1) -> Evidence:
+    """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, or at every so
+    many steps, in each stretch; under all of `priors`, or the roughest only."""
+    most = int(np.ceil(reach_px / (every * STEP_PX)))
+    whole = every * np.arange(-most, most + 1)
     more_px = STEP_PX / positions * np.arange(positions)
     shift = (STEP_PX * whole[:, None] + more_px).ravel()
     normal = np.stack([_normal(seen, whole, more, blur_px) for more in more_px], axis=2)

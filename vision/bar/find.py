@@ -76,16 +76,16 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
     steps, best = 0.5 * np.array([one[1] - one[0] for one in values]), grid
     for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)):
         near = [replace(one, field=gaussian_filter(one.field, (0.0, *[spread * one.half_px] * 2))) for one in seen]
-        counts = _COUNTS if spread == _SPREADS[-1] else np.maximum(_COUNTS, 0.0)
-        score = partial(_clear_in_all, near, axis_of, radius_mm, counts)
+        last = spread == _SPREADS[-1]
+        counts, along_mm = (_COUNTS, _ALONG_MM) if last else (np.maximum(_COUNTS, 0.0), _ALONG_MM[::2])
+        score = partial(_clear_in_all, near, axis_of, radius_mm, counts, along_mm)
         if best is grid:
-            best = _apart(grid, score(grid, _ALONG_MM[::2]), 4.0 * steps, _STARTS)
+            best = _apart(grid, score(grid), 4.0 * steps, _STARTS)
         best = _apart(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
     return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(best)).values())]
 
 
-def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, counts, each,
-                  along_mm=_ALONG_MM) -> np.ndarray:
+def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, counts, along_mm, each) -> np.ndarray:
     """How clear both edges of hypotheses (n, k) are, mean (n,) over the cameras; see `likely` and `both_edges`."""
     return np.mean([both_edges(axis_of(each), one, radius_mm, counts, along_mm) for one in seen], axis=0)
 

@@ -20,6 +20,7 @@ _WITHIN_SIGMAS = 4.0  # a next look reaches as far
 _LINE_PX, _LOG_BLUR = (0.25, 2.0), (0.1, 0.5)
 _BLURS_PX = 0.6, 0.85, 1.2, 1.7  # of a first look
 _ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
+_ROUGH_EVERY, _FAR_EVERY = 2, 3  # steps of the grid, about half a blur
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
 _LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by blur
 _APART_PX = 0.1  # lines of a wide window: farther apart they step over a peak
@@ -91,7 +92,8 @@ def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
     """The most probable line (2,) by blurred pictures, up to off_px off."""
     window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), all_light=False)
     seen = profiles(pieces, STRETCHES, off_px, 1.0)
-    lines, _, misfit, *_ = _over_lines([evidence(seen, off_px, _FAR_BLUR_PX, all_light=False)], seen, window)
+    under = [evidence(seen, off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
+    lines, _, misfit, *_ = _over_lines(under, seen, window)
     return lines[np.argmin(misfit[:, 0, 0])]
 
 
@@ -104,7 +106,8 @@ def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) ->
     """Over lines within a window about one (2,)."""
     reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
     seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
-    under = [evidence(seen, reach_px, blur_px, positions, window.all_light) for blur_px in window.blurs_px]
+    every = 1 if window.all_light or len(window.blurs_px) > 1 else _ROUGH_EVERY
+    under = [evidence(seen, reach_px, blur_px, positions, window.all_light, every) for blur_px in window.blurs_px]
     lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()

@@ -1,6 +1,6 @@
 """Where the bar is, before any wire is known: looked for by its edges, then by its lines in all cameras."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -47,6 +47,11 @@ class SeenBar:
         the place and no edge there speaks against it."""
         return sum(max(line.clearness, 0.0) if line.has_edges else -_NO_EDGES for line in self.lines.values())
 
+    @property
+    def at_best(self) -> float:
+        """How clearly, were its edges seen in all of them."""
+        return sum(max(line.clearness, 0.0) for line in self.lines.values())
+
 
 def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.ndarray,
             settings: VisionSettings) -> SeenBar:
@@ -68,8 +73,7 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
 
-    found = [settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)]
-    likely = max((settled(one.axis, NEAR_PX) for one in found), key=lambda one: one.clearness)
+    likely = _likeliest((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), settled)
     farther = settled(likely.axis, FAR_PX)  # a bar whose rims are dark, found by its highlight
     best = settled(max(likely, farther, key=lambda one: one.clearness).axis, NEAR_PX)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
@@ -85,6 +89,15 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
         found = found[1:]
     clearer = max(found, key=lambda one: one.clearness)
     return clearer if clearer.clearness > found[0].clearness + _CLEARER else found[0]
+
+
+def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis, float], SeenBar]) -> SeenBar:
+    """The clearest when settled once more; what was less clear before, its edges taken for seen, is not asked again."""
+    best = None
+    for one in sorted(found, key=lambda one: one.at_best, reverse=True):
+        if best is None or one.at_best > best.clearness:
+            best = max(filter(None, [best, settled(one.axis, NEAR_PX)]), key=lambda one: one.clearness)
+    return best
 
 
 def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:

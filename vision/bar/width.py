@@ -1,6 +1,6 @@
 """How thick the bar looks: a length known otherwise, against which a board at the wrong scale shows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -70,19 +70,25 @@ def seen_over_given(views: Sequence[View], cameras: Cameras, seen: SeenBar, rods
     and shade draw the edges: a bar as wide as these say is then not seen more clearly than the one that was given.
 
     What several cameras agree on is believed. motor_rad (n,): at each frame. A coarse look is enough where it finds the
-    width that it should; elsewhere the edges are measured.
+    width that it should; else the edges are measured.
     """
-    span, found = (float(np.min(motor_rad)), float(np.max(motor_rad))), {}
-    for view in (view for view in views if view.camera.name in seen.seen_by):
-        wires = resting_lines(view.camera, rods.wire, np.linspace(*span, 8))
-        share = coarse_share(of_mean(view), view.mean, seen.axis, rods.bar.radius_mm, wires, settings)
-        if share is not None and abs(share - 1.0) > _COARSE_ENOUGH:
-            share = _share(view, seen.axis, rods.wire, rods.bar, span, settings)
-        found |= {} if share is None else {view.camera.name: share}
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    asked = [view for view in views if view.camera.name in seen.seen_by]
+    found = _by_camera(asked, lambda view: coarse_share(
+        of_mean(view), view.mean, seen.axis, rods.bar.radius_mm,
+        resting_lines(view.camera, rods.wire, np.linspace(*span, 8)), settings))
+    if found and abs(np.median(list(found.values())) - 1.0) > _COARSE_ENOUGH:
+        found = _by_camera(asked, lambda view: _share(view, seen.axis, rods.wire, rods.bar, span, settings))
     share = float(np.median(list(found.values()))) if found else 1.0
     if abs(np.log(share)) < _WORTH_A_LOOK or _agree(list(found.values())):
         return found
     return found if _sees(views, cameras, rods, share, motor_rad, settings) > seen.clearness else {}
+
+
+def _by_camera(views: Sequence[View], share: Callable[[View], float | None]) -> dict[str, float]:
+    """What is told of each view, by camera, without those of which nothing is."""
+    told = {view.camera.name: share(view) for view in views}
+    return {name: one for name, one in told.items() if one is not None}
 
 
 def _agree(shares: Sequence[float]) -> bool:
