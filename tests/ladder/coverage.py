@@ -37,6 +37,7 @@ from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
 from vision.geometry.errors import Refused
+from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
 
 QUANTITIES = {"d_x_mm": 1.0, "touch_deg": 180 / math.pi, "beta_deg": 180 / math.pi, "slip_mm": 1.0}
@@ -83,7 +84,9 @@ def see_points(scene: Scene) -> Seen:
         return Seen({}, {}, str(reason))
 
 
-def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
+def see_pictures(
+    scene: Scene, most_cameras: int | None = None, settings: VisionSettings = VisionSettings()  # noqa: B008
+) -> Seen:
     """What `observe_trial` says of painted pictures, of the first cameras only where a number is given."""
     rng = np.random.default_rng([scene.seed, 23])
     cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
@@ -92,7 +95,8 @@ def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
               for k, studio in enumerate(job.studios[:most_cameras])}
     background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
     (whisk,) = observe_trial(frames, scene.recording.frames.time_s, scene.motor_rad,
-                             [slice(0, len(scene.motor_rad))], cameras, wire, bar, background).whisks
+                             [slice(0, len(scene.motor_rad))], cameras, wire, bar, background,
+                             settings).whisks
     if math.isnan(whisk.d_x_mm.value):
         return Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
