@@ -16,6 +16,9 @@ from bench.base.settings import Settings
 from bench.evaluate import DONE, evaluate
 from bench.session.check import checked_session
 from bench.session.footage import visible
+from bench.session.inside import check_outside
+from bench.trials.estimates import estimators
+from vision.geometry.errors import Refused
 
 Look = dict[str, tuple[int, int]]  # size and time of change of each file, by its path
 
@@ -90,6 +93,8 @@ def watch(
     is not whole. announce: is given the verdict each time, and what a trial waits for. Raises BadInput where there is
     no session.
     """
+    estimators(settings.estimators)
+    check_outside(out, session_path)
     if not session_path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(session_path))
     watched, code = _Watched(session_path, announce), DONE
@@ -107,7 +112,7 @@ def watch(
         announce(f"{len(ready)} complete: {', '.join(ready)}")
         try:
             code = evaluate(session_path, out, settings, trials=set(ready), announce=_verdict(announce), **told)
-        except BadInput as problem:
+        except (BadInput, Refused) as problem:
             announce(f"not yet: {problem}")
 
 

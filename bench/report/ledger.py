@@ -177,7 +177,7 @@ def _of_truth(name: str, here: _Here) -> LeftOut:
         return _clock(here)
     if name not in here.seen.refinements:
         in_vision = name in NAMES[: NAMES.index("gauges' delay")] or name == "one-sided light"
-        return LeftOut(NAN, NAN, NAN, "the fit was not asked") if in_vision else LeftOut()
+        return LeftOut(NAN, NAN, NAN, "the fit does not tell") if in_vision else LeftOut()
     found = here.seen.refinements[name]
     if name != ALONG:
         return found

@@ -9,6 +9,8 @@ from bench.base.errors import BadInput
 if TYPE_CHECKING:
     from bench.rig.protocol import Protocol, Run
 
+# As far as the march finds its way (docs/extremes.md): at a slope of 89.5° it does, at a tilt of 85° no more.
+_STEEPEST_DEG, _MOST_TILT_DEG, _NEAREST = 89.0, 80.0, 0.02
 
 def check_protocol(protocol: "Protocol", path: Path) -> None:
     """Raises BadInput, naming the file, for what no rig can do, or what its mechanics here do not cover."""
@@ -24,12 +26,13 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
 
 def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
     table, pictures = run.table, protocol.pictures
-    if not -80 <= run.beta_deg <= 80 or not -60 <= run.psi_deg <= 60:
-        raise BadInput(f"beta_deg {run.beta_deg:g}, psi_deg {run.psi_deg:g}; ±80 and ±60 are allowed", file=path)
-    if not 0.1 * protocol.whisker.length_mm <= run.d_x_mm <= 1.05 * protocol.whisker.length_mm:
-        raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside 0.1 to 1.05 of the whisker's length", file=path)
-    if not 0.01 <= run.speed_deg_s <= 1000:
-        raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 1000 is allowed", file=path)
+    if not -_STEEPEST_DEG <= run.beta_deg <= _STEEPEST_DEG or not -_MOST_TILT_DEG <= run.psi_deg <= _MOST_TILT_DEG:
+        allowed = f"±{_STEEPEST_DEG:g} and ±{_MOST_TILT_DEG:g} are allowed"
+        raise BadInput(f"beta_deg {run.beta_deg:g}, psi_deg {run.psi_deg:g}; {allowed}", file=path)
+    if not _NEAREST * protocol.whisker.length_mm <= run.d_x_mm <= 1.05 * protocol.whisker.length_mm:
+        raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside {_NEAREST:g} to 1.05 of the whisker's length", file=path)
+    if not 0.01 <= run.speed_deg_s <= 2000:
+        raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 2000 is allowed", file=path)
     if table.static_friction is not None and table.static_friction < table.friction:
         raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
     if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:

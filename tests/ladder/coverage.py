@@ -38,6 +38,7 @@ from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
+from vision.geometry.settings import VisionSettings
 from vision.truth.observe import observe_trial
 from vision.truth.trial_pictures import TrialPictures
 
@@ -85,7 +86,9 @@ def see_points(scene: Scene) -> Seen:
         return Seen({}, {}, str(reason))
 
 
-def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
+def see_pictures(
+    scene: Scene, most_cameras: int | None = None, settings: VisionSettings = VisionSettings()  # noqa: B008
+) -> Seen:
     """What `observe_trial` says of rasterised pictures, of the first cameras only where a number is given."""
     rng = np.random.default_rng([scene.seed, 23])
     cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
@@ -94,7 +97,7 @@ def see_pictures(scene: Scene, most_cameras: int | None = None) -> Seen:
               for k, studio in enumerate(job.studios[:most_cameras])}
     background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
     pictures = TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background)
-    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, Rods(wire, bar)).whisks
+    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, Rods(wire, bar), settings).whisks
     if math.isnan(whisk.d_x_mm.value):
         return Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}

@@ -120,8 +120,12 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
 
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:
+    """What the truth would be without each; nothing where the fit does not tell."""
     fit = Fit(fitted.problem, fitted.state, fitted.uncertainty.answer, fitted.measured, fitted.by_parameter)
-    return left_out(fit, whisk.light)
+    try:
+        return left_out(fit, whisk.light)
+    except np.linalg.LinAlgError:
+        return {}
 
 
 def _beam(fitted: FittedWhisk) -> BeamCheck:

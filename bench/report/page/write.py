@@ -37,7 +37,7 @@ _PARTS = {
     "remainder_mm": "beam theory, slip along",
 }
 _MOST_BARS = 60  # whisks; of more, those with the largest sum of shares are drawn
-_IN_FIGURES = ("Truth", "Error of d_x", "Doubtful", "Cameras", "Gauges", "Taken as exact")
+_IN_FIGURES = ("Truth", "Error of d_x", "Doubtful", "Cameras", "Gauges", "Taken as exact", "Only what")
 
 
 def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:

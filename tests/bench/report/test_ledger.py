@@ -93,8 +93,14 @@ def test_what_no_row_has_is_missing_with_a_reason():
     found = by_name(result(50.0))
     assert found["cross-talk"].verdict == UNTOLD and "one factor" in found["cross-talk"].status
     assert found["clock"].verdict == UNTOLD and found["clock"].status
-    assert found["psi"].status.startswith("the fit was not asked")
+    assert found["psi"].status.startswith("the fit does not tell")
     assert found["drift"].effects["d_x_est_mm"] == 0 and "free stroke" in found["drift"].status
+
+
+def test_summary_and_page_say_it(exact_run):
+    title = "Only what the scene requires"
+    assert title in (exact_run / "summary.txt").read_text()
+    assert f"<h3>{title}</h3>" in (exact_run / "report.html").read_text()
 
 
 def test_the_table_and_the_lines(exact_run, tmp_path):

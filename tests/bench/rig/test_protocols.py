@@ -13,7 +13,7 @@ from tests.scenes.rig_sessions import TINY, protocol_file
 
 @pytest.mark.parametrize("change, message", [
     (("name = \"tiny\"", "nome = \"tiny\""), "unknown field `nome`"),
-    (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±80"),
+    (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±89"),
     (("beta_deg = [20, 50]", "beta_deg = \"steep\""), "beta_deg"),
     (("friction = 0.2\n", "friction = -0.2\n"), "friction"),
     (("static_friction = 0.3", "static_friction = 0.1"), "below friction"),
