@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
-from bench.records.trial import FeltWhisk, SeenWhisk, TrialFacts, TrialResult, whisks
+from bench.records.trial import Deflection, FeltWhisk, SeenWhisk, TrialFacts, TrialResult, whisks
 from bench.trials.phases import seen_phases, slips
 from vision.truth.value import Value
 
+_ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 UNKNOWN = (float("nan"), float("nan"))
 BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture tells it
 
@@ -53,10 +54,10 @@ class WhiskAlphas:
 
 def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     """α of every whisk, in their order."""
-    return [_alphas(result.trial, seen, felt) for result, seen, felt in whisks(results)]
+    return [_alphas(result.trial, seen, felt, np.radians(result.theta_deg)) for result, seen, felt in whisks(results)]
 
 
-def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk) -> WhiskAlphas:
+def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> WhiskAlphas:
     beta, nominal = seen.beta_rad, not np.isfinite(seen.beta_rad.value)
     if nominal:
         beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
@@ -69,7 +70,7 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk) -> WhiskAlphas:
         *trial.panel,
         beta.value,
         seen_friction(seen),
-        felt_friction(seen, felt),
+        felt_friction(seen, felt, theta_rad),
         of_seen,
         felt.phases,
         *shared,
@@ -80,50 +81,47 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk) -> WhiskAlphas:
 def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     """α from the slope of d_z against d_y over the frames of a slipping whisk, and β. NaN where it hardly slips.
 
-    A line's slope is free of what offsets all deflections alike.
+    A line's slope is free of what offsets all deflections alike. What friction along the whisker bends that line by is
+    taken out of d_z first.
     """
     if not slips(seen):
         return UNKNOWN
-    d, weights = seen.deflection, _of_a_line(seen)
-    slope = float(weights @ d.across_z_mm)
+    d, beta = seen.deflection, abs(seen.beta_rad.value)
+    weights = (d.across_y_mm - d.across_y_mm.mean()) / np.sum((d.across_y_mm - d.across_y_mm.mean()) ** 2)
+    slope, alpha = float(weights @ d.across_z_mm), np.nan
+    side = np.copysign(1.0, slope)
+    for _ in range(_ROUNDS):
+        alpha = beta - np.arctan(side * slope)
+        across = np.arctan(np.tan(alpha) * np.cos(_heading(d, d.theta_rad)))
+        bent = d.across_y_mm * (np.tan(beta - across) - np.tan(beta - alpha))
+        slope = float(weights @ (d.across_z_mm - side * bent))
     n = len(weights)
     by_z, by_y = np.eye(2 * n)[0::2], np.eye(2 * n)[1::2]
     through = weights @ (by_z - slope * by_y)  # to first order an error of d_y acts as one of d_z times the slope
     slope_sigma = float(np.sqrt(through @ d.covariance @ through))
-    across = abs(seen.beta_rad.value) - abs(np.arctan(slope))
-    return _of_all_friction(seen, across, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma)))
+    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
 
 
-def felt_friction(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, float]:
-    """α by |β| − |φ|, the slope as seen and the slip angle from the moments, of a whisk that was seen to slip; unknown
-    where the moments are not those of the seen shape."""
+def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[float, float]:
+    """α by |β| − |φ|, the slope as seen and the slip angle from the moments at θ, of a whisk that was seen to slip;
+    unknown where the moments are not those of the seen shape."""
     beta, phi = seen.beta_rad, felt.phi_felt_rad
     if not (slips(seen) and np.isfinite(phi.value)) or felt.apart:
         return UNKNOWN
-    return _of_all_friction(seen, abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma)))
+    across = abs(beta.value) - abs(phi.value)
+    alpha = np.arctan(np.tan(across) / np.cos(_heading(seen.deflection, theta_rad)))
+    return float(alpha), float(np.hypot(beta.sigma, phi.sigma))
 
 
-def _of_all_friction(seen: SeenWhisk, across: float, sigma: float) -> tuple[float, float]:
-    """(α, sigma) from the angle |β| − |φ| of the force across the whisker, in which friction along the whisker is none.
+def _heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray:
+    """The angle h between the slip at θ and the bar, as seen: the whisker's material moves along itself, too.
 
-    Friction acts against the motion. That heads by h off the bar, since the contact wanders along the whisker too, and
-    where β is little above α by much: tan α = tan(|β| − |φ|) / cos h.
+    Friction acts against the whole motion, so that |β| − |φ|, the angle of the force across the whisker, is less than
+    α: tan(|β| − |φ|) = tan α cos h. The slip grows in proportion to θ, the motion along the whisker to θ².
     """
-    d, weights = seen.deflection, _of_a_line(seen)
-    slip, arc = weights @ d.slip_mm, weights @ d.arc_mm
-    size = np.hypot(slip, arc)
-    cosine, tangent = abs(slip) / size, abs(arc / slip)
-    alpha = np.arctan(np.tan(across) / cosine)
-    slip_sigma = np.sqrt(weights @ d.covariance[0::2, 0::2] @ weights) / np.cos(seen.beta_rad.value)
-    by_across = np.cos(alpha) ** 2 / (np.cos(across) ** 2 * cosine)
-    by_heading = 0.5 * np.sin(2.0 * alpha) * tangent
-    return float(alpha), float(np.hypot(by_across * sigma, by_heading * slip_sigma / size))
-
-
-def _of_a_line(seen: SeenWhisk) -> np.ndarray:
-    """Weights (f,) of the slope of a line over d_y."""
-    y = seen.deflection.across_y_mm
-    return (y - y.mean()) / np.sum((y - y.mean()) ** 2)
+    square = d.theta_rad**2 - np.mean(d.theta_rad**2)
+    past = 2.0 * (square @ d.past_mm) / (square @ square) * theta_rad
+    return np.arctan(past / ((d.theta_rad @ d.slip_mm) / (d.theta_rad @ d.theta_rad)))
 
 
 def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Whisks by surface and speed: the points of Fig. 8 and the friction angle α that (13), (14) fit them with."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,11 +9,12 @@ from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import slope_deg
 from estimator.beam import Beam
 from estimator.friction import FrictionFit, Pushes, fit_alpha
+from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 
-# From so many whisks on, the fit's sigma is that of its residuals; with fewer, that of the moments' own sigmas. From so
-# many recordings on, the whisks of one count together: what is wrong with its slope is wrong in all of them.
-_MANY = 8
+# From so many recordings that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
+# together: what is wrong with its slope is wrong in all of them. With fewer it is that of the moments' own sigmas.
+_MANY = 3
 _SAME_SLOPE_DEG = 2.5  # °: half of the step of 5° that a protractor sets
 _FITTED = {"m_y": "m_y_Nmm", "m_z": "m_z_Nmm", "d_x": "d_x_mm", "theta": "theta_rad"}  # fields of Pushes and of Felt
 
@@ -35,6 +36,7 @@ class Felt:
     recording: int = 0
     trial: str = ""
     whisk: int = 0
+    shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # as of `FeltWhisk`
 
     @property
     def m_Nmm(self) -> float:
@@ -142,23 +144,35 @@ def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | N
             moments = m_y.value, m_z.value, m_y.sigma, m_z.sigma
             angle = float(np.degrees(phi.value)), float(np.degrees(phi.sigma))
             theta = float(np.radians(result.theta_deg))
-            yield trial.panel, Felt(beta, d_x, theta, *moments, *angle, nominal, recording, trial.name, seen.whisk)
+            place = recording, trial.name, seen.whisk, felt.shared_Nmm
+            yield trial.panel, Felt(beta, d_x, theta, *moments, *angle, nominal, *place)
 
 
 def _fit(felt: list[Felt], beam: Beam) -> FrictionFit | None:
+    """α with its sigma, half of the 95 % interval over 1.96; None where the whisks do not hold it."""
     if len(felt) < 2:
         return None
-    columns = {name: np.array([getattr(f, field) for f in felt]) for name, field in _FITTED.items()}
+    columns = {name: np.array([getattr(f, column) for f in felt]) for name, column in _FITTED.items()}
     columns["d_x"] = beam.as_cylinder_mm(columns["d_x"])
-    pushes = Pushes(np.radians([f.beta_deg for f in felt]), **columns, C=beam.C_Nmm2)
+    beta, sigmas = np.radians([f.beta_deg for f in felt]), np.array([(f.m_y_sigma_Nmm, f.m_z_sigma_Nmm) for f in felt])
+    pushes = Pushes(beta, **columns, C=beam.C_Nmm2)
+    fit = fit_alpha(replace(pushes, sigma_y=sigmas[:, 0], sigma_z=sigmas[:, 1]))
+    if not np.isfinite(fit.alpha_rad):
+        return None
     recording = np.array([f.recording for f in felt])
-    if len(set(recording)) >= _MANY:
-        pushes = replace(pushes, recording=recording)
-    elif len(felt) < _MANY:
-        sigmas = np.array([(f.m_y_sigma_Nmm, f.m_z_sigma_Nmm) for f in felt]).T
-        pushes = replace(pushes, sigma_y=sigmas[0], sigma_z=sigmas[1])
-    fit = fit_alpha(pushes)
-    return fit if np.isfinite(fit.alpha_rad) else None
+    if len(set(recording[np.abs(beta) > fit.alpha_rad])) < _MANY:
+        return fit
+    own = fit_alpha(replace(pushes, recording=recording))
+    reach = np.hypot(own.high_rad - own.alpha_rad, Z_95 * np.linalg.norm(_shared(pushes, felt) - own.alpha_rad))
+    low = max(own.alpha_rad - reach, 0.0)
+    return replace(own, sigma_rad=float(reach / Z_95), low_rad=float(low), high_rad=float(own.alpha_rad + reach))
+
+
+def _shared(pushes: Pushes, felt: list[Felt]) -> np.ndarray:
+    """α (k,) with each cause off by its sigma that all whisks have in common."""
+    m_y, m_z = (m + np.array([f.shared_Nmm[:, axis] for f in felt]).T
+                for axis, m in enumerate((pushes.m_y, pushes.m_z)))  # fmt: skip
+    return fit_alpha(replace(pushes, m_y=m_y, m_z=m_z)).alpha_rad if len(m_y) else np.zeros(0)
 
 
 def _point(group: list[Felt], d_x_mm: float, beam: Beam) -> Point:

@@ -48,7 +48,8 @@ class WhiskerFacts:
 @dataclass(frozen=True, eq=False)
 class Deflection:
     """Where the contact lies in the hub's axes while touching, seen from the unbent whisker: (f,) each, and the joint
-    covariance (2f, 2f) of across z, y frame by frame. slip_mm: along the bar; arc_mm: along the whisker."""
+    covariance (2f, 2f) of across z, y frame by frame. slip_mm: along the bar; past_mm: how far the whisker's material
+    has moved along itself past the bar, from any zero (rolling is no such motion)."""
 
     theta_rad: np.ndarray
     motor_rad: np.ndarray
@@ -56,7 +57,7 @@ class Deflection:
     along_mm: np.ndarray
     across_y_mm: np.ndarray
     across_z_mm: np.ndarray
-    arc_mm: np.ndarray
+    past_mm: np.ndarray
     covariance: np.ndarray
 
 
@@ -217,7 +218,7 @@ class FeltWhisk:
     theta_sigma_rad: float = NAN
     covariance_at: np.ndarray | None = None
     theta_moment_covariance_at: np.ndarray | None = None
-    shared_Nmm: np.ndarray | None = None
+    shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     status: str = ""
     saturated: int = 0
     agreement_chi2: float = NAN

@@ -166,7 +166,7 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         along_mm=d_x / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
         across_y_mm=d_y * np.cos(theta) + towards * np.sin(theta),
         across_z_mm=d_z,
-        arc_mm=frames.arc_mm[frames.touching][chosen],
+        past_mm=towards - frames.arc_mm[frames.touching][chosen],
         covariance=jacobian @ smooth.covariance @ jacobian.T,
     )
 

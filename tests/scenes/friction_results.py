@@ -27,7 +27,7 @@ def deflection(d_x, beta):
     size = d_x * theta * np.cos(beta) / np.cos(beta - phi)
     y, z = size * np.cos(phi), size * np.sin(phi)
     rows = {"theta_rad": theta, "slip_mm": z / max(np.cos(beta), 1e-9), "across_y_mm": y, "across_z_mm": z}
-    rows |= {"motor_rad": theta, "along_mm": np.full(4, d_x), "arc_mm": np.full(4, d_x)}
+    rows |= {"motor_rad": theta, "along_mm": np.full(4, d_x), "past_mm": np.zeros(4)}
     return rows | {"covariance": 1e-6 * np.eye(8)}
 
 

@@ -109,15 +109,19 @@ def test_confidence_falls_with_the_slip_angle():
 
 
 def test_friction_along_the_whisker_counts():
-    """A contact that wanders along the whisker as far as along the bar: tan α = √2 tan(|β| − |φ|)."""
+    """Material that at 3° moves along the whisker as fast as along the bar: tan α = √2 tan(|β| − |φ|) there. A line
+    bent by it is straightened: d_z is made with the α that is to come out."""
     (seen,), (felt,) = (part.whisks for part in (result(60.0).seen, result(60.0).felt))
+    d = seen.deflection
+    fast = d.slip_mm[-1] / d.theta_rad[-1] / (2.0 * THETA)
+    wandering = replace(d, past_mm=-fast * d.theta_rad**2)
+    found = felt_friction(replace(seen, deflection=wandering), felt, THETA)[0]
+    assert found == pytest.approx(np.arctan(np.sqrt(2.0) * np.tan(ALPHA)), abs=1e-6)
+    cos = 1.0 / np.hypot(1.0, d.theta_rad / THETA)
+    bent = d.across_y_mm * np.tan(np.radians(60.0) - np.arctan(np.tan(ALPHA) * cos))
+    assert seen_friction(replace(seen, deflection=replace(wandering, across_z_mm=bent)))[0] == pytest.approx(
+        ALPHA, abs=1e-4)  # fmt: skip
     assert seen_friction(seen)[0] == pytest.approx(ALPHA, abs=1e-6)
-    wandering = replace(seen, deflection=replace(seen.deflection, arc_mm=60.0 - seen.deflection.slip_mm))
-    expected = np.arctan(np.sqrt(2.0) * np.tan(ALPHA))
-    for straight, found in zip((seen_friction(seen), felt_friction(seen, felt)),
-                               (seen_friction(wandering), felt_friction(wandering, felt))):  # fmt: skip
-        assert found[0] == pytest.approx(expected, abs=1e-6)
-        assert found[1] > straight[1]
 
 
 def test_what_a_recording_left_out_changes_is_a_sigma():
