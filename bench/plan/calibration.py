@@ -29,9 +29,11 @@ class BoardWork:
     views: int
     corner_px: Mapping[str, float]
 
-    def times(self, more: int) -> "BoardWork":
-        """The same with so many times the views."""
-        return replace(self, views=more * self.views)
+    def times(self, views: int, placed: int = 1) -> "BoardWork":
+        """The same with so many times the views, and its place known so many times as well."""
+        pose = self.on_rig
+        better = replace(pose, sigma_mm=pose.sigma_mm / placed, sigma_rad=pose.sigma_rad / placed)
+        return replace(self, views=views * self.views, on_rig=better)
 
     def corner_of(self, camera: str) -> float:
         """Sigma of a corner; of a camera that is not there yet, the largest."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.plan.expected import Expected
+from bench.plan.sight import ALONG_RAD
 from vision.fit.line_noise import LineNoise
 from vision.fit.uncertainty import variance_by_cause
 from vision.truth.records import WhiskTruth
@@ -25,9 +26,7 @@ WORDS = {
     "cameras": "the cameras' calibration",
     "placement": "where the rig board stands",
 }
-# What is said of a camera: a bar seen at less than this to its axis is a third as long; shares of the wire, of the
-# bar's stretch that its line is told from.
-_ALONG_RAD = np.radians(20.0)
+# What is said of a camera: shares of the wire, of the bar's stretch that its line is told from.
 _MUCH, _SOME, _LEAST_OF_BAR = 0.3, 0.1, 0.7
 
 
@@ -85,7 +84,7 @@ def obstacles(found: Expected, lines: Mapping[str, LineNoise]) -> Iterator[str]:
     """What keeps a camera from seeing the whole whisk, a sentence each."""
     for name, sight in found.sights.items():
         noise = lines.get(name)
-        if sight.to_bar_rad < _ALONG_RAD:
+        if sight.to_bar_rad < ALONG_RAD:
             yield f"camera {name} looks along the bar ({np.degrees(sight.to_bar_rad):.0f} deg to its axis)"
         elif noise is not None and len(noise.bar_px) == 0:
             yield f"camera {name} does not see the bar's edges"

@@ -52,7 +52,8 @@ def plan_seen(task: SeenTask) -> Row:
     settings = VisionSettings(clock_sigma_s=clock_sigma_s)
     cameras = task.cameras.subset([name for name in task.cameras.names if name in whisk.lines])
     found = outlook(expected(staged, cameras, whisk.lines, settings=settings), whisk.lines, task.theta_rad)
-    tried = [tried_on(staged, one, one.lines(whisk.lines), task.theta_rad, settings=settings) for one in task.tries]
+    tried = [tried_on(staged, one, one.lines(whisk.lines, staged.axis), task.theta_rad, settings=settings)
+             for one in task.tries]
     return Row(facts, found, tuple(tried), whisk.lines, _stated(whisk))
 
 

@@ -112,7 +112,7 @@ def plan_run(task: RigTask) -> Row:
     def after(one: Try) -> Mapping[str, LineNoise]:
         if one.light:
             return painter_of(brighter(task.protocol)).lines(staged, task.cameras)
-        return one.lines(lines)
+        return one.lines(lines, staged.axis)
 
     found = outlook(expected(staged, task.cameras, lines, Clamp.of(staged)), lines, task.theta_rad)
     tried = [tried_on(staged, one, after(one), task.theta_rad, Clamp.of(staged)) for one in task.tries]

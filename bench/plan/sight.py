@@ -22,6 +22,8 @@ from vision.truth.whisk import BESIDE_BAR_PX
 
 # Which of points (n, 3) something else stands before, as a camera sees them.
 Hides = Callable[[Camera, np.ndarray], np.ndarray]
+# A camera that looks at the bar at less than this to its axis has it a third as long.
+ALONG_RAD = np.radians(20.0)
 _LEAST_IN_PICTURE = 0.5  # of a piece's pixels
 
 
@@ -88,14 +90,18 @@ def _bar_is_nearer(camera: Camera, staged: Staged) -> bool:
     return bool(away[0] < away[1])
 
 
+def to_bar_rad(camera: Camera, axis: BarAxis) -> float:
+    """Angle between a camera's sight and the bar, where it is touched."""
+    sight = axis.point_mm - camera.centre_mm
+    return float(np.arccos(np.clip(abs(sight @ axis.direction) / np.linalg.norm(sight), 0.0, 1.0)))
+
+
 def _of_bar(camera: Camera, axis: BarAxis) -> tuple[float, float]:
     """Angle between sight and bar, and how much of it is in the picture within the arm to either side."""
-    sight = axis.point_mm - camera.centre_mm
-    angle = np.arccos(np.clip(abs(sight @ axis.direction) / np.linalg.norm(sight), 0.0, 1.0))
     along = axis.point_mm + np.linspace(-ARM_MM, ARM_MM, 41)[:, None] * axis.direction
     px = camera.project(along)
     inside = np.all((px > 0) & (px < np.array(camera.size_px) - 1), axis=1)
-    return float(angle), float(np.mean(inside))
+    return to_bar_rad(camera, axis), float(np.mean(inside))
 
 
 def _in_space(pieces: Pieces, curves: Mapping[int, Curves]) -> np.ndarray:

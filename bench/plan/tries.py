@@ -7,15 +7,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bench.plan.calibration import BoardWork, expected_cameras, seen_camera
+from bench.plan.sight import ALONG_RAD, to_bar_rad
 from bench.rig.camera import Camera as RigCamera
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
+from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
 
 _TURN_DEG = 30.0  # by which a camera is taken round the contact
 _NEAR_SHARE = 0.7  # of its distance, to which it is brought
 _LENS = 1.5  # times the focal length: the next in a shop
 VIEWS = 4  # times as many of the board
+PLACED = 4  # times as well is known where it stands on the rig
 LIGHT = 4.0  # times as much light, at a quarter of the gain
 # A third camera is tried from these directions, azimuth (0: beyond the tip) and elevation, degrees.
 _THIRD_DEG = [*itertools.product((-150.0, -90.0, -30.0, 30.0, 90.0, 150.0), (35.0,)), (-90.0, 75.0)]
@@ -27,8 +30,8 @@ USUAL = LineNoise(0.05, 0.0, np.array([[0.0, 0.11, 0.11]]))
 
 @dataclass(frozen=True, eq=False)
 class Try:
-    """A changed bench. kind, words: what is changed; cameras: those of the bench then; like: of a camera that is new or
-    elsewhere, whose lines its lines are worth as much as; light: whether there is more of it."""
+    """A changed bench. kind, words: what is changed; cameras: those of the bench then; like: of a camera that is not as
+    it was, whose lines its lines are worth as much as; light: whether there is more of it."""
 
     kind: str
     words: str
@@ -36,10 +39,14 @@ class Try:
     like: Mapping[str, str] = field(default_factory=dict)
     light: bool = False
 
-    def lines(self, lines: Mapping[str, LineNoise]) -> dict[str, LineNoise]:
-        """What its cameras' lines are worth, px, from what they were."""
-        return {name: _able(lines.get(self.like[name])) if name in self.like else lines[name]
-                for name in self.cameras.names if name in self.like or name in lines}
+    def lines(self, lines: Mapping[str, LineNoise], axis: BarAxis) -> dict[str, LineNoise]:
+        """What its cameras' lines are worth, px, from what they were: one that is new or elsewhere, and does not look
+        along the bar, sees both rods."""
+        as_they_were = {name: lines[self.like.get(name, name)] for name in self.cameras.names
+                        if self.like.get(name, name) in lines}
+        seeing = [camera.name for camera in self.cameras if self.kind in ("move", "third") and camera.name in self.like
+                  and to_bar_rad(camera, axis) > ALONG_RAD]
+        return as_they_were | {name: _able(as_they_were.get(name)) for name in seeing}
 
 
 def _able(noise: LineNoise | None) -> LineNoise:
@@ -55,9 +62,10 @@ def tries(cameras: Cameras, work: BoardWork | None, target_mm: np.ndarray, *, li
     """The changes that can be calibrated. work: what the cameras are calibrated from, None where they were given: then
     each keeps its covariance. light: whether to try more of it."""
     found = []
-    for kind, words, changed, like, views in _changes(cameras, target_mm):
+    for kind, words, changed, like in _changes(cameras, target_mm):
+        more = VIEWS if kind == "views" else 1, PLACED if kind == "board" else 1
         try:
-            made = _calibrated(cameras, changed, like, work, views, target_mm)
+            made = _calibrated(cameras, changed, like, work, more, target_mm)
         except Refused:
             continue  # its views would not do: no change to propose
         found.append(Try(kind, words, made, like))
@@ -65,21 +73,23 @@ def tries(cameras: Cameras, work: BoardWork | None, target_mm: np.ndarray, *, li
                       if light else [])]
 
 
-def _changes(cameras: Cameras, target_mm: np.ndarray) -> Iterator[tuple[str, str, tuple[Camera, ...], dict, int]]:
-    """Kind, words, cameras, like, and times the views, of each."""
+def _changes(cameras: Cameras, target_mm: np.ndarray) -> Iterator[tuple[str, str, tuple[Camera, ...], dict]]:
+    """Kind, words, cameras and like of each."""
     everyone = cameras.cameras
     for number, camera in enumerate(everyone):
         for place in _places(camera, target_mm):
             moved = looking(camera, camera.name, place, target_mm)
             others = (*everyone[:number], moved, *everyone[number + 1:])
-            yield "move", f"camera {camera.name} at {_said(place)}", others, {camera.name: camera.name}, 1
+            yield "move", f"camera {camera.name} at {_said(place)}", others, {camera.name: camera.name}
     longer = tuple(_longer(camera) for camera in everyone)
-    yield "lens", f"lenses {_LENS:g} times as long", longer, {name: name for name in cameras.names}, 1
-    yield "views", f"{VIEWS} times as many views of the board", everyone, {}, VIEWS
+    yield "lens", f"lenses {_LENS:g} times as long", longer, {name: name for name in cameras.names}
+    yield "views", f"{VIEWS} times as many views of the board", everyone, {}
+    if cameras.placement is not None and cameras.placement.any():
+        yield "board", f"where the board stands on the rig known {PLACED} times as well", everyone, {}
     for place in third_places(cameras, target_mm):
         name = next(name for name in ("third", "another", "one_more") if name not in cameras)
         third = looking(everyone[0], name, place, target_mm)
-        yield "third", f"a third camera at {_said(place)}", (*everyone, third), {name: everyone[0].name}, 1
+        yield "third", f"a third camera at {_said(place)}", (*everyone, third), {name: everyone[0].name}
 
 
 def _said(place_mm: np.ndarray) -> str:
@@ -133,18 +143,21 @@ def _longer(camera: Camera) -> Camera:
 
 
 def _calibrated(before: Cameras, changed: Sequence[Camera], like: Mapping[str, str], work: BoardWork | None,
-                views: int, target_mm: np.ndarray) -> Cameras:
-    """Cameras with a covariance: by predicted views, or each with that of the camera it is like. Raises Refused."""
+                more: tuple[int, int], target_mm: np.ndarray) -> Cameras:
+    """Cameras with a covariance: by predicted views, or each with that of the camera it is like. more: times the views,
+    and times as well placed. Raises Refused."""
     if work is not None:
-        return expected_cameras(changed, work.times(views))
+        return expected_cameras(changed, work.times(*more))
+    views, better = more
+    placement = None if before.placement is None else before.placement / better**2
     placed = np.zeros_like(before.covariance)
     if before.placement is not None:
         placed = before.by_placement @ before.placement @ before.by_placement.T
-    covariance = (before.covariance - placed) / views + placed
+    covariance = (before.covariance - placed) / views + placed / better**2
     models = [before[like.get(camera.name, camera.name)] for camera in changed]
     rows = np.concatenate([np.arange(N_PARAMETERS) + before.parameters_of(model.name).start for model in models])
     scale = np.concatenate([_scale(model, camera, target_mm) for model, camera in zip(models, changed)])
-    return Cameras(tuple(changed), covariance[np.ix_(rows, rows)] * np.outer(scale, scale), before.placement)
+    return Cameras(tuple(changed), covariance[np.ix_(rows, rows)] * np.outer(scale, scale), placement)
 
 
 def _scale(model: Camera, camera: Camera, target_mm: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Changes that are tried, and places that are found."""
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from bench.plan.tries import LIGHT, Try, tries
 from bench.rig.build import cameras as built
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from vision.geometry.camera import Cameras
+from vision.geometry.contact import BarAxis
 
 THETA_RAD = np.radians(3.0)
 
@@ -49,17 +52,44 @@ def test_a_third_camera_helps_and_each_camera_keeps_its_lines(bench):
     lines = dict.fromkeys(cameras.names, LINES)
     as_is = tried_on(staged, Try("", "", cameras), lines, THETA_RAD)
     third = by_kind(tries(cameras, None, staged.touch.point_mm, light=False), "third")[0]
-    after = third.lines(lines)
+    after = third.lines(lines, staged.axis)
     assert set(after) == {*cameras.names, "third"}
     assert tried_on(staged, third, after, THETA_RAD).sigma["d_x_mm"] < as_is.sigma["d_x_mm"]
+
+
+def test_only_a_camera_elsewhere_comes_to_see_the_bar(bench):
+    """A longer lens does not turn a camera away from the bar's axis; nor does a place from which it looks along it."""
+    _, staged, cameras = bench
+    blind = replace(LINES, bar_px=np.zeros((0, 3)))
+    found = tries(cameras, None, staged.touch.point_mm, light=False)
+    lines = dict.fromkeys(cameras.names, blind)
+    assert not any(len(noise.bar_px) for noise in by_kind(found, "lens")[0].lines(lines, staged.axis).values())
+    moved = by_kind(found, "move")[0]
+    (name,) = moved.like
+    assert len(moved.lines(lines, staged.axis)[name].bar_px) == 1
+    along = BarAxis(staged.foot_mm, (moved.cameras[name].centre_mm - staged.foot_mm))
+    along = replace(along, direction=along.direction / np.linalg.norm(along.direction))
+    assert len(moved.lines(lines, along)[name].bar_px) == 0
 
 
 def test_more_views_leave_less_of_the_cameras_own_uncertainty(bench):
     _, staged, cameras = bench
     sigmas = [*[0.3] * 4, *[1e-3] * 5, *[1e-4] * 3, *[0.05] * 3]
     known = Cameras(cameras.cameras, np.diag(np.tile(sigmas, 2)) ** 2)
-    more = by_kind(tries(known, None, staged.touch.point_mm, light=False), "views")[0]
-    assert np.allclose(more.cameras.covariance, known.covariance / 4.0)
+    found = tries(known, None, staged.touch.point_mm, light=False)
+    assert np.allclose(by_kind(found, "views")[0].cameras.covariance, known.covariance / 4.0)
+    assert not by_kind(found, "board")  # no placement is told
+
+
+def test_a_board_placed_better_leaves_less_of_what_all_cameras_share(bench):
+    _, staged, cameras = bench
+    placement = np.diag([1e-3] * 3 + [0.1] * 3) ** 2
+    shared = cameras.by_placement @ placement @ cameras.by_placement.T
+    own = 1e-6 * np.eye(len(shared))
+    known = Cameras(cameras.cameras, own + shared, placement)
+    (better,) = by_kind(tries(known, None, staged.touch.point_mm, light=False), "board")
+    assert np.allclose(better.cameras.covariance, own + shared / 16.0)
+    assert np.allclose(better.cameras.placement, placement / 16.0)
 
 
 def row(sigma_mm: float, tried: dict[str, float]) -> Row:
