@@ -116,7 +116,7 @@ class _Here:
 
     @property
     def alpha_rad(self) -> float:
-        known = (pair[0] for pair in (seen_friction(self.seen), felt_friction(self.seen, self.felt)))
+        known = (pair[0] for pair in (seen_friction(self.seen), felt_friction(self.seen, self.felt, self.theta_rad)))
         assumed = self.given.alpha_est_rad if self.given else NAN
         return max(next((alpha for alpha in known if np.isfinite(alpha)), assumed), 0.0)
 
