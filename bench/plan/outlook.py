@@ -9,6 +9,7 @@ from bench.plan.expected import Expected
 from bench.plan.sight import ALONG_RAD
 from vision.fit.line_noise import LineNoise
 from vision.fit.uncertainty import variance_by_cause
+from vision.truth.at_angle import expected_scatter
 from vision.truth.records import WhiskTruth
 
 # Quantities of a row by their columns: the fit's name, and what turns its unit into the column's.
@@ -57,11 +58,15 @@ def outlook(found: Expected, lines: Mapping[str, LineNoise], theta_rad: float) -
 
 
 def sigmas(truth: WhiskTruth, theta_rad: float) -> dict[str, float]:
-    """Sigmas by column."""
+    """Sigmas by column; at an angle with the scatter of its frames, which the staged ones do not have."""
     at = truth.at(theta_rad)
     found = {"d_x_mm": truth.d_x_mm, "touch_deg": truth.touch_rad, "beta_deg": truth.beta_rad, "slip_mm": at.slip_mm,
              "phi_deg": at.phi_rad, "alpha_deg": at.alpha_rad}
-    return {name: float(found[name].sigma) * scale for name, (_, scale) in (AT_TOUCH | AT_THETA).items()}
+    one_fit = truth.smooth is not None and not at.status
+    scatter = {name: expected_scatter(truth.smooth, key, theta_rad) if one_fit else 0.0
+               for name, (key, _) in AT_THETA.items()}
+    return {name: float(np.hypot(found[name].sigma, scatter.get(name, 0.0))) * scale
+            for name, (_, scale) in (AT_TOUCH | AT_THETA).items()}
 
 
 def _limits(found: Expected, theta_rad: float) -> dict[str, tuple[str, float]]:

@@ -97,6 +97,18 @@ def _unfitted(smooth: Smooth, name: str, theta_rad: float) -> float:
     return float(np.sqrt(np.sum(left**2) / (len(x) - degree - 1)))
 
 
+def expected_scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
+    """What `_unfitted` is, RMS, where nothing jumps and frames err as their covariance says."""
+    near = _near(smooth.theta_rad - theta_rad)
+    x, rows = smooth.theta_rad[near] - theta_rad, smooth.jacobians[name][near]
+    degree = _degree(len(x))
+    if len(x) <= degree + 1:
+        return 0.0
+    powers = np.vander(x, degree + 1)
+    left = rows - powers @ np.linalg.lstsq(powers, rows, rcond=None)[0]
+    return float(np.sqrt(np.einsum("fi,ij,fj->", left, smooth.covariance, left) / (len(x) - degree - 1)))
+
+
 def _least_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
     """Sigma of the surest of the frames nearby: what stands behind the wire errs in all of them alike."""
     rows = smooth.jacobians[name][_near(smooth.theta_rad - theta_rad)]
