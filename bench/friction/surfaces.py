@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bench.friction.alphas import BETA_BY_HAND_RAD
 from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import slope_deg
 from estimator.beam import Beam
@@ -13,7 +14,7 @@ from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 
 # From so many recordings that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
-# together: what is wrong with its slope is wrong in all of them. With fewer it is that of the moments' own sigmas.
+# together: what is wrong with its slope is wrong in all of them. With fewer it is that of moments and slopes as stated.
 _MANY = 3
 _SAME_SLOPE_DEG = 2.5  # °: half of the step of 5° that a protractor sets
 _FITTED = {"m_y": "m_y_Nmm", "m_z": "m_z_Nmm", "d_x": "d_x_mm", "theta": "theta_rad"}  # fields of Pushes and of Felt
@@ -37,6 +38,7 @@ class Felt:
     trial: str = ""
     whisk: int = 0
     shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # as of `FeltWhisk`
+    beta_sigma_rad: float = 0.0
 
     @property
     def m_Nmm(self) -> float:
@@ -144,7 +146,8 @@ def _felt(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, float | N
             moments = m_y.value, m_z.value, m_y.sigma, m_z.sigma
             angle = float(np.degrees(phi.value)), float(np.degrees(phi.sigma))
             theta = float(np.radians(result.theta_deg))
-            place = recording, trial.name, seen.whisk, felt.shared_Nmm
+            beta_sigma = BETA_BY_HAND_RAD if nominal else seen.beta_rad.sigma
+            place = recording, trial.name, seen.whisk, felt.shared_Nmm, beta_sigma
             yield trial.panel, Felt(beta, d_x, theta, *moments, *angle, nominal, *place)
 
 
@@ -161,11 +164,21 @@ def _fit(felt: list[Felt], beam: Beam) -> FrictionFit | None:
         return None
     recording = np.array([f.recording for f in felt])
     if len(set(recording[np.abs(beta) > fit.alpha_rad])) < _MANY:
-        return fit
-    own = fit_alpha(replace(pushes, recording=recording))
-    reach = np.hypot(own.high_rad - own.alpha_rad, Z_95 * np.linalg.norm(_shared(pushes, felt) - own.alpha_rad))
-    low = max(own.alpha_rad - reach, 0.0)
-    return replace(own, sigma_rad=float(reach / Z_95), low_rad=float(low), high_rad=float(own.alpha_rad + reach))
+        return _wider(fit, _by_slopes(pushes, felt, recording))
+    return _wider(fit_alpha(replace(pushes, recording=recording)), _shared(pushes, felt))
+
+
+def _wider(fit: FrictionFit, others: np.ndarray) -> FrictionFit:
+    """The fit whose interval holds, too, what other values of α (k,), one sigma of a cause each, differ from it by."""
+    reach = float(np.hypot(fit.high_rad - fit.alpha_rad, Z_95 * np.linalg.norm(np.nan_to_num(others - fit.alpha_rad))))
+    ends = {"low_rad": max(fit.alpha_rad - reach, 0.0), "high_rad": fit.alpha_rad + reach}
+    return replace(fit, sigma_rad=reach / Z_95, **ends)
+
+
+def _by_slopes(pushes: Pushes, felt: list[Felt], recording: np.ndarray) -> np.ndarray:
+    """α (k,) with each recording's slope off by its sigma."""
+    moved = [np.where(recording == one, [f.beta_sigma_rad for f in felt], 0.0) for one in dict.fromkeys(recording)]
+    return np.array([fit_alpha(replace(pushes, beta=pushes.beta + by)).alpha_rad for by in moved])
 
 
 def _shared(pushes: Pushes, felt: list[Felt]) -> np.ndarray:
