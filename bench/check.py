@@ -42,9 +42,9 @@ def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
         session = checked_session(path, doubts, follow_links=follow_links)
         find_damage(session, doubts, each=partial(tqdm, desc="pictures", disable=not progress, leave=False))
         look_ahead(session, doubts)
-    for line in doubts.refusals:
+    for line in dict.fromkeys(doubts.refusals):
         print(f"bad: {line}")
-    for line in doubts.notes:
+    for line in dict.fromkeys(doubts.notes):
         print(f"doubtful: {line}")
     if not (doubts.refusals or doubts.notes):
         print(f"{session.name}: {counted(len(session.trials), 'trial')}, nothing wrong or doubtful")

@@ -1,9 +1,10 @@
 """Seeded mutations of a session's files: each is checked in a process of its own, with limits of time and memory.
 
-    python tests/faults/fuzz.py FIRST_SEED COUNT
+    python tests/faults/fuzz.py FIRST_SEED COUNT [evaluate]
 
 Prints a line for each mutation that ends in a fault of ours (exit code 70, a traceback, a signal), takes more than
-10 s, or asks for more than 2 GB; then how many were tried and how they ended. 1000 take some minutes.
+10 s of a processor or a minute in all, or asks for more than 2 GB; then how many were tried and how they ended. 1000
+take some minutes; with `evaluate`, which evaluates each in place of a check, some ten times as long.
 """
 
 import os
@@ -24,7 +25,7 @@ import numpy as np
 
 SESSION = Path(__file__).resolve().parents[2] / "fixtures" / "small-session"
 TRIAL, FRAMES, SHRINK = "b60_4", 5, 8
-MOST_S, MOST_BYTES = 10.0, 2 << 30
+MOST_S, MOST_WAIT_S, MOST_BYTES = 10, 60.0, 2 << 30
 TOO_LONG = "too long"
 ODD = ["nan", "inf", "-1", "0", "1e308", "-1e-308", "99999999999999999999", "", "'", '"', "[", "]]", "=", ",", "\0"]
 
@@ -165,20 +166,21 @@ BYTES: tuple[Callable, ...] = (flipped, cut, without, doubled, emptied)
 TEXT: tuple[Callable, ...] = (number, number, number, lines_exchanged, word)
 
 
-def tried(base: Path, seed: int, work: Path) -> tuple[str, str]:
+def tried(base: Path, seed: int, work: Path, verb: str) -> tuple[str, str]:
     """How a mutation ended ('exit 0', 'signal 9', 'traceback', TOO_LONG), and what it was with what was said."""
-    session, said = work / "session", work / "said.txt"
+    session, said, out = work / "session", work / "said.txt", work / "out"
     shutil.rmtree(session, ignore_errors=True)
+    shutil.rmtree(out, ignore_errors=True)
     shutil.copytree(base, session, copy_function=shutil.copyfile)
     what = mutate(session, np.random.default_rng(seed))
     child, start = os.fork(), time.monotonic()
     if child == 0:
-        _run(session, said)
+        _run([verb, str(session), *(["--out", str(out), "--no-figures"] if verb == "evaluate" else [])], said)
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
         if ended:
             break
-        if time.monotonic() - start > MOST_S:
+        if time.monotonic() - start > MOST_WAIT_S:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
             return TOO_LONG, f"seed {seed}: {what}"
@@ -188,8 +190,8 @@ def tried(base: Path, seed: int, work: Path) -> tuple[str, str]:
     return ("traceback" if "Traceback" in text else how), f"seed {seed}: {what}: {text.strip()[-300:]}"
 
 
-def _run(session: Path, said: Path) -> None:
-    """In the child: check the session within limits, and end."""
+def _run(arguments: list[str], said: Path) -> None:
+    """In the child: run a verb within limits, and end."""
     code = 99
     try:
         with said.open("w") as file:
@@ -197,9 +199,10 @@ def _run(session: Path, said: Path) -> None:
             os.dup2(file.fileno(), 2)
         used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
         resource.setrlimit(resource.RLIMIT_AS, (used + MOST_BYTES, used + MOST_BYTES))
+        resource.setrlimit(resource.RLIMIT_CPU, (MOST_S, MOST_S))
         from bench import cli
 
-        code = cli.main(["check", str(session)])
+        code = cli.main(arguments)
         sys.stdout.flush()
         sys.stderr.flush()
     except BaseException:
@@ -213,13 +216,14 @@ def _sound() -> None:
     """In place of the look at all that is installed, a quarter of a mutation's time."""
 
 
-def fuzz(first: int, count: int) -> tuple[Counter, list[str]]:
+def fuzz(first: int, count: int, verb: str = "check") -> tuple[Counter, list[str]]:
     """How many mutations ended how, and a line for each that should not have ended so."""
     import bench.check  # all that is loaded and looked at once, before the forks
+    import bench.report.page.write
     from bench import cli
     from bench.base import environment
 
-    assert bench.check and cli
+    assert bench.check and bench.report.page.write and cli
     environment.check_environment()
     environment.check_environment = _sound
     cv2.setNumThreads(0)
@@ -227,9 +231,7 @@ def fuzz(first: int, count: int) -> tuple[Counter, list[str]]:
     with tempfile.TemporaryDirectory() as folder:
         base = small_base(Path(folder))
         for seed in range(first, first + count):
-            how, what = tried(base, seed, Path(folder))
-            if how == TOO_LONG:  # once more: another process may have had the machine
-                how, what = tried(base, seed, Path(folder))
+            how, what = tried(base, seed, Path(folder), verb)
             ways[how] += 1
             if how not in ("exit 0", "exit 1", "exit 2"):
                 bad.append(f"{how}: {what}")
@@ -238,6 +240,6 @@ def fuzz(first: int, count: int) -> tuple[Counter, list[str]]:
 
 
 if __name__ == "__main__":
-    ended, wrong = fuzz(int(sys.argv[1]), int(sys.argv[2]))
+    ended, wrong = fuzz(int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:4])
     print(dict(ended))
     sys.exit(bool(wrong))
