@@ -128,6 +128,12 @@ def _add_evaluate(verbs) -> None:
     verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
     verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
     add_figure_format(verb)
+    verb.add_argument(
+        "--nwb",
+        type=Path,
+        metavar="FILE",
+        help="signals, tables and tracks as Neurodata Without Borders too, for archives (extra `nwb`)",
+    )
     _add_workers(verb)
 
 
@@ -137,7 +143,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     single_thread()
     from bench.api import evaluate_with
     from bench.base.settings import Settings
+    from bench.report.nwb import check_nwb, write_nwb
 
+    if options.nwb is not None:
+        check_nwb(options.nwb, options.session)
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
     names = (*numbers, "estimators", "gauges_from_all", "trials", "figures", "follow_links")
@@ -148,6 +157,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     told = {"progress": sys.stderr.isatty(), "announce": print}
     formats = options.figure_format
     run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **told)
+    if options.nwb is not None:
+        write_nwb(options.nwb, run.out, options.session)
     return DOUBTFUL if run.doubtful else DONE
 
 
