@@ -14,7 +14,7 @@ from bench.session.trial import Trial
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
-from vision.pictures.files import VIDEO_SUFFIXES, Frames, picture_size, pictures_in
+from vision.pictures.files import STACK_SUFFIXES, VIDEO_SUFFIXES, Frames, page_count, picture_size, pictures_in
 
 Size = tuple[int, int]
 
@@ -124,6 +124,9 @@ def _picture_sizes(session: Session, camera: str) -> Iterator[tuple[str, Size]]:
     if camera in session.rig_pictures:
         files.append(session.rig_pictures[camera])
     for file in files:
+        if file.suffix.lower() in STACK_SUFFIXES and file.parent.name == camera and page_count(file) > 1:
+            found = f"holds {page_count(file)} pictures; a stack stands beside the camera's folder, in place of it"
+            raise BadInput(f"{found}, as {camera}{file.suffix}", file=file.relative_to(session.path).as_posix())
         size = _size(file)
         if size:
             yield file.relative_to(session.path).as_posix(), size

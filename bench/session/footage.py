@@ -1,4 +1,4 @@
-"""Where each camera's frames are in a session: a folder named after the camera, or a video of that name."""
+"""Where each camera's frames are in a session: a folder named after the camera, or a video or stack of that name."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from vision.geometry.errors import Refused
-from vision.pictures.files import PICTURE_SUFFIXES, VIDEO_SUFFIXES, Frames, Video, natural_order, pictures_in
+from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES, Frames, natural_order, pictures_in
 
 
 def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
@@ -51,13 +51,13 @@ def frame_count(source: Path) -> int:
 
 def decoded_count(source: Path) -> int:
     """How many frames a source really holds; of a video, by decoding it."""
-    return len(pictures_in(source)) if source.is_dir() else Video(source).decoded_count
+    return len(pictures_in(source)) if source.is_dir() else Frames.open(source).decoded_count
 
 
 def declared_rate_Hz(source: Path) -> float:
     """Frames a second as a video's header states it; 0 where it does not, or cannot be opened."""
     try:
-        return Video(source).rate_Hz
+        return Frames.open(source).rate_Hz
     except Refused:
         return 0.0
 
@@ -72,7 +72,7 @@ def visible(folder: Path) -> list[Path]:
 def _holds_frames(entry: Path) -> bool:
     if entry.is_dir():
         return bool(pictures_in(entry))
-    return entry.suffix.lower() in VIDEO_SUFFIXES
+    return entry.suffix.lower() in FILM_SUFFIXES
 
 
 def read_frames(source: Path, indices: Iterable[int]) -> dict[int, np.ndarray | None]:

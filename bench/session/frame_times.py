@@ -198,10 +198,11 @@ def _from_container(trial: Trial) -> FrameTimes:
 
 def _container_times(source: Path, trial: Trial) -> np.ndarray:
     fix = "write frames.csv (frame,time_s), or frame_rate_Hz and first_frame_s into trial.toml"
-    if source.is_dir():
-        raise BadInput(f"there are no frame times; {fix}", file=trial.shown("frames.csv"))
     try:
-        return Frames.open(source).times_s
+        found = None if source.is_dir() else Frames.open(source).times_s
+        if found is None:
+            raise BadInput(f"there are no frame times; {fix}", file=trial.shown("frames.csv"))
+        return found
     except Refused as problem:
         raise BadInput(f"there are no frame times, and {problem}; {fix}", file=_shown(trial)) from None
 

@@ -11,10 +11,10 @@ from pathlib import Path, PurePath
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from vision.pictures.files import PICTURE_SUFFIXES, VIDEO_SUFFIXES
+from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES
 
 _MOST_NAMED = 3
-_FOOTAGE = PICTURE_SUFFIXES | VIDEO_SUFFIXES
+_FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
 # Where a camera's folder stands, in parts of the path within the session: boards/<camera>, trials/<trial>/<camera>.
 _CAMERA_AT = {"boards": 2, "trials": 3}
 

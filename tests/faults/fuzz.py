@@ -66,12 +66,15 @@ def _shrunk(source: Path, target: Path) -> None:
 
 
 def _as_video(base: Path) -> None:
-    """A second trial whose frames are videos."""
+    """A second trial whose frames are a video and a TIFF stack."""
     trial = base / "trials" / "video"
     shutil.copytree(base / "trials" / TRIAL, trial)
     for camera in ("high", "low"):
         greys = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted((trial / camera).iterdir())]
         shutil.rmtree(trial / camera)
+        if camera == "low":
+            assert cv2.imwritemulti(str(trial / "low.tif"), greys)
+            continue
         fourcc = cv2.VideoWriter_fourcc(*"MJPG")
         writer = cv2.VideoWriter(str(trial / f"{camera}.avi"), fourcc, 20.0, greys[0].shape[::-1], False)
         for grey in greys:

@@ -1,4 +1,4 @@
-"""Frames of one camera in order, from a folder of pictures or a video; read forward only, every index kept.
+"""Frames of one camera in order, from a folder of pictures, a video or a TIFF stack; read forward, every index kept.
 
 A frame that cannot be read stays in its place as None, so that a series is never shortened and its times
 never shift. Grey is what the file holds at full depth; of a colour video it is the Y plane as stored (16 to
@@ -25,6 +25,8 @@ from vision.geometry.errors import Refused
 
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm"})
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv"})
+STACK_SUFFIXES = frozenset({".tif", ".tiff"})
+FILM_SUFFIXES = VIDEO_SUFFIXES | STACK_SUFFIXES  # of one file that holds all frames
 
 # FFmpeg would write about a truncated file to stderr; the caller says it in one line of its own.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -41,6 +43,7 @@ _NO_HEADER = (UnidentifiedImageError, Image.DecompressionBombError, OSError, Val
 # Pixel formats whose first plane is the grey picture, as OpenCV names them when asked not to convert.
 _PLANAR_GREY = frozenset({b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"})
 
+_MOST_PIXELS = 2 * Image.MAX_IMAGE_PIXELS  # what Pillow takes for sound in a single picture
 _MOST_BYTES = 1 << 30  # a colour picture of 16 bit with as many pixels as Pillow takes for sound
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
@@ -52,25 +55,30 @@ class Frames(ABC):
 
     path: the folder or the file. count: how many frames there are (a video: how many its header declares).
     size_px: (width, height). times_s: the container's times, shape (count,), or None for pictures.
+    rate_Hz: frames a second as the header states it; 0 where it does not.
     """
 
     path: Path
     count: int
     size_px: tuple[int, int]
+    times_s: np.ndarray | None = None
+    rate_Hz: float = 0.0
 
     @staticmethod
     def open(path: Path | str) -> "Frames":
-        """The frames in a folder of pictures or in a video file.
+        """The frames in a folder of pictures, in a video file or in a TIFF stack.
 
-        Raises Refused where there is no picture that can be read, or the video cannot be opened.
+        Raises Refused where there is no picture that can be read, or the file cannot be opened.
         """
         path = Path(path)
-        return PictureFolder(path) if path.is_dir() else Video(path)
+        if path.is_dir():
+            return PictureFolder(path)
+        return TiffStack(path) if path.suffix.lower() in STACK_SUFFIXES else Video(path)
 
     @property
-    @abstractmethod
-    def times_s(self) -> np.ndarray | None:
-        """Each frame's time as the container states it, s, or None where there is no container."""
+    def decoded_count(self) -> int:
+        """How many frames there really are."""
+        return self.count
 
     @abstractmethod
     def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
@@ -104,10 +112,6 @@ class PictureFolder(Frames):
         self.count = len(self.files)
         self.size_px = self._first_size()
 
-    @property
-    def times_s(self) -> None:
-        return None
-
     def _first_size(self) -> tuple[int, int]:
         for file in self.files:
             grey = read_picture(file)
@@ -118,6 +122,32 @@ class PictureFolder(Frames):
     def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
         for index in range(first, last):
             yield index, read_picture(self.files[index])
+
+
+class TiffStack(Frames):
+    """The pages of one TIFF file, in their order."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._sizes = _page_sizes(path)
+        if not self._sizes:
+            raise Refused(f"{path.name} cannot be opened as a TIFF stack: truncated, or no TIFF")
+        self.count, self.size_px = len(self._sizes), self._sizes[0]
+
+    def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
+        for index in range(first, last):
+            yield index, self._page(index)
+
+    def _page(self, index: int) -> np.ndarray | None:
+        width, height = self._sizes[index]
+        if width * height > _MOST_PIXELS:
+            return None
+        try:
+            with _quiet_opencv():
+                _, pages = cv2.imreadmulti(str(self.path), index, 1, flags=_AS_STORED)
+        except cv2.error:
+            return None
+        return pages[0] if pages and pages[0].dtype in (np.uint8, np.uint16) else None
 
 
 class Video(Frames):
@@ -202,6 +232,25 @@ def read_picture(path: Path) -> np.ndarray | None:
     except cv2.error:  # a header that OpenCV takes for absurd
         return None
     return grey if grey is not None and grey.dtype in (np.uint8, np.uint16) else None
+
+
+def page_count(path: Path) -> int:
+    """How many pictures a file holds; 0 where it is damaged or no TIFF."""
+    return len(_page_sizes(path))
+
+
+def _page_sizes(path: Path) -> list[tuple[int, int]]:
+    """(width, height) of each page by its header; none where it is no regular TIFF file."""
+    sizes = []
+    try:
+        if path.is_file():
+            with Image.open(path, formats=["TIFF"]) as picture:
+                for index in range(picture.n_frames):
+                    picture.seek(index)
+                    sizes.append(picture.size)
+    except (*_NO_HEADER, EOFError, TypeError, KeyError):  # of a page without a size
+        return []
+    return sizes
 
 
 def picture_size(path: Path) -> tuple[int, int] | None:

@@ -2,11 +2,13 @@
 
 import shutil
 
+import cv2
 import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.session.frame_times import FrameTimes, frame_times, merge_times
+from bench.session.check import checked_session
+from bench.session.frame_times import FrameTimes, frame_times, merge_times, read_trial
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 
@@ -135,3 +137,36 @@ def test_merging_recovers_a_common_trigger(seed):
     assert spread_s <= 0.008
     for name, k in kept.items():
         assert [frames[i] for i in np.flatnonzero(picture[name] >= 0)] == list(k)
+
+
+def stacked(folder, *, inside: bool):
+    """A camera's pictures as pages of a TIFF file, beside or within its folder."""
+    pages = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted(folder.iterdir())]
+    shutil.rmtree(folder)
+    folder.mkdir()
+    target = folder / "all.tif" if inside else folder.with_suffix(".tif")
+    assert cv2.imwritemulti(str(target), pages)
+    if not inside:
+        folder.rmdir()
+    return pages
+
+
+def test_a_tiff_stack_in_place_of_a_folder(small_copy, folder):
+    pages = {camera: stacked(folder / camera, inside=False) for camera in ("high", "low")}
+    trial = checked_session(small_copy).trial("b30_3")
+    found = frame_times(trial)
+    assert (found.source, found.doubts) == ("frames.csv", ())
+    for camera, frames in read_trial(trial, found).items():
+        assert all(np.array_equal(frames[k], page) for k, page in enumerate(pages[camera]))
+    (folder / "frames.csv").unlink()
+    with pytest.raises(BadInput, match=r"there are no frame times; write frames.csv"):
+        frame_times(trial)
+
+
+def test_a_stack_within_a_folder_of_pictures_is_refused(small_copy, folder):
+    stacked(folder / "low", inside=True)
+    (folder / "frames.csv").write_text("frame,time_s\n0,0.1\n")
+    for file in sorted((folder / "high").iterdir())[1:]:
+        file.unlink()
+    with pytest.raises(BadInput, match=r"low/all.tif: holds 11 pictures; a stack stands beside .* as low.tif"):
+        checked_session(small_copy)

@@ -55,6 +55,35 @@ def test_sixteen_bits_stay_sixteen(tmp_path, suffix):
     np.testing.assert_array_equal(grey, ramp(1, np.uint16))
 
 
+@pytest.mark.parametrize("suffix", [".png", ".tiff", ".bmp", ".jpg"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_colour_is_taken_as_its_luma(tmp_path, suffix, dtype):
+    """ITU-R 601: 0.299 R + 0.587 G + 0.114 B, at full depth; BMP and JPEG have 8 bits, and JPEG rounds."""
+    if dtype == np.uint16 and suffix in (".bmp", ".jpg"):
+        pytest.skip("these hold 8 bits")
+    b, g, r = (ramp(k, dtype) // 2 for k in (3, 1, 2))
+    blocks = np.kron(np.stack([b, g, r], axis=2)[::8, ::8], np.ones((8, 8, 1), dtype)).astype(dtype)
+    assert cv2.imwrite(str(tmp_path / f"a{suffix}"), blocks, [cv2.IMWRITE_JPEG_QUALITY, 100])
+    luma = blocks.astype(float) @ [0.114, 0.587, 0.299]
+    found = read_picture(tmp_path / f"a{suffix}")
+    assert found.dtype == dtype
+    assert np.abs(found - luma).max() <= (3.0 if suffix == ".jpg" else 1.0)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_pages_of_a_tiff_stack_are_frames(tmp_path, dtype):
+    pages = [ramp(k, dtype) for k in range(5)]
+    assert cv2.imwritemulti(str(tmp_path / "high.tif"), pages)
+    frames = Frames.open(tmp_path / "high.tif")
+    assert (frames.count, frames.decoded_count, frames.size_px) == (5, 5, (WIDTH, HEIGHT))
+    assert (frames.times_s, frames.rate_Hz) == (None, 0.0)
+    assert [index for index, _ in frames.read(2, 9)] == [2, 3, 4]
+    for index, grey in frames.read():
+        np.testing.assert_array_equal(grey, pages[index])
+    with pytest.raises(Refused, match="cannot be opened as a TIFF stack"):
+        Frames.open(cut(tmp_path / "high.tif", 0.3))
+
+
 def test_natural_order(tmp_path):
     names = ["f10.png", "f9.png", "f1.png", "g2.png", "f010b.png"]
     in_order = sorted((tmp_path / name for name in names), key=natural_order)
