@@ -43,7 +43,7 @@ def still_scene(
     """A trial's frames, held to the pictures of the scene without rods."""
     kept, left_out, notes = {}, {}, []
     for name, pictures in frames.items():
-        doubt = other_scene(name, pictures, calibration.background) if pictures else ""
+        doubt = other_scene(name, pictures, calibration.background) if pictures else "none of its frames can be read"
         if doubt:
             left_out[name] = f"camera {name} was left out: {doubt}"
         else:

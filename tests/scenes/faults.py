@@ -180,6 +180,12 @@ def _dropped(session: Path) -> None:
     file.write_text("\n".join(["frame,time_s", *(f"{k},{time}" for k, time in enumerate(kept))]) + "\n")
 
 
+def _damaged(session: Path) -> None:
+    """Every picture of a camera cut short."""
+    for path in pictures(session, "low"):
+        path.write_bytes(path.read_bytes()[:100])
+
+
 def _rig_board_hidden(session: Path) -> None:
     change_picture(session / "boards" / "rig" / "low.png", lambda grey: np.full_like(grey, 90))
 
@@ -259,6 +265,7 @@ FAULTS: dict[str, Fault] = {
     "cameras exchanged": _exchanged_cameras,
     "camera black": _camera(np.zeros_like),
     "camera white": _camera(lambda grey: np.full_like(grey, 255)),
+    "camera damaged": _damaged,
     "rig board hidden": _rig_board_hidden,
     "PNG of 60000 x 60000": _huge_png,
     "FIFO for a picture": _fifo,

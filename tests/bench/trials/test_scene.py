@@ -34,6 +34,7 @@ def test_a_sound_trial_is_as_recorded(small_session):
         ("camera knocked 6,4 px", "the scene lies +6, +4 px from where the rig picture has it, so it was moved"),
         ("camera mirrored", "its frames are mirrored left to right"),
         ("camera black", "its frames show nothing, they are all of one grey"),
+        ("camera damaged", "none of its frames can be read"),
         ("camera white", "its frames show nothing, they are all of one grey"),
     ],
 )
