@@ -1,6 +1,7 @@
 # make demo       evaluates the small session in fixtures/ into ./demo-out (makes .venv first if need be)
 # make test       the default tests;  make test-slow: the long ones;  make lint: ruff
 # make test-browser: the report in a headless Chromium (apt install chromium)
+# make test-versions: the small session with the oldest and the newest versions that are allowed, and whether they agree
 # PYTHON=python3.12 make demo   takes another Python (3.11 or newer)
 
 PYTHON ?= python3
@@ -11,7 +12,11 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --quiet --no-compile --disab
 # As many workers as there are processors.
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
 
-.PHONY: demo test test-slow test-browser lint clean
+# The newest Python for test-versions; the oldest versions take PYTHON.
+NEWEST_PYTHON ?= $(PYTHON)
+SETS := $(VENV)-lowest $(VENV)-newest
+
+.PHONY: demo test test-slow test-browser test-versions lint clean
 
 demo: $(VENV)/ready
 	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
@@ -27,11 +32,15 @@ test-slow: $(VENV)/ready-for-tests
 test-browser: $(VENV)/ready-for-tests
 	$(BIN)/python -m pytest -q -m browser
 
+test-versions: $(VENV)/ready $(SETS:=/ready)
+	@rm -rf versions-out
+	@$(BIN)/python tests/ladder/versions.py versions-out $(BIN)/python $(SETS:=/bin/python)
+
 lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff check .
 
 clean:
-	rm -rf $(VENV) demo-out
+	rm -rf $(VENV) $(SETS) demo-out versions-out
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -48,4 +57,16 @@ $(VENV)/ready: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ready-for-tests: $(VENV)/ready
 	@echo "Installing what the tests need into $(VENV)."
 	@$(PIP_INSTALL) -e '.[test]'
+	@touch $@
+
+# OpenCV's wheel asks for NumPy 2 and runs with 1.26, so it is installed without what it asks for.
+$(VENV)-lowest/ready: pyproject.toml constraints-lowest.txt
+	@$(PYTHON) -m venv $(VENV)-lowest
+	@$(VENV)-lowest/bin/python -m pip install -qq --no-compile $$(grep -v opencv constraints-lowest.txt)
+	@$(VENV)-lowest/bin/python -m pip install -qq --no-compile --no-deps $$(grep opencv constraints-lowest.txt)
+	@touch $@
+
+$(VENV)-newest/ready: pyproject.toml
+	@$(NEWEST_PYTHON) -m venv $(VENV)-newest
+	@$(VENV)-newest/bin/python -m pip install -qq --no-compile --upgrade --upgrade-strategy eager -e .
 	@touch $@

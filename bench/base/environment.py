@@ -1,16 +1,14 @@
 """Whether results can be trusted in this Python environment: one OpenCV, new enough, and our own packages."""
 
 import importlib
-import importlib.util
 import re
 from importlib import metadata
-from pathlib import Path
 
 from bench.base.errors import BadInput
+from whisker_bench import foreign_package
 
 OPENCV = "opencv-contrib-python-headless"
 OLDEST_OPENCV = (4, 14)  # older ones put ChArUco corners 0.5 px off
-PACKAGES = ("bench", "vision", "estimator")
 
 
 def check_environment() -> None:
@@ -35,15 +33,9 @@ def _version(name: str) -> str:
 
 def _check_packages() -> None:
     """Other distributions have packages of our names too."""
-    home = Path(__file__).resolve().parents[2]
-    for name in PACKAGES:
-        spec = importlib.util.find_spec(name)
-        found = Path(spec.origin).resolve().parent.parent if spec and spec.origin else None
-        if found != home:
-            raise BadInput(
-                f"the package {name!r} comes from {found}, not from whisker-bench in {home}; "
-                "use an environment of its own: python -m venv .venv"
-            )
+    found = foreign_package()
+    if found:
+        raise BadInput(found)
 
 
 def _check_opencv_distributions() -> None:
@@ -57,7 +49,7 @@ def _check_opencv_distributions() -> None:
 def _check_opencv() -> None:
     try:
         cv2 = importlib.import_module("cv2")
-    except ImportError as problem:
+    except Exception as problem:  # of two in one place any error comes
         raise BadInput(f"cv2 cannot be imported ({problem}); {_cure([OPENCV])}") from None
     version = getattr(cv2, "__version__", None)
     if version is None or not hasattr(getattr(cv2, "aruco", None), "CharucoDetector"):

@@ -2,6 +2,9 @@
 
 import os
 import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +18,9 @@ from vision.calibration.cameras_file import read_cameras
 from vision.calibration.cameras_import import import_cameras
 from vision.geometry.errors import Refused
 from vision.pictures.files import picture_size, read_picture
+from whisker_bench import PACKAGES
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def refusal(session) -> str:
@@ -132,13 +138,29 @@ def test_every_verb_tells_of_another_opencv(small_session, verb, monkeypatch, ca
     assert "cv2 is broken; cure: pip install" in capsys.readouterr().err
 
 
-def test_a_cv2_that_cannot_be_imported(monkeypatch):
+@pytest.mark.parametrize(
+    "problem", [ImportError("libGL.so.1: cannot open shared object file"), AttributeError("no attribute 'DictValue'")]
+)
+def test_a_cv2_that_cannot_be_imported(monkeypatch, problem):
+    """The second is what two OpenCVs in one place say."""
+
     def none(name):
-        raise ImportError("libGL.so.1: cannot open shared object file")
+        raise problem
 
     monkeypatch.setattr(environment.importlib, "import_module", none)
-    with pytest.raises(BadInput, match=r"cv2 cannot be imported \(libGL.so.1.*cure: "):
+    with pytest.raises(BadInput, match=rf"cv2 cannot be imported \({problem}.*cure: "):
         environment.check_environment()
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_package_of_our_name_is_told_before_it_is_imported(tmp_path, name):
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "__init__.py").write_text("raise RuntimeError")
+    path = [str(tmp_path), str(ROOT)]
+    start = f"import sys; sys.path[:0] = {path!r}; import whisker_bench; sys.exit(whisker_bench.main())"
+    done = subprocess.run([sys.executable, "-c", start, "info"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith(f"whisker-bench: the package '{name}' comes from {tmp_path}, not from whisker-bench")
 
 
 def test_tables_and_manifests_of_absurd_size(session, monkeypatch):
