@@ -19,16 +19,24 @@ def sigma_name(name: str) -> str:
 
 
 def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> None:
-    """A CSV file, whole; None and NaN are empty cells."""
-    text = io.StringIO()
+    """A CSV file, whole; None and NaN are empty cells. What we say is ASCII there: spreadsheets take a file without a
+    byte-order mark for another encoding, and other readers take the mark for a part of the first column's name."""
+    text, columns = io.StringIO(), list(columns)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    for row in rows:
+        cells = {name: _cell(row.get(name)) for name in columns}
+        writer.writerow(_in_ascii(cell) if name in SAID else cell for name, cell in cells.items())
     write_whole(path, text.getvalue())
 
 
 # Columns that hold text, and whole numbers that are never missing; all others are numbers.
 TEXT = ("trial", "surface", "estimator", "beta_from", "record", "kind", "notes", "status")
+SAID = ("status", "notes")  # sentences of ours
+_ASCII = {
+    **{"°": " deg", "±": "+-", "·": "*", "×": "x", "≥": ">=", "≤": "<=", "²": "2", "−": "-", "–": "-", "…": "..."},
+    **{"→": "->", "α": "alpha", "β": "beta", "θ": "theta", "μ": "mu", "σ": "sigma", "φ": "phi", "χ": "chi", "ψ": "psi"},
+}
 WHOLE = ("whisk", "whisks", "frame", "touching", "cameras", "frames_used")
 WHOLE += ("rests_seen", "jumps_seen", "rests_felt", "jumps_felt")
 
@@ -52,6 +60,10 @@ def read_table(path: Path) -> np.ndarray:
     for name, values in cells.items():
         table[name] = values
     return table
+
+
+def _in_ascii(text: str) -> str:
+    return "".join(_ASCII.get(letter, letter) for letter in text)
 
 
 def _cell(value) -> str:
