@@ -17,7 +17,8 @@ from bench.base.atomic import write_whole
 _TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
 SEEING = (
-    *("vision", "bench/session", "bench/cameras", "bench/trials/seen.py", "bench/trials/placing.py"),
+    *("vision", "bench/session", "bench/cameras", "bench/gauges/felt.py", "bench/trials/seen.py"),
+    *("bench/trials/consistency.py", "bench/trials/placing.py", "bench/trials/scene.py", "bench/trials/seeing.py"),
     *("bench/records", "bench/base/results.py", "bench/base/settings.py"),
 )
 ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")

@@ -1,5 +1,6 @@
 """Hashes: what counts is what a result depends on, and results come back as they went."""
 
+import ast
 import math
 import shutil
 from dataclasses import dataclass
@@ -108,6 +109,27 @@ def test_a_changed_figure_or_estimator_looks_at_no_picture_again(tmp_path):
     hash_of_code.cache_clear()
     after = [hash_of_code(places, tmp_path) for places in (SEEING, ESTIMATING, DRAWING)]
     assert [a == b for a, b in zip(before, after)] == [True, False, False]
+
+
+def _imported(path: Path) -> set[Path]:
+    """Our modules that a module imports."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            names |= {node.module, *(f"{node.module}.{one.name}" for one in node.names)}
+    return {file for name in names if (file := ROOT / f"{name.replace('.', '/')}.py").is_file()}
+
+
+def test_all_code_that_what_is_seen_rests_on_is_in_its_hash():
+    """What vision's records pass through; what results are written by does not change them, nor does an estimator."""
+    reached, new = set(), {ROOT / "bench/trials/seen.py"}
+    while new:
+        reached |= new
+        new = {found for path in new for found in _imported(path)} - reached
+    apart = [ROOT / place for place in ("bench/base", "estimator")]
+    covered = [ROOT / place for place in SEEING]
+    missing = [path for path in reached if not any(path.is_relative_to(place) for place in (*covered, *apart))]
+    assert len(reached) > 50 and missing == []
 
 
 def test_a_place_without_sources_is_told(tmp_path):
