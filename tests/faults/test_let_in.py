@@ -115,6 +115,13 @@ def test_results_are_not_written_into_the_session(session, inside, capsys):
     assert sorted(session.rglob("*")) == before
 
 
+def test_a_place_that_cannot_be_written_is_a_line(session, tmp_path, capsys):
+    (tmp_path / "file").write_text("x")
+    assert cli.main(["evaluate", str(session), "--out", str(tmp_path / "file" / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("whisker-bench: ") and str(tmp_path / "file") in said and said.count("\n") == 1
+
+
 def test_no_forward_stroke_in_any_trial(session, tmp_path, capsys):
     for trial in list((session / "trials").iterdir()):
         if trial.name != TRIAL:
