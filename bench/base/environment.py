@@ -5,7 +5,7 @@ import re
 from importlib import metadata
 
 from bench.base.errors import BadInput
-from whisker_bench import foreign_package
+from bench.base.packages import foreign_package
 
 OPENCV = "opencv-contrib-python-headless"
 OLDEST_OPENCV = (4, 14)  # older ones put ChArUco corners 0.5 px off

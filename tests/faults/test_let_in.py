@@ -12,13 +12,13 @@ import pytest
 from bench import cli
 from bench.base import environment
 from bench.base.errors import BadInput
+from bench.base.packages import PACKAGES
 from bench.session.check import checked_session
 from tests.scenes.faults import FAULTS, TRIAL
 from vision.calibration.cameras_file import read_cameras
 from vision.calibration.cameras_import import import_cameras
 from vision.geometry.errors import Refused
 from vision.pictures.files import picture_size, read_picture
-from whisker_bench import PACKAGES
 
 ROOT = Path(__file__).resolve().parents[2]
 
