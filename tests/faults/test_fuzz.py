@@ -12,10 +12,10 @@ SCRIPT = ROOT / "tests" / "faults" / "fuzz.py"
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="each mutation runs in a forked process")
 
 
-def fuzzed(first: int, count: int) -> subprocess.CompletedProcess:
+def fuzzed(first: int, count: int, verb: str = "check") -> subprocess.CompletedProcess:
     """In a process of its own: forks of one with many threads may hang."""
     one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1") | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, str(SCRIPT), str(first), str(count)]
+    command = [sys.executable, str(SCRIPT), str(first), str(count), verb]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ | one)
 
 
@@ -28,4 +28,10 @@ def test_a_few_mutations():
 @pytest.mark.slow
 def test_many_mutations():
     done = fuzzed(1000, 20000)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_mutations_that_are_evaluated():
+    done = fuzzed(200000, 500, "evaluate")
     assert done.returncode == 0, done.stdout + done.stderr
