@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 
 from bench.base.atomic import lock_output, whole_file
@@ -64,6 +65,7 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
     protocol = load(str(path))
     if not protocol.cameras:
         raise BadInput("has no [[cameras]]: there is nothing to see by", file=path)
+    _check_can_be_built(protocol, path)
     staged = dict(_staged(protocol))
     if not staged:
         raise BadInput("the whisker slips off its bar in every trial; push less far (motor.after_deg)", file=path)
@@ -85,6 +87,15 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
         _draw_rig(out, protocol, painter, cameras, staged)
     return Plan(f"{protocol.name}: {len(runs)} trials planned", tuple(_described(cameras, list(staged.values()))),
                 tuple(rows), options.theta_deg, tuple(_assumed(work)), tried)
+
+
+def _check_can_be_built(protocol: Protocol, path: Path) -> None:
+    """Whisker, board, and the cameras that have a place, say themselves what is wrong with them."""
+    placed = [camera for camera in protocol.cameras if camera.position_mm is not None]
+    try:
+        build.rod(protocol), build.scene(protocol), build.cameras(msgspec.structs.replace(protocol, cameras=placed))
+    except (ValueError, cv2.error) as problem:
+        raise BadInput(" ".join(str(problem).split()), file=path) from None
 
 
 def _staged(protocol: Protocol) -> Iterator[tuple[str, Staged]]:
