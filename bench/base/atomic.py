@@ -40,7 +40,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
     except BaseException as problem:
         temporary.unlink(missing_ok=True)
-        if isinstance(problem, OSError):  # a full disk names no file
+        if isinstance(problem, OSError) and problem.filename in (None, name):  # a full disk names no file
             problem.filename, problem.filename2 = str(path), None
         raise
 

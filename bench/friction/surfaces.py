@@ -165,7 +165,8 @@ def _fit(felt: list[Felt], beam: Beam) -> FrictionFit | None:
     recording = np.array([f.recording for f in felt])
     if len(set(recording[np.abs(beta) > fit.alpha_rad])) < _MANY:
         return _wider(fit, _by_slopes(pushes, felt, recording))
-    return _wider(fit_alpha(replace(pushes, recording=recording)), _shared(pushes, felt))
+    own = fit_alpha(replace(pushes, recording=recording))
+    return _wider(own, _shared(pushes, felt)) if np.isfinite(own.alpha_rad) else None
 
 
 def _wider(fit: FrictionFit, others: np.ndarray) -> FrictionFit:
