@@ -17,9 +17,9 @@ from scipy.special import ndtr
 
 from vision.lines.bands import Pieces
 from vision.lines.binned import sums
+from vision.pictures.view import SATURATED
 
 FULL_SCALE = 255.0
-SATURATED = 250.0  # grey: what the sensor cut off is not known
 _BIN_PX = 0.35  # a third of a lens blur
 _RIM_PX = 8.0  # of a thick bar so much inside either edge is looked at
 _OUTSIDE_PX = 6.0  # beyond either edge, wherever it is looked for: a shadow's border is seldom as near
@@ -112,7 +112,7 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> list[
     half = radius + reach_px + _OUTSIDE_PX
     bins = np.floor((stretched + half) / _BIN_PX).astype(int)
     size = int(np.ceil(2.0 * half / _BIN_PX))
-    seen = (bins >= 0) & (bins < size) & (pieces.grey < SATURATED)
+    seen = (bins >= 0) & (bins < size) & (pieces.grey < SATURATED * FULL_SCALE)
     seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
     light, slope = _light(pieces.grey, gamma)
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)

@@ -12,13 +12,13 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.bar.evidence import FULL_SCALE, SATURATED, Evidence, Profile, evidence, profiles
+from vision.bar.evidence import FULL_SCALE, Evidence, Profile, evidence, profiles
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces
 from vision.lines.points import LinePoints
-from vision.pictures.view import View
+from vision.pictures.view import SATURATED, View
 
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 # Lines are looked for as far off, at least, then once more close by if they are known so well.
@@ -128,7 +128,7 @@ def _mixed(posteriors: Sequence[_Posterior], chances) -> tuple[np.ndarray, np.nd
 
 def _shows(pieces: Pieces) -> bool:
     """Whether more than a half of the pixels are there, and not saturated."""
-    return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED)) > _LEAST_SHOWN)
+    return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED * FULL_SCALE)) > _LEAST_SHOWN)
 
 
 def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:

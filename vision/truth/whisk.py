@@ -25,7 +25,7 @@ from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
+from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, unsaturated, wire_pieces
 from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
@@ -238,6 +238,7 @@ def _trace_bar(views, rods: Rods, axis: BarAxis, wires, settings: VisionSettings
 def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curves, light: dict,
                 settings: VisionSettings, *, last: bool = True) -> list[Observed]:
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    pieces = unsaturated(pieces, view.full_scale)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, _BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
     if len(pieces) == 0:
