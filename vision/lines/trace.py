@@ -11,7 +11,7 @@ from vision.geometry.rods import Wire
 from vision.geometry.silhouette import outline
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.binned import binned, without
-from vision.lines.joint import BLUR_SIGMA, Task, solve
+from vision.lines.joint import BLUR_SIGMA, Task, settled, solve
 from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
 from vision.pictures.view import SATURATED, View
@@ -21,7 +21,6 @@ WIRE_WAVES = 11  # round a wire: with fewer, what they lack of a highlight passe
 # A lens blur to begin with. Narrow: one too wide can be the best nearby, for light that darkens at the rims mends it.
 _BLUR_PX = 0.8
 _BIN_PX = 0.3
-_LAST_STEPS = 0
 _NODES = 81  # of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
@@ -84,9 +83,7 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
     solved = solve(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma))
     blur_px = without(solved.blur_px, blurred)
     if last:
-        task = Task(pieces, terms, knots, blur_px, blur_sigma)
-        solved = solve(task, solved.shift_px, solved.robust, damped=0.0, most=_LAST_STEPS)
-        blur_px = solved.blur_px
+        solved = settled(Task(pieces, terms, knots, blur_px, blur_sigma), replace(solved, blur_px=blur_px))
     found = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px,
                     solved.widened_px2)
     return Traced(pieces.moved(solved.shift_px), found, blur_px)

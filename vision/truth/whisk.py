@@ -245,7 +245,7 @@ def _trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor, curve
         return []
     knots = Knots.of_turning(np.arange(NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
     name, known = view.camera.name, light.get(view.camera.name)
-    traced = trace(pieces, knots, known.blur_px, last=last) if known else trace(pieces, knots, last=last)
+    traced = trace(pieces, knots, last=last)
     looks = known or WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px))
     light[name] = replace(looks, misfit=float(np.sqrt(traced.misfit)))
     points, source = to_points(traced)
