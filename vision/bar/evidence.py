@@ -20,9 +20,9 @@ from scipy.ndimage import uniform_filter1d
 from scipy.special import ndtr
 
 from vision.lines.bands import Pieces
+from vision.pictures.view import SATURATED
 
 FULL_SCALE = 255.0
-SATURATED = 250.0  # grey: what the sensor cut off is not known
 STEP_PX = 0.25  # of the grid: a third of a lens blur
 _RIM_PX = 8.0  # of a thick bar so much inside either edge is looked at
 _OUTSIDE_PX = 6.0  # beyond either edge, wherever it is looked for: a shadow's border is seldom as near
@@ -158,7 +158,7 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profi
     stretched = pieces.offset_px * (radius / pieces.radius_px)[:, None]
     half = int(np.ceil((radius + reach_px + _OUTSIDE_PX) / STEP_PX))
     place = stretched / STEP_PX + half
-    seen = (place >= 0) & (place < 2 * half) & (pieces.grey < SATURATED)
+    seen = (place >= 0) & (place < 2 * half) & (pieces.grey < SATURATED * FULL_SCALE)
     seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
     light, slope = _light(pieces.grey, gamma)
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)

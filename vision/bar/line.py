@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bar.evidence import FULL_SCALE, SATURATED
+from vision.bar.evidence import FULL_SCALE
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.bar.posterior import Posterior, closer_look, first_look, most_probable, roughly
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces
 from vision.lines.points import LinePoints
-from vision.pictures.view import View
+from vision.pictures.view import SATURATED, View
 
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 _WIDE_PX = 2.0  # an axis that rough lines settled is less far off
@@ -139,7 +139,7 @@ def _bar_line(pieces: Pieces, looks: Mapping[float, Posterior], chances) -> BarL
 
 def _shows(pieces: Pieces) -> bool:
     """Whether more than a half of the pixels are there, and not saturated."""
-    return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED)) > _LEAST_SHOWN)
+    return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED * FULL_SCALE)) > _LEAST_SHOWN)
 
 
 def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:

@@ -5,17 +5,27 @@ along the valley between them, and end where they began. Here they are one dampe
 matrix has the form of an arrow: a position for each piece, and one block of what they share, some hundred unknowns, to
 which it is reduced (Schur's complement). The shading is linear, so that at each step it is the most probable one at
 these positions and this blur (variable projection: Golub and Pereyra 1973, in Kaufman's form).
+
+What all share has two snares. A shift of all pieces to one side, under another blur and shading, can be a minimum of
+its own: several starts are weighed by their evidence. And no model of light is right to a hundredth of the contrast,
+by the same in all pieces: what is shared is found with pixels weighed by no more than that leaves them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
-from vision.lines.shading import LEAST_POWER, Equations, Knots, stiffness, wave_prior
+from vision.lines.shading import LEAST_POWER, Equations, Knots, contrast_of, stiffness, wave_prior
 
-BLUR_SIGMA = 0.5  # of the logarithm of the blur: pixels say much more, where they say anything
+BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
+# Of the contrast: by so much the model of the light may be off at a distance from the axis, in all pieces alike (a blur
+# is no Gauss curve, a transfer curve no straight line). With a third or three times of it, common offsets of lines are
+# as far off and z is larger (tests/ladder/wire_scenes.py).
+_MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
+_SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
+_STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
 _MOST_STEPS, _LONGEST_PX, _LONGEST_LOG = 40, 0.7, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
@@ -29,7 +39,7 @@ _SETTLED, _SETTLED_EACH = 0.02, 1e-3
 class Solved:
     """Of each piece: shift_px, own_sigma_px by its own noise, chi2 per pixel, contrast, all (s,); shared_px (s, k): by
     how much it moves with one sigma of each of k independent causes that all share; robust (s,): its weight;
-    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma."""
+    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma; waves (s, terms): its shading."""
 
     shift_px: np.ndarray
     own_sigma_px: np.ndarray
@@ -39,6 +49,8 @@ class Solved:
     blur_px: float
     robust: np.ndarray
     widened_px2: np.ndarray
+    waves: np.ndarray
+    doubt: float
 
 
 @dataclass(frozen=True)
@@ -52,20 +64,71 @@ class Task:
     blur_sigma: float = BLUR_SIGMA
 
 
-def solve_jointly(task: Task, shift_px: np.ndarray | None = None, robust: np.ndarray | None = None,
-                  damped: float = _DAMPED, most: int = _MOST_STEPS) -> Solved:
-    """The most probable positions, shading and blur; begins with these shifts (s,) and weights (s,) of the pieces.
+    def of(self, some: slice) -> "Task":
+        """The same of some of the pieces."""
+        return replace(self, pieces=self.pieces.select(some))
+
+    def tempered(self) -> "Task":
+        """The same with pixels as many of which, at one distance from the axis, tell no more than the model is good."""
+        pieces = self.pieces
+        share = _MODEL_SHARE * contrast_of(pieces)
+        bins = np.floor(pieces.offset_px / _ALIKE_PX).astype(int)
+        bins -= bins.min(initial=0)
+        total = np.bincount(bins.ravel(), np.ravel(pieces.weight**2))
+        return replace(self, pieces=replace(pieces, weight=pieces.weight / np.sqrt(1.0 + total[bins] * share**2)))
+
+
+def solve_jointly(task: Task) -> Solved:
+    """The most probable positions, shading and blur of pieces that lie where they are expected, or all to one side."""
+    shift_px, log_blur, spread_px = _start(task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)))
+    shared = _descend(_begin(task.tempered(), shift_px, log_blur).weighted())
+    columns = np.concatenate([shared.shared_px, np.full((len(task.pieces), 1), spread_px)], axis=1)
+    return settled(task, replace(shared, shared_px=columns))
+
+
+def settled(task: Task, shared: Solved) -> Solved:
+    """Each piece's own position by all that its pixels tell, with what all share known: their mean stays."""
+    here = Equations(task.pieces.moved(shared.shift_px), shared.blur_px, task.terms)
+    slopes, chi2 = here.linearised(shared.waves), here.chi2(shared.waves) / task.pieces.freedom
+    power = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER)
+    step = np.clip(slopes.gram[:, 0, 2] / power, -_LONGEST_PX, _LONGEST_PX)
+    share = power / np.maximum(chi2 / max(float(np.median(chi2)), 1e-9), 1.0) ** 2
+    return replace(shared, shift_px=shared.shift_px + step - np.average(step, weights=share), chi2=chi2,
+                   own_sigma_px=np.sqrt(np.maximum(chi2, 1.0) / power), contrast=slopes.contrast,
+                   widened_px2=_widened(slopes.gram, power, shared.blur_px, np.maximum(chi2, 1.0)))
+
+
+def _start(task: Task) -> tuple[float, float, float]:
+    """Common shift and logarithm of the blur to begin with, and RMS distance, px, of others that are as probable."""
+    task = task.tempered()
+    blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
+    begins = sorted((_begin(task, shift, blur) for shift in _SHIFTS_PX for blur in blurs), key=lambda one: one.doubt)
+    robust, chosen = begins[0].weighted().robust, []
+    for one in begins:
+        if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
+            chosen.append(one)
+    ends = [_descend(_Point.at(task, one.shift_px, one.log_blur, robust)) for one in chosen[:_MOST_STARTS]]
+    best = min(ends, key=lambda one: one.doubt)
+    chance = np.exp(-0.5 * np.array([one.doubt - best.doubt for one in ends]))
+    apart = np.array([np.median(one.shift_px - best.shift_px) for one in ends])
+    spread = float(np.sqrt(np.average(apart**2, weights=chance)))
+    return float(np.median(best.shift_px)), float(np.log(best.blur_px)), spread
+
+
+def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
+    return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
+
+
+def _descend(here: "_Point") -> Solved:
+    """Downhill from a point, the pieces weighed as there: weighed anew at each step, those that a shift spoils would
+    count ever less.
 
     The last step is taken without looking again: what is told of the pieces is as it was before it.
     """
-    count = len(task.pieces)
-    here = _Point.at(task, np.zeros(count) if shift_px is None else shift_px, np.log(task.blur_px),
-                     np.ones(count) if robust is None else robust)
-    here = here.weighted()
-    arrow = _Arrow(task, here)
-    for _ in range(most):
+    arrow, damped = _Arrow(here), _DAMPED
+    for _ in range(_MOST_STEPS):
         step, by_blur, gain = arrow.step(damped)
-        if gain[0] < _SETTLED and gain[1] < _SETTLED_EACH * count:
+        if gain[0] < _SETTLED and gain[1] < _SETTLED_EACH * len(here.shift_px):
             break
         there = here.moved(step, by_blur)
         if there.misfit > here.misfit:
@@ -74,8 +137,8 @@ def solve_jointly(task: Task, shift_px: np.ndarray | None = None, robust: np.nda
                 break
             continue
         damped = damped / _EASIER if damped > _UNDAMPED * _DAMPED else 0.0
-        here = there.weighted()
-        arrow = _Arrow(task, here)
+        here = there
+        arrow = _Arrow(here)
     return arrow.solved(damped)
 
 
@@ -112,6 +175,11 @@ class _Point:
         misfit = float(robust @ chi2 + shared @ stiff @ shared + off**2)
         return cls(task, shift_px, log_blur, robust, stiff, equations, left, waves, chi2, misfit)
 
+    @property
+    def doubt(self) -> float:
+        """Minus twice the log evidence of positions and blur, the shading integrated out."""
+        return float(self.misfit + np.linalg.slogdet(self.left)[1] - np.linalg.slogdet(self.stiff)[1])
+
     def moved(self, step_px, by_blur: float) -> "_Point":
         """The point a step farther on, weighed as here."""
         shift = self.shift_px + np.clip(step_px, -_LONGEST_PX, _LONGEST_PX)
@@ -119,7 +187,7 @@ class _Point:
                        self.log_blur + float(np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG)), self.robust, self.stiff)
 
     def weighted(self) -> "_Point":
-        """The same point, pieces weighed by what they leave, and light by the contrast that is seen here.
+        """The same point, pieces weighed by what they leave.
 
         What all leave beyond noise is an error of the model: beside it the priors count as much as beside noise.
         """
@@ -133,7 +201,8 @@ class _Arrow:
     """The normal equations at a point: power, right (s,) of each piece's position, cross (s, size + 1) of these with
     what is shared, its own matrix (size + 1, size + 1), and by_blur: the right side of its last row; others are 0."""
 
-    def __init__(self, task: Task, point: _Point):
+    def __init__(self, point: _Point):
+        task = point.task
         self.point, self.slopes = point, point.equations.linearised(point.waves)
         hats, slopes, size = task.knots.weights(task.pieces), self.slopes, len(point.left)
         self.power, self.right = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER), slopes.gram[:, 0, 2]
@@ -169,15 +238,15 @@ class _Arrow:
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
         chi2 = point.chi2 / point.task.pieces.freedom
         shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T
+        blur_px = float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG)))
         return Solved(point.shift_px + np.clip(step, -_LONGEST_PX, _LONGEST_PX),
-                      np.sqrt(np.maximum(chi2, 1.0) / self.power), chi2, self.slopes.contrast, shared,
-                      float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG))), point.robust,
-                      self._widened(np.maximum(chi2, 1.0)))
+                      np.sqrt(np.maximum(chi2, 1.0) / self.power), chi2, self.slopes.contrast, shared, blur_px,
+                      point.robust, _widened(self.slopes.gram, self.power, blur_px, np.maximum(chi2, 1.0)), point.waves,
+                      point.doubt)
 
-    def _widened(self, chi2) -> np.ndarray:
-        """By how much each piece's own blur² is above that of all, and sigma, (s, 2), its position free as well."""
-        gram = self.slopes.gram
-        power = gram[:, 1, 1] - gram[:, 0, 1] ** 2 / self.power + LEAST_POWER
-        by_log = 2.0 * np.exp(2.0 * self.point.log_blur)
-        step = (gram[:, 1, 2] - gram[:, 0, 1] * gram[:, 0, 2] / self.power) / power
-        return by_log * np.stack([step, np.sqrt(chi2 / power)], axis=1)
+
+def _widened(gram, power, blur_px: float, chi2) -> np.ndarray:
+    """By how much each piece's own blur² is above that of all, and sigma, (s, 2), its position free as well."""
+    own = gram[:, 1, 1] - gram[:, 0, 1] ** 2 / power + LEAST_POWER
+    step = (gram[:, 1, 2] - gram[:, 0, 1] * gram[:, 0, 2] / power) / own
+    return 2.0 * blur_px**2 * np.stack([step, np.sqrt(chi2 / own)], axis=1)

@@ -210,11 +210,16 @@ def _between(turns: int, places: int) -> np.ndarray:
             + np.kron(turned, np.eye(places)) / _TURNED_SHARE**2)
 
 
-def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
-    """Sigma (terms,) of the shading's coefficients in grey levels, from the rod's contrast in these pieces."""
+def contrast_of(pieces: Pieces) -> float:
+    """By how much the rod differs from its background in these pieces, RMS, grey levels; one at least."""
     inside = (np.abs(pieces.offset_px) < pieces.radius_px[:, None]) & (pieces.weight > 0)
     contrast = np.sqrt(np.mean((pieces.grey - pieces.background)[inside] ** 2)) if np.any(inside) else 1.0
-    return max(float(contrast), 1.0) * _WAVE_SHARE[:terms]
+    return max(float(contrast), 1.0)
+
+
+def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
+    """Sigma (terms,) of the shading's coefficients in grey levels, from the rod's contrast in these pieces."""
+    return contrast_of(pieces) * _WAVE_SHARE[:terms]
 
 
 @dataclass(frozen=True)

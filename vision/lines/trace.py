@@ -11,17 +11,16 @@ from vision.geometry.rods import Wire
 from vision.geometry.silhouette import outline
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.binned import binned, without
-from vision.lines.joint import BLUR_SIGMA, Task, solve_jointly
+from vision.lines.joint import BLUR_SIGMA, Task, settled, solve_jointly
 from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
-from vision.pictures.view import View
+from vision.pictures.view import SATURATED, View
 
 NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 WIRE_WAVES = 11  # round a wire: with fewer, what they lack of a highlight passes for blur and for position
 # A lens blur to begin with. Narrow: one too wide can be the best nearby, for light that darkens at the rims mends it.
 _BLUR_PX = 0.8
 _BIN_PX = 0.3
-_LAST_STEPS = 0
 _NODES = 81  # of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
@@ -37,6 +36,11 @@ def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px:
              for frame, (arc, middle, radius) in zip(curves, outlines)]
     pieces = cut_pieces(bands, length_px, view.noise)
     return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
+
+
+def unsaturated(pieces: Pieces, full_scale: float) -> Pieces:
+    """The pieces without the pixels that the sensor cut off: of these only an edge of what is saturated is known."""
+    return replace(pieces, weight=np.where(pieces.grey < SATURATED * full_scale, pieces.weight, 0.0))
 
 
 def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -79,11 +83,9 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
     solved = solve_jointly(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma))
     blur_px = without(solved.blur_px, blurred)
     if last:
-        task = Task(pieces, terms, knots, blur_px, blur_sigma)
-        solved = solve_jointly(task, solved.shift_px, solved.robust, damped=0.0, most=_LAST_STEPS)
-        blur_px = solved.blur_px
+        solved = settled(Task(pieces, terms, knots, blur_px, blur_sigma), replace(solved, blur_px=blur_px))
     located = Located(np.zeros(len(pieces)), solved.own_sigma_px, solved.chi2, solved.contrast, solved.shared_px,
-                    solved.widened_px2)
+                      solved.widened_px2)
     return Traced(pieces.moved(solved.shift_px), located, blur_px)
 
 

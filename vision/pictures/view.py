@@ -10,6 +10,7 @@ from vision.geometry.camera import Camera
 from vision.pictures.pixel_noise import Noise
 
 _SCALE_OF = 3  # frames: what is saturated is so in all of them
+SATURATED = 250.0 / 255.0  # of full scale: what the sensor cut off is not known
 MEAN_OF = 40  # frames: more would not make a still thing clearer
 
 

@@ -25,7 +25,7 @@ from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import LinePoints, Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
+from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, unsaturated, wire_pieces
 from vision.pictures.view import View
 
 _WIRE_KNOT_MM = 12.0
@@ -243,14 +243,14 @@ def trace_wire(number: int, view: View, rods: Rods, axis: BarAxis, motor: Mappin
                last: bool = True) -> list[Observed]:
     """Line points of the wire in one camera, by frame. light: see `fit_whisk`."""
     pieces = wire_pieces(view, curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    pieces = unsaturated(pieces, view.full_scale)
     outline = outline_of_bar(view.camera, axis, rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
     if len(pieces) == 0:
         return []
     knots = Knots.of_turning(np.arange(NEAR_CLAMP_MM, rods.wire.length_mm, _WIRE_KNOT_MM), motor)
-    name, known = view.camera.name, light.get(view.camera.name)
-    traced = trace(pieces, knots, known.blur_px, last=last) if known else trace(pieces, knots, last=last)
-    looks = known or WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px))
-    light[name] = replace(looks, misfit=float(np.sqrt(traced.misfit)))
+    traced = trace(pieces, knots, last=last)
+    light[view.camera.name] = WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px),
+                                             float(np.sqrt(traced.misfit)))
     points, source = to_points(traced)
     return observed(points, source, number, list(curves))
