@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.bar.axis import settle_axis
 from vision.bar.find import Clear, clear_edges, find_bars
-from vision.bar.line import FAR_PX, NEAR_PX, BarLine, find_lines
+from vision.bar.line import FAR_PX, NEAR_PX, BarLine, find_lines, measure_bars
 from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -68,10 +68,13 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
         return SeenBar(_alone(views[0], clear[0], rods, motor_rad, settings), {})
     wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
 
+    def by_lines(axis: BarAxis, lines: Mapping[str, BarLine]) -> BarAxis:
+        bars = {name: line.points for name, line in lines.items() if line.is_bar}
+        return settle_axis(axis, cameras, bars, rods.bar.radius_mm)
+
     def settled(axis: BarAxis, off_px: float) -> SeenBar:
         lines = find_lines(views, axis, rods.bar.radius_mm, wires, settings, off_px)
-        bars = {name: line.points for name, line in lines.items() if line.is_bar}
-        return SeenBar(settle_axis(axis, cameras, bars, rods.bar.radius_mm), lines)
+        return SeenBar(by_lines(axis, lines), lines)
 
     likely = _likeliest((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), settled)
     farther = settled(likely.axis, FAR_PX)  # a bar whose rims are dark, found by its highlight
@@ -88,7 +91,9 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
     if len(found) > 1 and seen_from_one_side(cameras, found[1].axis):
         found = found[1:]
     clearer = max(found, key=lambda one: one.clearness)
-    return clearer if clearer.clearness > found[0].clearness + _CLEARER else found[0]
+    chosen = clearer if clearer.clearness > found[0].clearness + _CLEARER else found[0]
+    lines = measure_bars(views, chosen.axis, rods.bar.radius_mm, wires, settings)  # a quick look turns the one sight
+    return replace(chosen, axis=by_lines(chosen.axis, lines))
 
 
 def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis, float], SeenBar]) -> SeenBar:
