@@ -71,9 +71,8 @@ def pushed(push_deg: float) -> Protocol:
 
 
 def touching_frames(count: float) -> Protocol:
-    """So many frames that touch, and the last of them by 3°."""
-    step = 3.0 / count
-    return protocol(pictures=PicturesTable(before_deg=1.55, after_deg=3.0, step_deg=min(step, 0.5)))
+    """So many frames that touch, half a degree apart, after four that do not."""
+    return protocol(pictures=PicturesTable(before_deg=1.55, after_deg=0.5 * count, step_deg=0.5))
 
 
 def cone(d_x_mm: float) -> Protocol:
@@ -112,15 +111,15 @@ POINTS: Mapping[str, tuple[Callable[[float], Protocol], Sequence[float]]] = {
     "one_plane_deg": (above_each_other, (-150, -120, -90, -60)),
 }
 PAINTED: Mapping[str, tuple[Callable[[float], Protocol], Sequence[float]]] = {
-    "wire_px": (thick, (1.0, 1.5, 2.5, 5.0, 10.0, 15.0)),
+    "wire_px": (thick, (1.0, 1.5, 2.5, 5.0, 10.0)),
     "snr": (noisy, (3, 5, 10, 30, 100)),
     "blur_px": (lambda blur: protocol(pictures=PicturesTable(step_deg=0.7, blur_px=blur)), (0.3, 0.9, 2, 4)),
     "bits": (lambda bits: protocol(pictures=PicturesTable(step_deg=0.7, bits=int(bits))), (8, 12)),
     "roll_deg": (lambda roll: protocol(cameras=cameras(roll_deg=roll)), (0, 45, 90)),
     "touching": (touching_frames, (1, 2, 3)),
     "push_painted_deg": (pushed, (0.2, 0.5, 20)),
-    "beta_painted_deg": (lambda beta: protocol(beta_deg=beta), (-80, -70, 70, 80, 85)),
-    "d_x_painted_mm": (lambda d_x: protocol(d_x_mm=d_x), (5, 10, 20, 95)),
+    "beta_painted_deg": (lambda beta: protocol(beta_deg=beta), (-80, 70, 80, 85)),
+    "d_x_painted_mm": (lambda d_x: protocol(d_x_mm=d_x), (5, 10, 95)),
 }
 
 

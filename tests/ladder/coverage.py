@@ -127,8 +127,9 @@ def row_of(scene: Scene, seen: Seen) -> dict:
     error = {name: seen.value[name] - getattr(truth, name) for name in ("touch", "d_x", "beta", "slip")}
     touching = np.isfinite(error["slip"]) & (scene.motor_rad > truth.touch + math.radians(0.2))
     at = int(np.argmin(np.where(touching, np.abs(scene.motor_rad - truth.touch - SLIP_AT_RAD), np.inf)))
-    row |= {"slip_rms_mm": float(np.sqrt(np.mean(error["slip"][touching] ** 2))),
-            "slip_worst_z": float(np.max(np.abs(error["slip"] / seen.sigma["slip"])[touching]))}
+    if np.any(touching):  # or it was pushed by less
+        row |= {"slip_rms_mm": float(np.sqrt(np.mean(error["slip"][touching] ** 2))),
+                "slip_worst_z": float(np.max(np.abs(error["slip"] / seen.sigma["slip"])[touching]))}
     for column, unit in QUANTITIES.items():
         name = column.rpartition("_")[0]
         pair = (values[name][at] if name == "slip" else values[name] for values in (error, seen.sigma))
