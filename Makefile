@@ -25,7 +25,7 @@ demo: $(VENV)/ready
 	echo; echo "Open $(CURDIR)/demo-out/report.html; figures and tables are beside it."
 
 test: $(VENV)/ready-for-tests
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
 
 test-slow: $(VENV)/ready-for-tests
 	$(BIN)/python -m pytest -q -m slow

@@ -41,7 +41,7 @@ def check_keys(out) -> None:
     """docs/formats.md has every key of the JSON files and of cameras.npz, and no other."""
     for heading, files in (("trials/<trial>.json", "trials/b*.json"), ("calibration/cameras.json",) * 2):
         found = {key for file in out.glob(files) for key in keys(json.loads(file.read_text()))}
-        plain = {re.sub(r"\.(cameras|bar_looks)\.(high|low)\b", r".\1.<camera>", key) for key in found}
+        plain = {re.sub(r"\.(cameras|bar_looks|lines)\.(high|low)\b", r".\1.<camera>", key) for key in found}
         plain = {re.sub(r"\.refinements\.[^.]+", ".refinements.<refinement>", key) for key in plain}
         assert plain == set(documented(heading))
     with np.load(out / "calibration" / "cameras.npz") as arrays:

@@ -2,17 +2,17 @@
 
 from tests.ladder.thresholds import SESSION, _look, compared, put, seen_values
 from tests.scenes.recorded import exact_cameras
-from vision.fit import beam_check, problem
+from vision.fit import problem, reshaped
 
 
 def test_a_number_is_set_wherever_it_was_taken_by_name():
     usual = problem.CONTACT_SIGMA_MM
     put(problem, "CONTACT_SIGMA_MM", 2 * usual)
     try:
-        assert beam_check.CONTACT_SIGMA_MM == problem.CONTACT_SIGMA_MM == 2 * usual
+        assert reshaped.CONTACT_SIGMA_MM == problem.CONTACT_SIGMA_MM == 2 * usual
     finally:
         put(problem, "CONTACT_SIGMA_MM", usual)
-    assert usual == beam_check.CONTACT_SIGMA_MM
+    assert usual == reshaped.CONTACT_SIGMA_MM
 
 
 def test_moves_sigmas_and_lost_truths_are_told():
