@@ -17,7 +17,7 @@ from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.truth.records import WhiskTruth
 from vision.truth.rows import to_whisk
-from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early, near_touch
+from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _USUAL = VisionSettings()
@@ -56,7 +56,7 @@ def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], h
 
 def near_frames(staged: Staged) -> list[int]:
     """The frames that make the truth."""
-    return near_touch(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad)))
+    return TouchByClearance().near(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad)))
 
 
 def _faces(camera, staged: Staged) -> bool:

@@ -19,7 +19,7 @@ from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
-from vision.lines.points import LinePoints, Observed
+from vision.lines.points import LinePoints
 from vision.pictures.view import View
 from vision.truth.whisk_pictures import WhiskPictures
 
@@ -67,8 +67,14 @@ class TouchByClearance:
     fewest_cameras: int = 1
 
     def near(self, motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> list[int]:
-        """The frames to fit, by coarse bends (2,) in all of them."""
-        return near_touch(motor, bend)
+        """The frames to fit, by coarse bends (2,) in all: from a little before the first that surely touches."""
+        angles = np.array(list(motor.values()))
+        touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
+        if not np.any(touching):
+            return list(motor)
+        first = int(np.argmax(touching))
+        begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
+        return list(motor)[begin:]
 
     def first(self, motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which frames touch, and which are free, (f,) bool each, by coarse bends (f, 2). Raises Refused."""
@@ -76,11 +82,6 @@ class TouchByClearance:
         if not np.any(touching):
             raise Refused(NEVER_TOUCHES)
         return touching, free
-
-    def require(self, seen: Sequence[Observed]) -> None:
-        """Raises Refused where what is seen cannot tell touch so."""
-        if len({one.camera for one in seen if one.frame >= 0}) < self.fewest_cameras:
-            raise Refused("a single camera sees wire and bar")
 
     def settled(self, problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
         """Problem and state with what the fit tells of touch, from its covariance (size, size)."""
@@ -101,6 +102,8 @@ class TouchByOnset:
     """Touch is when the whisker begins to bend: of its first frames alone it is known that they are free, as a bend
     along the sight is not seen at first. Methods as those of `TouchByClearance`."""
 
+    fewest_cameras: int = 1
+
     def near(self, motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> list[int]:
         """All frames: what the coarse bend says of touch is not known."""
         return list(motor)
@@ -109,9 +112,6 @@ class TouchByOnset:
         """Those that the coarse bends (f, 2) show to touch, beyond the first part of the stroke."""
         free = early(motor_rad)
         return frames_that_touch(motor_rad, bend_rad)[0] & ~free, free
-
-    def require(self, seen: Sequence[Observed]) -> None:
-        """One camera is enough."""
 
     def settled(self, problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
         """The fit with the onset of bending in place of the frames that were taken to touch."""
@@ -146,14 +146,3 @@ def early(motor_rad: np.ndarray) -> np.ndarray:
     """The frames (f,) bool of the first part of the stroke, two at least, that are taken as free for a first look."""
     within = motor_rad <= motor_rad[0] + (motor_rad[-1] - motor_rad[0]) / _EARLY_PARTS
     return np.arange(len(motor_rad)) < max(FEWEST_FREE, np.sum(within))
-
-
-def near_touch(motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> list[int]:
-    """The frames from a little before the first that surely touches, by coarse bends (2,) in all."""
-    angles = np.array(list(motor.values()))
-    touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
-    if not np.any(touching):
-        return list(motor)
-    first = int(np.argmax(touching))
-    begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
-    return list(motor)[begin:]

@@ -61,7 +61,8 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles, touch: Touch) -> FittedWhi
     whisk, look = _first_look(whisk, touch)
     for _ in range(whisk.settings.rounds):
         seen = _trace_all(whisk, bar, look, last=False)
-        touch.require(seen)
+        if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
+            raise Refused("a single camera sees wire and bar")
         problem, state, answer = _fit(whisk, look, seen, touch)
         _check_scatter(problem, state)
         look = _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
