@@ -10,20 +10,17 @@ from bench.plan.staged import Staged
 from vision.bar.one_view import seen_from_one_side
 from vision.fit.line_noise import LineNoise
 from vision.fit.problem import BAR, REST, Problem, State
-from vision.fit.solve import solve, weighted_jacobian
-from vision.fit.touch import FEWEST_FREE, frames_by_touch, touch_and_sigma
-from vision.fit.touch_by_onset import touch_by_onset
+from vision.fit.solve import weighted_jacobian
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
 from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.truth.records import WhiskTruth
 from vision.truth.rows import to_whisk
-from vision.truth.whisk import NEVER_TOUCHES, STARTS_TOUCHING, near_touch
+from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _USUAL = VisionSettings()
-_EARLY = 7  # the first of so many parts of a stroke is taken as free where only the onset of bending tells touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +56,7 @@ def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], h
 
 def near_frames(staged: Staged) -> list[int]:
     """The frames that make the truth."""
-    return list(near_touch(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad))))
+    return TouchByClearance().near(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad)))
 
 
 def _faces(camera, staged: Staged) -> bool:
@@ -110,22 +107,14 @@ def state_of(problem: Problem, staged: Staged, frames: Sequence[int]) -> State:
 def _by_clearance(problem: Problem, staged: Staged, frames: Sequence[int]) -> tuple[Problem, State]:
     """The problem with the frames parted as the fit would know them to touch, and the state."""
     state = state_of(problem, staged, frames)
-    touch = touch_and_sigma(problem, state.vector, _answer(problem, state))
-    touching, free = frames_by_touch(problem.motor_rad, *touch)
-    if np.sum(free) < FEWEST_FREE:
-        raise Refused(STARTS_TOUCHING)
-    if not np.any(touching):
-        raise Refused(NEVER_TOUCHES)
+    touching, free = TouchByClearance().parted(problem, state, _answer(problem, state))
     problem = replace(problem, touching=touching, bent=~free)
     return problem, state_of(problem, staged, frames)
 
 
 def _by_onset(problem: Problem, staged: Staged, frames: Sequence[int]) -> tuple[Problem, State]:
     """The same where only the onset of bending tells when the whisker touches."""
-    angles = problem.motor_rad
-    early = angles <= angles[0] + (angles[-1] - angles[0]) / _EARLY
-    early[:FEWEST_FREE] = True
-    problem = replace(problem, touching=problem.touching & ~early, bent=~early)
+    free = early(problem.motor_rad)
+    problem = replace(problem, touching=problem.touching & ~free, bent=~free)
     state = state_of(problem, staged, frames)
-    problem, state = touch_by_onset(problem, state, _answer(problem, state))
-    return problem, solve(problem, state)[0]
+    return TouchByOnset().settled(problem, state, _answer(problem, state))

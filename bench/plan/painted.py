@@ -20,7 +20,6 @@ from bench.rig.studio import Setting, Studio
 from vision.bar.edges import measure_edges
 from vision.bar.line import measure_bars
 from vision.bar.one_view import seen_from_one_side
-from vision.bar.search import of_mean
 from vision.boards.corners import refine_corners
 from vision.fit.line_noise import LineNoise, line_noise
 from vision.fit.problem import Problem
@@ -35,6 +34,7 @@ from vision.lines.points import Observed
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.truth.whisk import trace_wire
+from vision.truth.whisk_pictures import WhiskPictures
 
 _FEWEST_CORNERS = 6
 _USUAL = VisionSettings()
@@ -112,17 +112,19 @@ class Painter:
         still = [self.setting(number, staged) for number in range(len(self.cameras))]
         bars, seen = self._bars(staged, cameras, still, curves, settings), []
         for number, setting in enumerate(still):
-            seen += self._wire(number, staged, setting, curves, settings)
+            seen += self._wire(number, staged, cameras, setting, curves, settings)
             seen += bar_points(self.cameras[number], number, staged.axis, staged.rods, bars[self.cameras[number].name])
         return line_noise(_scattered(staged, cameras, list(curves), seen))
 
-    def _wire(self, number: int, staged: Staged, setting: Setting, curves, settings: VisionSettings) -> list[Observed]:
+    def _wire(self, number: int, staged: Staged, cameras: Cameras, setting: Setting, curves,
+              settings: VisionSettings) -> list[Observed]:
         """The wire's points as traced in one camera's frames."""
         first, second = self.empty[number]
         frames = {f: self.frame(number, staged, setting, f) for f in curves}
         view = View(self.cameras[number], frames, first.astype(float), measure_noise(first, second))
-        motor = {f: float(staged.motor_rad[f]) for f in curves}
-        return trace_wire(number, view, staged.rods, staged.axis, motor, curves, {}, settings)
+        whisk = WhiskPictures(0, list(curves), staged.time_s, staged.motor_rad, (view,), cameras, staged.rods, None,
+                              settings)
+        return trace_wire(whisk, view, staged.axis, curves)
 
     def _bars(self, staged: Staged, cameras: Cameras, still: Sequence[Setting], curves, settings: VisionSettings
               ) -> Mapping[str, np.ndarray]:
@@ -142,7 +144,7 @@ class Painter:
         found = {name: np.array([[0.0, *line.points.sigma_px]]) for name, line in lines.items()}
         if len(lines) == 1 or seen_from_one_side(cameras, axis):
             for view in (view for view in views if view.camera.name in lines):
-                edges = measure_edges(of_mean(view), view.mean, axis, radius_mm, wires[view.camera.name], settings)
+                edges = measure_edges(view, axis, radius_mm, wires[view.camera.name], settings)
                 if edges:
                     rows = [[side, *points.sigma_px] for side, points in edges.items()]
                     found[view.camera.name] = np.array(rows, dtype=float)

@@ -42,17 +42,17 @@ class Recorder:
     def __init__(self, touch_rad: float):
         self.touch_rad, self.rows, self._trace = touch_rad, {}, seeing.trace_wire
 
-    def __call__(self, number, view, rods, axis, motor, curves, light, settings, **options):
-        found = self._trace(number, view, rods, axis, motor, curves, light, settings, **options)
-        angles = [motor[frame] for frame in curves]
+    def __call__(self, whisk, view, axis, curves, **options):
+        found = self._trace(whisk, view, axis, curves, **options)
+        angles = [whisk.motor[frame] for frame in curves]
         free = [one.points for one in found if angles[one.frame] < self.touch_rad]
         if free:
-            radius = float(rods.wire.radius_mm(0.5 * _LENGTH_MM))
+            radius = float(whisk.rods.wire.radius_mm(0.5 * _LENGTH_MM))
             errors = [off_px(one.points, free_wire_px(view.camera, angles[one.frame], radius))
                       for one in found if angles[one.frame] < self.touch_rad]
             shared = np.median(np.linalg.norm(np.concatenate([one.shared_px for one in free]), axis=1))
             error, sigma = float(np.mean(np.concatenate(errors))), float(np.hypot(shared, WIRE_OFFSET_PX))
-            looks = light[view.camera.name]
+            looks = whisk.light[view.camera.name]
             self.rows[view.camera.name] = (looks.blur_px, looks.misfit, error, sigma)
         return found
 

@@ -35,14 +35,14 @@ _LONGEST = np.array([0.7, 0.7, 0.7, 0.7, 0.4])
 _SETTLED_PX, _PARTS = 0.005, (1.0, 0.3, 0.1, 0.03)
 
 
-def measure_edges(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                  settings: VisionSettings, *, coarse: bool = False) -> dict[int, LinePoints] | None:
-    """Two points of each of the bar's edges in the mean picture `grey`, by side: 1 towards the points' normals, -1
+def measure_edges(view: View, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
+                  *, coarse: bool = False) -> dict[int, LinePoints] | None:
+    """Two points of each of the bar's edges in the mean picture, by side: 1 towards the points' normals, -1
     against them. None where too little of the bar is clear, or what is seen is no bar.
 
     wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be some pixels off, and its width.
     """
-    pieces, knots = bar_pieces(view, grey, axis, radius_mm, wires_px, settings), bar_knots(settings)
+    pieces, knots = _pieces(view, axis, radius_mm, wires_px, settings), bar_knots(settings)
     if len(pieces) < FEWEST_PIECES:
         return None
     found = np.append(_sweep(pieces, knots) if coarse else np.zeros(4), 0.0)
@@ -55,16 +55,21 @@ def measure_edges(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float,
     return _edges(pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4])
 
 
-def coarse_share(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+def coarse_share(view: View, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                  settings: VisionSettings) -> float | None:
     """How wide the bar looks over how wide it should, to some hundredths, as `measure_edges` begins with it; None where
     too little of the bar is clear, or where that lies far from where it was expected."""
-    pieces = bar_pieces(view, grey, axis, radius_mm, wires_px, settings)
+    pieces = _pieces(view, axis, radius_mm, wires_px, settings)
     if len(pieces) < FEWEST_PIECES:
         return None
     found = _sweep(pieces, bar_knots(settings), moved=(0, 2))
     widened = 1.0 + found[2] / float(np.median(pieces.radius_px))
     return widened if abs(found[0]) < 0.5 * _SWEEP_MOST_PX[0] else np.inf
+
+
+def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
+    """Pieces of the bar, with the noise of the mean picture beside one picture of the background."""
+    return bar_pieces(view, view.noise.times(view.mean_share + 1.0), axis, radius_mm, wires_px, settings)
 
 
 def _misfit(rims: Pieces, knots: Knots, q) -> float:

@@ -144,8 +144,7 @@ def _shows(pieces: Pieces) -> bool:
 
 def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
     """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit."""
-    quiet = replace(view, noise=view.noise.times(view.mean_share))
-    pieces = bar_pieces(quiet, view.mean, axis, radius_mm, wires_px, settings)
+    pieces = bar_pieces(view, view.noise.times(view.mean_share), axis, radius_mm, wires_px, settings)
     scale = FULL_SCALE / view.full_scale
     return replace(pieces, grey=pieces.grey * scale, background=pieces.background * scale,
                    slope=pieces.slope * scale, weight=pieces.weight / scale)

@@ -52,7 +52,7 @@ def see_bar_alone(first: BarAxis, view: View, wire: Wire, radius_mm: float, moto
     camera, axis = view.camera, first
     straight = resting_lines(camera, wire, np.unique(motor_rad))
     for coarse in (True, False):
-        edges = measure_edges(view, view.mean, axis, radius_mm, straight, settings, coarse=coarse)
+        edges = measure_edges(view, axis, radius_mm, straight, settings, coarse=coarse)
         found = axis if edges is None else axis_from_edges(edges, camera, radius_mm)
         if not _NEAREST < _distance_mm(found, camera) / _distance_mm(first, camera) < _FARTHEST or (
                 coarse and edges is None):

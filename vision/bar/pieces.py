@@ -12,6 +12,7 @@ from vision.geometry.silhouette import outline
 from vision.lines.bands import Band, Pieces, cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots, fit_shading, locate
+from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 
 ARM_MM = 20.0  # the line is handed on as two points, this far to either side
@@ -23,9 +24,10 @@ _KNOT_MM = 14.0
 NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
 
 
-def bar_pieces(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
+def bar_pieces(view: View, noise: Noise, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
                settings: VisionSettings) -> Pieces:
-    """Pieces of the bar's band in the picture `grey`, to either side of the axis's point, that show no wire.
+    """Pieces of the bar's band in the mean picture, to either side of the axis's point, that show no wire. noise: what
+    the difference of mean and background is taken to have.
 
     Raises Refused where no part of the bar lies before the camera."""
     place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
@@ -34,8 +36,8 @@ def bar_pieces(view: View, grey: np.ndarray, axis: BarAxis, radius_mm: float, wi
     if not np.any(np.isfinite(radius)):
         raise Refused(f"camera {view.camera.name} would have the bar behind it: check T_camera_rig")
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
-    band = _from_whole(read_band(grey, view.background, middle, place, radius, half), settings.bar_piece_px)
-    pieces = cut_pieces([band], settings.bar_piece_px, view.noise)
+    band = _from_whole(read_band(view.mean, view.background, middle, place, radius, half), settings.bar_piece_px)
+    pieces = cut_pieces([band], settings.bar_piece_px, noise)
     in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
     return pieces.select(in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
 

@@ -108,12 +108,7 @@ def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis, float], See
 def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
     """The axis as one camera alone sees it. Raises Refused where it sees none, or not how far away it is."""
     first = find_bars_alone(clear, rods, float(np.mean(motor_rad)))[0]
-    return see_bar_alone(first, of_mean(view), rods.wire, rods.bar.radius_mm, motor_rad, settings)
-
-
-def of_mean(view: View) -> View:
-    """The view with the noise of its mean picture beside one picture of the background."""
-    return replace(view, noise=view.noise.times(view.mean_share + 1.0))
+    return see_bar_alone(first, view, rods.wire, rods.bar.radius_mm, motor_rad, settings)
 
 
 def _median_picture(view: View) -> np.ndarray:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from vision.bar.edges import coarse_share, measure_edges
-from vision.bar.search import SeenBar, of_mean, see_bar
+from vision.bar.search import SeenBar, see_bar
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
 from vision.geometry.errors import Refused
@@ -54,7 +54,7 @@ def bar_diameter_mm(
 def _share(view: View, axis, wire: Wire, bar: Bar, motor_rad, settings: VisionSettings) -> float | None:
     """How wide the bar looks in one camera, over how wide it should."""
     wires = resting_lines(view.camera, wire, np.linspace(*motor_rad, 8))
-    edges = measure_edges(of_mean(view), view.mean, axis, bar.radius_mm, wires, settings, coarse=True)
+    edges = measure_edges(view, axis, bar.radius_mm, wires, settings, coarse=True)
     if edges is None:
         return None
     across = 0.5 * (edges[1].normal[0] + edges[1].normal[1])
@@ -75,8 +75,7 @@ def seen_over_given(views: Sequence[View], cameras: Cameras, seen: SeenBar, rods
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     asked = [view for view in views if view.camera.name in seen.seen_by]
     found = _by_camera(asked, lambda view: coarse_share(
-        of_mean(view), view.mean, seen.axis, rods.bar.radius_mm,
-        resting_lines(view.camera, rods.wire, np.linspace(*span, 8)), settings))
+        view, seen.axis, rods.bar.radius_mm, resting_lines(view.camera, rods.wire, np.linspace(*span, 8)), settings))
     if found and abs(np.median(list(found.values())) - 1.0) > _COARSE_ENOUGH:
         found = _by_camera(asked, lambda view: _share(view, seen.axis, rods.wire, rods.bar, span, settings))
     share = float(np.median(list(found.values()))) if found else 1.0

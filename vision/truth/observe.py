@@ -87,7 +87,7 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
             few = f"{counted(len(whisk.frames), 'frame')} seen by every camera, {_FEWEST_FRAMES} are needed"
             return WhiskTruth(whisk.number, None, status="; ".join([few, *whisk.left_out]))
         try:
-            fit = fit_whisk(whisk.views, whisk.cameras, whisk.rods, whisk.bar, whisk.motor, whisk.light, whisk.settings)
+            fitted = fit_whisk(whisk)
             break
         except Misled as reason:
             if len(whisk.views) == 1:
@@ -97,7 +97,7 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
             return _refused(whisk, str(reason))
         except np.linalg.LinAlgError:
             return _refused(whisk, "the fit of wire and bar does not settle")
-    return _truth(whisk, FittedWhisk.of(*fit))
+    return _truth(whisk, fitted)
 
 
 def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
@@ -112,7 +112,7 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     without = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
-        stroke = free_stroke(whisk.views, whisk.rods, *stroke, whisk.motor, fitted.frames, whisk.light, whisk.settings)
+        stroke = free_stroke(whisk, fitted)
     status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *unexplained, *whisk.left_out]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base = base_lines(*stroke, fitted.uncertainty.lens)

@@ -1,5 +1,6 @@
 """A whisk being seen: its pictures and what is known beforehand, and the fit to them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -29,7 +30,7 @@ class WhiskPictures:
     """
 
     number: int
-    indices: range
+    indices: Sequence[int]
     time_s: np.ndarray
     motor_rad: np.ndarray
     views: tuple[View, ...]
@@ -49,6 +50,15 @@ class WhiskPictures:
     def motor(self) -> dict[int, float]:
         """Motor angle by frame, of the frames that every camera has."""
         return {f: float(self.motor_rad[f]) for f in self.frames}
+
+    @property
+    def angles_rad(self) -> np.ndarray:
+        """Motor angles (f,) of those frames."""
+        return self.motor_rad[self.frames]
+
+    def during(self, frames: Sequence[int]) -> "WhiskPictures":
+        """The whisk in some of its frames."""
+        return replace(self, indices=frames)
 
     def without_gaps(self) -> "WhiskPictures":
         """The whisk by the cameras that have most of its frames: one camera's gaps are not all cameras'."""

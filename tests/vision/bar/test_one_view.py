@@ -11,7 +11,6 @@ from tests.scenes.model_scenes import CAMERAS, REACH, begun, camera, scene, with
 from vision.bar.axis import settle_axis
 from vision.bar.edges import measure_edges
 from vision.bar.one_view import axis_from_edges, seen_from_one_side
-from vision.bar.search import of_mean
 from vision.fit.onset import Onset, onset
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import jacobians
@@ -66,7 +65,7 @@ def test_edges_of_a_drawn_bar_lie_where_they_say(rng):
     view = noisy_view(painted, squares, angle, across_mm, rng)
     across = np.array([-np.sin(angle), np.cos(angle), 0.0])
     axis = BarAxis((across_mm + 0.2) * across - [0, 0, 0.04 * AWAY_MM], np.array([np.cos(angle), np.sin(angle), 0.0]))
-    found = measure_edges(of_mean(view), view.mean, axis, RADIUS_MM, [], VisionSettings(), coarse=True)
+    found = measure_edges(view, axis, RADIUS_MM, [], VisionSettings(), coarse=True)
     seen = sorted([(float(np.mean((p.px - CENTRE) @ across[:2])), float(p.sigma_px.max())) for p in found.values()])
     for (at, sigma), true in zip(seen, edges_px(across_mm)):
         assert sigma < 0.15

@@ -1,0 +1,148 @@
+"""How the bar is read and how touch is told: by two cameras' sights that cross, or by what a single one shows.
+
+Two cameras know bar and wire in space: the bar's middle is enough, and touch is told by clearance. To one camera, or to
+several on one side, the bar is as far away as it looks wide, and the wire touches when it begins to bend.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vision.bar.edges import measure_edges
+from vision.bar.line import BarLine, measure_bars
+from vision.bar.one_view import seen_from_one_side
+from vision.fit.problem import Problem, State
+from vision.fit.solve import solve
+from vision.fit.touch import FEWEST_FREE, frames_by_touch, frames_that_touch, touch_and_sigma
+from vision.fit.touch_by_onset import touch_by_onset
+from vision.geometry.contact import BarAxis
+from vision.geometry.errors import Refused
+from vision.geometry.settings import VisionSettings
+from vision.lines.points import LinePoints
+from vision.pictures.view import View
+from vision.truth.whisk_pictures import WhiskPictures
+
+# Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
+# another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
+_NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
+_EARLY_PARTS = 7.0  # the first of so many parts of a stroke is taken as free before anything is known
+NEVER_TOUCHES = "the whisker never touches"
+STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
+
+
+@dataclass
+class BarMiddles:
+    """The bar by its middle in each view; lines: as measured the time before, by which they are measured finely."""
+
+    views: Sequence[View]
+    radius_mm: float
+    settings: VisionSettings
+    lines: dict[str, BarLine] = field(default_factory=dict)
+
+    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]]) -> dict[str, dict[int, LinePoints]]:
+        """By camera and side of the bar (0: its middle, see `Observed`), about an axis. See `measure_bars`."""
+        self.lines = measure_bars(self.views, axis, self.radius_mm, wires_px, self.settings, self.lines)
+        return {name: {0: line.points} for name, line in self.lines.items() if line.is_bar}
+
+
+class BarEdges(BarMiddles):
+    """The bar by its two edges (sides -1 and 1), which tell how far away it is; by its middle where these are not
+    seen."""
+
+    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]]) -> dict[str, dict[int, LinePoints]]:
+        """See `BarMiddles.points`."""
+        found = super().points(axis, wires_px)
+        for view in self.views:
+            name = view.camera.name
+            edges = measure_edges(view, axis, self.radius_mm, wires_px[name], self.settings)
+            found |= {name: edges} if edges else {}
+        return found
+
+
+@dataclass(frozen=True)
+class TouchByClearance:
+    """Touch is where the resting whisker reaches the bar. fewest_cameras: so many must see the wire."""
+
+    fewest_cameras: int = 1
+
+    def near(self, motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> list[int]:
+        """The frames to fit, by coarse bends (2,) in all: from a little before the first that surely touches."""
+        angles = np.array(list(motor.values()))
+        touching, _ = frames_that_touch(angles, np.array(list(bend.values())))
+        if not np.any(touching):
+            return list(motor)
+        first = int(np.argmax(touching))
+        begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
+        return list(motor)[begin:]
+
+    def first(self, motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which frames touch, and which are free, (f,) bool each, by coarse bends (f, 2). Raises Refused."""
+        touching, free = frames_that_touch(motor_rad, bend_rad)
+        if not np.any(touching):
+            raise Refused(NEVER_TOUCHES)
+        return touching, free
+
+    def settled(self, problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
+        """Problem and state with what the fit tells of touch, from its covariance (size, size)."""
+        return problem, state
+
+    def parted(self, problem: Problem, state: State, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`first` once more, by a fit. answer (size, size): how its parameters answer. Raises Refused."""
+        touching, free = frames_by_touch(problem.motor_rad, *touch_and_sigma(problem, state.vector, answer))
+        if np.sum(free) < FEWEST_FREE:
+            raise Refused(STARTS_TOUCHING)
+        if not np.any(touching):
+            raise Refused(NEVER_TOUCHES)
+        return touching, free
+
+
+@dataclass(frozen=True)
+class TouchByOnset:
+    """Touch is when the whisker begins to bend: of its first frames alone it is known that they are free, as a bend
+    along the sight is not seen at first. Methods as those of `TouchByClearance`."""
+
+    fewest_cameras: int = 1
+
+    def near(self, motor: Mapping[int, float], bend: Mapping[int, np.ndarray]) -> list[int]:
+        """All frames: what the coarse bend says of touch is not known."""
+        return list(motor)
+
+    def first(self, motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Those that the coarse bends (f, 2) show to touch, beyond the first part of the stroke."""
+        free = early(motor_rad)
+        return frames_that_touch(motor_rad, bend_rad)[0] & ~free, free
+
+    def settled(self, problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
+        """The fit with the onset of bending in place of the frames that were taken to touch."""
+        problem, state = touch_by_onset(problem, state, covariance)
+        return problem, solve(problem, state)[0]
+
+    def parted(self, problem: Problem, state: State, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The frames after the onset, and again the first part of the stroke."""
+        return problem.touching, early(problem.motor_rad)
+
+
+Touch = TouchByClearance | TouchByOnset
+
+
+def ways_to_see(whisk: WhiskPictures) -> list[tuple[BarMiddles, Touch]]:
+    """How a whisk is seen; where the first way is refused, the next is taken.
+
+    The bar's edges are read where all cameras stand on one side of it, or a single one sees it. There the wire's
+    cameras may still tell touch by clearance, two at least.
+    """
+    cameras, radius_mm = whisk.cameras, whisk.rods.bar.radius_mm
+    seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
+    if seen_from_one_side(cameras, whisk.bar.axis):
+        return [(BarEdges(seeing or whisk.views, radius_mm, whisk.settings), TouchByOnset())]
+    if len(seeing) == 1:
+        return [(BarEdges(seeing, radius_mm, whisk.settings), touch)
+                for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())]
+    return [(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
+
+
+def early(motor_rad: np.ndarray) -> np.ndarray:
+    """The frames (f,) bool of the first part of the stroke, two at least, that are taken as free for a first look."""
+    within = motor_rad <= motor_rad[0] + (motor_rad[-1] - motor_rad[0]) / _EARLY_PARTS
+    return np.arange(len(motor_rad)) < max(FEWEST_FREE, np.sum(within))
