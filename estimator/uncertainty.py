@@ -142,8 +142,9 @@ def interval_with_friction(
 
     (10) falls with α_est, and by more than a line where its sigma is large. So each side is its own: the change that
     the end of α_est's interval makes and 1.96 sigma of the rest (`sigmas` as of `sigma`), added in squares (MOVER:
-    Zou & Donner, Statistics in Medicine 27, 2008). model_sigma: of the equation itself, a share of it. A low end at
-    zero or below says that no distance is too short: it is 0.
+    Zou & Donner, Statistics in Medicine 27, 2008). No friction angle is below 0: where α_est's interval is cut there,
+    α may well be at the cut itself, and the rest keeps its share of the sum (`_side`). model_sigma: of the equation
+    itself, a share of it. A low end at zero or below says that no distance is too short: it is 0.
     """
     require_sigma("alpha_est_sigma", alpha_est_sigma)
     require_friction_angle("alpha_est", alpha_est)
@@ -152,7 +153,8 @@ def interval_with_friction(
     rest = Z_95 * np.hypot(sigma(gradient, **sigmas), model_sigma * middle)
     ends = (alpha_est + side * Z_95 * alpha_est_sigma for side in (1.0, -1.0))
     least, most = (_through_zero(theta, m_y, m_z, np.clip(a, 0.0, _STEEPEST_RAD), C)[0] for a in ends)
-    low, high = middle - np.hypot(middle - least, rest), middle + np.hypot(most - middle, rest)
+    high = middle + _side(most - middle, rest, alpha_est, Z_95 * np.asarray(alpha_est_sigma))
+    low = middle - np.hypot(middle - least, rest)
     push = (np.asarray(theta) > 0) & (np.asarray(m_z) > 0) & np.isfinite(middle)
     return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(push, np.maximum(high, 0.0), np.nan)[()]
 
@@ -171,6 +173,20 @@ def model_share(
     rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
     dragging = held_spread * first_order.dragging(theta, alpha)
     return np.sqrt(leaning**2 + rolling**2 + dragging**2 + (theta**2 / (6 * left)) ** 2)
+
+
+@elementwise
+def _side(change, rest, alpha_est, half):
+    """How far the side of small α goes: the most of u·whole + √(1 − u²)·rest over what α ≥ 0 leaves of u in 0 to 1.
+
+    whole: the change by all of α_est's half interval (rad), of which `change` is the part down to α = 0. Where nothing
+    is cut off, it is the root of the sum of squares.
+    """
+    left = np.where(alpha_est < half, alpha_est / half, 1.0)
+    whole = np.where(left > 0, change / left, 0.0)
+    total = np.hypot(whole, rest)
+    u = np.where(total > 0, np.minimum(whole / total, left), 0.0)
+    return u * whole + np.sqrt(1 - u**2) * rest
 
 
 @elementwise

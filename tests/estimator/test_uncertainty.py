@@ -159,3 +159,18 @@ def test_arrays_broadcast():
 def test_negative_sigma_is_refused_with_its_name():
     with pytest.raises(ValueError, match="touch_sigma = -1"):
         uncertainty.sigma_no_slip(THETA, 7.0, C, touch_sigma=-1.0)
+
+
+@pytest.mark.parametrize("alpha_deg", [0.0, 2.0, 10.5])
+def test_interval_holds_where_no_friction_is(alpha_deg):
+    """α_est drawn about α with 5°, none below 0: at α = 0 an ellipse cut at its middle holds 93.8 to 95.5 %, the less
+    the more friction outweighs noise; where hardly anything is missed on one side, 97.5 %. 20 000 draws know it to
+    0.17 %."""
+    rng, sigma, beta, d_x = np.random.default_rng(3), np.radians(5.0), np.radians(50.0), 60.0
+    alpha, noise = np.radians(alpha_deg), 0.02
+    exact = slip.moments(d_x, THETA, beta, alpha, C)
+    m_y, m_z = np.array(exact)[:, None] + noise * rng.standard_normal((2, 20_000))
+    alpha_est = np.maximum(alpha + sigma * rng.standard_normal(20_000), 0.0)
+    told = {"alpha_est_sigma": sigma, "covariance": noise**2 * np.eye(2)}
+    low, high = uncertainty.interval_with_friction(THETA, m_y, m_z, alpha_est, C, **told)
+    assert 0.933 < np.mean((low <= d_x) & (d_x <= high)) < 0.981

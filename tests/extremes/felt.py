@@ -49,7 +49,7 @@ USUAL = Push()
 EXTREMES: Mapping[str, tuple[Push, Sequence[float]]] = {
     "beta_deg": (USUAL, (-85, 0, 60, 70, 75, 80, 85, 88)),
     "psi_deg": (USUAL, (-75, -60, -30, 30, 60, 75)),
-    "alpha_deg": (USUAL, (0, 23.3, 45, 63.4, 70)),
+    "alpha_deg": (USUAL, (0, 2.5, 5, 10.5, 23.3, 45, 63.4, 70)),
     "d_x_mm": (USUAL, (2, 5, 10, 20, 80, 95, 99)),
     "theta_deg": (USUAL, (0.2, 0.5, 1, 5, 10, 20)),
     "bar_radius_mm": (USUAL, (0.25, 10, 30)),

@@ -1,4 +1,10 @@
-"""Truth at a wanted pushing angle: a local fit over touching frames, or the nearest frame where it jumps."""
+"""Truth at a wanted pushing angle: a local fit over touching frames; where slip jumps, what the frames about it leave.
+
+A jump between two frames may lie before the wanted angle or after it, so slip is that of the one frame or of the other.
+The middle with half of the difference is its mean and standard deviation where both are as likely, and no distribution
+between the two has a larger one (Popoviciu). Where the contact is follows from angle and slip, and so do deflection and
+the force's angle: a line in both, over the frames nearby, carries slip's sigma to them.
+"""
 
 from dataclasses import dataclass
 
@@ -9,6 +15,7 @@ from vision.truth.value import FIELDS, Value, WhileTouching
 _WINDOW_RAD = np.radians(1.6)
 _JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
 _BEYOND_RAD = np.radians(0.3)
+_SURE_SIGMAS = 4.0  # of touch: which frames surely come before a wanted angle, one of 30 000 does not
 _FEWEST_FOR_PARABOLA = 5  # frames: two more than it has coefficients
 
 
@@ -41,36 +48,51 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: str) -> TruthAtAn
     if theta_rad > np.max(smooth.theta_rad) + _BEYOND_RAD or theta_rad <= 0:
         reached = np.degrees(np.max(smooth.theta_rad))
         return TruthAtAngle(theta_rad=theta_rad, status=f"pushed to {reached:.2f} deg only")
-    weights, slope, jumps = _weights(smooth, theta_rad)
-    values = {field: _value(smooth, name, theta_rad, weights, slope, jumps) for name, field in FIELDS.items()}
-    if jumps:
-        nearest = float(smooth.theta_rad[int(np.argmax(weights))])
-        status = f"slips in jumps: seen at {np.degrees(nearest):.2f} deg"
-        return TruthAtAngle(theta_rad=nearest, **values, status=status)
-    return TruthAtAngle(theta_rad=theta_rad, **values)
+    between = _about(smooth, theta_rad)
+    jumps = _jumps(smooth, theta_rad)
+    values = {field: _between(smooth, name, theta_rad, between) if jumps else _value(smooth, name, theta_rad)
+              for name, field in FIELDS.items()}
+    first, last = np.degrees(smooth.theta_rad[between][[0, -1]])
+    status = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg" if jumps else ""
+    return TruthAtAngle(theta_rad=theta_rad, **values, status=status)
 
 
-def _value(smooth: Smooth, name: str, theta_rad: float, weights, slope_weights, jumps: bool) -> Value:
-    """One quantity by these weights (f,). A smooth one is no surer than the surest frame nearby, and errs by what the
-    local fit leaves, too."""
-    value, sigma = _combine(smooth, name, weights, slope_weights)
-    if jumps:
-        return Value(value, sigma)
-    sigma = max(sigma, _least_sigma(smooth, name, theta_rad))
+def _value(smooth: Smooth, name: str, theta_rad: float) -> Value:
+    """One smooth quantity. It is no surer than the surest frame nearby, and errs by what the local fit leaves, too."""
+    value, sigma = _combine(smooth, name, *_local_fit(smooth.theta_rad, theta_rad))
+    sigma = max(sigma, np.min(_sigmas(smooth, name, _near(smooth.theta_rad - theta_rad))))
     return Value(value, float(np.hypot(sigma, _unfitted(smooth, name, theta_rad))))
 
 
-def _weights(smooth: Smooth, theta_rad: float):
-    """Weights (f,) that give a value at theta, weights of its slope, and whether the slip jumps."""
-    value, slope = _local_fit(smooth.theta_rad, theta_rad)
+def _jumps(smooth: Smooth, theta_rad: float) -> bool:
+    """Does the slip about theta leave its local fit?"""
     slip = smooth.values["slip"]
     near = np.abs(smooth.theta_rad - theta_rad) <= _WINDOW_RAD
     smoothed = np.array([_local_fit(smooth.theta_rad, t)[0] @ slip for t in smooth.theta_rad[near]])
-    if np.any(np.abs(smoothed - slip[near]) > _JUMP_MM):
-        nearest = np.zeros(len(slip))
-        nearest[int(np.argmin(np.abs(smooth.theta_rad - theta_rad)))] = 1.0
-        return nearest, np.zeros(len(slip)), True
-    return value, slope, False
+    return bool(np.any(np.abs(smoothed - slip[near]) > _JUMP_MM))
+
+
+def _about(smooth: Smooth, theta_rad: float) -> np.ndarray:
+    """Frames (k,) from the last that is surely before theta to the first that is surely past it; at the ends of the
+    record the two nearest at least. How sure is the touch's doing, which moves them all."""
+    order, count = np.argsort(smooth.theta_rad), len(smooth.theta_rad)
+    rising, touch = smooth.theta_rad[order], smooth.touch_jacobian
+    doubt = _SURE_SIGMAS * float(np.sqrt(max(touch @ smooth.covariance @ touch, 0.0)))
+    first, last = np.searchsorted(rising, theta_rad - doubt) - 1, np.searchsorted(rising, theta_rad + doubt)
+    return order[max(min(first, count - 2), 0):max(last, 1) + 1]
+
+
+def _between(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarray) -> Value:
+    """One quantity where slip is anywhere between these frames (k,): by what it is of angle and slip, nearby."""
+    slip, values = smooth.values["slip"], smooth.values[name]
+    near = _near(smooth.theta_rad - theta_rad)
+    rows = np.column_stack([np.ones(len(slip)), smooth.theta_rad - theta_rad, slip])[near]
+    by, *_ = np.linalg.lstsq(rows, values[near])
+    half, freedom = 0.5 * float(np.ptp(slip[frames])), max(len(rows) - rows.shape[1], 1)
+    left = np.sum((values[near] - rows @ by) ** 2) / freedom
+    sigma = np.max(_sigmas(smooth, name, frames, by[1]))
+    return Value(float(by @ [1.0, 0.0, np.min(slip[frames]) + half]),
+                 float(np.sqrt((by[2] * half) ** 2 + left + sigma**2)))
 
 
 def _local_fit(theta, at):
@@ -109,10 +131,11 @@ def expected_scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
     return float(np.sqrt(np.einsum("fi,ij,fj->", left, smooth.covariance, left) / (len(x) - degree - 1)))
 
 
-def _least_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
-    """Sigma of the surest of the frames nearby: what stands behind the wire errs in all of them alike."""
-    rows = smooth.jacobians[name][_near(smooth.theta_rad - theta_rad)]
-    return float(np.sqrt(np.min(np.einsum("fi,ij,fj->f", rows, smooth.covariance, rows))))
+def _sigmas(smooth: Smooth, name: str, frames: np.ndarray, slope: float = 0.0) -> np.ndarray:
+    """Sigma of each of the frames (k,) by itself: what stands behind the wire errs in all of them alike. slope:
+    per rad, by which the error of touch moves it."""
+    rows = smooth.jacobians[name][frames] + slope * smooth.touch_jacobian
+    return np.sqrt(np.maximum(np.einsum("fi,ij,fj->f", rows, smooth.covariance, rows), 0.0))
 
 
 def _near(x) -> np.ndarray:

@@ -7,7 +7,7 @@ _CURES = (
     (r"touches from the start|touching from the start", "begin the recording some 2° of motor angle before touch"),
     (r"touch lies outside the frames|at touch was lost", "record frames all through touch; look for dropped ones"),
     (r"pushed to .* deg only", "push farther, or evaluate at a smaller --theta-deg"),
-    (r"slips in jumps", "expected of stick–slip: slip is that of the nearest frame; more frames a second narrow it"),
+    (r"slips in jumps", "expected of stick–slip: slip lies between those frames; more frames a second narrow it"),
     (r"clear of the (wire|bar)|enough of the", "free the sight: nothing else may stand before or behind wire and bar"),
     (r"scatter by .* px", "look at the overlays: a shadow, a reflection, or another thing is taken for the wire"),
     (r"slope is known to|single camera", "place a second camera that sees the bar from another side"),
