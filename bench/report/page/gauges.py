@@ -65,12 +65,12 @@ def _panel(axis: int, points: Sequence[GaugePoints], series: dict, at: dict, eve
     panel, name = Panel(limits(known), limits(reach, (0.0, 0.0))), _AXES[axis]
     all_marks = [_mark(p, n, axis, series[p.trial], at) for p in points for n in range(len(p.moments_Nmm))]
     marks = [panel.mark(mark) for mark in all_marks[::every]]
-    alt = f"{name} by the gauges less that seen, N·mm, against that seen: {len(marks)} points"
-    return panel.drawing(marks, (f"{name} seen  [N·mm]", "gauge less seen  [N·mm]"), f"residuals of {name}", alt)
+    alt = f"{name} by the gauges less that known, N·mm, against that known: {len(marks)} points"
+    return panel.drawing(marks, (f"{name} known  [N·mm]", "gauge less known  [N·mm]"), f"residuals of {name}", alt)
 
 
 def _mark(p: GaugePoints, n: int, axis: int, series: int, at: dict) -> Mark:
     x, off, sigma = (float(v[n, axis]) for v in (p.moments_Nmm, p.residuals_Nmm, p.residuals_sigma_Nmm))
-    title = f"{p.trial}, whisk {p.whisk}: {_AXES[axis]} = {number(x, 3)} N·mm, gauge less seen {with_sigma(off, sigma)}"
+    title = f"{p.trial}, whisk {p.whisk}: {_AXES[axis]} = {number(x, 3)} N·mm, gauge less known {with_sigma(off, sigma)}"
     key = at[p.trial, p.whisk].key
     return Mark(x, off, sigma, f"e{series}", series, key, p.trial, p.whisk, title)
