@@ -71,6 +71,7 @@ def _panel(axis: int, points: Sequence[GaugePoints], series: dict, at: dict, eve
 
 def _mark(p: GaugePoints, n: int, axis: int, series: int, at: dict) -> Mark:
     x, off, sigma = (float(v[n, axis]) for v in (p.moments_Nmm, p.residuals_Nmm, p.residuals_sigma_Nmm))
-    title = f"{p.trial}, whisk {p.whisk}: {_AXES[axis]} = {number(x, 3)} N·mm, gauge less known {with_sigma(off, sigma)}"
+    said = f"{_AXES[axis]} = {number(x, 3)} N·mm, gauge less known {with_sigma(off, sigma)}"
+    title = f"{p.trial}, whisk {p.whisk}: {said}"
     key = at[p.trial, p.whisk].key
     return Mark(x, off, sigma, f"e{series}", series, key, p.trial, p.whisk, title)

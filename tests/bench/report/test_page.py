@@ -140,6 +140,16 @@ def test_the_gauges_stand_with_their_residuals_and_the_whisks_that_calibrated(ex
     assert all(line.strip() in said for line in gauges["certificate"]) and "seen in pictures" in said
 
 
+def test_gauges_brought_along_have_no_residuals_here(exact_run, tmp_path):
+    out = shutil.copytree(exact_run, tmp_path / "out")
+    record = json.loads((out / "run.json").read_text())
+    record["gauges"] |= {"certificate": [], "points": [], "matrix_sigma_Nmm_per_V": [[0, 0], [0, 0]]}
+    (out / "run.json").write_text(json.dumps(record))
+    assert main(["report", str(out)]) == 0
+    part = (out / REPORT).read_text().split('<section id="gauges">')[1].split("</section>")[0]
+    assert "They were brought along" in part and "<svg" not in part and "U95" not in part
+
+
 def test_parts_come_in_the_order_in_which_they_are_read(reader):
     ids = [a["id"] for tag, a in reader.elements if tag == "section"]
     assert ids[0] == "verdict" and ids[-5:] == ["sure", "gauges", "cameras", "run", "cite"]
