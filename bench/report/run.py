@@ -39,15 +39,15 @@ class BoardFacts:
 
 @dataclass(frozen=True, eq=False)
 class GaugePoints:
-    """What one whisk's n points say of the coefficients: moments (n, 2) known from its deflection, what the gauges
-    differ from them, and the sigma of that, in the follicle's axes, turned by roll_deg."""
+    """What one whisk's n points say of the coefficients: moments (n, 2) known from its deflection, with their sigma, and what the
+    gauges differ from them by, in the follicle's axes, turned by roll_deg."""
 
     trial: str
     whisk: int
     roll_deg: float
     moments_Nmm: np.ndarray
     residuals_Nmm: np.ndarray
-    residuals_sigma_Nmm: np.ndarray
+    moments_sigma_Nmm: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

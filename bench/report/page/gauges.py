@@ -61,7 +61,7 @@ def _whisk(p: GaugePoints, row: Row) -> tuple[str, ...]:
 def _panel(axis: int, points: Sequence[GaugePoints], series: dict, at: dict, every: int) -> Markup:
     """Residuals of one moment over that moment, each point ± one sigma."""
     known = np.concatenate([p.moments_Nmm[:, axis] for p in points])
-    reach = [v for p in points for side in (-1, 1) for v in (p.residuals_Nmm + side * p.residuals_sigma_Nmm)[:, axis]]
+    reach = [v for p in points for side in (-1, 1) for v in (p.residuals_Nmm + side * p.moments_sigma_Nmm)[:, axis]]
     panel, name = Panel(limits(known), limits(reach, (0.0, 0.0))), _AXES[axis]
     all_marks = [_mark(p, n, axis, series[p.trial], at) for p in points for n in range(len(p.moments_Nmm))]
     marks = [panel.mark(mark) for mark in all_marks[::every]]
@@ -70,7 +70,7 @@ def _panel(axis: int, points: Sequence[GaugePoints], series: dict, at: dict, eve
 
 
 def _mark(p: GaugePoints, n: int, axis: int, series: int, at: dict) -> Mark:
-    x, off, sigma = (float(v[n, axis]) for v in (p.moments_Nmm, p.residuals_Nmm, p.residuals_sigma_Nmm))
+    x, off, sigma = (float(v[n, axis]) for v in (p.moments_Nmm, p.residuals_Nmm, p.moments_sigma_Nmm))
     said = f"{_AXES[axis]} = {number(x, 3)} N·mm, gauge less known {with_sigma(off, sigma)}"
     title = f"{p.trial}, whisk {p.whisk}: {said}"
     key = at[p.trial, p.whisk].key
