@@ -39,8 +39,8 @@ class BoardFacts:
 
 @dataclass(frozen=True, eq=False)
 class GaugePoints:
-    """What one whisk's n points say of the coefficients: moments (n, 2) known from its deflection, with their sigma, and what the
-    gauges differ from them by, in the follicle's axes, turned by roll_deg."""
+    """What one whisk's n points say of the coefficients: moments (n, 2) known from its deflection, with their
+    sigma, and what the gauges differ from them by, in the follicle's axes, turned by roll_deg."""
 
     trial: str
     whisk: int
