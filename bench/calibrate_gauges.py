@@ -1,6 +1,5 @@
 """`whisker-bench calibrate gauges`: gauges.toml from a session's gauge trials, with its certificate."""
 
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,19 +11,14 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.gauges.certificate import Certificate, page
-from bench.gauges.checks import check_alive
-from bench.gauges.felt import Stroke, strokes_of
-from bench.gauges.fit import fit_gauges
+from bench.gauges.felt import Stroke
 from bench.gauges.gauges_file import write_gauges
-from bench.gauges.readings import pairs_of
-from bench.gauges.reversal import reversals
 from bench.gauges.weights import scale_by_weights
 from bench.session.check import checked_session
 from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
-from bench.trials.of_session import judged, placed_units, session_drift
-from bench.trials.unit import see_unit
+from bench.trials.of_session import certified, judged, placed_units, session_drift
 
 
 def calibrate_gauges_command(
@@ -69,26 +63,13 @@ def calibrate_gauges(
     session: Session, trials: list[Trial], doubts: Doubts, *, workers: int = 1, progress: bool = False
 ) -> Certificate:
     """Coefficients from what the cameras and the gauges show of these trials. Raises BadInput."""
-    settings = Settings()
-    strokes = {trial.name: strokes_of(read_signals(trial), trial, settings) for trial in trials}
-    check_alive([stroke for many in strokes.values() for stroke in many])
+    settings, names = Settings(), {trial.name for trial in trials}
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
         every = judged(session)
         rate = session_drift(every, settings, pool)
         _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
-        chosen = {unit.trial.name: unit for unit in units}
-        seen = pool.run(see_unit, [chosen[trial.name] for trial in trials], "trials")
-    pairs = [
-        pairs_of(trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
-        for trial, of_trial in zip(trials, seen)
-        for whisk, stroke in zip(of_trial.whisks, strokes[trial.name])
-    ]
-    used = tuple(p for p in pairs if p is not None)
-    every_stroke = tuple(stroke for many in strokes.values() for stroke in many)
-    back = tuple(r for trial in trials for r in reversals(trial, read_signals(trial), settings))
-    made = Certificate(session.name, session.whisker, fit_gauges(used), used, every_stroke, rate, back)
-    made = replace(made, roll_sigma_deg=max(trial.follicle_roll_sigma_deg for trial in trials))
-    return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(every_stroke)))
+        made = certified([unit for unit in units if unit.trial.name in names], rate, pool)
+    return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(made.strokes)))
 
 
 def zeros(strokes: tuple[Stroke, ...]) -> tuple[np.ndarray, np.ndarray]:

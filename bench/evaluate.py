@@ -52,7 +52,7 @@ def evaluate(
     _require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
         calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
-        gauges, units = with_gauges(units, pool, doubts)
+        gauges, certificate, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         whole = finished(evaluated(chosen, pool), session.whisker, settings)
         doubts.notes += filter(None, [whole.doubt])
@@ -65,7 +65,7 @@ def evaluate(
         write_curvature(out, shapes)
         recordings = {unit.trial.name: unit.files for unit in chosen}
         found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
-        summary = report(Evaluation(session, out, settings, *found), pool, figure_formats)
+        summary = report(Evaluation(session, out, settings, *found, certificate), pool, figure_formats)
     announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
 

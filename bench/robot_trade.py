@@ -80,7 +80,7 @@ def robot_trade(
     session = checked_session(session_path, doubts)
     with lock_output(out), Workers(workers, progress) as pool:
         _, units = placed_units(session, judged(session), out, settings, pool, doubts)
-        _, units = with_gauges(units, pool, doubts)
+        *_, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         results = finished(evaluated(chosen, pool), session.whisker, settings).results
         range_V = np.max([range_of(read_signals(unit.trial)) for unit in chosen], axis=0, initial=0.0)

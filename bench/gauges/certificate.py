@@ -64,7 +64,7 @@ class Certificate:
     @property
     def residuals(self) -> np.ndarray:
         """Moments from the gauges less those seen, (n, 2)."""
-        return np.concatenate([p.volts @ self.gauges.all.matrix.T - p.moments for p in self.pairs])
+        return np.concatenate([p.residuals(self.gauges.all.matrix) for p in self.pairs])
 
     def nonlinearity_percent(self, axis: int) -> tuple[float, float] | None:
         """Largest departure of a parabola through the origin from its best line, % of full scale, with U95.
@@ -218,6 +218,5 @@ def page(certificate: Certificate) -> "Figure":
 
 def _draw_residuals(axes, pairs: Sequence[Pairs], matrix, axis: int) -> None:
     for p in pairs:
-        off = (p.volts @ matrix.T - p.moments)[:, axis]
-        sigma = np.hypot(np.sqrt(np.diag(p.moments_covariance))[axis::2], p.scale_sigma * p.moments[:, axis])
+        off, sigma = p.residuals(matrix)[:, axis], p.moments_sigma[:, axis]
         axes.errorbar(p.moments[:, axis], off, sigma, fmt="o", ms=3, lw=0.8, label=f"{p.trial}, whisk {p.whisk}")

@@ -54,6 +54,15 @@ class Pairs:
     def __len__(self) -> int:
         return len(self.theta_rad)
 
+    def residuals(self, matrix: np.ndarray) -> np.ndarray:
+        """Moments (n, 2) by these coefficients (2, 2) less those known, N·mm."""
+        return self.volts @ matrix.T - self.moments
+
+    @property
+    def moments_sigma(self) -> np.ndarray:
+        """One standard deviation (n, 2) of the known moments, N·mm."""
+        return np.hypot(np.sqrt(np.diag(self.moments_covariance)).reshape(-1, 2), self.scale_sigma * self.moments)
+
 
 @dataclass(frozen=True)
 class ReferenceMoments:

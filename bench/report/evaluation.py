@@ -10,6 +10,7 @@ from bench.friction.curved import Curved
 from bench.friction.runs import with_runs
 from bench.friction.soft import Soft
 from bench.friction.tables import SurfaceFriction, friction_of
+from bench.gauges.certificate import Certificate
 from bench.gauges.matrix import Gauges
 from bench.records.trial import FeltWhisk, TrialResult
 from bench.session.session import Session
@@ -41,7 +42,7 @@ class Evaluation:
     """Results of all trials in the folder `out`. calibration: the cameras as placed in the rig, with its notes; doubts:
     lines that the user should read; friction: a surface and speed each; gauges: None where volts cannot become moments;
     recordings: hash of each trial's files, by name; soft: pairs of distances that tell how soft an object is; shapes:
-    how each whisk's object is curved."""
+    how each whisk's object is curved; certificate: of gauges that the session's own trials calibrated."""
 
     session: Session
     out: Path
@@ -54,3 +55,4 @@ class Evaluation:
     recordings: Mapping[str, str]
     soft: tuple[Soft, ...] = ()
     shapes: tuple[tuple[TrialResult, FeltWhisk, Curved], ...] = ()
+    certificate: Certificate | None = None

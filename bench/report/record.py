@@ -11,7 +11,7 @@ from bench.base.errors import BadInput
 from bench.cameras.calibration import SessionCalibration
 from bench.records.plain import from_plain, to_plain
 from bench.report.evaluation import Evaluation
-from bench.report.run import BoardFacts, CameraFacts, RunRecord
+from bench.report.run import BoardFacts, CameraFacts, GaugeFacts, GaugePoints, RunRecord
 from bench.report.summary.page import Summary
 from bench.session.session import Session
 
@@ -33,6 +33,7 @@ def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) 
         any(trial.camera_sources for trial in session.trials),
         _cameras(calibration),
         _board(session, calibration),
+        _gauges(evaluation),
         dict(evaluation.recordings),
         {result.trial.name: result.hash for result in evaluation.results},
         versions(),
@@ -50,6 +51,18 @@ def _board(session: Session, calibration: SessionCalibration) -> BoardFacts | No
     if session.board is None or calibration.T_rig_board is None:
         return None
     return BoardFacts(tuple(session.board.squares), session.board.square_mm, calibration.T_rig_board)
+
+
+def _gauges(evaluation: Evaluation) -> GaugeFacts | None:
+    gauges, made = evaluation.gauges, evaluation.certificate
+    if gauges is None:
+        return None
+    matrix, lines = gauges.all.matrix, () if made is None else tuple(made.lines())
+    points = tuple(
+        GaugePoints(p.trial, p.whisk, p.roll_deg, p.moments, p.residuals(matrix), p.moments_sigma)
+        for p in (() if made is None else made.pairs)
+    )
+    return GaugeFacts(gauges.source, matrix, gauges.all.sigma, lines, points)
 
 
 def write_record(out: Path, record: RunRecord, session: Path) -> RunRecord:

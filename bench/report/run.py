@@ -38,6 +38,31 @@ class BoardFacts:
 
 
 @dataclass(frozen=True, eq=False)
+class GaugePoints:
+    """What one whisk's n points say of the coefficients: moments (n, 2) known from its deflection, with their
+    sigma, and what the gauges differ from them by, in the follicle's axes, turned by roll_deg."""
+
+    trial: str
+    whisk: int
+    roll_deg: float
+    moments_Nmm: np.ndarray
+    residuals_Nmm: np.ndarray
+    moments_sigma_Nmm: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeFacts:
+    """The gauges as they were used: matrix (2, 2) from [y_V, z_V] to [m_y, m_z], and its sigma. certificate,
+    points: its lines and what they rest on; empty where the coefficients were brought along."""
+
+    source: str
+    matrix_Nmm_per_V: np.ndarray
+    matrix_sigma_Nmm_per_V: np.ndarray
+    certificate: tuple[str, ...] = ()
+    points: tuple[GaugePoints, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class RunRecord:
     """verdict, doubts and sections: as the summary has them; figures: names of the pictures in the folder; recordings:
     hash of each trial's files, by name; results: of each trial's result; versions: by distribution."""
@@ -52,6 +77,7 @@ class RunRecord:
     has_pictures: bool
     cameras: tuple[CameraFacts, ...] = ()
     board: BoardFacts | None = None
+    gauges: GaugeFacts | None = None
     recordings: dict[str, str] = field(default_factory=dict)
     results: dict[str, str] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)

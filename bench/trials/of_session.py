@@ -13,13 +13,15 @@ from bench.base.results import hash_of_files, read_result
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.cameras.calibration import SessionCalibration, calibrate_session
+from bench.gauges.certificate import Certificate
 from bench.gauges.checks import Undetermined, check_alive
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauges_file import given_gauges
 from bench.gauges.matrix import FROM_ALL, Gauges
-from bench.gauges.readings import Pairs, pairs_of
+from bench.gauges.readings import pairs_of
+from bench.gauges.reversal import reversals
 from bench.records.plain import from_plain
 from bench.records.trial import TrialResult
 from bench.session.session import Session
@@ -54,11 +56,14 @@ def placed_units(
     return calibration, [replace(unit, calibration=calibration) for unit in units]
 
 
-def with_gauges(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> tuple[Gauges | None, list[Unit]]:
-    """The session's gauges, and the units with them and with the drift of the channels."""
+def with_gauges(
+    units: Sequence[Unit], pool: Workers, doubts: Doubts
+) -> tuple[Gauges | None, Certificate | None, list[Unit]]:
+    """The session's gauges, their certificate where its own trials calibrated them, and the units with the gauges and
+    with the drift of the channels."""
     rate = session_drift([unit.trial for unit in units], units[0].settings, pool)
-    gauges = session_gauges(units, rate, pool, doubts)
-    return gauges, [unit.with_gauges(rate, gauges) for unit in units]
+    gauges, made = session_gauges(units, rate, pool, doubts)
+    return gauges, made, [unit.with_gauges(rate, gauges) for unit in units]
 
 
 def evaluated(units: Sequence[Unit], pool: Workers) -> list[TrialResult]:
@@ -80,21 +85,45 @@ def _free_slopes(task: tuple[Trial, Settings]) -> list:
     return [slope for slope in slopes if slope is not None]
 
 
-def session_gauges(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Gauges | None:
-    """Gauges as brought along, else from the gauge trials, or from all where the settings say so; None, and a note on
-    what is lacking, where these cannot fix them."""
+def session_gauges(
+    units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
+) -> tuple[Gauges | None, Certificate | None]:
+    """Gauges as brought along, without a certificate; else from the gauge trials, or from all where the settings say
+    so; none, and a note on what is lacking, where these cannot fix them."""
     given, from_all = given_gauges(units[0].session), units[0].settings.gauges_from_all
     volts = [unit for unit in units if read_signals(unit.trial).kind == "V"]
     trials = [unit for unit in volts if from_all or unit.trial.purpose == "gauge"]
     if given is not None or not trials:
-        return given
-    pool.run(see_unit, trials, "gauge trials")
+        return given, None
     try:
-        fitted = fit_gauges([pairs for unit in trials for pairs in _pairs(unit, rate)])
+        made = certified(trials, rate, pool)
     except Undetermined as reason:
         doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * (len(trials) < len(volts))]))
-        return None
-    return replace(fitted, source=FROM_ALL) if from_all else fitted
+        return None, None
+    return (replace(made.gauges, source=FROM_ALL) if from_all else made.gauges), made
+
+
+def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers) -> Certificate:
+    """The gauges fitted to what the cameras and the gauges show of these trials, with all that they rest on.
+
+    rate (2,): drift of the channels, V/s. Raises Undetermined where the trials do not fix the coefficients, BadInput
+    where a channel is dead, swapped or reversed.
+    """
+    session, settings = units[0].session, units[0].settings
+    strokes = [strokes_of(read_signals(unit.trial), unit.trial, settings) for unit in units]
+    for of_trial in strokes:
+        check_alive(of_trial)
+    found = [
+        pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
+        for unit, seen, of_trial in zip(units, pool.run(see_unit, units, "gauge trials"), strokes)
+        for whisk, stroke in zip(seen.whisks, of_trial)
+    ]
+    pairs = tuple(p for p in found if p is not None)
+    every_stroke = tuple(stroke for of_trial in strokes for stroke in of_trial)
+    back = tuple(r for unit in units for r in reversals(unit.trial, read_signals(unit.trial), settings))
+    turn = max(unit.trial.follicle_roll_sigma_deg for unit in units)
+    gauges = fit_gauges(pairs)
+    return Certificate(session.name, session.whisker, gauges, pairs, every_stroke, rate, back, roll_sigma_deg=turn)
 
 
 def _lacking(units: Sequence[Unit]) -> Iterator[str]:
@@ -103,14 +132,3 @@ def _lacking(units: Sequence[Unit]) -> Iterator[str]:
         lacks = dict.fromkeys(whisk.status for whisk in see_unit(unit).whisks if not whisk.has_truth and whisk.status)
         if lacks:
             yield f"{unit.trial.name} has no truth: {', '.join(lacks)}"
-
-
-def _pairs(unit: Unit, rate) -> list[Pairs]:
-    """Pairs of moment and volts of a gauge trial's whisks."""
-    strokes, whisker = strokes_of(read_signals(unit.trial), unit.trial, unit.settings), unit.session.whisker
-    check_alive(strokes)
-    found = [
-        pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
-        for seen, stroke in zip(see_unit(unit).whisks, strokes)
-    ]
-    return [pairs for pairs in found if pairs is not None]

@@ -35,7 +35,7 @@ class Page:
         self._number, self._unread = 0, b""
 
     def __enter__(self) -> "Page":
-        self._profile = TemporaryDirectory()
+        self._profile = TemporaryDirectory(ignore_cleanup_errors=True)  # its children may still write
         to_read, self._write = os.pipe()
         self._read, to_write = os.pipe()
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe"]

@@ -1,4 +1,4 @@
-"""The session's figures as the page draws them: error against slope and friction, Fig. 8, error explained, budget."""
+"""The session's figures as the page draws them: Fig. 8, error against slope, friction and θ, its parts, the budget."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -45,11 +45,11 @@ def figures(record: RunRecord, rows: Sequence[Row], friction: Sequence[SurfaceFr
     judged = [j for j in judge(row.result for row in unique(rows)) if _shown(j)]
     fitted = [f.surface for f in friction]
     keys = {(row.trial, row.seen.whisk): row.key for row in rows}
+    yield from (figure_8(surface, keys) for surface in fitted)
     if judged:
         yield error_by_slope(judged, keys, fitted, record.settings)
         yield from error_by_friction(judged, keys, rows)
     yield from error_by_theta(against_theta([row.result for row in unique(rows)]))
-    yield from (figure_8(surface, keys) for surface in fitted)
 
 
 def unique(rows: Sequence[Row]) -> Sequence[Row]:

@@ -8,7 +8,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 WIDTH, HEIGHT = 480, 330  # px, of one panel
-_LEFT, _RIGHT, _TOP, _BOTTOM = 54, 10, 26, 42
+_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 10, 26, 42
 _R = 4.2  # px, half a marker
 _MARGIN = 0.06  # of the data's reach, on either side
 _TRIANGLE = np.array([(0, -1.25), (1.15, 0.85), (-1.15, 0.85)])

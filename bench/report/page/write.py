@@ -17,6 +17,7 @@ from bench.records.trial import TrialResult
 from bench.report.evaluation import finished
 from bench.report.page.cards import SOUND, card, cells, columns
 from bench.report.page.cures import cure_of
+from bench.report.page.gauges import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
 from bench.report.page.scene import ELLIPSOID_FACTOR, scene
@@ -88,6 +89,7 @@ def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction:
         settings=[(f.name, _setting(getattr(record.settings, f.name))) for f in fields(record.settings)],
         factor=ELLIPSOID_FACTOR,
         cameras=[(camera, _distance(camera)) for camera in record.cameras],
+        gauges=gauge_part(record.gauges, rows),
         others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
         citation=bibliography(record),
         number=number,

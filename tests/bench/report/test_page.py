@@ -1,6 +1,7 @@
 """The report: all of it in one file, every name escaped, every whisk found, and made again from results alone."""
 
 import io
+import json
 import re
 import shutil
 import tomllib
@@ -124,6 +125,34 @@ def test_methods_tell_this_runs_numbers(exact_run):
         numbers = (words.number(v) for v in (s.bias_percent, s.rms_percent, s.worst_percent))
         assert f"| {s.label} | {s.n} of {s.asked} | {' | '.join(numbers)} |" in text
     assert "doi     = {10.1109/TRO.2008.2002562}" in (exact_run / BIBLIOGRAPHY).read_text()
+
+
+def test_the_gauges_stand_with_their_residuals_and_the_whisks_that_calibrated(exact_run, reader):
+    gauges = json.loads((exact_run / "run.json").read_text())["gauges"]
+    trials = {row["trial"] for row in table(exact_run / "whisks.csv") if row["trial"].startswith("gauge")}
+    assert {p["trial"] for p in gauges["points"]} == trials and len(trials) == 2
+    marks = [m for m in reader.all("a") if m.get("class", "").startswith("mark") and m["data-trial"] in trials]
+    assert len(marks) == 2 * sum(len(p["moments_Nmm"]) for p in gauges["points"])
+    said = "".join(reader.text)
+    sigma = np.array(gauges["matrix_sigma_Nmm_per_V"])
+    for value, one in zip(np.ravel(gauges["matrix_Nmm_per_V"]), np.ravel(sigma)):
+        assert f"{words.number(value, 4)} ± {1.96 * one:.4f}" in said
+    assert all(line.strip() in said for line in gauges["certificate"]) and "seen in pictures" in said
+
+
+def test_gauges_brought_along_have_no_residuals_here(exact_run, tmp_path):
+    out = shutil.copytree(exact_run, tmp_path / "out")
+    record = json.loads((out / "run.json").read_text())
+    record["gauges"] |= {"certificate": [], "points": [], "matrix_sigma_Nmm_per_V": [[0, 0], [0, 0]]}
+    (out / "run.json").write_text(json.dumps(record))
+    assert main(["report", str(out)]) == 0
+    part = (out / REPORT).read_text().split('<section id="gauges">')[1].split("</section>")[0]
+    assert "They were brought along" in part and "<svg" not in part and "U95" not in part
+
+
+def test_parts_come_in_the_order_in_which_they_are_read(reader):
+    ids = [a["id"] for tag, a in reader.elements if tag == "section"]
+    assert ids[0] == "verdict" and ids[-5:] == ["sure", "gauges", "cameras", "run", "cite"]
 
 
 def test_made_again_from_results_alone_it_is_the_same(exact_run, tmp_path, capsys):
