@@ -100,7 +100,7 @@ def test_what_no_row_has_is_missing_with_a_reason():
 def test_summary_and_page_say_it(exact_run):
     title = "Only what the scene requires"
     assert title in (exact_run / "summary.txt").read_text()
-    assert f"<h3>{title}</h3>" in (exact_run / "report.html").read_text()
+    assert f"<h3>Ledger: {title[0].lower()}{title[1:]}</h3>" in (exact_run / "report.html").read_text()
 
 
 def test_the_table_and_the_lines(exact_run, tmp_path):
