@@ -17,16 +17,16 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
-from vision.lines.shading import LEAST_POWER, Equations, Knots, contrast_of, stiffness, wave_prior
+from vision.lines.shading import LEAST_POWER, LONGEST_PX, Equations, Knots, Slopes, contrast_of, stiffness, wave_prior
 
 BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
 # Of the contrast: by so much the model of the light may be off at a distance from the axis, in all pieces alike (a blur
-# is no Gauss curve, a transfer curve no straight line). With a third or three times of it, common offsets of lines are
-# as far off and z is larger (tests/ladder/wire_scenes.py).
+# is no Gauss curve, a transfer curve no straight line). With half of it, or five times as much, common offsets of lines
+# are larger, and larger still beside their sigma (tests/ladder/wire_scenes.py).
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
 _STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
-_MOST_STEPS, _LONGEST_PX, _LONGEST_LOG = 40, 0.7, 0.3
+_MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
 _STIFFER, _EASIER, _UNDAMPED = 10.0, 5.0, 1e-2  # what a step makes of it; of _DAMPED, below which there is none
@@ -36,21 +36,27 @@ _SETTLED, _SETTLED_EACH = 0.02, 1e-3
 
 
 @dataclass(frozen=True)
-class Solved:
-    """Of each piece: shift_px, own_sigma_px by its own noise, chi2 per pixel, contrast, all (s,); shared_px (s, k): by
-    how much it moves with one sigma of each of k independent causes that all share; robust (s,): its weight;
-    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma; waves (s, terms): its shading."""
+class Shared:
+    """What all pieces share, and where they lie by it: shift_px (s,); shared_px (s, k): by how much each moves with one
+    sigma of each of k independent causes that all share; waves (s, terms): its shading; blur_px; doubt: minus twice the
+    log evidence of positions and blur, the shading integrated out."""
 
     shift_px: np.ndarray
+    shared_px: np.ndarray
+    waves: np.ndarray
+    blur_px: float
+    doubt: float
+
+
+@dataclass(frozen=True)
+class Solved(Shared):
+    """And of each piece by itself: own_sigma_px by its own noise, chi2 per pixel, contrast, all (s,); widened_px2
+    (s, 2): by how much its blur² is above that of all, and sigma."""
+
     own_sigma_px: np.ndarray
     chi2: np.ndarray
     contrast: np.ndarray
-    shared_px: np.ndarray
-    blur_px: float
-    robust: np.ndarray
     widened_px2: np.ndarray
-    waves: np.ndarray
-    doubt: float
 
 
 @dataclass(frozen=True)
@@ -86,16 +92,14 @@ def solve_jointly(task: Task) -> Solved:
     return settled(task, replace(shared, shared_px=columns))
 
 
-def settled(task: Task, shared: Solved) -> Solved:
+def settled(task: Task, shared: Shared) -> Solved:
     """Each piece's own position by all that its pixels tell, with what all share known: their mean stays."""
     here = Equations(task.pieces.moved(shared.shift_px), shared.blur_px, task.terms)
     slopes, chi2 = here.linearised(shared.waves), here.chi2(shared.waves) / task.pieces.freedom
-    power = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER)
-    step = np.clip(slopes.gram[:, 0, 2] / power, -_LONGEST_PX, _LONGEST_PX)
-    share = power / np.maximum(chi2 / max(float(np.median(chi2)), 1e-9), 1.0) ** 2
-    return replace(shared, shift_px=shared.shift_px + step - np.average(step, weights=share), chi2=chi2,
-                   own_sigma_px=np.sqrt(np.maximum(chi2, 1.0) / power), contrast=slopes.contrast,
-                   widened_px2=_widened(slopes.gram, power, shared.blur_px, np.maximum(chi2, 1.0)))
+    share = slopes.power / np.maximum(chi2 / max(float(np.median(chi2)), 1e-9), 1.0) ** 2
+    shift = shared.shift_px + slopes.step_px - np.average(slopes.step_px, weights=share)
+    return Solved(shift, shared.shared_px, shared.waves, shared.blur_px, shared.doubt, slopes.own_sigma_px(chi2), chi2,
+                  slopes.contrast, _widened(slopes, shared.blur_px, np.maximum(chi2, 1.0)))
 
 
 def _start(task: Task) -> tuple[float, float, float]:
@@ -119,7 +123,7 @@ def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
     return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
 
 
-def _descend(here: "_Point") -> Solved:
+def _descend(here: "_Point") -> Shared:
     """Downhill from a point, the pieces weighed as there: weighed anew at each step, those that a shift spoils would
     count ever less.
 
@@ -182,7 +186,7 @@ class _Point:
 
     def moved(self, step_px, by_blur: float) -> "_Point":
         """The point a step farther on, weighed as here."""
-        shift = self.shift_px + np.clip(step_px, -_LONGEST_PX, _LONGEST_PX)
+        shift = self.shift_px + np.clip(step_px, -LONGEST_PX, LONGEST_PX)
         return self.at(self.task, np.clip(shift, -_FARTHEST_PX, _FARTHEST_PX),
                        self.log_blur + float(np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG)), self.robust, self.stiff)
 
@@ -205,7 +209,7 @@ class _Arrow:
         task = point.task
         self.point, self.slopes = point, point.equations.linearised(point.waves)
         hats, slopes, size = task.knots.weights(task.pieces), self.slopes, len(point.left)
-        self.power, self.right = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER), slopes.gram[:, 0, 2]
+        self.power, self.right = slopes.power, slopes.gram[:, 0, 2]
         by_waves = (hats[:, :, None] * slopes.rod[:, None, 0]).reshape(len(hats), size)
         self.cross = np.concatenate([by_waves, slopes.gram[:, 0, 1:2]], axis=1)
         self.shared = np.zeros((size + 1, size + 1))
@@ -231,22 +235,20 @@ class _Arrow:
         step = (right - cross @ shared) / power
         return step, float(shared[-1]), (float(shared_right @ shared), float(right @ (right / power)))
 
-    def solved(self, damped: float) -> Solved:
-        """A step farther on, with covariance: each piece's own, and what all move by with what they share."""
+    def solved(self, damped: float) -> Shared:
+        """A step farther on, with what all move by with what they share."""
         point, (step, by_blur, _) = self.point, self.step(damped)
         own = self.cross / self.power[:, None]
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
-        chi2 = point.chi2 / point.task.pieces.freedom
         shared = np.linalg.solve(np.linalg.cholesky(left), own.T).T
         blur_px = float(np.exp(point.log_blur + np.clip(by_blur, -_LONGEST_LOG, _LONGEST_LOG)))
-        return Solved(point.shift_px + np.clip(step, -_LONGEST_PX, _LONGEST_PX),
-                      np.sqrt(np.maximum(chi2, 1.0) / self.power), chi2, self.slopes.contrast, shared, blur_px,
-                      point.robust, _widened(self.slopes.gram, self.power, blur_px, np.maximum(chi2, 1.0)), point.waves,
-                      point.doubt)
+        shift_px = point.shift_px + np.clip(step, -LONGEST_PX, LONGEST_PX)
+        return Shared(shift_px, shared, point.waves, blur_px, point.doubt)
 
 
-def _widened(gram, power, blur_px: float, chi2) -> np.ndarray:
+def _widened(slopes: Slopes, blur_px: float, chi2) -> np.ndarray:
     """By how much each piece's own blur² is above that of all, and sigma, (s, 2), its position free as well."""
+    gram, power = slopes.gram, slopes.power
     own = gram[:, 1, 1] - gram[:, 0, 1] ** 2 / power + LEAST_POWER
     step = (gram[:, 1, 2] - gram[:, 0, 1] * gram[:, 0, 2] / power) / own
     return 2.0 * blur_px**2 * np.stack([step, np.sqrt(chi2 / own)], axis=1)

@@ -15,7 +15,7 @@ _WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equa
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
 # alike, moved all lines by half a pixel, and by a quarter of one from end to end.
 _LIT_ALIKE_RAD = np.radians(8.0)
-_LONGEST_PX = 0.7  # a step: beyond, a thin rod's edge is another's
+LONGEST_PX = 0.7  # a step: beyond, a thin rod's edge is another's
 
 
 @dataclass(frozen=True)
@@ -178,6 +178,20 @@ class Slopes:
     gram: np.ndarray
     contrast: np.ndarray
 
+    @property
+    def power(self) -> np.ndarray:
+        """What each piece by itself tells of its position (s,), 1/px²."""
+        return np.maximum(self.gram[:, 0, 0], LEAST_POWER)
+
+    @property
+    def step_px(self) -> np.ndarray:
+        """Gauss–Newton's step of each piece by itself (s,)."""
+        return np.clip(self.gram[:, 0, 2] / self.power, -LONGEST_PX, LONGEST_PX)
+
+    def own_sigma_px(self, chi2: np.ndarray) -> np.ndarray:
+        """Sigma of each piece's position by itself (s,), where it leaves chi2 (s,) per pixel."""
+        return np.sqrt(np.maximum(chi2, 1.0) / self.power)
+
 
 def _inverse_of_two(matrices) -> np.ndarray:
     """Inverses of symmetric matrices (s, 2, 2)."""
@@ -247,7 +261,6 @@ def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 
     waves, shift = shading.of(pieces), np.zeros(len(pieces))
     for _ in range(rounds):
         slopes = Equations(pieces.moved(shift), shading.blur_px, waves.shape[1]).linearised(waves)
-        power = np.maximum(slopes.gram[:, 0, 0], LEAST_POWER)
-        shift = np.clip(shift + np.clip(slopes.gram[:, 0, 2] / power, -_LONGEST_PX, _LONGEST_PX), -limit_px, limit_px)
+        shift = np.clip(shift + slopes.step_px, -limit_px, limit_px)
     chi2 = slopes.gram[:, 2, 2] / pieces.freedom
-    return Located(shift, np.sqrt(np.maximum(chi2, 1.0) / power), chi2, slopes.contrast)
+    return Located(shift, slopes.own_sigma_px(chi2), chi2, slopes.contrast)
