@@ -110,25 +110,23 @@ def _local_fit(theta, at):
 
 def _unfitted(smooth: Smooth, name: str, theta_rad: float) -> float:
     """How far the frames scatter about the local fit: small jumps are in no frame's sigma, but in what lies between."""
-    near = _near(smooth.theta_rad - theta_rad)
-    x, values = smooth.theta_rad[near] - theta_rad, smooth.values[name][near]
-    degree = _degree(len(x))
-    if len(x) <= degree + 1:
-        return 0.0
-    left = values - np.polyval(np.polyfit(x, values, degree), x)
-    return float(np.sqrt(np.sum(left**2) / (len(x) - degree - 1)))
+    left, freedom = _beside_fit(smooth, smooth.values[name], theta_rad)
+    return float(np.sqrt(np.sum(left**2) / freedom)) if freedom else 0.0
 
 
 def expected_scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
     """What `_unfitted` is, RMS, where nothing jumps and frames err as their covariance says."""
+    left, freedom = _beside_fit(smooth, smooth.jacobians[name], theta_rad)
+    return float(np.sqrt(np.einsum("fi,ij,fj->", left, smooth.covariance, left) / freedom)) if freedom else 0.0
+
+
+def _beside_fit(smooth: Smooth, values: np.ndarray, theta_rad: float) -> tuple[np.ndarray, int]:
+    """What a polynomial through the frames nearby leaves of values (f, …) there, and how many frames are more than its
+    coefficients."""
     near = _near(smooth.theta_rad - theta_rad)
-    x, rows = smooth.theta_rad[near] - theta_rad, smooth.jacobians[name][near]
-    degree = _degree(len(x))
-    if len(x) <= degree + 1:
-        return 0.0
-    powers = np.vander(x, degree + 1)
-    left = rows - powers @ np.linalg.lstsq(powers, rows, rcond=None)[0]
-    return float(np.sqrt(np.einsum("fi,ij,fj->", left, smooth.covariance, left) / (len(x) - degree - 1)))
+    x, degree = smooth.theta_rad[near] - theta_rad, _degree(int(np.sum(near)))
+    fit = np.polyfit(x, values[near], degree)
+    return values[near] - np.vander(x, degree + 1) @ fit, len(x) - degree - 1
 
 
 def _sigmas(smooth: Smooth, name: str, frames: np.ndarray, slope: float = 0.0) -> np.ndarray:
