@@ -27,30 +27,24 @@ from bench.plan.rows import Row
 from bench.plan.run import Options, plan_rig, plan_session
 from bench.plan.written import SIGMAS, STATED
 from bench.rig.simulate import simulate
+from tests.scenes.planned import TWO_CAMERAS
 from vision.geometry.errors import Refused
 
 LOW, HIGH = 0.8, 1.25
 COLUMNS = ("session", "trial", *SIGMAS, *STATED, "wire_px", "bar_px", "status")
 # Benches that differ in what a plan must foretell: cameras, lenses, light, noise, frames, slopes.
-_TWO = """
-[[cameras]]
-name = "high"
-position_mm = [38.0, -175.0, 335.0]
-[[cameras]]
-name = "low"
-position_mm = [98.0, -325.0, 120.0]
-"""
 _THIRD = '\n[[cameras]]\nname = "far"\nposition_mm = [150.0, 260.0, 190.0]\n'
 _TRIALS = "[[trials]]\nbeta_deg = [0, 20, 40, 60]\nd_x_mm = {}\n"
 RIGS = {
-    "usual": _TWO + _TRIALS.format(60.0),
-    "near_the_base": _TWO + _TRIALS.format(40.0),
-    "three_cameras": _TWO + _THIRD + _TRIALS.format(55.0),
-    "long_lenses": _TWO.replace("[98.0", "[80.0").replace('"high"', '"high"\nfocal_px = 2600.0') + _TRIALS.format(60.0),
-    "noisy": "[pictures]\nread_noise = 3.0\nblur_px = 1.5\n" + _TWO + _TRIALS.format(60.0),
-    "one_sided_light": "[light]\nlamp = 0.9\nsoft = 0.05\n" + _TWO + _TRIALS.format(60.0),
-    "few_frames": "[pictures]\nstep_deg = 0.9\n" + _TWO + _TRIALS.format(60.0),
-    "thin_whisker": "[whisker]\ndiameter_mm = 0.6\n" + _TWO + _TRIALS.format(50.0),
+    "usual": TWO_CAMERAS + _TRIALS.format(60.0),
+    "near_the_base": TWO_CAMERAS + _TRIALS.format(40.0),
+    "three_cameras": TWO_CAMERAS + _THIRD + _TRIALS.format(55.0),
+    "long_lenses": TWO_CAMERAS.replace("[98.0", "[80.0").replace('"high"', '"high"\nfocal_px = 2600.0')
+    + _TRIALS.format(60.0),
+    "noisy": "[pictures]\nread_noise = 3.0\nblur_px = 1.5\n" + TWO_CAMERAS + _TRIALS.format(60.0),
+    "one_sided_light": "[light]\nlamp = 0.9\nsoft = 0.05\n" + TWO_CAMERAS + _TRIALS.format(60.0),
+    "few_frames": "[pictures]\nstep_deg = 0.9\n" + TWO_CAMERAS + _TRIALS.format(60.0),
+    "thin_whisker": "[whisker]\ndiameter_mm = 0.6\n" + TWO_CAMERAS + _TRIALS.format(50.0),
 }
 
 

@@ -10,17 +10,15 @@ from tests.scenes.rig_sessions import protocol_file
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import Cameras
 
-BENCH = """
-name = "bench"
+TWO_CAMERAS = """
 [[cameras]]
 name = "high"
 position_mm = [38.0, -175.0, 335.0]
 [[cameras]]
 name = "low"
 position_mm = [98.0, -325.0, 120.0]
-[[trials]]
-beta_deg = 30
 """
+BENCH = f'name = "bench"{TWO_CAMERAS}[[trials]]\nbeta_deg = 30\n'
 LINES = LineNoise(0.03, 0.2, np.array([[0.0, 0.06, 0.08]]))
 
 
