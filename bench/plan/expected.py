@@ -12,12 +12,13 @@ from vision.fit.line_noise import LineNoise
 from vision.fit.problem import BAR, REST, Problem, State
 from vision.fit.solve import weighted_jacobian
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import resting_lines
+from vision.geometry.centreline import is_before
 from vision.geometry.errors import Refused
 from vision.geometry.settings import VisionSettings
 from vision.truth.records import WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early
+from vision.truth.whisk import require_both_rods
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _USUAL = VisionSettings()
@@ -36,7 +37,7 @@ class Expected:
 def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], hides: Hides = nothing_hides,
              settings: VisionSettings = _USUAL) -> Expected:
     """A whisk seen by cameras whose lines are worth so much."""
-    facing = [camera.name for camera in cameras if _faces(camera, staged)]
+    facing = [camera.name for camera in cameras if is_before(camera, staged.rods.wire, staged.motor_rad)]
     if not facing:
         return Expected(WhiskTruth(0, None, status="all cameras have the whisker behind them"), {})
     cameras, curves = cameras.subset(facing), curves_of(staged, near_frames(staged))
@@ -59,11 +60,6 @@ def near_frames(staged: Staged) -> list[int]:
     return TouchByClearance().near(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad)))
 
 
-def _faces(camera, staged: Staged) -> bool:
-    span = [np.min(staged.motor_rad), np.max(staged.motor_rad)]
-    return bool(np.all(np.isfinite(resting_lines(camera, staged.rods.wire, span))))
-
-
 def _fitted(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], sights: Mapping[str, Sight],
             curves) -> FittedWhisk:
     """The fit to the predicted lines. Raises Refused where there is none."""
@@ -74,10 +70,7 @@ def _fitted(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], si
             seen += wire_points(sights[camera.name], number, curves, noise.wire_px)
         if noise is not None:
             seen += bar_points(camera, number, staged.axis, staged.rods, noise.bar_px)
-    for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
-                       ("bar clear of the wire", any(one.frame < 0 for one in seen))):
-        if not there:
-            raise Refused(f"no camera shows enough of the {rod}")
+    require_both_rods(seen)
     touches = staged.motor_rad[frames] > staged.touch.motor_rad
     if not np.any(touches):
         raise Refused(NEVER_TOUCHES)

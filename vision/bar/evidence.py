@@ -20,7 +20,6 @@ from scipy.ndimage import uniform_filter1d
 from scipy.special import ndtr
 
 from vision.lines.bands import Pieces
-from vision.pictures.view import SATURATED
 
 FULL_SCALE = 255.0
 STEP_PX = 0.25  # of the grid: a third of a lens blur
@@ -158,7 +157,7 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profi
     stretched = pieces.offset_px * (radius / pieces.radius_px)[:, None]
     half = int(np.ceil((radius + reach_px + _OUTSIDE_PX) / STEP_PX))
     place = stretched / STEP_PX + half
-    seen = (place >= 0) & (place < 2 * half) & (pieces.grey < SATURATED * FULL_SCALE)
+    seen = (place >= 0) & (place < 2 * half)
     seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
     light, slope = _light(pieces.grey, gamma)
     weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
@@ -241,7 +240,6 @@ def _median_there(values, there) -> np.ndarray:
     ordered, count = np.sort(np.where(there, values, np.inf), axis=0), np.sum(there, axis=0)
     middle = ordered[np.clip(count // 2, 0, len(there) - 1), np.arange(len(count))]
     return np.where(count > 0, middle, 0.0)
-
 
 
 def _alike(left) -> float:

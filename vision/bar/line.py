@@ -85,14 +85,13 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     pieces = _clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
         return {}
+    before = before or {}
     gammas = next(iter(before.values())).looks if before else _GAMMAS
+    seen = {name: before[name].seen_from(some) if name in before else _looks(some, gammas)
+            for name, some in pieces.items()}
     if before:
-        seen = {name: before[name].seen_from(some) if name in before else _looks(some, gammas)
-                for name, some in pieces.items()}
         seen = {name: {gamma: closer_look(pieces[name], one, gamma, positions=2) for gamma, one in looks.items()}
                 for name, looks in seen.items()}
-    else:
-        seen = {name: _looks(some, gammas) for name, some in pieces.items()}
     chances = _chances(seen.values())
     likely = chances > _LEAST_CHANCE
     kept = [gamma for gamma, is_likely in zip(gammas, likely) if is_likely]
@@ -139,12 +138,14 @@ def _bar_line(pieces: Pieces, looks: Mapping[float, Posterior], chances) -> BarL
 
 def _shows(pieces: Pieces) -> bool:
     """Whether more than a half of the pixels are there, and not saturated."""
-    return bool(np.mean((pieces.weight > 0) & (pieces.grey < SATURATED * FULL_SCALE)) > _LEAST_SHOWN)
+    return bool(np.mean(pieces.weight > 0) > _LEAST_SHOWN)
 
 
 def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
-    """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit."""
+    """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit; saturated pixels weigh
+    nothing."""
     pieces = bar_pieces(view, view.noise.times(view.mean_share), axis, radius_mm, wires_px, settings)
+    pieces = pieces.below(SATURATED * view.full_scale)
     scale = FULL_SCALE / view.full_scale
     return replace(pieces, grey=pieces.grey * scale, background=pieces.background * scale,
                    slope=pieces.slope * scale, weight=pieces.weight / scale)

@@ -131,3 +131,8 @@ def resting_lines(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> list[np.
     """Lines (m, 2) in one camera of a straight, unbent wire at each of the motor angles (n,)."""
     return [camera.project(one_curve(np.zeros((2, REST_POWERS)), np.zeros(2), wire.length_mm, motor, wire).points_mm)
             for motor in motor_rad]
+
+
+def is_before(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> bool:
+    """Whether a straight wire is before the camera over its whole stroke; motor_rad (n,)."""
+    return bool(np.all(np.isfinite(resting_lines(camera, wire, [np.min(motor_rad), np.max(motor_rad)]))))

@@ -108,6 +108,10 @@ class Pieces:
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
+    def below(self, grey: float) -> "Pieces":
+        """The same pieces; pixels of this grey level or above weigh nothing."""
+        return replace(self, weight=np.where(self.grey < grey, self.weight, 0.0))
+
     def moved(self, shift_px: np.ndarray) -> "Pieces":
         """The same pixels seen from curves moved by shift_px (s,) along their normals."""
         return replace(self, offset_px=self.offset_px - shift_px[:, None],

@@ -250,5 +250,5 @@ def _best_width(pieces: Pieces, begin: _Width) -> _Width:
     middle = min((np.log(start) for start in starts), key=misfit)  # a thick line and a blurred one are two minima
     bounds = [np.log(_RADII_PX)] * 2 + [np.log(_BLURS_PX)]
     solution = minimize(misfit, middle, method="Nelder-Mead", bounds=bounds,
-                     options={"initial_simplex": middle + 0.4 * np.eye(4, 3, -1), "xatol": 0.03, "maxfev": 60})
+                        options={"initial_simplex": middle + 0.4 * np.eye(4, 3, -1), "xatol": 0.03, "maxfev": 60})
     return _Width(*(float(v) for v in np.exp(solution.x)))

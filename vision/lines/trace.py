@@ -14,7 +14,7 @@ from vision.lines.binned import binned, without
 from vision.lines.joint import BLUR_SIGMA, Task, settled, solve_jointly
 from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
-from vision.pictures.view import SATURATED, View
+from vision.pictures.view import View
 
 NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 WIRE_WAVES = 11  # round a wire: with fewer, what they lack of a highlight passes for blur and for position
@@ -36,11 +36,6 @@ def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px:
              for frame, (arc, middle, radius) in zip(curves, outlines)]
     pieces = cut_pieces(bands, length_px, view.noise)
     return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
-
-
-def unsaturated(pieces: Pieces, full_scale: float) -> Pieces:
-    """The pieces without the pixels that the sensor cut off: of these only an edge of what is saturated is known."""
-    return replace(pieces, weight=np.where(pieces.grey < SATURATED * full_scale, pieces.weight, 0.0))
 
 
 def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

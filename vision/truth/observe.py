@@ -19,7 +19,7 @@ from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import resting_lines
+from vision.geometry.centreline import is_before
 from vision.geometry.counted import counted
 from vision.geometry.errors import Misled, Refused
 from vision.geometry.rods import Rods, Wire
@@ -69,8 +69,7 @@ def _nothing(whisks, reason: str) -> TrialTruth:
 
 def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, list[str]]:
     """The cameras that have the whisker before them, and lines on the others. Raises Refused where none has."""
-    span = [np.min(motor_rad), np.max(motor_rad)]
-    faces = {camera.name: bool(np.all(np.isfinite(resting_lines(camera, wire, span)))) for camera in cameras}
+    faces = {camera.name: is_before(camera, wire, motor_rad) for camera in cameras}
     lines = [f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig"
              for name, faced in faces.items() if not faced]
     if not any(faces.values()):

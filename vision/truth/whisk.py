@@ -15,8 +15,8 @@ from vision.geometry.errors import Misled, Refused
 from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import Observed
 from vision.lines.shading import Knots
-from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, unsaturated, wire_pieces
-from vision.pictures.view import View
+from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
+from vision.pictures.view import SATURATED, View
 from vision.truth.strategies import BarMiddles, Touch, early, ways_to_see
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -138,11 +138,16 @@ def _trace_all(whisk: WhiskPictures, bar: BarMiddles, look: _Look, *, last: bool
     for number, view in enumerate(whisk.views):
         seen += trace_wire(whisk, view, look.axis, look.curves, last=last)
         seen += [Observed(-1, number, points, side) for side, points in bars.get(view.camera.name, {}).items()]
+    require_both_rods(seen)
+    return seen
+
+
+def require_both_rods(seen: Sequence[Observed]) -> None:
+    """Raises Refused where wire or bar is seen in no camera."""
     for rod, there in (("wire clear of the bar", any(one.frame >= 0 for one in seen)),
                        ("bar clear of the wire", any(one.frame < 0 for one in seen))):
         if not there:
             raise Refused(f"no camera shows enough of the {rod}")
-    return seen
 
 
 def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[int, Curves], *,
@@ -153,7 +158,7 @@ def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[
     """
     wire, settings = whisk.rods.wire, whisk.settings
     pieces = wire_pieces(view, curves, wire, settings.wire_piece_px, settings.wire_margin_px)
-    pieces = unsaturated(pieces, view.full_scale)
+    pieces = pieces.below(SATURATED * view.full_scale)
     outline = outline_of_bar(view.camera, axis, whisk.rods.bar.radius_mm)
     pieces = pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
     if len(pieces) == 0:
