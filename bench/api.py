@@ -21,7 +21,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,9 +30,6 @@ from bench.base.drawing import style
 from bench.base.settings import Settings
 from bench.base.tables import read_table
 from bench.evaluate import evaluate as _evaluate
-from bench.plan.run import Options
-from bench.plan.run import plan as _plan
-from bench.plan.written import Plan
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
 from bench.report.paper import session_figures
@@ -40,6 +37,9 @@ from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run import RunRecord
 from bench.trials.seeing import STANDARD, by_preset
+
+if TYPE_CHECKING:
+    from bench.plan.written import Plan
 
 TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
@@ -165,11 +165,13 @@ def plan(
     theta_deg: float = 3.0,
     changes: bool = True,
     workers: int = 1,
-) -> Plan:
+) -> "Plan":
     """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does: a row a trial, with expected
     sigmas, limits and changes. Raises BadInput."""
-    quiet = logging.getLogger(__name__).info
-    return _plan(Path(what), Path(out), Options(theta_deg, changes), workers=workers, announce=quiet)
+    from bench.plan import run as planning  # with the rig and all that paints: other verbs do without
+
+    quiet, options = logging.getLogger(__name__).info, planning.Options(theta_deg, changes)
+    return planning.plan(Path(what), Path(out), options, workers=workers, announce=quiet)
 
 
 def report(out: Folder, figure_formats: Sequence[str] = ()) -> list[Path]:

@@ -25,11 +25,13 @@ Look = dict[str, tuple[int, int]]  # size and time of change of each file, by it
 
 @dataclass
 class _Watched:
-    """A session that is being recorded. around: what all trials share; last: the trials at the last look; asked: what
-    complete or refused trials were asked with; refused: why one is not complete, '' where it is."""
+    """A session that is being recorded. follow_links: see `Settings`; around: what all trials share; last: the trials at
+    the last look; asked: what complete or refused trials were asked with; refused: why one is not complete, '' where it
+    is."""
 
     path: Path
     announce: Callable[[str], object]
+    follow_links: bool = False
     around: Look = field(default_factory=dict)
     last: dict[str, Look] = field(default_factory=dict)
     asked: dict[str, tuple[Look, Look]] = field(default_factory=dict)
@@ -50,7 +52,7 @@ class _Watched:
         """Whether the trial can be evaluated."""
         self.asked[name], before, self.refused[name] = (self.around, self.last[name]), self.refused.get(name), ""
         try:
-            checked_session(self.path, trials={name})
+            checked_session(self.path, trials={name}, follow_links=self.follow_links)
         except BadInput as problem:
             self.refused[name] = str(problem)
             if self.refused[name] != before:
@@ -97,7 +99,7 @@ def watch(
     check_outside(out, session_path)
     if not session_path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(session_path))
-    watched, code = _Watched(session_path, announce), DONE
+    watched, code = _Watched(session_path, announce, settings.follow_links), DONE
     done: tuple[Look, dict[str, Look]] = {}, {}
     told = {"workers": workers, "progress": progress, "figure_formats": figure_formats}
     while True:

@@ -26,10 +26,10 @@ def recorded(steps: Iterator) -> Callable[[float], None]:
     return pause
 
 
-def watched(session: Path, out: Path, steps: Iterator) -> tuple[int, list[str]]:
+def watched(session: Path, out: Path, steps: Iterator, settings: Settings = SETTINGS) -> tuple[int, list[str]]:
     said: list[str] = []
     told = {"every_s": 0.0, "workers": 0, "announce": said.append}
-    return watch(session, out, SETTINGS, **told, pause=recorded(steps)), said
+    return watch(session, out, settings, **told, pause=recorded(steps)), said
 
 
 def copied_in(source: Path, session: Path, names) -> Iterator[None]:
@@ -87,6 +87,19 @@ def test_a_trial_without_all_its_frames_waits(small_copy, exact_vision, tmp_path
     (waiting,) = (line for line in said if line.startswith("waiting for b30_3"))
     assert "there must be a row a frame" in waiting
     assert names_in(said) == [["gauge_roll0"], ["b30_3", "gauge_roll0"]]
+
+
+@pytest.mark.parametrize("follow", [False, True])
+def test_pictures_on_another_disk_are_waited_for_unless_links_are_followed(small_copy, exact_vision, tmp_path, follow):
+    for name in ("b60_4", "gauge_roll0", "gauge_roll90"):
+        shutil.rmtree(small_copy / "trials" / name)
+    pictures = small_copy / "trials" / "b30_3" / "low"
+    shutil.move(pictures, tmp_path / "disk")
+    pictures.symlink_to(tmp_path / "disk")
+    settings = Settings(figures=False, follow_links=follow)
+    _, said = watched(small_copy, tmp_path / "out", iter([None, None]), settings)
+    assert names_in(said) == ([["b30_3"]] if follow else [])
+    assert follow != any("waiting for b30_3" in line and "--follow-links" in line for line in said)
 
 
 def test_a_trial_that_changes_is_evaluated_again(steel_signals, exact_vision, tmp_path):
