@@ -25,9 +25,9 @@ Look = dict[str, tuple[int, int]]  # size and time of change of each file, by it
 
 @dataclass
 class _Watched:
-    """A session that is being recorded. follow_links: see `Settings`; around: what all trials share; last: the trials at
-    the last look; asked: what complete or refused trials were asked with; refused: why one is not complete, '' where it
-    is."""
+    """A session that is being recorded. follow_links: see `Settings`; around: what all trials share; last: the trials
+    at the last look; asked: what complete or refused trials were asked with; refused: why one is not complete, '' where
+    it is."""
 
     path: Path
     announce: Callable[[str], object]
