@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
+from vision.lines.learnt import shift_by_learnt_light
 from vision.lines.shading import LEAST_POWER, LONGEST_PX, Equations, Knots, Slopes, contrast_of, stiffness, wave_prior
 
 BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
@@ -26,6 +27,7 @@ BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 p
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
 _STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
+_LEARNT_BY = 120  # pieces by which the light's strength is learnt
 _MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
@@ -86,10 +88,23 @@ class Task:
 
 def solve_jointly(task: Task) -> Solved:
     """The most probable positions, shading and blur of pieces that lie where they are expected, or all to one side."""
-    shift_px, log_blur, spread_px = _start(task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)))
-    shared = _descend(_begin(task.tempered(), shift_px, log_blur).weighted())
-    columns = np.concatenate([shared.shared_px, np.full((len(task.pieces), 1), spread_px)], axis=1)
-    return settled(task, replace(shared, shared_px=columns))
+    begin = _start(task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered())
+    task_shared = task.tempered()
+    shared = _descend(_begin(task_shared, np.median(begin.shift_px), np.log(begin.blur_px)).weighted())
+    return settled(task, _by_learnt_light(task_shared, shared))
+
+
+def _by_learnt_light(task: Task, shared: Shared) -> Shared:
+    """The same moved as a whole to where light of learnt strength has it, with the sigma that goes with it."""
+    here = _Point.at(task, shared.shift_px, np.log(shared.blur_px), np.ones(len(task.pieces))).weighted()
+    some = slice(None, None, 1 + len(task.pieces) // _LEARNT_BY)
+    pieces = here.equations.pieces.select(some)
+    mean, sigma, blur = shift_by_learnt_light(pieces, shared.blur_px, task.terms, task.knots, here.robust[some],
+                                              (task.blur_px, task.blur_sigma))
+    there = _Point.at(task, shared.shift_px + mean, np.log(blur), here.robust)
+    bent = shared.shared_px - np.average(shared.shared_px, axis=0, weights=here.robust)
+    columns = np.concatenate([bent, np.full((len(bent), 1), sigma)], axis=1)
+    return Shared(there.shift_px, columns, there.waves, blur, there.doubt)
 
 
 def settled(task: Task, shared: Shared) -> Solved:
@@ -102,21 +117,16 @@ def settled(task: Task, shared: Shared) -> Solved:
                   slopes.contrast, _widened(slopes, shared.blur_px, np.maximum(chi2, 1.0)))
 
 
-def _start(task: Task) -> tuple[float, float, float]:
-    """Common shift and logarithm of the blur to begin with, and RMS distance, px, of others that are as probable."""
-    task = task.tempered()
+def _start(task: Task) -> Shared:
+    """The most probable end of descents from several common shifts and blurs."""
     blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
     begins = sorted((_begin(task, shift, blur) for shift in _SHIFTS_PX for blur in blurs), key=lambda one: one.doubt)
     robust, chosen = begins[0].weighted().robust, []
     for one in begins:
         if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
             chosen.append(one)
-    ends = [_descend(_Point.at(task, one.shift_px, one.log_blur, robust)) for one in chosen[:_MOST_STARTS]]
-    best = min(ends, key=lambda one: one.doubt)
-    chance = np.exp(-0.5 * np.array([one.doubt - best.doubt for one in ends]))
-    apart = np.array([np.median(one.shift_px - best.shift_px) for one in ends])
-    spread = float(np.sqrt(np.average(apart**2, weights=chance)))
-    return float(np.median(best.shift_px)), float(np.log(best.blur_px)), spread
+    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust)) for one in chosen[:_MOST_STARTS])
+    return min(ends, key=lambda one: one.doubt)
 
 
 def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":

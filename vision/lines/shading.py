@@ -211,14 +211,18 @@ _TURNED_SHARE = 0.3
 
 def stiffness(prior: np.ndarray, knots: Knots) -> np.ndarray:
     """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
-    between = _between(len(knots.turn_rad), len(knots.place_mm))
+    between = between_knots(knots)
     both, size = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :], len(knots) * len(prior)
     return both.reshape(size, size)
 
 
+def between_knots(knots: Knots) -> np.ndarray:
+    """Inverse covariance (knots, knots) of one wave's coefficients over its own variance."""
+    return _between(len(knots.turn_rad), len(knots.place_mm))
+
+
 @lru_cache
 def _between(turns: int, places: int) -> np.ndarray:
-    """Inverse covariance (knots, knots) of one wave's coefficients over its own variance."""
     along, turned = (steps.T @ steps for steps in (np.diff(np.eye(count), axis=0) for count in (places, turns)))
     return (np.eye(turns * places) + np.kron(np.eye(turns), along) / _CHANGE_SHARE**2
             + np.kron(turned, np.eye(places)) / _TURNED_SHARE**2)
