@@ -11,13 +11,12 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from vision.lines.bands import Pieces
-from vision.lines.shading import Equations, Knots, between_knots, contrast_of
+from vision.lines.shading import Equations, Knots, between_knots, contrast_of, wave_prior
 
 _SHIFTS_PX = 1.5 * np.linspace(-1.0, 1.0, 15) * np.sqrt(np.abs(np.linspace(-1.0, 1.0, 15)))  # denser in the middle
 _LOG_BLURS = np.linspace(-0.3, 0.3, 5)
 _FINE = 301
 _STRENGTHS = 0.05, 1.0  # of the contrast: less does not show, more is more than the rod itself
-_MEAN_SHARE = 2.0  # of the contrast: brightness itself, not learnt
 _ROUNDS = 12
 # What the evidence counts: strengths are fitted to the same pixels, and what the model lacks of the light is alike in
 # all. In 65 views the shift's probability is the best so, and it keeps to its sigma (tests/ladder/wire_scenes.py).
@@ -33,7 +32,7 @@ def shift_by_learnt_light(pieces: Pieces, blur_px: float, terms: int, knots: Kno
     """
     along = knots.place_mm[[0, len(knots.place_mm) // 2, -1]] if len(knots.place_mm) > 3 else knots.place_mm
     knots = Knots(along, knots.turn_rad, knots.turns)
-    hats, contrast = knots.weights(pieces), contrast_of(pieces)
+    hats = knots.weights(pieces)
     normal = []
     for shift in _SHIFTS_PX:
         moved = pieces.moved(np.full(len(pieces), shift))
@@ -41,19 +40,21 @@ def shift_by_learnt_light(pieces: Pieces, blur_px: float, terms: int, knots: Kno
             equations = Equations(moved, blur, terms)
             normal.append((*equations.shared(hats, robust), robust @ equations.power))
     left, right, power = (np.array(column) for column in zip(*normal))
-    doubts = _doubts(left, right, power, between_knots(knots), contrast).reshape(len(_SHIFTS_PX), len(_LOG_BLURS))
-    off = (_LOG_BLURS + np.log(blur_px / blur_prior[0])) / blur_prior[1]
-    return _moments(_COUNTS * doubts + off**2, blur_px)
+    usual, between = wave_prior(pieces, terms), between_knots(knots)
+    off = ((_LOG_BLURS + np.log(blur_px / blur_prior[0])) / blur_prior[1]) ** 2
+    chances = [_chance(_doubts(left, right, power, between, usual, rounds, contrast_of(pieces)).reshape(
+        len(_SHIFTS_PX), len(_LOG_BLURS)), off) for rounds in (0, _ROUNDS)]
+    return _moments(sum(chances) / len(chances), blur_px)
 
 
-def _doubts(left, right, power, between, contrast: float) -> np.ndarray:
+def _doubts(left, right, power, between, strength, rounds: int, contrast: float) -> np.ndarray:
     """Minus twice the log evidence (g,) of normal matrices left (g, size, size), right sides (g, size) and squares
-    (g,), under the most probable strength of each wave; between (k, k): see `between_knots`."""
-    count, terms = len(between), left.shape[1] // len(between)
-    strength = np.full((len(left), terms), 0.5 * contrast)
-    strength[:, 0] = _MEAN_SHARE * contrast
+    (g,), waves as strong as believed (terms,), grey levels, or in some rounds made as strong as is most probable;
+    between (k, k): see `between_knots`."""
+    count, terms = len(between), len(strength)
+    strength = np.tile(strength, (len(left), 1))
     low, high = contrast * np.array(_STRENGTHS)
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         inverse = np.linalg.inv(left + _stiffness(strength, between))
         waves = (inverse @ right[..., None]).reshape(-1, count, terms)
         asked = np.einsum("gat,ab,gbt->gt", waves, between, waves)
@@ -61,8 +62,7 @@ def _doubts(left, right, power, between, contrast: float) -> np.ndarray:
         strength[:, 1:] = np.clip(np.sqrt(asked / count), low, high)[:, 1:]
     stiff = _stiffness(strength, between)
     waves = np.linalg.solve(left + stiff, right[..., None])[..., 0]
-    return (power - np.sum(right * waves, axis=1) + np.linalg.slogdet(left + stiff)[1]
-            - np.linalg.slogdet(stiff)[1])
+    return power - np.sum(right * waves, axis=1) + np.linalg.slogdet(left + stiff)[1] - np.linalg.slogdet(stiff)[1]
 
 
 def _stiffness(strength, between) -> np.ndarray:
@@ -72,12 +72,20 @@ def _stiffness(strength, between) -> np.ndarray:
     return both.reshape(len(strength), size, size)
 
 
-def _moments(doubts, blur_px: float) -> tuple[float, float, float]:
-    """Mean and sigma of the shift, and mean blur, px."""
-    shift, log_blur = (np.linspace(grid[0], grid[-1], _FINE) for grid in (_SHIFTS_PX, _LOG_BLURS))
-    fine = RectBivariateSpline(_SHIFTS_PX, _LOG_BLURS, doubts)(shift, log_blur)
+def _chance(doubts, off) -> np.ndarray:
+    """Probability (_FINE, _FINE) of shift and blur."""
+    fine = RectBivariateSpline(_SHIFTS_PX, _LOG_BLURS, _COUNTS * doubts + off)(_fine(_SHIFTS_PX), _fine(_LOG_BLURS))
     chance = np.exp(-0.5 * (fine - fine.min()))
-    chance /= chance.sum()
-    mean = float(chance.sum(axis=1) @ shift)
-    spread = float(np.sqrt(chance.sum(axis=1) @ (shift - mean) ** 2))
-    return mean, spread, float(blur_px * np.exp(chance.sum(axis=0) @ log_blur))
+    return chance / chance.sum()
+
+
+def _moments(chance, blur_px: float) -> tuple[float, float, float]:
+    """Mean and sigma of the shift, and mean blur, px."""
+    of_shift, shift = chance.sum(axis=1), _fine(_SHIFTS_PX)
+    mean = float(of_shift @ shift)
+    return (mean, float(np.sqrt(of_shift @ (shift - mean) ** 2)),
+            float(blur_px * np.exp(chance.sum(axis=0) @ _fine(_LOG_BLURS))))
+
+
+def _fine(grid) -> np.ndarray:
+    return np.linspace(grid[0], grid[-1], _FINE)
