@@ -7,8 +7,9 @@ which it is reduced (Schur's complement). The shading is linear, so that at each
 these positions and this blur (variable projection: Golub and Pereyra 1973, in Kaufman's form).
 
 What all share has two snares. A shift of all pieces to one side, under another blur and shading, can be a minimum of
-its own: several starts are weighed by their evidence. And no model of light is right to a hundredth of the contrast,
-by the same in all pieces: what is shared is found with pixels weighed by no more than that leaves them.
+its own, or as good as the best: several starts are followed, and the sigma of such a shift holds all that are probable
+(`common_shift.py`). And no model of light is right to a hundredth of the contrast, by the same in all pieces:
+what is shared is found with pixels weighed by no more than that leaves them.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
-from vision.lines.learnt import shift_by_learnt_light
+from vision.lines.common_shift import common_spread_px
 from vision.lines.shading import LEAST_POWER, LONGEST_PX, Equations, Knots, Slopes, contrast_of, stiffness, wave_prior
 
 BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
@@ -27,7 +28,7 @@ BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 p
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
 _STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
-_LEARNT_BY = 120  # pieces by which the light's strength is learnt
+_TOLD_BY = 120  # pieces that tell how probable a common shift is
 _MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
 _DAMPED, _MOST_DAMPED = 1e-3, 1e3  # of the median piece's normal matrix: at first, and where nothing lower is found
@@ -86,25 +87,25 @@ class Task:
         return replace(self, pieces=replace(pieces, weight=pieces.weight / np.sqrt(1.0 + total[bins] * share**2)))
 
 
-def solve_jointly(task: Task) -> Solved:
-    """The most probable positions, shading and blur of pieces that lie where they are expected, or all to one side."""
+def solve_jointly(task: Task, *, last: bool = True) -> Solved:
+    """The most probable positions, shading and blur of pieces that lie where they are expected, or all to one side.
+
+    Unless this is the last look, other common shifts that are as probable are not asked for.
+    """
     begin = _start(task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered())
-    task_shared = task.tempered()
-    shared = _descend(_begin(task_shared, np.median(begin.shift_px), np.log(begin.blur_px)).weighted())
-    return settled(task, _by_learnt_light(task_shared, shared))
+    tempered = task.tempered()
+    shared = _descend(_begin(tempered, np.median(begin.shift_px), np.log(begin.blur_px)).weighted())
+    return settled(task, _with_all_shifts(tempered, shared) if last else shared)
 
 
-def _by_learnt_light(task: Task, shared: Shared) -> Shared:
-    """The same moved as a whole to where light of learnt strength has it, with the sigma that goes with it."""
+def _with_all_shifts(task: Task, shared: Shared) -> Shared:
+    """The same with a sigma for its shift as a whole that holds all shifts that are probable."""
     here = _Point.at(task, shared.shift_px, np.log(shared.blur_px), np.ones(len(task.pieces))).weighted()
-    some = slice(None, None, 1 + len(task.pieces) // _LEARNT_BY)
-    pieces = here.equations.pieces.select(some)
-    mean, sigma, blur = shift_by_learnt_light(pieces, shared.blur_px, task.terms, task.knots, here.robust[some],
-                                              (task.blur_px, task.blur_sigma))
-    there = _Point.at(task, shared.shift_px + mean, np.log(blur), here.robust)
+    some = slice(None, None, 1 + len(task.pieces) // _TOLD_BY)
+    spread_px = common_spread_px(here.equations.pieces.select(some), shared.blur_px, task.terms, task.knots,
+                                 here.robust[some], (task.blur_px, task.blur_sigma))
     bent = shared.shared_px - np.average(shared.shared_px, axis=0, weights=here.robust)
-    columns = np.concatenate([bent, np.full((len(bent), 1), sigma)], axis=1)
-    return Shared(there.shift_px, columns, there.waves, blur, there.doubt)
+    return replace(shared, shared_px=np.concatenate([bent, np.full((len(bent), 1), spread_px)], axis=1))
 
 
 def settled(task: Task, shared: Shared) -> Solved:

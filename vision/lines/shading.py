@@ -201,7 +201,7 @@ def _inverse_of_two(matrices) -> np.ndarray:
 
 # How strong each wave round a thin, lit rod is beside its contrast: diffuse light fills the first three, a highlight
 # a quarter of the rod wide reaches the eleventh (its Fourier series).
-_WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
+WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
 # What of it changes from knot to knot: the light and the rod's finish are much the same a centimetre farther on. Left
 # to itself at every knot, shading bends the line of a wire before an even floor by up to a pixel.
 _CHANGE_SHARE = 0.1
@@ -237,7 +237,7 @@ def contrast_of(pieces: Pieces) -> float:
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
     """Sigma (terms,) of the shading's coefficients in grey levels, from the rod's contrast in these pieces."""
-    return contrast_of(pieces) * _WAVE_SHARE[:terms]
+    return contrast_of(pieces) * WAVE_SHARE[:terms]
 
 
 @dataclass(frozen=True)

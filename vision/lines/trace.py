@@ -75,7 +75,7 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
     pixels, but for the last where this is the last look.
     """
     rough, blurred = binned(pieces, _BIN_PX)
-    solved = solve_jointly(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma))
+    solved = solve_jointly(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma), last=last)
     blur_px = without(solved.blur_px, blurred)
     if last:
         solved = settled(Task(pieces, terms, knots, blur_px, blur_sigma), replace(solved, blur_px=blur_px))

@@ -46,21 +46,21 @@ def test_a_wire_is_found_again_from_a_curve_that_is_off_as_a_whole(rng, name):
     off = errors(scene, points, source)
     for third in np.array_split(np.argsort(points.place), 3):
         sigma = np.linalg.norm(np.mean(traced.located.shared_px[third], axis=0))
-        assert sigma < 0.08 and abs(np.mean(off[third])) < 0.02 + 3 * sigma
+        assert sigma < 0.12 and abs(np.mean(off[third])) < 0.02 + 3 * sigma
 
 
 @pytest.mark.parametrize("off_px, phase_rad", [(1.0, 0.0), (1.5, 1.0)])
 def test_a_line_forgets_where_it_was_looked_for(rng, off_px, phase_rad):
     """A start off by 1 px along a sine, alike in all frames, or by 1.5 px, another in each: by turns 0.34 px were kept.
 
-    Allowed: three times the stated sigma of what all pieces share, 0.04 px (a model good to 0.6 % of the contrast tells
-    no more), and of 611 pieces' own 0.011 px, RMS; and from the true line, which is another choice of pixels, a fifth
-    of the sigma (tests/ladder/starts.py).
+    Allowed: three times the stated sigma of what all pieces share, 0.075 px (half the evidence of a model good to 0.6 %
+    of the contrast tells no more), and of 611 pieces' own 0.011 px, RMS; and from the true line, which is another
+    choice of pixels, a fifth of the sigma (tests/ladder/starts.py).
     """
     pictures = starts.drawn(starts.SCENES["flat, bright wire"], rng)
     near, far = (starts.looked_twice(*pictures, *start) for start in ((0.0, 0.0), (off_px, phase_rad)))
     sigma = starts.whole_sigma_px(far)
-    assert np.sqrt(np.mean(starts.errors(far) ** 2)) < 3 * np.sqrt(np.mean(sigma**2)) < 0.15
+    assert np.sqrt(np.mean(starts.errors(far) ** 2)) < 3 * np.sqrt(np.mean(sigma**2)) < 0.25
     assert np.sqrt(np.mean((starts.errors(far) - starts.errors(near)) ** 2 / sigma**2)) < 0.2
 
 
