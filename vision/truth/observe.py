@@ -29,6 +29,7 @@ from vision.pictures.scale import shrunk_cameras
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.trial_pictures import TrialPictures
+from vision.truth.value import Value
 from vision.truth.whisk import fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -58,7 +59,8 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
                           left_out=tuple(behind)) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
-    bars = seen_over_given(views, used, bar_seen, rods, motor_rad, settings)
+    looks = seen_over_given(views, bar_seen, rods, motor_rad, settings)
+    bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 
 
