@@ -106,8 +106,9 @@ def _looks(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
     return {gamma: closer_look(pieces, one, gamma, positions=1) for gamma, one in first.items()}
 
 
-def clear_pieces(views, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> dict[str, Pieces]:
-    """By camera the pieces of the bar, where enough are clear."""
+def clear_pieces(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
+                 settings: VisionSettings) -> dict[str, Pieces]:
+    """By camera the pieces of the bar, where enough are clear. wires_px: see `measure_bars`."""
     pieces = {view.camera.name: _pieces(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings)
               for view in views}
     return {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}

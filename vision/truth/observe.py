@@ -16,6 +16,7 @@ from vision.bar.search import see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
@@ -114,7 +115,8 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk, fitted)
-    status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *unexplained, *whisk.left_out]))
+    doubts = [contradiction(fitted.one_less), beam and beam.alarm, *unexplained, *whisk.left_out]
+    status = "; ".join(filter(None, [truth.status, *doubts]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base = base_lines(*stroke, fitted.uncertainty.lens)
     return replace(truth, base=base, beam=beam, turns=turns, refinements=without, status=status)
