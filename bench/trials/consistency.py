@@ -138,6 +138,11 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
     if not bar_looks:
         return ""
     looks, looks_sigma = in_all({name: (one.value, one.sigma) for name, one in bar_looks.items()})
+    each = np.array([[np.log(one.value / looks), (one.value / one.sigma) ** 2] for one in bar_looks.values()])
+    if len(each) > 1 and not Difference(each[:, 0], np.diag(each[:, 1]), len(each) - 1).is_chance:
+        low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))
+        found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
+        return f"{found}: check its diameter_mm, or something else is taken for it"
     sigma = float(np.hypot(looks_sigma / looks, trial.bar_diameter_sigma_mm / trial.bar_diameter_mm))
     difference = Difference(np.array([np.log(looks)]), np.array([[sigma**-2.0]]), 1)
     if difference.is_chance:
