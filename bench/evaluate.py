@@ -96,19 +96,22 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     from bench.report.paper import write_paper_figures
     from bench.report.record import record_of, write_record
     from bench.report.score import score
+    from bench.report.sensors import sensors_worth, write_sensors
     from bench.report.summary.page import summary_of
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     drawn = evaluation.settings.figures
     by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
     needed = write_ledger(out, results, evaluation.session.whisker)
+    write_sensors(out, worth := sensors_worth(results, evaluation.friction))
     figures = [
         *(write_figures(evaluation, pool) if drawn else []),
         *of_theta,
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
-    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta, needed)
+    scores = score(evaluation.session, out, evaluation.gauges)
+    summary = summary_of(evaluation, scores, figures, by_theta, needed, worth)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
     write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
