@@ -186,7 +186,7 @@ def draw(cells: dict, path: Path) -> None:
             for number, name in enumerate(NAMED):
                 mine = [worth[name][0] for (one, _), worth in cells.items() if one == alpha]
                 panel.plot(SLOPES_DEG, mine, "o-", ms=3, color=f"C{number}", label=label_of(name))
-            panel.set(yscale="log", xlabel="slope β, °", title=f"α = {alpha:g}°", ylim=(0.2, 300.0))
+            panel.set(yscale="log", xlabel="slope β, °", title=f"α = {alpha:g}°", ylim=(0.1, 300.0))
         panels[0].set_ylabel("error of d$_x$, RMS, %")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(NAMED))
         save(figure, path, "tests/ladder/sensors.py")
