@@ -15,6 +15,7 @@ from bench.friction.explained import write_explained
 from bench.friction.runs import alpha_est_sigma
 from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import write_friction
+from bench.friction.tilted import tilted_whisks, write_tilts
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation, finished
 from bench.report.summary.page import Summary
@@ -63,9 +64,11 @@ def evaluate(
         write_compliance(out, soft)
         shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
         write_curvature(out, shapes)
+        tilted = tuple(tilted_whisks(session, whole.results))
+        write_tilts(out, tilted)
         recordings = {unit.trial.name: unit.files for unit in chosen}
         found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
-        summary = report(Evaluation(session, out, settings, *found, certificate), pool, figure_formats)
+        summary = report(Evaluation(session, out, settings, *found, certificate, tilted), pool, figure_formats)
     announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
 

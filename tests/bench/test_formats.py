@@ -11,7 +11,7 @@ import pytest
 from bench import robot_trade, tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import curved, error_map, explained, soft, tables
+from bench.friction import curved, error_map, explained, soft, tables, tilted
 from bench.gauges.gauges_file import FileKeys
 from bench.plan import written
 from bench.report import against_theta, assembly, compare, figure_8, ledger, sensors
@@ -50,6 +50,7 @@ CSV = {
     "error_map.csv": error_map.COLUMNS,
     "compliance.csv": soft.COLUMNS,
     "curvature.csv": curved.COLUMNS,
+    "tilts.csv": tilted.COLUMNS,
     "against_theta.csv": against_theta.COLUMNS,
     "ledger.csv": ledger.COLUMNS,
     "sensors.csv": sensors.COLUMNS,

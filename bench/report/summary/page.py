@@ -7,6 +7,7 @@ from pathlib import Path
 from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
+from bench.friction.tilted import tilted_lines
 from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
 from bench.report.ledger import Entry, ledger_lines
@@ -24,7 +25,7 @@ DOUBTFUL = "Doubtful"
 _MOST_ON_SCREEN = 20  # lines: a screen
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature", "ledger"),
+    *("against_theta", "compliance", "curvature", "tilts", "ledger"),
 )
 
 
@@ -90,7 +91,7 @@ def _sections(
     yield _titled(errors, [*error_lines(judged), *contact_lines(results)])
     yield _titled("Sensors of Table I: error of d_x, RMS (sensors.csv)", sensor_lines(sensors))
     yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
-    friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]
+    friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings), *tilted_lines(evaluation.tilted)]
     yield _titled("Friction angle α (± one sigma)", friction)
     yield _titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)])
     yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
