@@ -25,7 +25,7 @@ _ROUNDS = 8  # of weights and e by the solution; after four nothing changes that
 _DRAWN = 0.6  # of θ d: how far a cantilever's end is drawn along itself as it bends, its arc's excess over its chord
 # Of large bending's second order and of friction along the whisker that slips, what is left unknown when they are taken
 # out: as much as exact mechanics differ from them (tests/ladder/two_tilts.py).
-_LARGE_LEFT, _DRAGGING_LEFT = 0.25, 0.25
+_LARGE_LEFT, _DRAGGING_LEFT = 1 / 3, 1 / 3
 _HELD_SIGMAS = 2.0  # of m_y: within, the contact is held, as estimator.builtin has it
 ALIKE = "the whisks slip alike: no two of them tell friction from distance"
 NO_PUSH = "a whisk does not push: its m_z is not positive"
