@@ -70,7 +70,7 @@ def with_runs(results: Iterable[TrialResult], whisker: Whisker, settings: Settin
 def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, doubt: Doubt) -> TrialResult:
     surface = by_panel.get(result.trial.panel)
     felt = tuple(
-        _by_theta(result, replace(felt, estimates=answers, sensors=_sensors(felt, doubt)), beam, doubt)
+        _by_theta(result, replace(felt, estimates=answers, sensors=_sensors(felt, beam, doubt)), beam, doubt)
         for _, seen, felt in whisks([result])
         for answers in [_answers(result, seen, felt, surface, beam, doubt)]
     )
@@ -133,19 +133,21 @@ def _rescaled(row: EstimateRow, part: float) -> EstimateRow:
     return replace(row, d_x_est_mm=Value(value.value, sigma), **(ends if symmetric else {}))
 
 
-def _sensors(felt: FeltWhisk, doubt: Doubt) -> tuple[EstimateRow, ...]:
+def _sensors(felt: FeltWhisk, beam: Beam, doubt: Doubt) -> tuple[EstimateRow, ...]:
     """What other sensors say, likewise, each side of an interval that is not symmetric by itself."""
-    return tuple(replace(_rescaled(row, doubt.part), **_sides(row, doubt.part)) for row in felt.sensors)
+    return tuple(replace(_rescaled(row, doubt.part), **_sides(row, beam, doubt.part)) for row in felt.sensors)
 
 
-def _sides(row: EstimateRow, part: float) -> dict[str, float]:
-    """Both ends, with this part of what they hold beyond an exact α_est; an end beyond the whisker stays open."""
+def _sides(row: EstimateRow, beam: Beam, part: float) -> dict[str, float]:
+    """Both ends, with this part of what they hold beyond an exact α_est. An open end stays open."""
     value, own = row.d_x_est_mm.value, Z_95 * row.d_x_est_sigma_alpha_exact_mm
     ends = {}
     for name, way in (("d_x_est_low_mm", -1.0), ("d_x_est_high_mm", 1.0)):
-        half = way * (getattr(row, name) - value)
-        if np.isfinite(half) and half > own:
-            ends[name] = max(value + way * float(np.sqrt(own**2 + part**2 * (half**2 - own**2))), 0.0)
+        end = getattr(row, name)
+        half = way * (end - value)
+        if 0 < end < beam.length_mm and half > own:
+            moved = value + way * float(np.sqrt(own**2 + part**2 * (half**2 - own**2)))
+            ends[name] = min(max(moved, 0.0), beam.length_mm)
     return ends
 
 

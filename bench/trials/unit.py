@@ -16,7 +16,7 @@ from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_r
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of, touch_on_the_way_back
-from bench.gauges.matrix import FROM_TRIALS, Gauges
+from bench.gauges.matrix import FROM_ALL, FROM_TRIALS, Gauges
 from bench.gauges.readings import pairs_of
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
@@ -211,7 +211,7 @@ def _newtons_sigma(unit: Unit, readout: Readout) -> float:
     """Share by which a load cell's newtons and the moments' may disagree: gauges fitted to this wire's bending have
     newtons that go with its C."""
     whisker = unit.session.whisker
-    of_wire = readout.is_gauged and unit.gauges.source == FROM_TRIALS
+    of_wire = readout.is_gauged and unit.gauges.source in (FROM_TRIALS, FROM_ALL)
     return whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if of_wire else 0.0
 
 

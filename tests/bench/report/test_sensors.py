@@ -65,3 +65,18 @@ def test_they_stand_beside_the_other_estimates(run):
 def test_without_a_load_cell_there_is_no_such_table(exact_run):
     assert not (exact_run / TABLE).exists()
     assert "Sensors of Table I" not in (exact_run / "summary.txt").read_text()
+
+
+def test_newtons_that_go_with_the_wires_stiffness_are_in_the_sigma(tmp_path, exact_vision):
+    """Gauges fitted to a wire whose modulus is known to 2 % and a load cell disagree by that; (2) does not feel it."""
+    text = PROTOCOL.replace("known = true", "known = false").replace("beta_deg = [5, 60]", "beta_deg = 5")
+    text += '[[trials]]\npurpose = "gauge"\n' + '[[trials]]\npurpose = "gauge"\nfollicle_roll_deg = 90.0\n'
+    session = simulate(tmp_path / "six", protocol=protocol_file(tmp_path, text), signals_only=True, seed=2)
+    manifest = session / "session.toml"
+    stated = manifest.read_text().replace("[whisker]", "[whisker]\nyoungs_modulus_sigma_GPa = 1.2")
+    manifest.write_text(stated)
+    evaluate(session, tmp_path / "out", Settings(figures=False), workers=0, announce=lambda text: None)
+    table = {row["estimator"]: row for row in rows(tmp_path / "out" / "estimates.csv") if "b05" in row["trial"]}
+    shares = {name: float(row["d_x_est_sigma_mm"]) / float(row["d_x_est_mm"]) for name, row in table.items()}
+    assert shares["force_and_moment"] == pytest.approx(0.02, rel=0.15)
+    assert shares["no_slip"] < 0.01
