@@ -78,5 +78,6 @@ def test_newtons_that_go_with_the_wires_stiffness_are_in_the_sigma(tmp_path, exa
     evaluate(session, tmp_path / "out", Settings(figures=False), workers=0, announce=lambda text: None)
     table = {row["estimator"]: row for row in rows(tmp_path / "out" / "estimates.csv") if "b05" in row["trial"]}
     shares = {name: float(row["d_x_est_sigma_mm"]) / float(row["d_x_est_mm"]) for name, row in table.items()}
-    assert shares["force_and_moment"] == pytest.approx(0.02, rel=0.15)
-    assert shares["no_slip"] < 0.01
+    of_gauges = shares["no_slip"]  # moments with their gauges' own sigma, which force and moment have, too
+    assert of_gauges < 0.015
+    assert 0.02 < shares["force_and_moment"] < np.hypot(0.021, of_gauges) + 0.005
