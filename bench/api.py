@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature", "ledger"),
+    *("against_theta", "compliance", "curvature", "tilts", "ledger"),
 )
 Folder = Path | str
 

@@ -66,7 +66,7 @@ def calibrate_gauges(
     settings, names = Settings(), {trial.name for trial in trials}
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
         every = judged(session)
-        rate = session_drift(every, settings, pool)
+        rate, _ = session_drift(every, settings, pool)
         _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
         made = certified([unit for unit in units if unit.trial.name in names], rate, pool)
     return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(made.strokes)))

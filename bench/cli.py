@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from bench.base.errors import BadInput
+from bench.cli_design import add_design
 from bench.cli_evaluate import add_calibrate, add_check, add_evaluate
 from bench.cli_plan import add_plan
 from bench.cli_results import add_compare, add_report, add_view
@@ -73,7 +74,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    first = (add_plan, add_new, add_board, add_check, add_calibrate, add_evaluate)
+    first = (add_plan, add_design, add_new, add_board, add_check, add_calibrate, add_evaluate)
     looking = (add_report, add_compare, add_view)
     for add in (*first, *looking, add_tradeoff, add_robot, add_figures, add_simulate, _add_info):
         add(verbs)

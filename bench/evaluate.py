@@ -15,6 +15,7 @@ from bench.friction.explained import write_explained
 from bench.friction.runs import alpha_est_sigma
 from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import write_friction
+from bench.friction.tilted import tilted_whisks, write_tilts
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation, finished
 from bench.report.summary.page import Summary
@@ -63,9 +64,11 @@ def evaluate(
         write_compliance(out, soft)
         shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
         write_curvature(out, shapes)
+        tilted = tuple(tilted_whisks(session, whole.results))
+        write_tilts(out, tilted)
         recordings = {unit.trial.name: unit.files for unit in chosen}
         found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
-        summary = report(Evaluation(session, out, settings, *found, certificate), pool, figure_formats)
+        summary = report(Evaluation(session, out, settings, *found, certificate, tilted), pool, figure_formats)
     announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
 
@@ -94,19 +97,22 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     from bench.report.page.write import write_report
     from bench.report.record import record_of, write_record
     from bench.report.score import score
+    from bench.report.sensors import sensors_worth, write_sensors
     from bench.report.summary.page import summary_of
 
     out, results, alpha_est_rad = evaluation.out, evaluation.results, evaluation.settings.alpha_est_rad
     drawn = evaluation.settings.figures
     by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
     needed = write_ledger(out, results, evaluation.session.whisker)
+    write_sensors(out, worth := sensors_worth(results, evaluation.friction))
     figures = [
         *(_figures(evaluation, pool) if drawn else []),
         *of_theta,
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
-    summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta, needed)
+    scores = score(evaluation.session, out, evaluation.gauges)
+    summary = summary_of(evaluation, scores, figures, by_theta, needed, worth)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
     if figure_formats:

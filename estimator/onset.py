@@ -217,7 +217,7 @@ def _extrapolate(motor, samples, used, touch, window, guard):
         return Touch.none(NO_FREE_STROKE)
     if np.count_nonzero(rising) < MIN_RISE_SAMPLES:
         return Touch.none(SHORT_RISE)
-    level = _level(motor, samples, free)
+    level = free_level(motor, samples, free)
     weights = noise.line_weights(motor, rising, touch)
     memory = noise.Memory.of(motor, samples, free, rising)
     scatter = noise.wider(memory.of_sum(weights), noise.Memory.of(motor, samples, rising).of_sum(weights))
@@ -233,7 +233,8 @@ def _extrapolate(motor, samples, used, touch, window, guard):
     return Touch(float(touch - gap @ gain), float(sigma), level=level, rise=rise)
 
 
-def _level(motor, samples, free):
+def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Level:
+    """The level of the samples (n, k) of a free stroke, a mask (n,), over motor angles (n,)."""
     weights = noise.mean_weights(free)
     memory = noise.Memory.of(motor, samples, free)
     centre = motor[free].mean()

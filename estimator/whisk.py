@@ -11,6 +11,22 @@ from estimator.domain import require_friction_angle, require_sigma
 _ARRAYS = ("time_s", "theta_rad", "m_y_Nmm", "m_z_Nmm", "covariance_at", "theta_moment_covariance_at")
 
 
+@dataclass(frozen=True, eq=False)
+class OtherSensors:
+    """What other sensors of Table I tell of a whisk at its pushing angle; NaN where there is no such sensor.
+
+    force_N (3,): f_x, f_y, f_z of the base on the whisker, hub's axes, with covariance (3, 3); scale_sigma: share by
+    which the force's newtons and the moments' may disagree. rate_Nmm (2,): rate of m_y and m_z over the motor angle,
+    per rad, with covariance (2, 2).
+    """
+
+    force_N: np.ndarray
+    force_covariance: np.ndarray
+    scale_sigma: float
+    rate_Nmm: np.ndarray
+    rate_covariance: np.ndarray
+
+
 @dataclass(frozen=True)
 class Whisk:
     """One forward stroke against an object, as a robot feels it.
@@ -19,9 +35,9 @@ class Whisk:
     angle since felt touch (negative before it), moments are above the free stroke's level. theta_at_rad:
     the pushing angle wanted; m_y_at_Nmm, m_z_at_Nmm: moments there; covariance_at (2, 2): theirs, in the
     order y, z, in (N·mm)²; theta_sigma_rad: of the pushing angle, felt touch included;
-    theta_moment_covariance_at (2,): of the pushing angle with m_y and m_z, in rad·N·mm. Raises ValueError
-    where shapes disagree or a sigma is negative. The arrays are copies that cannot be written to: what one estimator
-    does with them is no other's concern.
+    theta_moment_covariance_at (2,): of the pushing angle with m_y and m_z, in rad·N·mm. others: what other sensors
+    tell, None where nobody asked. Raises ValueError where shapes disagree or a sigma is negative. The arrays are
+    copies that cannot be written to: what one estimator does with them is no other's concern.
     """
 
     time_s: np.ndarray
@@ -35,6 +51,7 @@ class Whisk:
     theta_sigma_rad: float
     beam: Beam
     theta_moment_covariance_at: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    others: OtherSensors | None = None
 
     def __post_init__(self):
         shapes = {np.shape(a) for a in (self.time_s, self.theta_rad, self.m_y_Nmm, self.m_z_Nmm)}

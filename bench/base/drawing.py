@@ -31,6 +31,9 @@ LABELS = {
     "with_friction_fitted": "(10), α fitted",
     "with_friction_seen": "(10), α seen",
     "with_friction_kinetic": "(10) at kinetic ends",
+    "touch_alone": "touch alone",
+    "moment_rate": "rate of the moment",
+    "force_and_moment": "force and moment",
     "estimator.builtin:printed_17": "(17) as printed",
 }
 _STYLE = {

@@ -18,11 +18,11 @@ from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
-from bench.trials.estimates import answer
+from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, answer
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.uncertainty import Z_95
-from estimator.whisk import Whisk
+from estimator.whisk import EstimatorSettings, Whisk
 from vision.truth.value import Value
 
 GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
@@ -70,7 +70,7 @@ def with_runs(results: Iterable[TrialResult], whisker: Whisker, settings: Settin
 def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, doubt: Doubt) -> TrialResult:
     surface = by_panel.get(result.trial.panel)
     felt = tuple(
-        _by_theta(result, replace(felt, estimates=answers), beam, doubt)
+        _by_theta(result, replace(felt, estimates=answers, sensors=_sensors(felt, beam, doubt)), beam, doubt)
         for _, seen, felt in whisks([result])
         for answers in [_answers(result, seen, felt, surface, beam, doubt)]
     )
@@ -92,14 +92,14 @@ def _answers(
     fit = surface and surface.fit_without(result.trial.name, seen.whisk)
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
     theta_rad = np.radians(result.theta_deg)
-    whisk = _whisk(felt, theta_rad, beam)
+    whisk = whisk_of(felt, theta_rad, beam)
     angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
     radii_mm, known = _radii_mm(result), ((name, *pair) for name, pair in angles if np.isfinite(pair[0]))
     runs = [answer(name, with_friction, whisk, max(a, 0.0), sigma, radii_mm) for name, a, sigma in known]
     given = _given(result, felt, theta_rad, beam, doubt)
     if felt.kinetic is not None:
         alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
-        kinetic = _whisk(felt.kinetic, theta_rad, beam)
+        kinetic = whisk_of(felt.kinetic, theta_rad, beam)
         runs.append(answer(KINETIC, with_friction, kinetic, alpha, doubt.sigma_rad, radii_mm))
     return (*given, *runs)
 
@@ -108,7 +108,7 @@ def _given(
     result: TrialResult, felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam, doubt: Doubt
 ) -> tuple[EstimateRow, ...]:
     """The estimates, those with α_est as given asked again with the session's sigma of it."""
-    whisk, radii_mm = _whisk(felt, theta_rad, beam), _radii_mm(result)
+    whisk, radii_mm = whisk_of(felt, theta_rad, beam), _radii_mm(result)
 
     def again(a: EstimateRow) -> EstimateRow:
         return answer(a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, doubt.sigma_rad, radii_mm)
@@ -133,7 +133,32 @@ def _rescaled(row: EstimateRow, part: float) -> EstimateRow:
     return replace(row, d_x_est_mm=Value(value.value, sigma), **(ends if symmetric else {}))
 
 
-def _whisk(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
+def _sensors(felt: FeltWhisk, beam: Beam, doubt: Doubt) -> tuple[EstimateRow, ...]:
+    """What other sensors say, likewise, each side of an interval that is not symmetric by itself."""
+    return tuple(replace(_rescaled(row, doubt.part), **_sides(row, beam, doubt.part)) for row in felt.sensors)
+
+
+def _sides(row: EstimateRow, beam: Beam, part: float) -> dict[str, float]:
+    """Both ends, with this part of what they hold beyond an exact α_est. An open end stays open."""
+    value, own = row.d_x_est_mm.value, Z_95 * row.d_x_est_sigma_alpha_exact_mm
+    ends = {}
+    for name, way in (("d_x_est_low_mm", -1.0), ("d_x_est_high_mm", 1.0)):
+        end = getattr(row, name)
+        half = way * (end - value)
+        if 0 < end < beam.length_mm and half > own:
+            moved = value + way * float(np.sqrt(own**2 + part**2 * (half**2 - own**2)))
+            ends[name] = min(max(moved, 0.0), beam.length_mm)
+    return ends
+
+
+def told_of(result: TrialResult) -> EstimatorSettings:
+    """What an estimator that asks for no α_est is told of a trial's object."""
+    radii_mm = _radii_mm(result)
+    reach_mm = OBJECT_REACH_MM if np.isnan(radii_mm[0]) else sum(radii_mm)
+    return EstimatorSettings(0.0, 0.0, reach_mm, TILT_SIGMA_RAD, *radii_mm)
+
+
+def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
     """The whisk at the wanted angle: all that (10) looks at."""
     no_samples = (np.zeros(0),) * 4
     moments = felt.m_y_Nmm.value, felt.m_z_Nmm.value

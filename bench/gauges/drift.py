@@ -20,7 +20,7 @@ _ROUNDS = 10  # of weights and excess; after five nothing changes that matters
 
 @dataclass(frozen=True)
 class FreeSlope:
-    """Slope (2,) of the channels over a free stroke, per second, and its variance (2,) from noise alone."""
+    """Slope (k,) of the channels over a free stroke, per second, and its variance (k,) from noise alone."""
 
     slope: np.ndarray
     variance: np.ndarray
@@ -28,11 +28,20 @@ class FreeSlope:
 
 def free_slope(stroke: Stroke) -> FreeSlope | None:
     """Of a stroke's samples before felt touch; None where there is no touch."""
+    return _slope_of(stroke, stroke.channels)
+
+
+def force_slope(stroke: Stroke) -> FreeSlope | None:
+    """Of a load cell's forces, (3,), likewise; None where there is none."""
+    return None if stroke.forces_N is None else _slope_of(stroke, stroke.forces_N)
+
+
+def _slope_of(stroke: Stroke, samples: np.ndarray) -> FreeSlope | None:
     touch = stroke.touch()
     if touch.status:
         return None
-    free = (stroke.motor_rad < touch.motor_rad - _GUARD_RAD) & np.isfinite(stroke.channels).all(axis=1)
-    samples = np.where(free[:, None], stroke.channels, 0.0)
+    free = (stroke.motor_rad < touch.motor_rad - _GUARD_RAD) & np.isfinite(samples).all(axis=1)
+    samples = np.where(free[:, None], samples, 0.0)
     start = stroke.time_s[0]
     per_second = noise.line_weights(stroke.time_s, free, start + 1.0) - noise.line_weights(stroke.time_s, free, start)
     variance = np.diag(noise.Memory.of(stroke.time_s, samples, free).of_sum(per_second))
@@ -40,8 +49,8 @@ def free_slope(stroke: Stroke) -> FreeSlope | None:
 
 
 def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
-    """RMS rate (2,) of the channels' drift, per second: the slopes' mean square beyond their noise, and one standard
-    deviation of that, which is what the strokes cannot rule out. Zeros where there are no slopes.
+    """RMS rate (k,) of the channels' drift, per second: the slopes' mean square beyond their noise, and one standard
+    deviation of that, which is what the strokes cannot rule out. Two zeros where there are no slopes.
 
     A square scatters by √2 of its own mean: each stroke counts by one over the square of that, for a fast one is short
     and tells hardly anything.
@@ -49,7 +58,7 @@ def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
     if not slopes:
         return np.zeros(2)
     squares, variances = np.array([s.slope**2 for s in slopes]), np.array([s.variance for s in slopes])
-    excess = np.zeros(2)
+    excess = np.zeros(squares.shape[1])
     for _ in range(_ROUNDS):
         information = 0.5 / np.maximum(excess + variances, noise.TINY) ** 2
         excess = np.maximum(0.0, np.sum(information * (squares - variances), axis=0) / information.sum(axis=0))

@@ -50,13 +50,14 @@ def touch_on_the_way_back(signals: Signals) -> Value:
 @dataclass(frozen=True)
 class Stroke:
     """One forward stroke: time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered; drift
-    (n, 2) that was taken out of both, None where none was."""
+    (n, 2) that was taken out of both, None where none was; forces_N (n, 3), None where no load cell was recorded."""
 
     time_s: np.ndarray
     motor_rad: np.ndarray
     channels: np.ndarray
     filtered: np.ndarray
     drift: np.ndarray | None = None
+    forces_N: np.ndarray | None = None
 
     @property
     def saturated(self) -> int:
@@ -102,7 +103,9 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: boo
         cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
         if cutoff_Hz not in lowpassed:  # strokes at the stated speed share one
             lowpassed[cutoff_Hz] = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
-        stroke, back = Stroke(time, motor, channels[where], lowpassed[cutoff_Hz][where]), slice(where.stop, end)
+        forces = None if signals.forces_N is None else signals.forces_N[where]
+        stroke = Stroke(time, motor, channels[where], lowpassed[cutoff_Hz][where], forces_N=forces)
+        back = slice(where.stop, end)
         way_back = signals.time_s[back], signals.motor_rad[back], channels[back]
         strokes.append(_levelled(stroke, *way_back) if level else stroke)
     return strokes

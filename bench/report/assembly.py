@@ -163,7 +163,7 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     """A row a whisk and estimator, by column; errors are empty where there is no truth."""
     for result, seen, felt in whisks(results):
         truth = seen.d_x_mm.value
-        for answer in felt.estimates:
+        for answer in (*felt.estimates, *felt.sensors):
             error = answer.d_x_est_mm.value - truth
             yield (
                 _whisk_of(result, seen)

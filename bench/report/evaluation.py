@@ -10,6 +10,7 @@ from bench.friction.curved import Curved
 from bench.friction.runs import with_runs
 from bench.friction.soft import Soft
 from bench.friction.tables import SurfaceFriction, friction_of
+from bench.friction.tilted import Tilted
 from bench.gauges.certificate import Certificate
 from bench.gauges.matrix import Gauges
 from bench.records.trial import FeltWhisk, TrialResult
@@ -42,7 +43,8 @@ class Evaluation:
     """Results of all trials in the folder `out`. calibration: the cameras as placed in the rig, with its notes; doubts:
     lines that the user should read; friction: a surface and speed each; gauges: None where volts cannot become moments;
     recordings: hash of each trial's files, by name; soft: pairs of distances that tell how soft an object is; shapes:
-    how each whisk's object is curved; certificate: of gauges that the session's own trials calibrated."""
+    how each whisk's object is curved; certificate: of gauges that the session's own trials calibrated; tilted:
+    what whisks at several slopes tell together."""
 
     session: Session
     out: Path
@@ -56,3 +58,4 @@ class Evaluation:
     soft: tuple[Soft, ...] = ()
     shapes: tuple[tuple[TrialResult, FeltWhisk, Curved], ...] = ()
     certificate: Certificate | None = None
+    tilted: tuple[Tilted, ...] = ()

@@ -3,12 +3,14 @@
 import math
 
 import cv2
+import msgspec
 import numpy as np
 
 from bench.rig.board import Board, Ink
 from bench.rig.camera import Camera
 from bench.rig.gauges import Gauges
 from bench.rig.light import Light, Material
+from bench.rig.load_cell import LoadCell
 from bench.rig.protocol import Protocol
 from bench.rig.rod import Rest, Rod
 from bench.rig.scene import Looks, Scene
@@ -27,6 +29,14 @@ def gauges(protocol: Protocol) -> Gauges:
     g = protocol.gauges
     return Gauges(np.array(g.matrix_Nmm_per_V), np.array(g.offset_V), g.noise_V, g.hum_V, g.hum_Hz, g.drift_V_per_s,
                   g.filter_Hz, g.rate_Hz, g.adc_bits, g.range_V)
+
+
+def load_cell(protocol: Protocol) -> LoadCell | None:
+    """The load cell of a protocol; None where it has none."""
+    c, g = protocol.load_cell, protocol.gauges
+    if c is msgspec.UNSET:
+        return None
+    return LoadCell(c.noise_N, c.hum_N, c.hum_Hz, c.drift_N_per_s, c.step_N, g.filter_Hz, g.rate_Hz)
 
 
 def cameras(protocol: Protocol) -> list[Camera]:

@@ -37,18 +37,10 @@ class Gauges:
         """
         cos, sin = np.cos(roll_rad), np.sin(roll_rad)
         own = moments_Nmm @ np.array([[cos, -sin], [sin, cos]])
-        volts = self._filtered(own @ np.linalg.inv(self.matrix_Nmm_per_V).T)[::OVERSAMPLED]
+        volts = low_passed(own @ np.linalg.inv(self.matrix_Nmm_per_V).T, self.filter_Hz, self.rate_Hz)[::OVERSAMPLED]
         times = np.arange(len(volts))[:, None] / self.rate_Hz
         volts = volts + self.offset_V + self._disturbed(times, rng)
         return self._converted(volts)
-
-    def _filtered(self, volts):
-        """Behind a fourth-order Butterworth low-pass, at rest before the recording."""
-        if not self.filter_Hz:
-            return volts
-        sos = signal.butter(4, self.filter_Hz, fs=self.rate_Hz * OVERSAMPLED, output="sos")
-        settled = signal.sosfilt_zi(sos)[:, :, None] * volts[0]
-        return signal.sosfilt(sos, volts, axis=0, zi=settled)[0]
 
     def _disturbed(self, times, rng):
         """White noise, the mains, and a drift of either sign."""
@@ -62,3 +54,13 @@ class Gauges:
             return np.clip(volts, -self.range_V, self.range_V)
         step = 2 * self.range_V / 2**self.adc_bits
         return np.clip(np.rint(volts / step) * step, -self.range_V, self.range_V - step)
+
+
+def low_passed(fine: np.ndarray, filter_Hz: float, rate_Hz: float) -> np.ndarray:
+    """Channels (n, k) at OVERSAMPLED times the sampling rate, behind a fourth-order Butterworth low-pass that was at
+    rest before the recording; as they are where `filter_Hz` is 0."""
+    if not filter_Hz:
+        return fine
+    sos = signal.butter(4, filter_Hz, fs=rate_Hz * OVERSAMPLED, output="sos")
+    settled = signal.sosfilt_zi(sos)[:, :, None] * fine[0]
+    return signal.sosfilt(sos, fine, axis=0, zi=settled)[0]

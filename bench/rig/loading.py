@@ -1,11 +1,11 @@
 """Moments at the base over a whole recording: the quasi-static ones of each whisk, and what rings on top."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from bench.rig.marched import MarchedWhisk
+from bench.rig.marched import Instants, MarchedWhisk
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, ring
 
@@ -14,12 +14,22 @@ _TICK_S = 5e-4  # s: over which the motor's speed, and its changes, are taken
 
 def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
     """(n, 2): m_y, m_z in the hub frame at times, without vibration."""
-    motor, moments = stroke.angle_rad(times_s), np.zeros((len(times_s), 2))
+    return _over_time(stroke, whisks, times_s, Instants.moments_at)
+
+
+def base_force_N(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
+    """(n, 3): force of the base on the whisker in the hub frame at times, likewise."""
+    return _over_time(stroke, whisks, times_s, Instants.forces_at)
+
+
+def _over_time(stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.ndarray]) -> np.ndarray:
+    motor = stroke.angle_rad(times_s)
+    found = np.zeros_like(at(whisks[0].forward, motor))
     for whisk, start, turn, end in _periods(stroke, whisks):
         rising, falling = (times_s >= start) & (times_s <= turn), (times_s > turn) & (times_s < end)
-        moments[rising] = whisk.forward.moments_at(motor[rising])
-        moments[falling] = (whisk.back or whisk.forward).moments_at(motor[falling])
-    return moments
+        found[rising] = at(whisk.forward, motor[rising])
+        found[falling] = at(whisk.back or whisk.forward, motor[falling])
+    return found
 
 
 def ringing_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray, damping: float) -> np.ndarray:

@@ -21,15 +21,16 @@ class Instants:
     point_mm: np.ndarray  # (n, 3)
     arc_mm: np.ndarray
     moment_Nmm: np.ndarray  # (n, 2): m_y, m_z
+    force_N: np.ndarray  # (n, 3): of the base on the whisker, hub frame
     states: tuple[ContactState | None, ...]
 
     @classmethod
     def of(cls, path_rad: np.ndarray, states: Sequence[ContactState | None]) -> "Instants":
         """What a path of motor angles and the states on it (None while free) tell."""
-        free = np.full(3, np.nan), np.nan, (0.0, 0.0)
-        rows = [free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s)) for s in states]
-        points, arcs, moments = (np.array(column) for column in zip(*rows))
-        return cls(np.asarray(path_rad), points, arcs, moments, tuple(states))
+        free = np.full(3, np.nan), np.nan, (0.0, 0.0), np.zeros(3)
+        rows = [free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s), -s.force_hub_N) for s in states]
+        points, arcs, moments, forces = (np.array(column) for column in zip(*rows))
+        return cls(np.asarray(path_rad), points, arcs, moments, forces, tuple(states))
 
     @property
     def _way(self) -> int:
@@ -37,8 +38,15 @@ class Instants:
 
     def moments_at(self, motor_rad: np.ndarray) -> np.ndarray:
         """(m_y, m_z) at motor angles, straight lines between instants, zero before touch."""
+        return self._between(self.moment_Nmm, motor_rad)
+
+    def forces_at(self, motor_rad: np.ndarray) -> np.ndarray:
+        """Force (n, 3) of the base on the whisker, likewise."""
+        return self._between(self.force_N, motor_rad)
+
+    def _between(self, columns, motor_rad):
         at, knots = self._way * np.asarray(motor_rad), self._way * self.motor_rad
-        return np.stack([np.interp(at, knots, m) for m in self.moment_Nmm.T], -1)
+        return np.stack([np.interp(at, knots, column) for column in columns.T], -1)
 
     def row_at(self, motor_rad: float) -> int:
         """Row of the last instant on the way to a motor angle, −1 where the way has not begun."""

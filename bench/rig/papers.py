@@ -11,6 +11,7 @@ from bench.rig import build
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 
+_GAUGED, _FORCES = ("time_s", "motor_deg", "y_V", "z_V"), ("f_x_N", "f_y_N", "f_z_N")
 _TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"
 
 
@@ -81,9 +82,11 @@ def frames_csv(recording: Recording, clock_offset_s: float) -> str:
 
 
 def signals_csv(recording: Recording) -> str:
-    """signals.csv of a recording, V."""
-    lines = [f"{time:.6f},{motor:.5f},{y:.6f},{z:.6f}" for time, motor, y, z in recording.signals.tolist()]
-    return "\n".join(["time_s,motor_deg,y_V,z_V", *lines]) + "\n"
+    """signals.csv of a recording: gauges, V, and the load cell's forces, N, where there is one."""
+    has_forces = recording.signals.shape[1] > len(_GAUGED)
+    form = ",".join(["%.6f", "%.5f", *["%.6f"] * (recording.signals.shape[1] - 2)])
+    lines = [form % tuple(row) for row in recording.signals.tolist()]
+    return "\n".join([",".join(_GAUGED + _FORCES * has_forces), *lines]) + "\n"
 
 
 def truth_csv(recording: Recording) -> str:

@@ -176,6 +176,16 @@ class GaugesTable(Table):
     known: bool = False  # written into session.toml
 
 
+class LoadCellTable(Table):
+    """[load_cell] of a protocol: the force at the base is recorded too. Sampled and filtered as the gauges."""
+
+    noise_N: Zero = 0.003  # of a six-axis cell of 17 mm: resolution as its maker states it, 1/320 N
+    hum_N: Zero = 0.0
+    hum_Hz: Positive = 58.0
+    drift_N_per_s: float = 0.0
+    step_N: Zero = 0.0  # of its converter; 0: none
+
+
 def _many(value):
     return value if isinstance(value, list) else [value]
 
@@ -220,6 +230,7 @@ class Protocol(Table, kw_only=True):
     motor: MotorTable = MotorTable()
     friction: FrictionTable = FrictionTable()
     gauges: GaugesTable = GaugesTable()
+    load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET  # none, and no channels of it
     trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
 
     def runs(self) -> list["Run"]:

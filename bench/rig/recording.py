@@ -9,7 +9,7 @@ import numpy as np
 from bench.rig import build
 from bench.rig.bar import Bar, Touch, first_touch
 from bench.rig.friction import Friction
-from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
+from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.rod import Rod
@@ -37,7 +37,7 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V."""
+    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too."""
 
     run: Run
     rod: Rod
@@ -123,4 +123,6 @@ def _signals(protocol, run, stroke, whisks, rng):
     volts = gauges.volts(moments, math.radians(run.table.follicle_roll_deg), rng)
     times = gauges.times_s(stroke.end_s)
     motor = np.degrees(stroke.angle_rad(times))
-    return np.column_stack([times, np.rint(motor / step) * step if step else motor, volts])
+    cell = build.load_cell(protocol)
+    forces = [] if cell is None else [cell.forces_N(base_force_N(stroke, whisks, fine), rng)]
+    return np.column_stack([times, np.rint(motor / step) * step if step else motor, volts, *forces])

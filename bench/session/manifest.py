@@ -144,11 +144,14 @@ class SignalKeys(Keys, kw_only=True):
     z_V: ChannelKeys | None = None
     m_y_Nmm: ChannelKeys | None = None
     m_z_Nmm: ChannelKeys | None = None
+    f_x_N: ChannelKeys | None = None
+    f_y_N: ChannelKeys | None = None
+    f_z_N: ChannelKeys | None = None
     frame_V: ChannelKeys | None = None
 
     windows: ClassVar = {"rate_Hz": plausible.RATE}
     tables: ClassVar = dict.fromkeys(
-        ("time_s", "motor_deg", "y_V", "z_V", "m_y_Nmm", "m_z_Nmm", "frame_V"), ChannelKeys
+        ("time_s", "motor_deg", "y_V", "z_V", "m_y_Nmm", "m_z_Nmm", "f_x_N", "f_y_N", "f_z_N", "frame_V"), ChannelKeys
     )
 
 

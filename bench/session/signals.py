@@ -14,9 +14,11 @@ from bench.session.trial import Trial
 
 TIME, MOTOR = "time_s", "motor_deg"
 VOLTS, MOMENTS = ("y_V", "z_V"), ("m_y_Nmm", "m_z_Nmm")
+FORCES = ("f_x_N", "f_y_N", "f_z_N")
 
 SAMPLING_STEP = Window(1e-6, 0.05, (MILLISECONDS, MICROSECONDS))  # s: 1 MHz to 20 Hz
 VOLTAGE = Window(-30.0, 30.0, (MILLIVOLTS,))  # V: what a DAQ's input takes
+FORCE = Window(-20.0, 20.0, (("millinewtons", 1e-3),))  # N: a whisker of 1 mm gives way at a hundredth of it
 MOMENT = Window(-1e5, 1e5, (("N um", 1e-3), ("nN m", 1e-3)))
 _TURN_DEG = 360.0  # °: an encoder that wraps does so by a turn
 _STILL_DEG = 0.02  # less is an encoder that stands still
@@ -30,7 +32,8 @@ class Signals:
     """What the DAQ recorded in one trial, all (n,): time_s, increasing, motor_rad, and two gauge channels.
 
     kind: "V", y and z are the gauges' volts; "Nmm", they are m_y and m_z, N·mm. dropped: rows or wraps
-    mended, by cause. doubts: lines that the user should read.
+    mended, by cause. doubts: lines that the user should read. forces_N (n, 3): of the base on the whisker in the hub's
+    axes, None where no load cell was recorded.
     """
 
     time_s: np.ndarray
@@ -40,6 +43,7 @@ class Signals:
     kind: str
     dropped: Mapping[str, int] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
+    forces_N: np.ndarray | None = None
 
     @property
     def rate_Hz(self) -> float:
@@ -72,9 +76,12 @@ def read_signals(trial: Trial) -> Signals:
     path, shown = trial.signals_path, trial.shown(trial.signals_path.name)
     table = read_table(path, shown) if trial.daq is None else read_daq(path, trial.daq, shown)
     kind, channels = _columns(table, shown)
+    forces = _force_columns(table, shown)
     table, duplicates = forward_in_time(table, TIME, shown)
     motor_deg, wraps = _unwrapped(table[MOTOR])
     _check_units(table, kind, channels, shown)
+    for name in forces:
+        FORCE.check(_extreme(table[name]), f"the largest {name}", shown)
     doubts = () if trial.purpose == "weight" else _check_motor(table[TIME], motor_deg, trial, shown)
     return Signals(
         time_s=table[TIME],
@@ -84,6 +91,7 @@ def read_signals(trial: Trial) -> Signals:
         kind=kind,
         dropped={cause: n for cause, n in (("duplicate rows", duplicates), ("encoder wraps", wraps)) if n},
         doubts=doubts,
+        forces_N=np.column_stack([table[name] for name in forces]) if forces else None,
     )
 
 
@@ -95,6 +103,14 @@ def _columns(table: Table, shown: str) -> tuple[str, tuple[str, str]]:
     kind, channels = ("Nmm", MOMENTS) if has_moments else ("V", VOLTS)
     require_columns(table, (TIME, MOTOR, *channels), shown)
     return kind, channels
+
+
+def _force_columns(table: Table, shown: str) -> tuple[str, ...]:
+    """The load cell's columns, all three or none."""
+    found = tuple(name for name in FORCES if name in table.columns)
+    if found:
+        require_columns(table, FORCES, shown)
+    return found
 
 
 def _unwrapped(motor_deg: np.ndarray) -> tuple[np.ndarray, int]:

@@ -15,7 +15,7 @@ from bench.base.workers import Workers
 from bench.cameras.calibration import SessionCalibration, calibrate_session
 from bench.gauges.certificate import Certificate
 from bench.gauges.checks import Undetermined, check_alive
-from bench.gauges.drift import drift_rate, free_slope
+from bench.gauges.drift import drift_rate, force_slope, free_slope
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauges_file import given_gauges
@@ -61,9 +61,9 @@ def with_gauges(
 ) -> tuple[Gauges | None, Certificate | None, list[Unit]]:
     """The session's gauges, their certificate where its own trials calibrated them, and the units with the gauges and
     with the drift of the channels."""
-    rate = session_drift([unit.trial for unit in units], units[0].settings, pool)
+    rate, of_forces = session_drift([unit.trial for unit in units], units[0].settings, pool)
     gauges, made = session_gauges(units, rate, pool, doubts)
-    return gauges, made, [unit.with_gauges(rate, gauges) for unit in units]
+    return gauges, made, [unit.with_gauges(rate, gauges, of_forces) for unit in units]
 
 
 def evaluated(units: Sequence[Unit], pool: Workers) -> list[TrialResult]:
@@ -72,17 +72,22 @@ def evaluated(units: Sequence[Unit], pool: Workers) -> list[TrialResult]:
     return [from_plain(TrialResult, read_result(unit.path)) for unit in units]
 
 
-def session_drift(trials: Sequence[Trial], settings: Settings, pool: Workers) -> np.ndarray:
-    """RMS drift (2,) of the channels per second, from free strokes all over the session."""
+def session_drift(
+    trials: Sequence[Trial], settings: Settings, pool: Workers
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """RMS drift per second, from free strokes all over the session: (2,) of the gauges' channels, and (3,) of the
+    forces, None where no load cell was recorded."""
     every = max(1, len(trials) // _MOST_DRIFT_STROKES)
     tasks = [(trial, settings) for trial in trials[::every]]
-    return drift_rate([slope for slopes in pool.run(_free_slopes, tasks, "free strokes") for slope in slopes])
+    pairs = [pair for pairs in pool.run(_free_slopes, tasks, "free strokes") for pair in pairs]
+    gauges, forces = ([slope for slope in column if slope is not None] for column in zip(*pairs or [(None, None)]))
+    return drift_rate(gauges), drift_rate(forces) if forces else None
 
 
 def _free_slopes(task: tuple[Trial, Settings]) -> list:
+    """(of the gauges' channels, of the forces) a stroke."""
     trial, settings = task
-    slopes = [free_slope(stroke) for stroke in strokes_of(read_signals(trial), trial, settings)]
-    return [slope for slope in slopes if slope is not None]
+    return [(free_slope(stroke), force_slope(stroke)) for stroke in strokes_of(read_signals(trial), trial, settings)]
 
 
 def session_gauges(

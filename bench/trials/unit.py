@@ -5,6 +5,7 @@ redoing only what changed are this one mechanism. What is seen has a hash of its
 look at the pictures.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_r
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of, touch_on_the_way_back
-from bench.gauges.matrix import FROM_TRIALS, Gauges
+from bench.gauges.matrix import FROM_ALL, FROM_TRIALS, Gauges
 from bench.gauges.readings import pairs_of
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
@@ -41,8 +42,10 @@ from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_a
 from bench.trials.gate import kinetic_end
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
+from bench.trials.sensors import with_others
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
+from estimator.sensors import SENSORS
 from estimator.signal import NOT_REACHED, Touch
 from estimator.whisk import Whisk
 from vision.truth.value import NAN, UNKNOWN
@@ -56,7 +59,8 @@ OWN_GAUGES = "not judged: without this trial the gauges are not known"
 @dataclass(frozen=True)
 class Unit:
     """What one trial's result is made from. files: hash of the trial's files. drift_rate: (2,), of the channels per
-    second; gauges: None where volts cannot become moments. stage: folder of what is seen before all is known."""
+    second, and force_drift_rate (3,) of a load cell; gauges: None where volts cannot become moments. stage: folder of
+    what is seen before all is known."""
 
     session: Session
     trial: Trial
@@ -67,6 +71,7 @@ class Unit:
     drift_rate: np.ndarray | None = None
     gauges: Gauges | None = None
     stage: str = "seen"
+    force_drift_rate: np.ndarray | None = None
 
     @property
     def path(self) -> Path:
@@ -97,11 +102,13 @@ class Unit:
     def hash(self) -> str:
         """Hash of all that the result depends on."""
         made_from = self.drift_rate, self.gauges, self.settings.estimated(), self.settings.own_code()
-        return hash_of(hash_of_code(ESTIMATING), self.seen_hash, *made_from)
+        return hash_of(hash_of_code(ESTIMATING), self.seen_hash, self.force_drift_rate, *made_from)
 
-    def with_gauges(self, drift_rate: np.ndarray, gauges: Gauges | None) -> "Unit":
+    def with_gauges(
+        self, drift_rate: np.ndarray, gauges: Gauges | None, force_drift_rate: np.ndarray | None = None
+    ) -> "Unit":
         """The unit complete, once the gauges are known."""
-        return replace(self, drift_rate=drift_rate, gauges=gauges)
+        return replace(self, drift_rate=drift_rate, gauges=gauges, force_drift_rate=force_drift_rate)
 
 
 def see_unit(unit: Unit) -> SeenTrial:
@@ -177,8 +184,11 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
         return felt
     felt = replace(felt, shared_Nmm=readout.shared_Nmm(usable))
     felt = _against_pictures(felt, unit, stroke, readout, seen)
-    asked, radii_mm = estimators(unit.settings.estimators), _radii_mm(unit)
-    answered = partial(answers, asked=asked, settings=unit.settings, radii_mm=radii_mm)
+    told = {"settings": unit.settings, "radii_mm": _radii_mm(unit)}
+    known = {"force_drift_rate": unit.force_drift_rate, "scale_sigma": _newtons_sigma(unit, readout)}
+    sensing = partial(with_others, stroke=stroke, readout=readout, touch=touch, **known)
+    answered = partial(_answered, sensing if unit.settings.estimators else None,
+                       asked=estimators(unit.settings.estimators), **told)  # fmt: skip
     estimates = answered(usable)
     return replace(
         felt,
@@ -186,9 +196,23 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
         estimates=estimates,
         kinetic=_kinetic(stroke, touch, readout, usable, estimates),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
+        sensors=() if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told),
         one_factor=_one_factor(unit, kind, stroke),
         with_drift=_with_drift(unit, stroke, readout),
     )
+
+
+def _answered(sensing: Callable[[Whisk], Whisk] | None, whisk: Whisk, **asked) -> tuple[EstimateRow, ...]:
+    """Answers about a whisk; sensing: tells it what other sensors have to say."""
+    return answers(whisk if sensing is None else sensing(whisk), **asked)
+
+
+def _newtons_sigma(unit: Unit, readout: Readout) -> float:
+    """Share by which a load cell's newtons and the moments' may disagree: gauges fitted to this wire's bending have
+    newtons that go with its C."""
+    whisker = unit.session.whisker
+    of_wire = readout.is_gauged and unit.gauges.source in (FROM_TRIALS, FROM_ALL)
+    return whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if of_wire else 0.0
 
 
 def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:

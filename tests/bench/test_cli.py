@@ -11,7 +11,7 @@ from bench import cli
 from bench.base.errors import BadInput
 
 VERBS = ["new", "board", "check", "calibrate cameras", "calibrate gauges", "evaluate", "simulate", "info"]
-VERBS += ["report", "compare", "view"]
+VERBS += ["report", "compare", "view", "design"]
 VERBS += ["figures 5", "figures 6", "figures 8", "figures tilt", "figures radius"]
 
 

@@ -11,10 +11,10 @@ import pytest
 from bench import robot_trade, tradeoff
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import curved, error_map, explained, soft, tables
+from bench.friction import curved, error_map, explained, soft, tables, tilted
 from bench.gauges.gauges_file import FileKeys
 from bench.plan import written
-from bench.report import against_theta, assembly, compare, figure_8, ledger
+from bench.report import against_theta, assembly, compare, figure_8, ledger, sensors
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
@@ -50,8 +50,10 @@ CSV = {
     "error_map.csv": error_map.COLUMNS,
     "compliance.csv": soft.COLUMNS,
     "curvature.csv": curved.COLUMNS,
+    "tilts.csv": tilted.COLUMNS,
     "against_theta.csv": against_theta.COLUMNS,
     "ledger.csv": ledger.COLUMNS,
+    "sensors.csv": sensors.COLUMNS,
     "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,

@@ -7,10 +7,12 @@ from pathlib import Path
 from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
+from bench.friction.tilted import tilted_lines
 from bench.report.against_theta import AtTheta, theta_lines
 from bench.report.evaluation import Evaluation
 from bench.report.ledger import Entry, ledger_lines
 from bench.report.run import Section
+from bench.report.sensors import SensorWorth, sensor_lines
 from bench.report.summary.doubts import frame_lines, light_lines, taken_as_exact, whisk_doubts
 from bench.report.summary.errors import contact_lines, error_lines
 from bench.report.summary.gauges import gauge_lines
@@ -23,7 +25,7 @@ DOUBTFUL = "Doubtful"
 _MOST_ON_SCREEN = 20  # lines: a screen
 _TABLES = (
     *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature", "ledger"),
+    *("against_theta", "compliance", "curvature", "tilts", "ledger"),
 )
 
 
@@ -59,14 +61,15 @@ def summary_of(
     figures: Sequence[str],
     by_theta: Sequence[AtTheta] = (),
     needed: Sequence[Entry] = (),
+    sensors: Sequence[SensorWorth] = (),
 ) -> Summary:
     """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta:
-    errors against θ; needed: which refinements are."""
+    errors against θ; needed: which refinements are; sensors: what each is worth, where a load cell was recorded."""
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
     judged = judge(evaluation.results)
     said = verdict(evaluation.session, evaluation.results, judged, evaluation.settings, len(doubtful))
     said = (*said, *gauges_of_all(evaluation.gauges), *looked_at(evaluation.results, evaluation.settings))
-    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta, needed)
+    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta, needed, sensors)
     return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))
 
 
@@ -78,6 +81,7 @@ def _sections(
     figures: Sequence[str],
     by_theta: Sequence[AtTheta],
     needed: Sequence[Entry],
+    sensors: Sequence[SensorWorth],
 ) -> Iterator[Section]:
     results, settings = evaluation.results, evaluation.settings
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
@@ -85,8 +89,9 @@ def _sections(
     yield _titled("Truth, from the pictures (± one sigma)", truth)
     yield _titled("Clocks", clock_lines(results))
     yield _titled(errors, [*error_lines(judged), *contact_lines(results)])
+    yield _titled("Sensors of Table I: error of d_x, RMS (sensors.csv)", sensor_lines(sensors))
     yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
-    friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings)]
+    friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings), *tilted_lines(evaluation.tilted)]
     yield _titled("Friction angle α (± one sigma)", friction)
     yield _titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)])
     yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
@@ -97,15 +102,15 @@ def _sections(
     yield _titled(DOUBTFUL, doubtful)
     yield _titled("Score against the truth files of this synthetic session (no result knows them)", scores)
     yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))
-    yield _titled("Files", _files(figures))
+    yield _titled("Files", _files(figures, [*_TABLES, *["sensors"] * bool(sensors)]))
 
 
 def _titled(title: str, lines: Iterable[str]) -> Section:
     return Section(title, tuple(lines))
 
 
-def _files(figures: Sequence[str]) -> list[str]:
+def _files(figures: Sequence[str], tables: Iterable[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    tables = [f"{name}.csv" for name in _TABLES]
+    tables = [f"{name}.csv" for name in tables]
     return [", ".join(["report.html", *tables, "track/", *single, *(f"{folder}/" for folder in folders)])]

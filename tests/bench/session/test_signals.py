@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bench.base.errors import BadInput
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 
@@ -25,6 +26,31 @@ def test_moments_in_place_of_volts(small_copy):
     file = small_copy / "trials" / "b30_3" / "signals.csv"
     file.write_text(file.read_text().replace("y_V,z_V", "m_y_Nmm,m_z_Nmm"))
     assert read(small_copy).kind == "Nmm"
+
+
+def with_forces(session, columns="f_x_N,f_y_N,f_z_N", scale=1.0):
+    """The trial's signals with three columns more: a thousandth of the row's number, twice and three times that."""
+    file = session / "trials" / "b30_3" / "signals.csv"
+    header, *rows = file.read_text().splitlines()
+    cells = (",".join(f"{scale * k * n / 1000:.6f}" for k in (1, 2, 3)) for n in range(len(rows)))
+    file.write_text("\n".join([f"{header},{columns}", *(f"{row},{cell}" for row, cell in zip(rows, cells))]) + "\n")
+    return session
+
+
+def test_forces_of_a_load_cell(small_copy):
+    assert read(small_copy).forces_N is None
+    forces = read(with_forces(small_copy)).forces_N
+    assert forces[100] == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_two_forces_are_no_load_cell(small_copy):
+    with pytest.raises(BadInput, match="column f_z_N is missing"):
+        read(with_forces(small_copy, "f_x_N,f_y_N,f_q_N"))
+
+
+def test_forces_in_millinewtons(small_copy):
+    with pytest.raises(BadInput, match=r"the largest f_x_N is .*Is it in millinewtons\?"):
+        read(with_forces(small_copy, scale=1000.0))
 
 
 def test_columns_are_found_by_name(small_copy):
