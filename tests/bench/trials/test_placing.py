@@ -40,7 +40,7 @@ def place(small_copy, monkeypatch):
             base = lines.setdefault((unit.stage, unit.trial.name), made)
             return SeenTrial((SeenWhisk(0, base=base), SeenWhisk(1), SeenWhisk(2, "no pictures")))
 
-        monkeypatch.setattr("bench.trials.placing.see_unit", see)
+        monkeypatch.setattr("bench.trials.lost.see_unit", see)
         session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)
         session = session if board else replace(session, T_rig_board=None)
         before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",), session.T_rig_board)
