@@ -30,6 +30,10 @@ _BY_RULER_MM = 1.0
 _STAYS = "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
 
 
+class _Unread(Refused):
+    """No free stroke shows the whisker."""
+
+
 def place_rig(
     session: Session, calibration: SessionCalibration, units: Sequence[Unit], pool: Workers, doubts: Doubts
 ) -> SessionCalibration:
@@ -55,7 +59,8 @@ def place_rig(
         if alone:
             asked = "record free strokes of some 10 degrees, or measure T_rig_board"
             raise BadInput(f"T_rig_board is missing, and {reason}: {asked}", file="trials") from None
-        doubts.notes += _elsewhere(session, calibration)
+        if isinstance(reason, _Unread):
+            doubts.notes += _elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
     if alone or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
         _check_suffices(both)
@@ -141,6 +146,9 @@ def _before(session: Session) -> Placement:
 
 
 def _by_strokes(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> Placement:
-    """What the free strokes of these trials say, of every whisk whose base is seen before touch."""
+    """What the free strokes of these trials say, of every whisk whose base is seen before touch. Raises Refused."""
     seen = seen_units(units, pool, "free strokes", doubts)
-    return by_strokes([w.base for trial in seen for w in trial.whisks if w.base is not None])
+    lines = [whisk.base for trial in seen for whisk in trial.whisks if whisk.base is not None]
+    if not lines:
+        raise _Unread("none of them can be read")
+    return by_strokes(lines)
