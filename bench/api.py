@@ -123,6 +123,7 @@ def evaluate(
     accuracy_mm: float | None = None,
     follow_links: bool = False,
     workers: int = 1,
+    dask: str | None = None,
     figure_formats: Sequence[str] = (),
 ) -> Run:
     """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the screen.
@@ -143,13 +144,14 @@ def evaluate(
         accuracy_mm=accuracy_mm,
         follow_links=follow_links,
     )
-    return evaluate_with(Path(session), Path(out), settings, workers, figure_formats)
+    return evaluate_with(Path(session), Path(out), settings, workers, figure_formats, dask=dask)
 
 
 def evaluate_with(
     session: Path, out: Path, settings: Settings, workers: int = 1, figure_formats: Sequence[str] = (), **shown: Any
 ) -> Run:
-    """The same with the options in one object. shown: progress and announce of `bench.evaluate.evaluate`."""
+    """The same with the options in one object. shown: progress, announce and dask of
+    `bench.evaluate.evaluate`."""
     quiet = {"announce": logging.getLogger(__name__).info}
     _evaluate(session, out, settings, workers=workers, figure_formats=figure_formats, **quiet | shown)
     return read(out)

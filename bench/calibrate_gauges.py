@@ -68,7 +68,7 @@ def calibrate_gauges(
         every = judged(session)
         rate, _ = session_drift(every, settings, pool)
         _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
-        made = certified([unit for unit in units if unit.trial.name in names], rate, pool)
+        made = certified([unit for unit in units if unit.trial.name in names], rate, pool, doubts)
     return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(made.strokes)))
 
 

@@ -45,7 +45,14 @@ def add_evaluate(verbs: Verbs) -> None:
         metavar="FILE",
         help="signals, tables and tracks as Neurodata Without Borders too, for archives (extra `nwb`)",
     )
-    add_workers(verb)
+    by = verb.add_mutually_exclusive_group()
+    add_workers(by)
+    by.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="send trials to a Dask cluster that runs, by its scheduler's address; its workers must see SESSION and "
+        "OUT under the same paths (extra `cluster`)",
+    )
 
 
 def _add_numbers(verb: argparse.ArgumentParser) -> None:
@@ -89,7 +96,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         given["estimators"] = tuple(given["estimators"])
     if options.watch is not None:
         return watch(options, Settings(**given))
-    shown = {"progress": sys.stderr.isatty(), "announce": print}
+    shown = {"progress": sys.stderr.isatty(), "announce": print, "dask": options.dask}
     formats = options.figure_format
     run = evaluate_with(options.session, options.out, Settings(**given), options.workers, formats, **shown)
     if options.nwb is not None:

@@ -49,7 +49,8 @@ def watch(options: argparse.Namespace, settings: "Settings") -> int:
     if not 0 < options.watch <= 3600:
         raise BadInput(f"--watch {options.watch:g}: must be above 0 and at most 3600 s")
     told = {"progress": sys.stderr.isatty(), "figure_formats": options.figure_format, "announce": _at_once}
-    return watched(options.session, options.out, settings, every_s=options.watch, workers=options.workers, **told)
+    by = {"workers": options.workers, "dask": options.dask}
+    return watched(options.session, options.out, settings, every_s=options.watch, **by, **told)
 
 
 def _at_once(line: str) -> None:

@@ -23,7 +23,8 @@ from bench.session.check import checked_session
 from bench.session.inside import check_outside
 from bench.session.trial import Trial
 from bench.trials.estimates import estimators
-from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
+from bench.trials.lost import evaluated
+from bench.trials.of_session import judged, placed_units, with_gauges
 
 DONE, DOUBTFUL = 0, 1
 _MOST_NAMED = 8  # names in one line
@@ -35,6 +36,7 @@ def evaluate(
     settings: Settings,
     *,
     workers: int = 1,
+    dask: str | None = None,
     progress: bool = False,
     figure_formats: Sequence[str] = (),
     announce: Callable[[str], object] = print,
@@ -42,16 +44,19 @@ def evaluate(
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
-    figure_formats: of figures for a paper, beside the others; announce: is given what is to be seen at a glance.
-    trials: names of those that the session is taken to have; None: all.
+    dask: address of a Dask cluster's scheduler, in place of `workers`. figure_formats: of figures for a paper, beside
+    the others; announce: is given what is to be seen at a glance; trials: names of those that the session is taken to
+    have; None: all.
     """
     estimators(settings.estimators)
+    if dask is not None:
+        session_path, out = session_path.absolute(), out.absolute()  # its workers stand elsewhere
     check_outside(out, session_path)
     doubts = Doubts()
     session = checked_session(session_path, doubts, trials, follow_links=settings.follow_links)
     recorded = judged(session)
     _require_some(recorded, settings)
-    with lock_output(out), Workers(workers, progress) as pool:
+    with lock_output(out), _workers(dask, workers, out, progress) as pool:
         calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
         gauges, certificate, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
@@ -71,6 +76,15 @@ def evaluate(
         summary = report(Evaluation(session, out, settings, *found, certificate, tilted), pool, figure_formats)
     announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
+
+
+def _workers(dask: str | None, count: int, out: Path, progress: bool) -> Workers:
+    """Processes here, or a cluster."""
+    if dask is None:
+        return Workers(count, progress)
+    from bench.base.cluster import Cluster
+
+    return Cluster(dask, out, progress)
 
 
 def _require_some(trials: Sequence[Trial], settings: Settings) -> None:

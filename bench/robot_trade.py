@@ -27,7 +27,8 @@ from bench.robot import Converter, Task, answered, range_of
 from bench.session.check import checked_session
 from bench.session.inside import check_outside
 from bench.session.signals import read_signals
-from bench.trials.of_session import evaluated, judged, placed_units, with_gauges
+from bench.trials.lost import evaluated
+from bench.trials.of_session import judged, placed_units, with_gauges
 
 TABLE, FIGURE = "robot_trade.csv", "robot_trade"
 AS_RECORDED = Converter()

@@ -84,6 +84,7 @@ def watch(
     *,
     every_s: float,
     workers: int = 1,
+    dask: str | None = None,
     progress: bool = False,
     figure_formats: Sequence[str] = (),
     announce: Callable[[str], object] = print,
@@ -101,7 +102,7 @@ def watch(
         raise BadInput("there is no such folder; give the session's folder", file=str(session_path))
     watched, code = _Watched(session_path, announce, settings.follow_links), DONE
     done: tuple[Look, dict[str, Look]] = {}, {}
-    told = {"workers": workers, "progress": progress, "figure_formats": figure_formats}
+    told = {"workers": workers, "dask": dask, "progress": progress, "figure_formats": figure_formats}
     while True:
         ready = watched.look()
         if not ready or (watched.around, ready) == done or watched.is_writing(done[1]):

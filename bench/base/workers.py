@@ -10,8 +10,9 @@ import os
 import signal
 import threading
 import time
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 
@@ -20,10 +21,13 @@ from tqdm import tqdm
 from bench.base.errors import BadInput
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_PICTURES = "OPENCV_FOR_THREADS_NUM"  # OpenCV's own number, as it is loaded
 _LOOK_FOR_PARENT_S = 1.0  # s: so long a worker may outlive a run that was killed
-_KILLED = (
-    "a worker process was killed, by the system where memory ran out; what was finished is kept: the same command goes "
-    "on from there, with fewer --workers if need be"
+MOST_DEATHS = 3  # of processes at one task, which is then given up
+DIED = object()  # in place of the result of such a task
+KILLED = (
+    "a worker process was killed three times at the same task, by the system where memory ran out; what was finished "
+    "is kept: the same command goes on from there, with fewer --workers if need be"
 )
 
 
@@ -32,48 +36,77 @@ class Workers:
 
     def __init__(self, count: int, progress: bool = False):
         self.count, self.progress = count, progress
-        self._pool: ProcessPoolExecutor | None = None
+        self._processes: list[ProcessPoolExecutor] = []  # one process each: a death is the death of one task
 
     def __enter__(self) -> "Workers":
         return self
 
     def __exit__(self, kind, *_) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(wait=kind is None, cancel_futures=True)
-            if kind is not None:
-                _end_children()
+        for process in self._processes:
+            process.shutdown(wait=kind is None, cancel_futures=True)
+        if kind is not None and self._processes:
+            _end_children()
 
-    def run(self, job: Callable, tasks: Sequence, name: str) -> list:
-        """job(task) of every task, in their order; a bar over them where progress is wanted."""
+    def run(self, job: Callable, tasks: Sequence, name: str, lost: Callable | None = None) -> list:
+        """job(task) of every task, in their order; a bar over them where progress is wanted.
+
+        A task whose process dies is given to another, MOST_DEATHS times in all; then lost(task) stands for its result.
+        Raises BadInput where there is no `lost`.
+        """
         results = [None] * len(tasks)
         for place, result in tqdm(
             self._finished(job, tasks), desc=name, total=len(tasks), leave=False, disable=not self.progress
         ):
-            results[place] = result
+            if result is DIED and lost is None:
+                raise BadInput(KILLED)
+            results[place] = lost(tasks[place]) if result is DIED else result
         return results
 
     def _finished(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
-        if self.count == 0 or (self.count == 1 and _has_one_thread()):
+        """Places and results as they come; DIED in place of a result."""
+        if self.count == 0 or (self.count == 1 and has_one_thread()):
             for place, task in enumerate(tasks):
-                with _pictures_by_one_thread() if self.count else nullcontext():
+                with pictures_by_one_thread() if self.count else nullcontext():
                     result = job(task)
                 yield place, result
         elif tasks:
-            pool = self._started()
-            try:
-                places = {pool.submit(job, task): place for place, task in enumerate(tasks)}
-                yield from ((places[future], future.result()) for future in as_completed(places))
-            except BrokenProcessPool:
-                raise BadInput(_KILLED) from None
+            yield from self._by_processes(job, tasks)
 
-    def _started(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(self.count, context, initializer=_begin, initargs=(os.getpid(),))
-            with _single_threaded():
-                for _ in range(self.count):
-                    self._pool.submit(_nothing)
-        return self._pool
+    def _by_processes(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
+        while len(self._processes) < min(self.count, len(tasks)):
+            self._processes.append(_process())
+        idle, waiting, deaths = list(range(len(self._processes))), deque(range(len(tasks))), Counter()
+        busy: dict[Future, tuple[int, int]] = {}
+        while waiting or busy:
+            while waiting and idle:
+                number, place = idle.pop(), waiting.popleft()
+                busy[self._submitted(number, job, tasks[place])] = number, place
+            for future in wait(busy, return_when=FIRST_COMPLETED).done:
+                number, place = busy.pop(future)
+                idle.append(number)
+                died = isinstance(future.exception(), BrokenProcessPool)
+                deaths[place] += died
+                if died and deaths[place] < MOST_DEATHS:
+                    waiting.appendleft(place)
+                else:
+                    yield place, DIED if died else future.result()
+
+    def _submitted(self, number: int, job: Callable, task: object) -> Future:
+        """The task given to a process, which is started anew where it has died."""
+        try:
+            return self._processes[number].submit(job, task)
+        except BrokenProcessPool:
+            self._processes[number] = _process()
+            return self._processes[number].submit(job, task)
+
+
+def _process() -> ProcessPoolExecutor:
+    """One process of one thread, which is being started."""
+    context = multiprocessing.get_context("spawn")
+    process = ProcessPoolExecutor(1, context, initializer=_begin, initargs=(os.getpid(),))
+    with _single_threaded():
+        process.submit(_nothing)
+    return process
 
 
 def single_thread() -> None:
@@ -82,12 +115,13 @@ def single_thread() -> None:
         os.environ.setdefault(name, "1")
 
 
-def _has_one_thread() -> bool:
+def has_one_thread() -> bool:
+    """Whether linear algebra has one thread in this process."""
     return all(os.environ.get(name) == "1" for name in _THREADS)
 
 
 @contextmanager
-def _pictures_by_one_thread() -> Iterator[None]:
+def pictures_by_one_thread() -> Iterator[None]:
     """OpenCV keeps to one thread in here, as in a worker."""
     import cv2
 
@@ -101,9 +135,9 @@ def _pictures_by_one_thread() -> Iterator[None]:
 
 @contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Processes started in here inherit one thread for linear algebra; this one keeps what it has."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    """Processes started in here inherit one thread; this one keeps what it has."""
+    before = {name: os.environ.get(name) for name in (*_THREADS, _PICTURES)}
+    os.environ.update(dict.fromkeys(before, "1"))
     try:
         yield
     finally:
@@ -115,9 +149,6 @@ def _begin(parent: int) -> None:
     """Ctrl-C is the parent's to handle; a process whose parent was killed ends by itself."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    import cv2
-
-    cv2.setNumThreads(1)
 
 
 def _end_with(parent: int) -> None:

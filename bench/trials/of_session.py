@@ -1,5 +1,5 @@
-"""The steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges, each trial's
-result. `evaluate` and `calibrate gauges` share them."""
+"""The steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges. `evaluate` and
+`calibrate gauges` share them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from bench.base.results import hash_of_files, read_result
+from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.cameras.calibration import SessionCalibration, calibrate_session
@@ -22,13 +22,12 @@ from bench.gauges.gauges_file import given_gauges
 from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.gauges.readings import pairs_of
 from bench.gauges.reversal import reversals
-from bench.records.plain import from_plain
-from bench.records.trial import TrialResult
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
+from bench.trials.lost import seen_units
 from bench.trials.placing import place_rig
-from bench.trials.unit import Unit, evaluate_unit, see_unit
+from bench.trials.unit import Unit, kept_seen
 
 _MORE = "or let the other trials serve: --gauges-from-all"
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
@@ -66,12 +65,6 @@ def with_gauges(
     return gauges, made, [unit.with_gauges(rate, gauges, of_forces) for unit in units]
 
 
-def evaluated(units: Sequence[Unit], pool: Workers) -> list[TrialResult]:
-    """Every unit's result, made where it does not stand in its file already."""
-    pool.run(evaluate_unit, units, "trials")
-    return [from_plain(TrialResult, read_result(unit.path)) for unit in units]
-
-
 def session_drift(
     trials: Sequence[Trial], settings: Settings, pool: Workers
 ) -> tuple[np.ndarray, np.ndarray | None]:
@@ -101,14 +94,14 @@ def session_gauges(
     if given is not None or not trials:
         return given, None
     try:
-        made = certified(trials, rate, pool)
+        made = certified(trials, rate, pool, doubts)
     except Undetermined as reason:
         doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * (len(trials) < len(volts))]))
         return None, None
     return (replace(made.gauges, source=FROM_ALL) if from_all else made.gauges), made
 
 
-def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers) -> Certificate:
+def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Certificate:
     """The gauges fitted to what the cameras and the gauges show of these trials, with all that they rest on.
 
     rate (2,): drift of the channels, V/s. Raises Undetermined where the trials do not fix the coefficients, BadInput
@@ -120,7 +113,7 @@ def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers) -> Certifi
         check_alive(of_trial)
     found = [
         pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
-        for unit, seen, of_trial in zip(units, pool.run(see_unit, units, "gauge trials"), strokes)
+        for unit, seen, of_trial in zip(units, seen_units(units, pool, "gauge trials", doubts), strokes)
         for whisk, stroke in zip(seen.whisks, of_trial)
     ]
     pairs = tuple(p for p in found if p is not None)
@@ -132,8 +125,10 @@ def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers) -> Certifi
 
 
 def _lacking(units: Sequence[Unit]) -> Iterator[str]:
-    """What the truth of these trials lacks."""
+    """What the truth of these trials lacks, of those that were seen."""
     for unit in units:
-        lacks = dict.fromkeys(whisk.status for whisk in see_unit(unit).whisks if not whisk.has_truth and whisk.status)
+        seen = kept_seen(unit)
+        whisks = seen.whisks if seen else ()
+        lacks = dict.fromkeys(whisk.status for whisk in whisks if not whisk.has_truth and whisk.status)
         if lacks:
             yield f"{unit.trial.name} has no truth: {', '.join(lacks)}"

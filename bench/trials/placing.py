@@ -13,7 +13,8 @@ from bench.cameras.calibration import SessionCalibration
 from bench.cameras.first_look import by_first_look, first_look, spread
 from bench.session.session import Session
 from bench.trials.consistency import Cause, Difference
-from bench.trials.unit import Unit, see_unit
+from bench.trials.lost import seen_units
+from bench.trials.unit import Unit
 from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
 from vision.calibration.swing import by_strokes
 from vision.geometry.errors import Refused
@@ -27,6 +28,10 @@ _ELSEWHERE_MM = 2.0
 # A T_rig_board known no better is a first guess: the strokes alone must then do.
 _BY_RULER_MM = 1.0
 _STAYS = "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
+
+
+class _Unread(Refused):
+    """No free stroke shows the whisker."""
 
 
 def place_rig(
@@ -44,17 +49,18 @@ def place_rig(
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
-            strokes = _by_strokes(chosen, pool)
+            strokes = _by_strokes(chosen, pool, doubts)
             both, placed_here = combine(board, strokes), calibration
             if both.alarm:
                 both = replace(both, alarm=both.alarm + _by_scale(session, board, strokes))
         else:
-            placed_here, both = _settled(calibration, board, chosen, pool)
+            placed_here, both = _settled(calibration, board, chosen, pool, doubts)
     except Refused as reason:
         if alone:
             asked = "record free strokes of some 10 degrees, or measure T_rig_board"
             raise BadInput(f"T_rig_board is missing, and {reason}: {asked}", file="trials") from None
-        doubts.notes += _elsewhere(session, calibration)
+        if isinstance(reason, _Unread):
+            doubts.notes += _elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
     if alone or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
         _check_suffices(both)
@@ -103,7 +109,9 @@ def _check_suffices(both: Placement) -> None:
         raise BadInput(str(reason), file="trials") from None
 
 
-def _settled(calibration: SessionCalibration, board: Placement, chosen: Sequence[Unit], pool: Workers):
+def _settled(
+    calibration: SessionCalibration, board: Placement, chosen: Sequence[Unit], pool: Workers, doubts: Doubts
+) -> tuple[SessionCalibration, Placement]:
     """The calibration moved to where board and strokes together have the rig, and that placement.
 
     The strokes are read by cameras whose uncertainty leaves out T_rig_board's, which is weighed on the other side.
@@ -112,7 +120,7 @@ def _settled(calibration: SessionCalibration, board: Placement, chosen: Sequence
     here = _moved(calibration, board, exact)
     for round_number in range(_MOST_ROUNDS):
         units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
-        both = combine(board, _by_strokes(units, pool))
+        both = combine(board, _by_strokes(units, pool, doubts))
         if np.all(np.abs(both.step) < _SMALL_STEP):
             break
         here = _moved(here, exact, replace(both, covariance=exact.covariance))
@@ -137,7 +145,10 @@ def _before(session: Session) -> Placement:
     return by_board(T, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
 
 
-def _by_strokes(units: Sequence[Unit], pool: Workers) -> Placement:
-    """What the free strokes of these trials say, of every whisk whose base is seen before touch."""
-    pool.run(see_unit, units, "free strokes")
-    return by_strokes([w.base for unit in units for w in see_unit(unit).whisks if w.base is not None])
+def _by_strokes(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> Placement:
+    """What the free strokes of these trials say, of every whisk whose base is seen before touch. Raises Refused."""
+    seen = seen_units(units, pool, "free strokes", doubts)
+    lines = [whisk.base for trial in seen for whisk in trial.whisks if whisk.base is not None]
+    if not lines:
+        raise _Unread("none of them can be read")
+    return by_strokes(lines)

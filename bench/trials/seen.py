@@ -39,14 +39,15 @@ def see_trial(
     """
     strokes = forward_strokes(signals)
     if not trial.camera_sources or calibration.cameras is None:
-        return _unseen(len(strokes), NO_PICTURES)
+        return unseen(len(strokes), NO_PICTURES)
     try:
         return _see(session, trial, signals, strokes, calibration, settings)
     except Refused as reason:
-        return _unseen(len(strokes), str(reason))
+        return unseen(len(strokes), str(reason))
 
 
-def _unseen(count: int, status: str) -> SeenTrial:
+def unseen(count: int, status: str) -> SeenTrial:
+    """So many whisks without a truth, and why."""
     return SeenTrial(tuple(SeenWhisk(number, status) for number in range(count)))
 
 

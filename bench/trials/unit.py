@@ -113,7 +113,7 @@ class Unit:
 
 def see_unit(unit: Unit) -> SeenTrial:
     """The seen half, kept beside the calibration."""
-    seen = _kept_seen(unit)
+    seen = kept_seen(unit)
     if seen is None:
         seen = _see(unit, read_signals(unit.trial))
         write_result(unit.seen_path, {"seen_hash": unit.seen_hash, "seen": to_plain(seen)})
@@ -124,7 +124,7 @@ def _see(unit: Unit, signals: Signals) -> SeenTrial:
     return see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings)
 
 
-def _kept_seen(unit: Unit) -> SeenTrial | None:
+def kept_seen(unit: Unit) -> SeenTrial | None:
     """The seen half of an earlier result, where all that it depends on is as it was."""
     for path in (unit.path, unit.seen_path):
         kept = read_result(path)
@@ -143,10 +143,14 @@ def evaluate_unit(unit: Unit) -> None:
 def trial_result(unit: Unit) -> TrialResult:
     """Truth and estimates of every whisk of the trial."""
     signals = read_signals(unit.trial)
-    seen = _kept_seen(unit) or _see(unit, signals)
+    seen = kept_seen(unit) or _see(unit, signals)
     felt = feel_trial(unit, signals, seen)
-    described = _described(unit.trial), _whisker(unit.session.whisker)
-    return TrialResult(*described, unit.settings.theta_deg, seen, felt, unit.hash, unit.seen_hash)
+    return TrialResult(*described(unit), seen, felt, unit.hash, unit.seen_hash)
+
+
+def described(unit: Unit) -> tuple[TrialFacts, WhiskerFacts, float]:
+    """What a result begins with: trial, whisker and wanted pushing angle."""
+    return _described(unit.trial), _whisker(unit.session.whisker), unit.settings.theta_deg
 
 
 def _described(trial: Trial) -> TrialFacts:

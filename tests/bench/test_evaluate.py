@@ -10,9 +10,11 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
+from bench.base.workers import DIED, Workers
 from bench.evaluate import evaluate
 from bench.records.trial import SeenWhisk
 from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
+from bench.trials.unit import Unit
 from tests.faults.interrupted import contents, full_disk
 from tests.scenes.results import table
 
@@ -288,6 +290,26 @@ def test_any_number_of_workers_gives_the_same_bytes(without_pictures, tmp_path):
         run(without_pictures, tmp_path / str(workers), workers=workers)
     for name in ("whisks.csv", "estimates.csv", "summary.txt", "fig8.png"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_a_trial_whose_process_dies_is_told_and_tried_again(without_pictures, tmp_path, monkeypatch):
+    """The others have their results; a second run comes to what it would have been."""
+
+    def b30_dies(_, job, tasks):
+        for place, task in enumerate(tasks):
+            lost = isinstance(task, Unit) and task.trial.name == "b30_3"
+            yield place, DIED if lost else job(task)
+
+    plain = replace(TRUE_ALPHA, figures=False)
+    run(without_pictures, tmp_path / "never", plain)
+    with monkeypatch.context() as patched:
+        patched.setattr(Workers, "_finished", b30_dies)
+        assert run(without_pictures, tmp_path / "out", plain) == 1
+    rows = {row["trial"]: row for row in table(tmp_path / "out" / "whisks.csv")}
+    assert "died 3 times" in rows["b30_3"]["status"] and not rows["b30_3"]["d_x_mm"]
+    assert "died" not in rows["b60_4"]["status"] and "died 3 times" in (tmp_path / "out" / "summary.txt").read_text()
+    run(without_pictures, tmp_path / "out", plain)
+    assert (tmp_path / "out" / "summary.txt").read_bytes() == (tmp_path / "never" / "summary.txt").read_bytes()
 
 
 @pytest.mark.slow

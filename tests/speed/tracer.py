@@ -34,10 +34,11 @@ KNOTS = Knots(np.arange(40.0, 600.0, 70.0))  # as many as a whisker of 100 mm ge
 BAR_MS = 13.2  # a tenth of the faster of Janelia's two times
 
 
-def wire_frames(rng) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """Background, frames of a wire that bends more and more, and the true height of its axis at each column."""
+def wire_frames(rng, step: float = 40.0) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """Background (a chessboard, its squares so many grey levels apart), frames of a wire that bends more and more, and
+    the true height of its axis at each column."""
     column = np.arange(SHAPE[1])
-    background = 60.0 + 40.0 * ((np.arange(SHAPE[0]) // 45)[:, None] + column[None] // 45 & 1)
+    background = 60.0 + step * ((np.arange(SHAPE[0]) // 45)[:, None] + column[None] // 45 & 1)
     heights = [200.0 + 6.0 * k + (0.05 + 0.01 * k) * column + 2e-4 * k * column**1.6 for k in range(FRAMES)]
     frames = []
     for height in heights:

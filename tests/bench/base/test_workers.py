@@ -30,7 +30,14 @@ def test_each_process_has_one_thread_and_this_one_keeps_its_own(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")  # not one: a process of its own
     with Workers(1) as pool:
         assert pool.run(os.getenv, ["OMP_NUM_THREADS"], "threads") == ["1"]
+        assert pool.run(_threads_of_pictures, ["x"], "threads") == [1]
     assert os.environ["OMP_NUM_THREADS"] == "7"
+
+
+def _threads_of_pictures(_) -> int:
+    import cv2
+
+    return cv2.getNumThreads()
 
 
 def test_one_process_of_one_thread_works_here(monkeypatch):
@@ -44,7 +51,7 @@ def test_one_process_of_one_thread_works_here(monkeypatch):
         assert pool.run(lambda _: (os.getpid(), cv2.getNumThreads()), [1], "here") == [(os.getpid(), 1)]
     assert cv2.getNumThreads() == before
     with Workers(2) as pool:
-        assert pool.run(os.path.abspath, ["/"], "elsewhere") == ["/"] and pool._pool is not None
+        assert pool.run(os.path.abspath, ["/"], "elsewhere") == ["/"] and pool._processes
 
 
 def test_bad_input_comes_through_as_it_was():
@@ -56,13 +63,28 @@ def _refuse(_):
     raise BadInput("is wrong", file="signals.csv", row=7)
 
 
-def test_a_killed_process_is_told_in_a_line():
-    with pytest.raises(BadInput, match="a worker process was killed"), Workers(2) as pool:
-        pool.run(_killed, ["x"], "killed")
+def test_a_process_that_dies_costs_its_task_a_retry_and_the_third_death_is_its_result(tmp_path):
+    tasks = [(tmp_path / "fine", 0), (tmp_path / "once", 1), (tmp_path / "always", 9)]
+    with Workers(2) as pool:
+        found = pool.run(_dies, tasks, "deaths", lost=lambda task: f"{task[0].name} is lost")
+    assert found == ["fine", "once", "always is lost"]
+    assert [len(file.read_text()) for file, _ in tasks] == [1, 2, 3]  # how often each was begun
 
 
-def _killed(_):
-    os.kill(os.getpid(), signal.SIGKILL)
+def test_a_killed_process_is_told_in_a_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("bench.base.workers.MOST_DEATHS", 1)
+    with pytest.raises(BadInput, match="a worker process was killed three times"), Workers(2) as pool:
+        pool.run(_dies, [(tmp_path / "always", 9)], "killed")
+
+
+def _dies(task):
+    """Its process is killed so often; a file counts, a letter each time."""
+    begun, deaths = task
+    with begun.open("a") as file:
+        file.write("x")
+    if len(begun.read_text()) <= deaths:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return begun.name
 
 
 _LONG = """

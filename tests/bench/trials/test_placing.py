@@ -18,6 +18,7 @@ from bench.trials.placing import place_rig
 from bench.trials.unit import Unit
 from tests.scenes.base_lines import some_lines
 from tests.scenes.model_scenes import CAMERAS
+from vision.calibration.turning import FirstRig
 
 SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 T_RIG_BOARD = load_session(SMALL).T_rig_board
@@ -36,11 +37,11 @@ def place(small_copy, monkeypatch):
             stages.append(unit.stage)
             now = unit.calibration.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
             left = step - np.append(np.zeros(3), CAMERAS["one"].T_camera_rig[:, :3].T @ now)
-            made = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames, rng=rng)
-            base = lines.setdefault((unit.stage, unit.trial.name), made)
+            made = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames or 1, rng=rng)
+            base = lines.setdefault((unit.stage, unit.trial.name), made if frames else None)
             return SeenTrial((SeenWhisk(0, base=base), SeenWhisk(1), SeenWhisk(2, "no pictures")))
 
-        monkeypatch.setattr("bench.trials.placing.see_unit", see)
+        monkeypatch.setattr("bench.trials.lost.see_unit", see)
         session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)
         session = session if board else replace(session, T_rig_board=None)
         before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",), session.T_rig_board)
@@ -76,9 +77,20 @@ def test_a_board_with_a_sigma_gives_way(place):
     np.testing.assert_allclose(after, before, atol=1e-6)
 
 
-def test_strokes_too_short_to_tell_are_no_doubt(place):
+def test_strokes_too_short_to_tell_are_no_doubt(place, monkeypatch):
+    monkeypatch.setattr("bench.trials.placing.first_look", None)  # which would decode every trial: not asked
     made, doubts, _ = place(OFF, frames=3)
     assert not doubts and "needs 4 frames" in made.notes[-1]
+
+
+def test_where_no_stroke_can_be_read_what_turns_elsewhere_is_a_doubt(place, monkeypatch):
+    """A wrong square_mm has the wire looked for where it is not."""
+    T = np.eye(3, 4)
+    T[1, 3] = 12.0
+    monkeypatch.setattr("bench.trials.placing.first_look", lambda *_: FirstRig(T, 0, 0))
+    made, doubts, _ = place(OFF, frames=0)
+    assert "about a centre some 12 mm from where T_rig_board has it" in doubts[0]
+    assert "none of them can be read" in made.notes[-1]
 
 
 def test_a_board_by_ruler_needs_strokes_wide_enough(place):
