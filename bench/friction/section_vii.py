@@ -147,7 +147,7 @@ def _with_shared(name: str, found: Callable[[Sequence[Contact]], _Found], known:
 
     Whisks of one recording share a bar that was set up once, and are no independent repeats: their mean counts as one.
     What all whisks share comes on top, one cause after another. The sum has the degrees of freedom of Welch and
-    Satterthwaite (GUM, G.4); sigma is half a 95 % interval by Student's t, over 1.96.
+    Satterthwaite, cut to a whole number (GUM, G.4); sigma is half a 95 % interval by Student's t, over 1.96.
     """
     of_trials = [[c for c in known if c.trial == trial] for trial in dict.fromkeys(c.trial for c in known)]
     recordings = [_mean(some) for some in of_trials]
@@ -157,7 +157,7 @@ def _with_shared(name: str, found: Callable[[Sequence[Contact]], _Found], known:
     causes = range(len(known[0].shared_Nmm))
     shared = [found([c.moved(k) for c in recordings]).alpha_rad - fit.alpha_rad for k in causes]
     variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared) ** 2)
-    freedom = fit.freedom * (variance / max(fit.sigma_rad**2, np.finfo(float).tiny)) ** 2
+    freedom = np.floor(fit.freedom * (variance / max(fit.sigma_rad**2, np.finfo(float).tiny)) ** 2)
     return Way(name, fit.alpha_rad, float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95))
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.tables import write_table
+from bench.gauges.readings import NOMINAL_SHARE
 from bench.records.trial import FeltWhisk, TrialFacts, TrialResult, whisks
 from bench.session.session import Session
 from bench.session.whisker import Whisker
@@ -84,11 +85,13 @@ def soft_objects(
 
 
 def _places(session: Session, results: Sequence[TrialResult]) -> Iterator[Place | None]:
-    """By nominal distance, from near to far; None where no whisk serves."""
+    """By nominal distance, from near to far; None where no whisk serves. Where nobody says how well a distance is known
+    it was set by a ruler, for each recording anew."""
     nominal = {r.trial.d_x_nominal_mm for r in results}
     for d_x in sorted(d for d in nominal if np.isfinite(d)):
         there = [r for r in results if r.trial.d_x_nominal_mm == d_x]
-        sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there)
+        by_ruler = NOMINAL_SHARE * d_x / np.sqrt(len(there))
+        sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there) or by_ruler
         rows = [_compliance(r, felt) for r, seen, felt in whisks(there) if is_sound(seen, felt) and _is_held(felt)]
         yield _place(d_x, sigma_mm, *map(np.array, zip(*rows))) if rows else None
 
