@@ -29,6 +29,7 @@ _STEP_RAD = 1e-4  # of a derivative by differences: its error goes with the squa
 # rad: the best of these is then refined
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
 TOO_FEW = "needs more recordings than it has unknowns to say how well it is known"
+_LEAST_SHARE = 1e-3  # of the variance that is the fit's own: with less, Student's t is the normal distribution
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
 
 
@@ -54,7 +55,6 @@ class Contact:
     theta_rad: float
     m_y_Nmm: float
     m_z_Nmm: float
-    phi_sigma_rad: float
     shared_Nmm: np.ndarray
     trial: str = ""
 
@@ -78,7 +78,6 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
             float(np.radians(result.theta_deg)),
             felt.m_y_Nmm.value,
             felt.m_z_Nmm.value,
-            felt.phi_felt_rad.sigma,
             felt.shared_Nmm,
             result.trial.name,
         )
@@ -157,7 +156,8 @@ def _with_shared(name: str, found: Callable[[Sequence[Contact]], _Found], known:
     causes = range(len(known[0].shared_Nmm))
     shared = [found([c.moved(k) for c in recordings]).alpha_rad - fit.alpha_rad for k in causes]
     variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared) ** 2)
-    freedom = np.floor(fit.freedom * (variance / max(fit.sigma_rad**2, np.finfo(float).tiny)) ** 2)
+    own = max(fit.sigma_rad**2 / variance, _LEAST_SHARE) if variance > 0 else 1.0
+    freedom = np.floor(fit.freedom / own**2)
     return Way(name, fit.alpha_rad, float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95))
 
 

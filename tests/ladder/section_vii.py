@@ -43,9 +43,8 @@ def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> 
         _, exact = push(rod, beta, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD)
         for _ in range(WHISKS):
             m_y, m_z = gauges @ exact + NOISE_NMM * rng.normal(size=2)
-            sigma = np.hypot(GAUGE_SHARE, NOISE_NMM / np.hypot(m_y, m_z))
             shared = GAUGE_SHARE * np.kron(np.eye(2), [[m_y], [m_z]])
-            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, sigma, shared, f"b{beta_deg}")
+            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, shared, f"b{beta_deg}")
 
 
 def two_places(shape: str, stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Soft:

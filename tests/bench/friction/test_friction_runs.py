@@ -16,7 +16,7 @@ from bench.report.assembly import estimate_rows
 from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.uncertainty import Z_95
-from tests.scenes.friction_results import ALPHA, PHI_SIGMA, THETA, WHISKER, C, result
+from tests.scenes.friction_results import ALPHA, THETA, WHISKER, C, result
 from vision.truth.value import Value
 
 NOTHING_SHARED = np.zeros((1, 2))
@@ -92,7 +92,7 @@ def test_every_way_finds_the_friction_angle(tmp_path):
 
 def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
-    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, PHI_SIGMA, NOTHING_SHARED, f"b{beta_deg}")
+    return Contact(np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg}")
 
 
 def test_ways_say_what_they_lack():
@@ -142,6 +142,15 @@ def test_a_fit_without_a_spare_recording_has_no_sigma():
     assert np.isnan(found.alpha_rad) and "more recordings" in found.status
 
 
+def test_bars_that_agree_exactly_leave_what_gauges_share():
+    """No residual: the sigma is that of the cause in common, by the normal distribution."""
+    shared = np.array([[0.0, 0.05]])
+    bars = [replace(contact(b), shared_Nmm=shared) for b in (20, 40, 55, 65)]
+    way = by_consistency(bars, WHISKER)
+    moved = by_consistency([c.moved(0) for c in bars], WHISKER).alpha_rad
+    assert way.sigma_rad == pytest.approx(abs(moved - way.alpha_rad), rel=1e-3) and way.sigma_rad > 0
+
+
 def test_mean_does_not_shrink_a_shared_sigma():
     assert mean_alpha([(0.2, 0.01)] * 16) == pytest.approx((0.2, 0.01))
     assert np.isnan(mean_alpha([(np.nan, np.nan)])).all()
@@ -185,7 +194,7 @@ def along(beta_deg: float, d_x: float, whisker: Whisker) -> Contact:
     """A contact of a bar at this slope and distance, in a recording of its own."""
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(whisker.beam.as_cylinder_mm(d_x), THETA, beta, ALPHA, whisker.beam.C_Nmm2)
-    return Contact(beta, d_x, THETA, m_y, m_z, 1e-3, NOTHING_SHARED, f"b{beta_deg:g}")
+    return Contact(beta, d_x, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg:g}")
 
 
 def test_ones_own_estimate_takes_the_sessions_sigma_of_alpha():
