@@ -65,7 +65,8 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
     values = _quantities(estimate.d_x_mm, inputs, whisk.beam)
     by_d_x, by_input = _derivatives(estimate.d_x_mm, inputs, whisk.beam)
     rows = by_input + np.outer(by_d_x, gradient)
-    sigmas = np.sqrt(np.einsum("ij,jk,ik->i", rows, covariance, rows) + by_d_x**2 * of_model)
+    variances = np.einsum("ij,jk,ik->i", rows, covariance, rows) + by_d_x**2 * of_model
+    sigmas = np.sqrt(np.maximum(variances, 0.0))
     pairs = (float(number) for pair in zip(values, sigmas) for number in pair)
     found = Contact(*pairs, -float(gradient @ covariance[:, 0]))
     if estimate.deflection_mm is None:
