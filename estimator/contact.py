@@ -4,7 +4,7 @@ Frame and signs are those of the sensing plane (y, z): d_y against the push, d_z
 rad, moments in N·mm, lengths in mm.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, nan, sqrt
 
 import numpy as np
@@ -52,9 +52,11 @@ def slip(d_x: float, theta: float, m_y: float, m_z: float, alpha: float) -> floa
 def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
     """The contact of an estimate, by first order from what the whisk says of its angle and moments.
 
-    An estimate without a gradient is taken to err on its own; what a sigma holds beyond the gradient is the model's.
+    An estimate without a gradient is taken to err on its own; what a sigma holds beyond the gradient is the model's. A
+    deflection that the estimate gives itself stands.
     """
-    if not (estimate.d_x_mm > 0 and estimate.sigma_mm > 0):
+    on_whisker = estimate.d_x_mm > 0 and np.isfinite(whisk.beam.as_cylinder_mm(estimate.d_x_mm * (1 + _STEP)))
+    if not (on_whisker and estimate.sigma_mm > 0):
         return NO_CONTACT
     inputs = np.array([whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, estimate.alpha_est_rad])
     covariance = _covariance(whisk, alpha_sigma)
@@ -63,9 +65,14 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
     values = _quantities(estimate.d_x_mm, inputs, whisk.beam)
     by_d_x, by_input = _derivatives(estimate.d_x_mm, inputs, whisk.beam)
     rows = by_input + np.outer(by_d_x, gradient)
-    sigmas = np.sqrt(np.einsum("ij,jk,ik->i", rows, covariance, rows) + by_d_x**2 * of_model)
+    variances = np.einsum("ij,jk,ik->i", rows, covariance, rows) + by_d_x**2 * of_model
+    sigmas = np.sqrt(np.maximum(variances, 0.0))
     pairs = (float(number) for pair in zip(values, sigmas) for number in pair)
-    return Contact(*pairs, -float(gradient @ covariance[:, 0]))
+    found = Contact(*pairs, -float(gradient @ covariance[:, 0]))
+    if estimate.deflection_mm is None:
+        return found
+    (d_y, d_z), (d_y_sigma, d_z_sigma) = estimate.deflection_mm, estimate.deflection_sigma_mm
+    return replace(found, d_y_mm=d_y, d_z_mm=d_z, d_y_sigma_mm=d_y_sigma, d_z_sigma_mm=d_z_sigma)
 
 
 def _covariance(whisk: Whisk, alpha_sigma: float) -> np.ndarray:

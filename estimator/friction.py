@@ -41,8 +41,8 @@ class FrictionFit:
     """Least-squares friction cone angle: floats for one run, arrays for many.
 
     alpha_rad with sigma_rad and the 95 % interval low_rad … high_rad; rms of the residuals in the unit of
-    what was fitted; status empty, or what is doubtful. All numbers but rms are NaN where the data do not
-    hold α.
+    what was fitted; status empty, or what is doubtful; freedom: degrees, of Student's t in the interval. NaN where
+    the data do not hold α, but for rms and freedom.
     """
 
     alpha_rad: float
@@ -51,6 +51,7 @@ class FrictionFit:
     high_rad: float
     rms: float
     status: str
+    freedom: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +206,8 @@ def _fit(alpha, sigma, freedom, residuals, unseen):
     reach = stdtrit(freedom, 0.975) * sigma
     rms = np.sqrt((residuals**2).mean(axis=-1))
     numbers = (alpha, sigma, np.maximum(alpha - reach, 0.0), alpha + reach, rms)
-    return FrictionFit(*(_float_or_array(value) for value in numbers), status if status.ndim else str(status))
+    status = status if status.ndim else str(status)
+    return FrictionFit(*(_float_or_array(value) for value in numbers), status, _float_or_array(freedom))
 
 
 def _float_or_array(value):
@@ -217,8 +219,8 @@ def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 
 
     tilt (n,) and the felt slip angles φ (n,) in rad. φ follows the tilt less α beyond the range in which
     it is zero, and that range is 2α: the two lines of slope one are fitted, and α is half their distance.
-    phi_sigma is one slip angle's; 0 takes the scatter about the lines. NaN with a status where φ does not
-    leave zero on both sides.
+    phi_sigma is one slip angle's; 0 takes the scatter about the lines, with Student's t for the interval: NaN with two
+    slip angles on them. NaN with a status where φ does not leave zero on both sides.
     """
     require_sigma("phi_sigma", phi_sigma)
     tilt, phi = np.asarray(tilt, dtype=float), np.asarray(phi, dtype=float)
@@ -230,11 +232,15 @@ def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 
         return FrictionFit(np.nan, np.nan, np.nan, np.nan, np.nan, one_sided)
     outside = np.maximum(np.abs(tilt - middle) - alpha, 0.0) * np.sign(tilt - middle)
     rms = float(np.sqrt(((phi - outside) ** 2).mean()))
-    scatter = phi_sigma if phi_sigma > 0 else rms
+    slipping = sides[0] | sides[1]
+    freedom = np.inf if phi_sigma > 0 else float(np.count_nonzero(slipping) - 2)  # less the middle, and α
+    scatter = phi_sigma
+    if not phi_sigma > 0:
+        scatter = np.sqrt(np.sum((phi - outside)[slipping] ** 2) / freedom) if freedom else np.nan
     sigma = scatter / 2 * np.sqrt(sum(1 / np.count_nonzero(side) for side in sides))
-    reach = 1.96 * sigma
+    reach = stdtrit(freedom, 0.975) * sigma
     low, high = max(0.0, float(alpha - reach)), float(alpha + reach)
-    return FrictionFit(float(alpha), float(sigma), low, high, rms, "")
+    return FrictionFit(float(alpha), float(sigma), low, high, rms, "", freedom)
 
 
 def _dead_band(tilt, phi, phi_sigma):

@@ -96,8 +96,10 @@ class Estimate:
 
     low_mm, high_mm: its 95 % interval, NaN where that is 1.96 sigma to either side; a low end of 0 and a high one at
     the whisker's length are open. alpha_est_rad, beta_rad: the friction angle that was assumed and the slope that came
-    of it, NaN where the estimator knows of none. gradient (4,): of the distance by θ, m_y, m_z and alpha_est, where the
-    estimator knows it: so the contact point's errors hang together.
+    of it, NaN where the estimator knows of none. deflection_mm, deflection_sigma_mm: where it says itself where the
+    contact is at the pushing angle, (d_y, d_z) from the unbent whisker; None: worked out from distance and moments.
+    gradient (4,): of the distance by θ, m_y, m_z and alpha_est, where the estimator knows it: so the contact point's
+    errors hang together.
     """
 
     d_x_mm: float
@@ -107,4 +109,6 @@ class Estimate:
     high_mm: float = nan
     alpha_est_rad: float = nan
     beta_rad: float = nan
+    deflection_mm: tuple[float, float] | None = None
+    deflection_sigma_mm: tuple[float, float] | None = None
     gradient: np.ndarray | None = field(default=None, compare=False)

@@ -160,5 +160,6 @@ def curved_lines(found: Sequence[tuple[TrialResult, FeltWhisk, Curved]]) -> Iter
         if abs(c.lateral_per_mm.value) > Z_95 * c.lateral_per_mm.sigma:
             yield (
                 f"{result.trial.name}, whisk {felt.whisk}: curved to the side by {c.lateral_per_mm.value:.4f} ± "
-                f"{c.lateral_per_mm.sigma:.4f} 1/mm (Appendix B; {c.lateral_printed_per_mm:.4f} by (24) as printed)"
+                f"{c.lateral_per_mm.sigma:.4f} 1/mm (Appendix B; {c.lateral_printed_per_mm:.4f} by (24) as printed), "
+                "or it leans along the whisker"
             )

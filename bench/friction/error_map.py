@@ -19,6 +19,7 @@ from bench.friction.tables import SurfaceFriction
 from bench.records.trial import TrialResult
 from bench.trials.compare import judge
 from estimator.threshold import distance_error
+from vision.geometry.counted import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +84,8 @@ def _edge(value: float, size: float) -> float:
 def _whisks(results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> Iterator[tuple]:
     """(β in degrees, α in rad, error in per cent) of every whisk for which all three are known, and how its whisker's
     taper changes a relative error."""
-    errors = {(j.trial, j.whisk): j for j in judge(results) if j.estimator == "with_friction" and not j.one_factor}
+    judged = (j for j in judge(results) if j.estimator == "with_friction")
+    errors = {(j.trial, j.whisk): j for j in judged if not (j.one_factor or j.doubtful)}
     for surface in friction:
         seen, fitted = surface.alpha("seen")[0], surface.alpha("least_squares")[0]
         alpha = seen if np.isfinite(seen) else fitted
@@ -129,13 +131,21 @@ def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float, of_taper: Callab
     slopes, angles = np.meshgrid(np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121))
     predicted = 100.0 * of_taper(distance_error(np.radians(slopes), np.radians(angles), alpha_est_rad))
     right.pcolormesh(slopes, angles, np.clip(predicted, -most, most), shading="nearest", rasterized=True, **look)
-    for axes, title in ((left, "measured"), (right, "predicted by (13), (14)")):
+    for axes, title in ((left, _measured(cells)), (right, "predicted by (13), (14)")):
         axes.set(xlabel="slope β  [°]", title=title, xlim=(-2.5, _STEEPEST_DEG), ylim=(0.0, top))
         axes.axhline(np.degrees(alpha_est_rad), color="black", lw=0.8, ls=":")
     left.set_ylabel("friction angle α  [°]")
-    left.text(80.0, np.degrees(alpha_est_rad), "α_est", va="bottom", ha="right", fontsize=8)
+    left.text(80.0, np.degrees(alpha_est_rad), "α$_{est}$", va="bottom", ha="right", fontsize=8)
     figure.colorbar(mesh, ax=[left, right], label="error of d$_x$ by (10)  [%]", extend="both")
     return figure
+
+
+def _measured(cells: Sequence[Cell]) -> str:
+    """The title says how many whisks the map rests on, and that empty cells are empty."""
+    counts = [len(cell.errors) for cell in cells]
+    fewest, most = min(counts), max(counts)
+    each = f"{fewest} a cell" if fewest == most else f"{fewest} to {most} a cell"
+    return f"measured: {counted(sum(counts), 'whisk')}, {each}; blank: none"
 
 
 def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -154,4 +164,5 @@ def _tell(axes: "Axes", cells: Sequence[Cell], most: float) -> None:
     for cell in cells:
         colour = "white" if abs(cell.errors.mean()) > 0.6 * most else "black"
         middle = cell.beta_deg + 0.5 * _BETA_DEG, cell.alpha_deg + 0.5 * _ALPHA_DEG
-        axes.text(*middle, f"{cell.errors.mean():+.1f}", ha="center", va="center", fontsize=6, color=colour)
+        said = f"{cell.errors.mean():+.1f}".replace("-", "−")
+        axes.text(*middle, said, ha="center", va="center", fontsize=6 if len(said) < 5 else 5, color=colour)

@@ -18,6 +18,7 @@ from bench.friction.alphas import seen_friction
 from bench.gauges.readings import reference_from_pictures
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
+from bench.trials.compare import is_sound
 from estimator.distance import with_friction
 
 if TYPE_CHECKING:
@@ -25,22 +26,24 @@ if TYPE_CHECKING:
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
 COLUMNS = ("trial", "whisk", "d_x_mm", "alpha_seen_deg", "alpha_seen_sigma_deg", "error_mm", *SHARES)
-TOTAL = "mean of all"
+TOTAL = "mean"
 _LOOK = {
     "by_touch_mm": ("touch felt → seen", "#80b1d3"),
     "by_moments_mm": ("moments felt → seen", "#fdb462"),
-    "by_alpha_mm": ("α_est → α seen", "#b3de69"),
+    "by_alpha_mm": ("α$_{est}$ → α seen", "#b3de69"),
     "remainder_mm": ("beam theory, slip along", "#bbbbbb"),
 }
 _MOST_NAMED = 40  # whisks; more bars than that have no room for a name each
 
 
 def write_explained(out: Path, results: Iterable[TrialResult], whisker: Whisker, *, drawn: bool = True) -> list[str]:
-    """explained.csv: a row for each whisk that has a truth and an estimate by (10), and their mean; its bar chart,
-    where it is to be `drawn`. Names of the pictures.
+    """explained.csv: a row for each whisk that has a truth and an estimate by (10), and the mean of those of which
+    nothing is doubtful; its bar chart, where it is to be `drawn`. Names of the pictures.
     """
+    results = list(results)
     rows = list(explained_rows(results, whisker))
-    total = [mean_row(rows)] if rows else []
+    sound = {(r.trial.name, seen.whisk) for r, seen, felt in whisks(results) if is_sound(seen, felt)}
+    total = [mean_row([row for row in rows if (row["trial"], row["whisk"]) in sound])] if rows else []
     write_table(out / "explained.csv", COLUMNS, [*rows, *total])
     if not rows or not drawn:
         return []

@@ -19,16 +19,17 @@ from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.friction.explained import by_10
 from bench.records.trial import TrialResult, whisks
 from bench.session.whisker import Whisker
-from estimator.consistency import smoothest_alpha
 from estimator.distance import felt_slip_angle
-from estimator.friction import Contacts, alpha_from_tilts, confidence
+from estimator.friction import alpha_from_tilts, confidence
 from estimator.uncertainty import Z_95
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
 _FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a slope
-_BEARS_NOTHING = 1e-6  # of the largest change: a recording without which the fit is the same, to rounding
+_STEP_RAD = 1e-4  # of a derivative by differences: its error goes with the square
 # rad: the best of these is then refined
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
+TOO_FEW = "needs more recordings than it has unknowns to say how well it is known"
+_LEAST_SHARE = 1e-3  # of the variance that is the fit's own: with less, Student's t is the normal distribution
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
 
 
@@ -54,7 +55,6 @@ class Contact:
     theta_rad: float
     m_y_Nmm: float
     m_z_Nmm: float
-    phi_sigma_rad: float
     shared_Nmm: np.ndarray
     trial: str = ""
 
@@ -78,7 +78,6 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
             float(np.radians(result.theta_deg)),
             felt.m_y_Nmm.value,
             felt.m_z_Nmm.value,
-            felt.phi_felt_rad.sigma,
             felt.shared_Nmm,
             result.trial.name,
         )
@@ -95,103 +94,116 @@ def by_tilting(of_surface: Sequence[Contact]) -> Way:
     known = [c for c in of_surface if np.isfinite(c.beta_rad)]
     if not (any(c.beta_rad < 0 for c in known) and any(c.beta_rad > 0 for c in known)):
         return Way("tilting", np.nan, np.nan, "needs nominal slopes (beta_deg) of both signs")
-    sigma = float(np.median([c.phi_sigma_rad for c in known]))
 
-    def found(some: Sequence[Contact]) -> tuple[float, str]:
-        fit = alpha_from_tilts([c.beta_rad for c in some], [c.phi_rad for c in some], phi_sigma=sigma)
-        return fit.alpha_rad, fit.status
+    def found(some: Sequence[Contact]) -> _Found:
+        fit = alpha_from_tilts([c.beta_rad for c in some], [c.phi_rad for c in some])
+        return _Found(fit.alpha_rad, fit.sigma_rad, fit.freedom, fit.status)
 
-    return _by_recordings("tilting", found, known, 2)
+    return _with_shared("tilting", found, known)
 
 
 def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
-    """Way 2: the α under which distances scatter least as shares of their mean."""
+    """Way 2: the α under which distances scatter least as shares of themselves."""
     nominal = {c.d_x_nominal_mm for c in of_surface}
-    spread = np.ptp([abs(np.tan(c.phi_rad)) for c in of_surface]) if of_surface else 0.0
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
         return Way("consistency", np.nan, np.nan, f"needs {_FEWEST} whisks or more at one nominal distance (d_x_mm)")
-    if spread < _LEAST_SPREAD:
-        return Way("consistency", np.nan, np.nan, "the whisks do not span two slip angles")
-    if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
-        return Way("consistency", np.nan, np.nan, "a whisk is no push against an object")
-    return _by_recordings("consistency", lambda some: _least_scatter(some, whisker), of_surface, 2)
+    return _by_object("consistency", of_surface, whisker, 0)
 
 
 def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     """Way 2 of an object that is no edge at one distance: the α whose contacts lie best on a straight one.
 
     Bars at several nominal distances stand for one straight edge that leans along the whisker, touched at heights that
-    are these distances (`estimator.consistency`).
+    are these distances.
     """
     nominal = {c.d_x_nominal_mm for c in of_surface}
     if len(nominal) < 2 or not np.isfinite(list(nominal)).all():
         return Way("smoothness", np.nan, np.nan, "needs whisks at two nominal distances (d_x_mm) or more")
+    return _by_object("smoothness", of_surface, whisker, 1)
+
+
+def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degree: int) -> Way:
+    """Way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
-        return Way("smoothness", np.nan, np.nan, "a whisk is no push against an object")
-    return _by_recordings("smoothness", lambda some: _smoothest(some, whisker), of_surface, 3)
+        return Way(name, np.nan, np.nan, "a whisk is no push against an object")
+    if np.ptp([abs(np.tan(c.phi_rad)) for c in of_surface]) < _LEAST_SPREAD:
+        return Way(name, np.nan, np.nan, "the whisks do not span two slip angles")
+    return _with_shared(name, lambda some: _least_scatter(some, whisker, degree), of_surface)
 
 
-def _smoothest(some: Sequence[Contact], whisker: Whisker) -> tuple[float, str]:
-    felt = (np.array([getattr(c, name) for c in some]) for name in ("theta_rad", "m_y_Nmm", "m_z_Nmm"))
-    heights = np.array([c.d_x_nominal_mm for c in some])
-    beam = whisker.beam
-    at = Contacts(*felt, beam.C_Nmm2, np.zeros(len(some)), heights, taper_per_mm=beam.taper / beam.length_mm)
-    return smoothest_alpha(at)
+@dataclass(frozen=True)
+class _Found:
+    """What a fit to recordings gives: α, its sigma by their residuals, and the degrees of freedom of that."""
+
+    alpha_rad: float
+    sigma_rad: float = np.nan
+    freedom: float = 0
+    status: str = ""
 
 
-def _by_recordings(
-    name: str, found: Callable[[Sequence[Contact]], tuple[float, str]], known: Sequence[Contact], unknowns: int
-) -> Way:
-    """α that `found` makes of contacts (α or NaN, a status), with its sigma; NaN where that has a status.
+def _with_shared(name: str, found: Callable[[Sequence[Contact]], _Found], known: Sequence[Contact]) -> Way:
+    """What `found` makes of recordings; NaN where that has a status.
 
-    Whisks of one recording share a bar that was set up once, and are no independent repeats: each recording is left out
-    in turn. What all whisks share comes on top, one cause after another. unknowns: what `found` fits, α among it.
+    Whisks of one recording share a bar that was set up once, and are no independent repeats: their mean counts as one.
+    What all whisks share comes on top, one cause after another. The sum has the degrees of freedom of Welch and
+    Satterthwaite, cut to a whole number (GUM, G.4); sigma is half a 95 % interval by Student's t, over 1.96.
     """
-    alpha, status = found(known)
-    trials = list(dict.fromkeys(c.trial for c in known))
-    if status or len(trials) <= unknowns:
-        few = f"needs {unknowns + 1} recordings or more to say how well it is known"
-        return Way(name, np.nan, np.nan, status or few)
-    without = [found([c for c in known if c.trial != trial]) for trial in trials]
-    if any(why for _, why in without):
-        return Way(name, np.nan, np.nan, f"rests on one recording: without it, {next(w for _, w in without if w)}")
-    changes = np.array([a for a, _ in without]) - alpha
-    shared = [found([c.moved(k) for c in known])[0] - alpha for k in range(len(known[0].shared_Nmm))]
-    return Way(name, alpha, float(np.hypot(_own_sigma(changes, unknowns), np.linalg.norm(np.nan_to_num(shared)))))
+    of_trials = [[c for c in known if c.trial == trial] for trial in dict.fromkeys(c.trial for c in known)]
+    recordings = [_mean(some) for some in of_trials]
+    fit = found(recordings)
+    if fit.status or fit.freedom < 1:
+        return Way(name, np.nan, np.nan, fit.status or TOO_FEW)
+    causes = range(len(known[0].shared_Nmm))
+    shared = [found([c.moved(k) for c in recordings]).alpha_rad - fit.alpha_rad for k in causes]
+    variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared) ** 2)
+    own = max(fit.sigma_rad**2 / variance, _LEAST_SHARE) if variance > 0 else 1.0
+    freedom = np.floor(fit.freedom / own**2)
+    return Way(name, fit.alpha_rad, float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95))
 
 
-def _own_sigma(changes: np.ndarray, unknowns: int) -> float:
-    """Sigma of a fit from what leaving out each recording changes it by, as half a 95 % interval over 1.96.
-
-    A recording left out moves the fit by more than it had pulled it, 1/(1 − h), by its leverage h, p/n in the mean of p
-    unknowns. So the sum of the squares is n/(n − p) times the variance, with n − p degrees of freedom for Student's t
-    (after MacKinnon & White, J. Econometrics 29, 1985: HC2 in place of HC3). Of n, those count that bear on it.
-    """
-    n = np.count_nonzero(np.abs(changes) > _BEARS_NOTHING * np.abs(changes).max())
-    freedom = max(n - unknowns, 1)
-    return float(np.sqrt(freedom / max(n, 1) * np.sum(changes**2)) * stdtrit(freedom, 0.975) / Z_95)
+def _mean(some: Sequence[Contact]) -> Contact:
+    """The whisks of one recording as one."""
+    means = {name: np.mean([getattr(c, name) for c in some], axis=0) for name in ("m_y_Nmm", "m_z_Nmm", "shared_Nmm")}
+    return replace(some[0], **means)
 
 
 def _distances(some: Sequence[Contact], alphas_rad, whisker: Whisker) -> np.ndarray:
     """By (10), mm, (contacts, α); NaN where there is none."""
-    return np.array([by_10(c.theta_rad, c.m_y_Nmm, c.m_z_Nmm, alphas_rad, whisker) for c in some])
+    felt = ([[getattr(c, name)] for c in some] for name in ("theta_rad", "m_y_Nmm", "m_z_Nmm"))
+    return by_10(*map(np.array, felt), alphas_rad, whisker)
 
 
-def _least_scatter(some: Sequence[Contact], whisker: Whisker) -> tuple[float, str]:
-    """(α, rad, '') at which the distances scatter least; where one of them ends, the search ends, and says so."""
+def _off(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.ndarray:
+    """How far contacts (n,) lie off the polynomial in height that fits them best, as shares of their distances."""
+    design = np.vander(heights, degree + 1) / distances[:, None]
+    if not np.isfinite(design).all():
+        return np.full(len(distances), np.nan)
+    return 1.0 - design @ np.linalg.lstsq(design, np.ones(len(distances)), rcond=None)[0]
 
-    def scatter(alphas_rad) -> np.ndarray:
-        distances = _distances(some, np.atleast_1d(alphas_rad), whisker)
-        return distances.std(axis=0) / distances.mean(axis=0)
 
-    on_grid = scatter(_GRID_RAD)
-    last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
-    best = int(np.nanargmin(on_grid))
+def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _Found:
+    """α at which the contacts lie least off an object; where one of their distances ends, the search ends, and says so.
+
+    Sigma is that of a least-squares fit whose residuals, all of one size, are what bars are set up wrong by.
+    """
+    heights = np.array([c.d_x_nominal_mm for c in some])
+
+    def off(alphas_rad) -> np.ndarray:
+        return np.array([_off(d, heights, degree) for d in _distances(some, np.atleast_1d(alphas_rad), whisker).T])
+
+    on_grid = np.sum(off(_GRID_RAD) ** 2, axis=1)
+    last, best = int(np.flatnonzero(np.isfinite(on_grid))[-1]), int(np.nanargmin(on_grid))
     if best in (0, last):
-        return float("nan"), f"at the bound of the search, {np.degrees(_GRID_RAD[best]):.1f}°: no angle between fits"
+        bound = np.degrees(_GRID_RAD[best])
+        return _Found(np.nan, status=f"at the bound of the search, {bound:.1f}°: no angle between fits")
     bracket = _GRID_RAD[best - 1], _GRID_RAD[best + 1]
-    found = minimize_scalar(lambda a: float(scatter(a)[0]), bounds=bracket, method="bounded", options={"xatol": 1e-7})
-    return float(found.x), ""
+    found = minimize_scalar(lambda a: np.sum(off(a) ** 2), bounds=bracket, method="bounded", options={"xatol": 1e-7})
+    freedom = len(some) - degree - 2  # the object's coefficients, and α
+    if freedom < 1:
+        return _Found(float(found.x))
+    high, low = off(found.x + _STEP_RAD * np.array([1.0, -1.0]))
+    sigma = np.sqrt(found.fun / freedom / np.sum(((high - low) / (2.0 * _STEP_RAD)) ** 2))
+    return _Found(float(found.x), float(sigma), freedom)
 
 
 def weights(phi_rad: Sequence[float], alpha_est_rad: float) -> np.ndarray:

@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.tables import write_table
+from bench.gauges.readings import NOMINAL_SHARE
 from bench.records.trial import FeltWhisk, TrialFacts, TrialResult, whisks
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from bench.trials.compare import is_sound
 from estimator import compliance, first_order
+from estimator.beam import Beam
 from estimator.uncertainty import Z_95, model_share
 from vision.truth.value import Value
 
@@ -29,7 +31,6 @@ COLUMNS = (
 _LEAST_SHIFT_MM = 2.0  # nominal distances that differ by less are one distance set up again
 _HELD_SIGMAS = 3.0  # of φ felt: beyond, the contact slips sideways
 NOT_SOFT = "no softer than a rigid object within the noise"
-NO_CYLINDER = "the equation is that of a cylinder"
 NO_PUSH = "no distance explains both compliances"
 
 
@@ -84,11 +85,13 @@ def soft_objects(
 
 
 def _places(session: Session, results: Sequence[TrialResult]) -> Iterator[Place | None]:
-    """By nominal distance, from near to far; None where no whisk serves."""
+    """By nominal distance, from near to far; None where no whisk serves. Where nobody says how well a distance is known
+    it was set by a ruler, for each recording anew."""
     nominal = {r.trial.d_x_nominal_mm for r in results}
     for d_x in sorted(d for d in nominal if np.isfinite(d)):
         there = [r for r in results if r.trial.d_x_nominal_mm == d_x]
-        sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there)
+        by_ruler = NOMINAL_SHARE * d_x / np.sqrt(len(there))
+        sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there) or by_ruler
         rows = [_compliance(r, felt) for r, seen, felt in whisks(there) if is_sound(seen, felt) and _is_held(felt)]
         yield _place(d_x, sigma_mm, *map(np.array, zip(*rows))) if rows else None
 
@@ -118,39 +121,49 @@ def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float, np.
 def softness(whisker: Whisker, trial: TrialFacts, near: Place, far: Place, theta_rad: float, alpha_est: Value) -> Soft:
     """What two places tell, whose whisks are those of `trial` but for the distance; alpha_est: rad, as assumed."""
     described = trial.surface, trial.speed_deg_s, near, far
-    if whisker.shape != "cylinder":
-        return Soft(*described, *(np.nan,) * 4, NO_CYLINDER)
-    C, shift = whisker.C_Nmm2, far.nominal_mm - near.nominal_mm
-    reach = 0.5 * float(np.nan_to_num(trial.bar_diameter_mm) + whisker.diameter_mm)
-    k_near, k_far = (_corrected(place, C, reach, theta_rad, alpha_est.value) for place in (near, far))
-    d_x, _ = compliance.two_distances(k_near, k_far, shift, C)
+    C, taper = whisker.C_Nmm2, whisker.beam.taper / whisker.length_mm
+    shift = far.nominal_mm - near.nominal_mm
+    known = whisker.beam, 0.5 * np.nan_to_num(trial.bar_diameter_mm), 0.5 * whisker.diameter_mm
+    k_near, k_far = (_corrected(place, *known, theta_rad, alpha_est.value) for place in (near, far))
+    d_x, _ = compliance.two_distances(k_near, k_far, shift, C, taper)
     if not np.isfinite(d_x):
         return Soft(*described, *(np.nan,) * 4, NO_PUSH)
-    give = compliance.give(d_x, k_near, C)
+    give = compliance.give(d_x, k_near, C, taper)
     shift_sigma = float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))
-    own = compliance.two_distances_spread(d_x, give, shift, C, near.sigma, far.sigma, shift_sigma)
-    left = _left(theta_rad, alpha_est) / C
-    alike = (np.append(place.shared, left * place.nominal_mm) for place in (near, far))
-    shared = compliance.two_distances_moved(d_x, give, shift, C, *alike)
+    own = compliance.two_distances_spread(d_x, give, shift, C, near.sigma, far.sigma, shift_sigma, taper)
+    alike = (np.append(place.shared, _left(place, whisker.beam, theta_rad, alpha_est)) for place in (near, far))
+    shared = compliance.two_distances_moved(d_x, give, shift, C, *alike, taper)
     sigmas = [float(np.hypot(*pair)) for pair in zip(own, np.linalg.norm(shared, axis=1))]
     status = NOT_SOFT if give <= Z_95 * sigmas[1] else ""
     return Soft(*described, float(d_x), sigmas[0], float(give), sigmas[1], status)
 
 
-def _corrected(place: Place, C: float, reach: float, theta: float, alpha_rad: float) -> float:
-    """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`). reach: radii of bar and
-    whisker together, mm."""
-    share = first_order.rolling(theta, reach, 0.0, alpha_rad, place.nominal_mm, 1.0)
+def _corrected(
+    place: Place, beam: Beam, bar_radius_mm: float, base_radius_mm: float, theta: float, alpha_rad: float
+) -> float:
+    """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`)."""
+    left = _left_of_diameter(beam, place)
+    reach = bar_radius_mm + base_radius_mm * left
+    share = first_order.rolling(theta, reach, 0.0, alpha_rad, place.nominal_mm, left)
     share += first_order.HELD_SHARE * first_order.dragging(theta, alpha_rad)
-    return place.compliance - share * place.nominal_mm / C
+    return place.compliance - share * _compliance_of_distance(beam, place)
 
 
-def _left(theta: float, alpha_est: Value) -> float:
-    """What is left of that, as a share of the distance, at both places alike: the contact is the same, and so is α."""
-    alpha = alpha_est.value
-    share = model_share(theta, 0.0, alpha, 1.0, held_spread=first_order.HELD_SPREAD)
+def _left(place: Place, beam: Beam, theta: float, alpha_est: Value) -> float:
+    """What is left of that in k_θ, of a cause that both places have alike: the contact is the same, and so is α."""
+    alpha, left = alpha_est.value, _left_of_diameter(beam, place)
+    share = model_share(theta, 0.0, alpha, 1.0, left=left, held_spread=first_order.HELD_SPREAD)
     by_alpha = first_order.dragging(theta, alpha + alpha_est.sigma) - first_order.dragging(theta, alpha)
-    return float(np.hypot(share, first_order.HELD_SHARE * by_alpha))
+    return float(np.hypot(share, first_order.HELD_SHARE * by_alpha)) * _compliance_of_distance(beam, place)
+
+
+def _left_of_diameter(beam: Beam, place: Place) -> float:
+    return place.nominal_mm / beam.as_cylinder_mm(place.nominal_mm)
+
+
+def _compliance_of_distance(beam: Beam, place: Place) -> float:
+    """What k_θ changes by with a relative error of the distance: d_x ∂(d/C)/∂d_x."""
+    return place.nominal_mm / (beam.C_Nmm2 * _left_of_diameter(beam, place) ** 2)
 
 
 def write_compliance(out: Path, found: Sequence[Soft]) -> None:

@@ -22,7 +22,7 @@ from estimator.signal import Touch
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
 _FRICTION, _FRICTION_SIGMA = 0.2, 0.4 / np.sqrt(12.0)
 _LEAST_THETA_RAD = np.radians(0.3)  # rad: nearer to touch its error counts too much. Set by eye
-_NOMINAL_SHARE = 0.01  # a distance set by a ruler
+NOMINAL_SHARE = 0.01  # a distance set by a ruler
 # °: up to here the moments of a nominal distance are those of no slip to half a percent (1 − cos)
 _NOMINAL_SLOPE_DEG = 5.0
 # rad: a stroke's usual range, where no frame tells the angles
@@ -160,7 +160,7 @@ def reference_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> Refe
     along, across = x * np.cos(theta) + y * np.sin(theta), x * np.sin(theta) - y * np.cos(theta)
     deflection = np.stack([np.zeros_like(across), across], axis=1)
     moments, by_friction = _with_friction(along, deflection, np.ones_like(theta), whisker)
-    by_distance = trial.d_x_sigma_mm / trial.d_x_mm or _NOMINAL_SHARE
+    by_distance = trial.d_x_sigma_mm / trial.d_x_mm or NOMINAL_SHARE
     by_touch = touch.sigma_rad * moments / theta[:, None]
     covariance = _shared(by_touch) + _shared(_FRICTION_SIGMA * by_friction)
     motor = touch.motor_rad + theta

@@ -44,6 +44,11 @@ class WhiskerFacts:
     EI_Nmm2: float
     tip_diameter_mm: float | None = None
 
+    def left(self, x_mm: float) -> float:
+        """Share of the base's diameter that is left at a distance from the base."""
+        tip_mm = {"cylinder": self.diameter_mm, "cone": 0.0}.get(self.shape, self.tip_diameter_mm)
+        return 1.0 - (1.0 - tip_mm / self.diameter_mm) * x_mm / self.length_mm
+
 
 @dataclass(frozen=True, eq=False)
 class Deflection:

@@ -43,11 +43,12 @@ def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: t
     along, normal = np.array([np.sin(beta), np.cos(beta)]), np.array([-np.cos(beta), np.sin(beta)])
     contact = at.slip_mm.value * along
     virtual = contact + np.array([at.d_y_mm.value, -at.d_z_mm.value])
-    _draw_bar(axes, result.seen, along, normal)
+    radius = result.seen.wire_radius_mm * result.whisker.left(whisk.d_x_mm.value)
+    _draw_bar(axes, result.seen, radius, along, normal)
     _draw_cone(axes, contact, normal, friction, float(np.linalg.norm(virtual - contact)))
     onward = along if contact @ along >= 0 else -along
-    _draw_whisker(axes, result.seen, contact, virtual, path, onward, normal)
-    _draw_angles(axes, whisk, contact, virtual, result.seen.wire_radius_mm)
+    _draw_whisker(axes, radius, contact, virtual, path, onward, normal)
+    _draw_angles(axes, whisk, contact, virtual, radius)
     _draw_slip(axes, contact, normal)
     points = np.array([np.zeros(2), contact, virtual])
     low, high = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
@@ -66,10 +67,10 @@ def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: t
     )
 
 
-def _draw_bar(axes: Axes, seen: SeenTrial, along, normal) -> None:
+def _draw_bar(axes: Axes, seen: SeenTrial, radius_mm: float, along, normal) -> None:
     """The bar's outline: its near side one whisker radius from P0, which lies on the whisker's centreline."""
     far = 60.0 * along
-    near = -seen.wire_radius_mm * normal
+    near = -radius_mm * normal
     width = -2.0 * seen.bar_radius_mm * normal
     axes.add_patch(
         Polygon([near - far, near + far, near + far + width, near - far + width], fc=_BAR, ec="0.45", lw=0.8, zorder=0)
@@ -98,13 +99,12 @@ def _draw_cone(axes: Axes, contact, normal, friction: tuple[float, str], size: f
     axes.plot(*zip(contact, contact + reach * normal), color="0.4", lw=0.8, ls="--", zorder=2)
 
 
-def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path, onward, normal) -> None:
+def _draw_whisker(axes: Axes, radius_mm: float, contact, virtual, path, onward, normal) -> None:
     """onward (2,): the way of the slip. P stands that way and in the bar, where no cone and no slip are."""
-    radius = seen.wire_radius_mm
-    at_p = (radius + 0.28) * (onward - 0.5 * normal) / np.linalg.norm(onward - 0.5 * normal)
+    at_p = (radius_mm + 0.28) * (onward - 0.5 * normal) / np.linalg.norm(onward - 0.5 * normal)
     for place, fill in ((np.zeros(2), "white"), (contact, _WIRE)):
-        axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
-    axes.add_patch(Circle(virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
+        axes.add_patch(Circle(place, radius_mm, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
+    axes.add_patch(Circle(virtual, radius_mm, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
     axes.plot(*path.T, "-o", color=_PATH, ms=2.5, lw=1.0, zorder=5, label="contact, frame by frame")
     axes.annotate(
         "",
@@ -114,14 +114,14 @@ def _draw_whisker(axes: Axes, seen: SeenTrial, contact, virtual, path, onward, n
         zorder=4,
     )
     axes.plot(*zip(contact, contact + 0.5 * (contact - virtual)), color=_FORCE, lw=0.8, zorder=4)
-    axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force on the whisker")
+    axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force")
     for place, name, shift in (
-        (np.zeros(2), "P$_0$", -(radius + 0.32) * onward),
+        (np.zeros(2), "P$_0$", -(radius_mm + 0.32) * onward),
         (contact, "P", at_p),
         (virtual, "V", (0.55, -0.55)),
     ):
         axes.annotate(name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7, columnspacing=1.2)
 
 
 def _draw_slip(axes: Axes, contact, normal) -> None:

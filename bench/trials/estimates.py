@@ -239,7 +239,20 @@ def held_to_its_word(estimate: Estimate, length_mm: float) -> Estimate:
     if d_x > length_mm and not estimate.status:
         doubts.append(f"gave {d_x:.1f} mm, past the whisker's length of {length_mm:g} mm")
     sigma = math.nan if doubts and "sigma" in doubts[0] else sigma
+    if estimate.deflection_mm is not None and not _is_measured(estimate.deflection_mm, estimate.deflection_sigma_mm):
+        given = f"{estimate.deflection_mm} ± {estimate.deflection_sigma_mm} mm"
+        doubts.append(f"gave a deflection of {given}, which is none")
+        estimate = replace(estimate, deflection_mm=None, deflection_sigma_mm=None)
     return replace(estimate, sigma_mm=sigma, status="; ".join(filter(None, [estimate.status, *doubts])))
+
+
+def _is_measured(pair, sigmas) -> bool:
+    """Are these two finite numbers with two sigmas above 0?"""
+    try:
+        values, widths = np.asarray(pair, dtype=float), np.asarray(sigmas, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    return values.shape == widths.shape == (2,) and bool(np.isfinite([values, widths]).all() and (widths > 0).all())
 
 
 def _float(value) -> float:

@@ -23,7 +23,7 @@ from bench.friction.soft import Place, Soft, softness
 from bench.records.trial import TrialFacts
 from bench.report.score import Score
 from bench.session.whisker import Whisker
-from tests.ladder.estimates_montecarlo import E_GPA, push, rod_and_beam
+from tests.ladder.estimates_montecarlo import DIAMETER_MM, E_GPA, LENGTH_MM, TIP_MM, push, rod_and_beam
 from vision.truth.value import Value
 
 SLOPES_DEG, D_X_MM, THETA_RAD = (-60, -45, -30, 0, 30, 45, 60), 60.0, np.radians(3.0)
@@ -43,14 +43,15 @@ def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> 
         _, exact = push(rod, beta, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD)
         for _ in range(WHISKS):
             m_y, m_z = gauges @ exact + NOISE_NMM * rng.normal(size=2)
-            sigma = np.hypot(GAUGE_SHARE, NOISE_NMM / np.hypot(m_y, m_z))
             shared = GAUGE_SHARE * np.kron(np.eye(2), [[m_y], [m_z]])
-            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, sigma, shared, f"b{beta_deg}")
+            yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, shared, f"b{beta_deg}")
 
 
-def two_places(stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Soft:
+def two_places(shape: str, stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Soft:
     """What whisks against an object of that stiffness [N/mm] tell of it, at a distance and SHIFT_MM farther."""
-    rod, _ = rod_and_beam("cylinder")
+    rod, _ = rod_and_beam(shape)
+    tip = TIP_MM if shape == "tapered" else None
+    whisker = Whisker(shape, LENGTH_MM, DIAMETER_MM, youngs_modulus_GPa=E_GPA, tip_diameter_mm=tip)
     near, gauge = rng.uniform(35.0, 55.0), 1.0 + GAUGE_SHARE * rng.normal()
     places = []
     for nominal in (near, near + SHIFT_MM):
@@ -60,17 +61,17 @@ def two_places(stiffness: float, alpha_deg: float, rng: np.random.Generator) -> 
         k, shared = THETA_RAD / m_z, np.array([GAUGE_SHARE])
         places.append(Place(nominal, SHIFT_SIGMA_MM / np.sqrt(2.0), k, k / m_z * NOISE_NMM, 1, k * shared))
     facts = TrialFacts("soft", "measure", "soft", 10.0, bar_diameter_mm=6.0)
-    return softness(WHISKER, facts, *places, THETA_RAD, Value(*np.radians([ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG])))
+    return softness(whisker, facts, *places, THETA_RAD, Value(*np.radians([ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG])))
 
 
-def soft_study(count: int, seed: int) -> Score:
+def soft_study(shape: str, count: int, seed: int) -> Score:
     """Of 1/k, mm/N, over objects from 0.1 N/mm to rigid."""
     rng, rows = np.random.default_rng(seed), []
     for k in range(count):
         stiffness = np.inf if k % 4 == 0 else 10.0 ** rng.uniform(-1.0, 1.0)
-        found = two_places(stiffness, rng.uniform(5.0, 24.0), rng)
+        found = two_places(shape, stiffness, rng.uniform(5.0, 24.0), rng)
         rows.append((found.give_mm_N - 1.0 / stiffness, found.give_sigma_mm_N))
-    return Score("softness", "mm/N", *np.array(rows).T)
+    return Score(f"softness, {shape}", "mm/N", *np.array(rows).T)
 
 
 def study(count: int, seed: int) -> dict[str, tuple[Score, Counter]]:
@@ -98,7 +99,8 @@ def main() -> None:
     print(f"{'':<28}{'n':>5}  {'bias':>9}  {'RMS':>8}     in 95 %  most |z|")
     for score, statuses in study(options.count, options.seed).values():
         print(score.line(), *(f"; {n} × {status}" for status, n in statuses.items()))
-    print(soft_study(options.count, options.seed).line())
+    for shape in ("cylinder", "cone", "tapered"):
+        print(soft_study(shape, options.count, options.seed).line())
 
 
 if __name__ == "__main__":

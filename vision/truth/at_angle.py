@@ -9,6 +9,7 @@ the force's angle: a line in both, over the frames nearby, carries slip's sigma 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri, stdtrit
 
 from vision.truth.value import FIELDS, Value, WhileTouching
 
@@ -16,6 +17,8 @@ _WINDOW_RAD = np.radians(1.6)
 _JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
 _BEYOND_RAD = np.radians(0.3)
 _SURE_SIGMAS = 4.0  # of touch: which frames surely come before a wanted angle, one of 30 000 does not
+_CHANCE = 1e-3  # of frames that scatter as far as their sigmas let them
+Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 _FEWEST_FOR_PARABOLA = 5  # frames: two more than it has coefficients
 
 
@@ -61,7 +64,7 @@ def _value(smooth: Smooth, name: str, theta_rad: float) -> Value:
     """One smooth quantity. It is no surer than the surest frame nearby, and errs by what the local fit leaves, too."""
     value, sigma = _combine(smooth, name, *_local_fit(smooth.theta_rad, theta_rad))
     sigma = max(sigma, np.min(_sigmas(smooth, name, _near(smooth.theta_rad - theta_rad))))
-    return Value(value, float(np.hypot(sigma, _unfitted(smooth, name, theta_rad))))
+    return Value(value, float(np.hypot(sigma, _scatter(smooth, name, theta_rad))))
 
 
 def _jumps(smooth: Smooth, theta_rad: float) -> bool:
@@ -106,6 +109,16 @@ def _local_fit(theta, at):
     if degree >= 1:
         slope[near] = inverse[1]
     return value, slope
+
+
+def _scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
+    """One sigma of how far a value between the frames may be from the local fit: as far as the frames are. Where chance
+    hardly leaves them that far, small jumps do, of which so few frames tell the size by Student's t only."""
+    left, freedom = _unfitted(smooth, name, theta_rad), _beside_fit(smooth, smooth.values[name], theta_rad)[1]
+    expected = expected_scatter(smooth, name, theta_rad)
+    if not freedom or freedom * left**2 <= chdtri(freedom, _CHANCE) * expected**2:
+        return left
+    return float(stdtrit(freedom, 0.975) / Z_95 * np.sqrt(left**2 - expected**2))
 
 
 def _unfitted(smooth: Smooth, name: str, theta_rad: float) -> float:

@@ -52,7 +52,7 @@ def _equal_panel(points: np.ndarray) -> Panel:
 
 def _bar(panel: Panel, row: Row, along, normal) -> Markup:
     """The bar's outline within the panel: its near side one whisker radius from P0, which lies on the centreline."""
-    near = -row.result.seen.wire_radius_mm * normal
+    near = -row.result.seen.wire_radius_mm * row.result.whisker.left(row.seen.d_x_mm.value) * normal
     width = -2.0 * row.result.seen.bar_radius_mm * normal
     far = _FAR_MM * along
     corners = [near - far, near + far, near + far + width, near - far + width]

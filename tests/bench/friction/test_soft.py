@@ -8,7 +8,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction.soft import NO_CYLINDER, NO_PUSH, NOT_SOFT, Place, soft_lines, softness
+from bench.friction.soft import NO_PUSH, NOT_SOFT, Place, soft_lines, softness
 from bench.records.trial import TrialFacts
 from bench.rig.simulate import simulate
 from bench.session.whisker import Whisker
@@ -37,15 +37,17 @@ d_x_scatter_mm = 0.0
 """
 
 
-def places(stiffness: float, sigma: float = 1e-6) -> list[Place]:
-    C = WHISKER.C_Nmm2
-    each = ((d, compliance_on_soft_object(d, stiffness, C) if np.isfinite(stiffness) else d / C) for d in (45.0, 65.0))
+def places(stiffness: float, sigma: float = 1e-6, whisker: Whisker = WHISKER) -> list[Place]:
+    known = whisker.C_Nmm2, whisker.beam.taper / whisker.length_mm
+    each = ((d, compliance_on_soft_object(d, stiffness, *known)) for d in (45.0, 65.0))
     return [Place(d, 0.0, float(k), sigma, 1, NOTHING_SHARED) for d, k in each]
 
 
-def test_two_places_tell_the_stiffness_to_what_is_corrected():
+@pytest.mark.parametrize("shape, tip", [("cylinder", None), ("cone", None), ("tapered", 0.4)])
+def test_two_places_tell_the_stiffness_to_what_is_corrected(shape, tip):
     """At θ = 1e-4 what (2) leaves out is nothing."""
-    found = softness(WHISKER, FACTS, *places(0.5), 1e-4, FRICTIONLESS)
+    whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0, tip_diameter_mm=tip)
+    found = softness(whisker, FACTS, *places(0.5, whisker=whisker), 1e-4, FRICTIONLESS)
     assert found.give_mm_N == pytest.approx(2.0, abs=1e-3)
     k, low, high = found.stiffness_N_mm
     assert low < k < high and k == pytest.approx(0.5, rel=1e-3)
@@ -62,11 +64,9 @@ def test_a_rigid_object_is_only_stiffer_than_something():
 
 
 def test_what_no_distance_explains_has_no_stiffness():
-    near, far = places(0.5)
+    _, far = places(0.5)
     found = softness(WHISKER, FACTS, Place(45.0, 0.0, 1e-9, 1e-6, 1, NOTHING_SHARED), far, 0.05, FRICTIONLESS)
     assert found.status == NO_PUSH and np.isnan(found.stiffness_N_mm).all()
-    cone = Whisker("cone", 100.0, 1.0, youngs_modulus_GPa=60.0)
-    assert softness(cone, FACTS, near, far, 0.05, FRICTIONLESS).status == NO_CYLINDER
     assert list(soft_lines([found])) == []
 
 

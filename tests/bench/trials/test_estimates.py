@@ -1,5 +1,7 @@
 """Channels to moments: turned follicles, covariances, and the answers' columns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -148,6 +150,14 @@ def test_a_distance_without_a_sigma_is_told(rng, sigma):
     assert "which is none" in row.status
 
 
+def test_past_a_cones_point_there_is_no_contact(rng):
+    """And no warning: what bends there is infinitely thin."""
+    whisk = replace(felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)[1],
+                    beam=Beam(8835.7, 100.0, "cone"))  # fmt: skip
+    row = answers(whisk, {"mine:f": lambda *_: Estimate(130.0, 1.0)}, Settings())[0]
+    assert "past the whisker's length" in row.status and np.isnan(row.d_y_est_mm.value)
+
+
 def test_past_the_length_is_told_and_left(rng):
     row = asked(rng, lambda *_: Estimate(130.0, 1.0))
     assert row.d_x_est_mm.value == 130.0 and "past the whisker's length of 100 mm" in row.status
@@ -167,3 +177,14 @@ def test_an_estimator_cannot_spoil_the_whisk_of_the_next(rng):
 
     row = asked(rng, vandal)
     assert "read-only" in row.status and np.isnan(row.d_x_est_mm.value)
+
+
+def test_a_deflection_of_ones_own_stands_and_is_held_to_its_word(rng):
+    given = {"deflection_mm": (2.0, 1.0), "deflection_sigma_mm": (0.1, 0.2)}
+    row = asked(rng, lambda *_: Estimate(60.0, 1.0, **given))
+    stands = [number for of in (row.d_y_est_mm, row.d_z_est_mm) for number in (of.value, of.sigma)]
+    assert stands == [2.0, 0.1, 1.0, 0.2] and row.status == ""
+    for name, wrong in (("sigma_", None), ("", (2.0, np.nan)), ("sigma_", (0.1, 0.0))):
+        spoilt = given | {f"deflection_{name}mm": wrong}
+        row = asked(rng, lambda *_, spoilt=spoilt: Estimate(60.0, 1.0, **spoilt))
+        assert "which is none" in row.status and row.d_y_est_mm.value != 2.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vision.truth.at_angle import Smooth, _unfitted, at_angle, expected_scatter
+from vision.truth.at_angle import Smooth, _scatter, _unfitted, at_angle, expected_scatter
 from vision.truth.value import FIELDS
 
 THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
@@ -26,6 +26,17 @@ def test_scatter_expected_is_that_of_draws(shared):
     expected = expected_scatter(frames(covariance, draws[0]), "slip", np.radians(3.0))
     assert np.sqrt(np.mean(np.square(seen))) == pytest.approx(expected, rel=0.04)
     assert expected == pytest.approx(0.01 * np.sqrt(1.0 - shared))
+
+
+def test_small_jumps_that_few_frames_show_are_known_by_students_t():
+    """Frames to and fro by far more than their sigmas, too little to be jumps: left over four degrees of freedom, the
+    line's t of 2.78 over 1.96. As far as chance lets them, their scatter stands as it is."""
+    size = len(THETA_RAD)
+    zigzag = 0.01 * (-1.0) ** np.arange(size)
+    for sigma, widened in ((1e-6, 2.776 / 1.960), (0.01, 1.0)):
+        smooth = frames(sigma**2 * np.eye(size), zigzag)
+        left = _unfitted(smooth, "slip", np.radians(3.0))
+        assert _scatter(smooth, "slip", np.radians(3.0)) == pytest.approx(widened * left, rel=1e-3)
 
 
 TOOTH_RAD, JUMP_MM, SIGMA_MM, TOUCH_RAD = np.radians(0.8), 0.3, 0.004, np.radians(0.02)
