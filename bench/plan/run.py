@@ -40,10 +40,11 @@ EXAMPLE = Path(__file__).with_name("example.toml")
 
 @dataclass(frozen=True)
 class Options:
-    """theta_deg: of slip, φ, α. changes: whether to try any."""
+    """theta_deg: of slip, φ, α. changes: whether to try any. follow_links: a session's pictures may lie elsewhere."""
 
     theta_deg: float = 3.0
     changes: bool = True
+    follow_links: bool = False
 
     def __post_init__(self):
         if not 0.0 < self.theta_deg <= 25.0:
@@ -158,7 +159,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
     """A session as recorded. Raises BadInput."""
     check_outside(out, path)
     doubts = Doubts()
-    session = checked_session(path, doubts)
+    session = checked_session(path, doubts, follow_links=options.follow_links)
     trials = [trial for trial in judged(session) if trial.camera_sources]
     if not trials:
         raise BadInput("has no pictures: there is nothing to plan", file="trials")
