@@ -34,7 +34,7 @@ from vision.geometry.errors import Refused
 
 _MOST_DRAWN = 12  # bars in a drawing
 _AS_RECORDED = ("Expected: rods and cameras where they were seen, the frames as recorded, an exact beam, and each "
-                "camera's lines worth what they were in that whisk.")
+                "camera's lines as sure as they were in that whisk.")
 EXAMPLE = Path(__file__).with_name("example.toml")
 
 
@@ -118,9 +118,9 @@ def _board_work(painter: Painter) -> BoardWork:
 
 def _assumed(work: BoardWork) -> Iterator[str]:
     corner = max(work.corner_px.values())
-    yield (f"Taken for granted: light and noise of the file, lines of wire and bar worth what they are in pictures "
+    yield (f"Taken for granted: light and noise of the file, lines of wire and bar as sure as they are in pictures "
            f"painted so; {work.views} views of the board a camera, corners to {corner:.3f} px.")
-    yield ("Changes are tried with lines worth as many pixels as before; a camera that is new, or did not see the bar, "
+    yield ("Changes are tried with lines as sure, in pixels, as before; a camera that is new, or did not see the bar, "
            "sees it as others do.")
 
 
