@@ -168,13 +168,14 @@ def plan(
     *,
     theta_deg: float = 3.0,
     changes: bool = True,
+    follow_links: bool = False,
     workers: int = 1,
 ) -> "Plan":
     """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does: a row a trial, with expected
     sigmas, limits and changes. Raises BadInput."""
     from bench.plan import run as planning  # with the rig and all that paints: other verbs do without
 
-    quiet, options = logging.getLogger(__name__).info, planning.Options(theta_deg, changes)
+    quiet, options = logging.getLogger(__name__).info, planning.Options(theta_deg, changes, follow_links)
     return planning.plan(Path(what), Path(out), options, workers=workers, announce=quiet)
 
 

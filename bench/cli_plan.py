@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from bench.base.errors import BadInput
-from bench.options import DONE, DOUBTFUL, Verbs, add_verb, add_workers
+from bench.options import DONE, DOUBTFUL, Verbs, add_follow_links, add_verb, add_workers
 
 
 def add_plan(verbs: Verbs) -> None:
@@ -29,6 +29,7 @@ def add_plan(verbs: Verbs) -> None:
     verb.add_argument("--example", action="store_true", help="print a RIG.toml to begin with")
     verb.add_argument("--theta-deg", type=float, default=3.0, metavar="X", help="of slip, φ and α (default 3)")
     verb.add_argument("--no-changes", action="store_false", dest="changes", help="try no change: sigmas alone, sooner")
+    add_follow_links(verb)
     add_workers(verb)
 
 
@@ -43,6 +44,6 @@ def _plan(options: argparse.Namespace) -> int:
     from bench.base.workers import single_thread
 
     single_thread()
-    wanted = Options(options.theta_deg, options.changes)
+    wanted = Options(options.theta_deg, options.changes, options.follow_links)
     made = plan(options.what, options.out, wanted, workers=options.workers, progress=sys.stderr.isatty())
     return DOUBTFUL if made.doubtful else DONE

@@ -34,6 +34,11 @@ def add_session(verb: argparse.ArgumentParser) -> None:
 def add_recorded(verb: argparse.ArgumentParser) -> None:
     """SESSION as it was recorded, and where its pictures may lie."""
     add_session(verb)
+    add_follow_links(verb)
+
+
+def add_follow_links(verb: argparse.ArgumentParser) -> None:
+    """--follow-links."""
     verb.add_argument(
         "--follow-links",
         action="store_true",

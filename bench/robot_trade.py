@@ -78,7 +78,7 @@ def robot_trade(
     BadInput, also where no whisk has both a truth and moments."""
     check_outside(out, session_path)
     doubts = Doubts()
-    session = checked_session(session_path, doubts)
+    session = checked_session(session_path, doubts, follow_links=settings.follow_links)
     with lock_output(out), Workers(workers, progress) as pool:
         _, units = placed_units(session, judged(session), out, settings, pool, doubts)
         *_, units = with_gauges(units, pool, doubts)

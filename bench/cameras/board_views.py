@@ -18,7 +18,8 @@ from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.pictures.files import Frames, read_picture
+from vision.pictures.files import read_picture
+from vision.pictures.frames import Frames
 
 # A series longer than this is sampled in runs of neighbours, which tell how the board moved.
 _MOST_FRAMES = 120

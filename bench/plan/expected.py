@@ -36,7 +36,7 @@ class Expected:
 
 def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], hides: Hides = nothing_hides,
              settings: VisionSettings = _USUAL) -> Expected:
-    """A whisk seen by cameras whose lines are worth so much."""
+    """A whisk seen by cameras whose lines have such sigmas."""
     facing = [camera.name for camera in cameras if is_before(camera, staged.rods.wire, staged.motor_rad)]
     if not facing:
         return Expected(WhiskTruth(0, None, status="all cameras have the whisker behind them"), {})

@@ -23,7 +23,7 @@ WORDS = {
     "touch": "roundness at touch",
     "diameters": "the diameters",
     "light": "light (lines off as a whole)",
-    "beliefs": "what is believed of whisker and bend",
+    "priors": "the priors of rest shape and bend",
     "cameras": "the cameras' calibration",
     "placement": "where the rig board stands",
 }

@@ -1,4 +1,4 @@
-"""What the cameras of a rig that does not stand yet would show, and what lines in such pictures are worth."""
+"""What the cameras of a rig that does not stand yet would show, and how sure lines in such pictures are."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -39,7 +39,7 @@ class SeenTask:
 
 
 def plan_seen(task: SeenTask) -> Row:
-    """A whisk with its sigmas as expected from where rods and cameras stand, and what each camera's lines were worth in
+    """A whisk with its sigmas as expected from where rods and cameras stand, and how sure each camera's lines were in
     it."""
     whisk, facts = task.whisk, _facts(task)
     if not whisk.has_truth:

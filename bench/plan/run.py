@@ -34,16 +34,17 @@ from vision.geometry.errors import Refused
 
 _MOST_DRAWN = 12  # bars in a drawing
 _AS_RECORDED = ("Expected: rods and cameras where they were seen, the frames as recorded, an exact beam, and each "
-                "camera's lines worth what they were in that whisk.")
+                "camera's lines as sure as they were in that whisk.")
 EXAMPLE = Path(__file__).with_name("example.toml")
 
 
 @dataclass(frozen=True)
 class Options:
-    """theta_deg: of slip, φ, α. changes: whether to try any."""
+    """theta_deg: of slip, φ, α. changes: whether to try any. follow_links: a session's pictures may lie elsewhere."""
 
     theta_deg: float = 3.0
     changes: bool = True
+    follow_links: bool = False
 
     def __post_init__(self):
         if not 0.0 < self.theta_deg <= 25.0:
@@ -117,9 +118,9 @@ def _board_work(painter: Painter) -> BoardWork:
 
 def _assumed(work: BoardWork) -> Iterator[str]:
     corner = max(work.corner_px.values())
-    yield (f"Taken for granted: light and noise of the file, lines of wire and bar worth what they are in pictures "
+    yield (f"Taken for granted: light and noise of the file, lines of wire and bar as sure as they are in pictures "
            f"painted so; {work.views} views of the board a camera, corners to {corner:.3f} px.")
-    yield ("Changes are tried with lines worth as many pixels as before; a camera that is new, or did not see the bar, "
+    yield ("Changes are tried with lines as sure, in pixels, as before; a camera that is new, or did not see the bar, "
            "sees it as others do.")
 
 
@@ -158,7 +159,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
     """A session as recorded. Raises BadInput."""
     check_outside(out, path)
     doubts = Doubts()
-    session = checked_session(path, doubts)
+    session = checked_session(path, doubts, follow_links=options.follow_links)
     trials = [trial for trial in judged(session) if trial.camera_sources]
     if not trials:
         raise BadInput("has no pictures: there is nothing to plan", file="trials")

@@ -31,7 +31,7 @@ USUAL = LineNoise(0.05, 0.0, np.array([[0.0, 0.11, 0.11]]))
 @dataclass(frozen=True, eq=False)
 class Try:
     """A changed bench. kind, words: what is changed; cameras: those of the bench then; like: of a camera that is not as
-    it was, whose lines its lines are worth as much as; light: whether there is more of it."""
+    it was, the one whose lines' sigmas are taken; light: whether there is more of it."""
 
     kind: str
     words: str
@@ -40,7 +40,7 @@ class Try:
     light: bool = False
 
     def lines(self, lines: Mapping[str, LineNoise], axis: BarAxis) -> dict[str, LineNoise]:
-        """What its cameras' lines are worth, px, from what they were: one that is new or elsewhere, and does not look
+        """How sure its cameras' lines are, px, from how sure they were: one that is new or elsewhere, and does not look
         along the bar, sees both rods."""
         as_they_were = {name: lines[self.like.get(name, name)] for name in self.cameras.names
                         if self.like.get(name, name) in lines}

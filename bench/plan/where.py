@@ -30,8 +30,8 @@ def place_cameras(protocol: Protocol, staged: Sequence[Staged], target_mm: np.nd
     chosen = [staged[int(k)] for k in np.unique(np.linspace(0, len(staged) - 1, _TRIALS).round())]
     options = [_options(table, protocol, chosen, target_mm) for table in protocol.cameras]
     ways = [one for one in itertools.product(*options) if _differ(one) and _first_of_its_kind(one, protocol)]
-    best = min(ways, key=lambda tables: _worth(protocol, tables, chosen), default=None)
-    if best is None or not np.isfinite(_worth(protocol, best, chosen)):
+    best = min(ways, key=lambda tables: _largest_sigma(protocol, tables, chosen), default=None)
+    if best is None or not np.isfinite(_largest_sigma(protocol, best, chosen)):
         found = "no place tried for the cameras without position_mm gives a truth; give them places, or other lenses"
         raise BadInput(found)
     return msgspec.structs.replace(protocol, cameras=list(best))
@@ -68,8 +68,8 @@ def _first_of_its_kind(tables: Sequence[CameraTable], protocol: Protocol) -> boo
     return all(places == sorted(places) for places in kinds.values())
 
 
-def _worth(protocol: Protocol, tables: Sequence[CameraTable], staged: Sequence[Staged]) -> float:
-    """The largest sigma of d_x over these whisks, mm, with exact cameras whose lines are worth the usual."""
+def _largest_sigma(protocol: Protocol, tables: Sequence[CameraTable], staged: Sequence[Staged]) -> float:
+    """The largest sigma of d_x over these whisks, mm, with exact cameras whose lines are as sure as usual."""
     cameras = Cameras(_seen(protocol, tables))
     lines = dict.fromkeys(cameras.names, USUAL)
     sigmas = [expected(one, cameras, lines, Clamp.of(one)).truth.d_x_mm.sigma for one in staged]

@@ -1,7 +1,9 @@
 """`whisker-bench view`: a trial as an annotated film: its frames with wire, bar and contact, the curves below them."""
 
 import math
+import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,13 +92,27 @@ def _write(path: Path, pictures: Iterator[np.ndarray], code: str, rate_Hz: float
     for picture in pictures:
         if writer is None:
             size = picture.shape[1], picture.shape[0]
-            writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), rate_Hz, size)
+            with _quiet_ffmpeg():
+                writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), rate_Hz, size)
             if not writer.isOpened():
                 raise BadInput(f"this OpenCV writes no {code} film; try --out with .avi", file=path.name)
         writer.write(picture)
     if writer is None:
         raise BadInput("no camera has a picture of these frames; give --session")
     writer.release()
+
+
+@contextmanager
+def _quiet_ffmpeg() -> Iterator[None]:
+    """OpenCV says on descriptor 2, whatever its log level, that WebM has no tag for VP9: it needs none."""
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _frames(trial: Trial, cameras: Mapping[str, CameraFacts], result: TrialResult) -> Iterator[np.ndarray]:

@@ -14,7 +14,8 @@ from bench.session.trial import Trial
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
-from vision.pictures.files import STACK_SUFFIXES, VIDEO_SUFFIXES, Frames, page_count, picture_size, pictures_in
+from vision.pictures.files import STACK_SUFFIXES, VIDEO_SUFFIXES, page_count, picture_size, pictures_in
+from vision.pictures.frames import Frames
 
 Size = tuple[int, int]
 

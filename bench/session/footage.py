@@ -7,7 +7,8 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from vision.geometry.errors import Refused
-from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES, Frames, natural_order, pictures_in
+from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES, natural_order, pictures_in
+from vision.pictures.frames import Frames
 
 
 def camera_sources(folder: Path, shown: str) -> dict[str, Path]:

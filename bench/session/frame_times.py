@@ -14,7 +14,7 @@ from bench.session.table import Table, forward_in_time, read_table, require_colu
 from bench.session.trial import Trial
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
-from vision.pictures.files import Frames
+from vision.pictures.frames import Frames
 
 FRAME, TIME = "frame", "time_s"
 _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame

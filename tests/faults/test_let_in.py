@@ -54,6 +54,20 @@ def test_footage_elsewhere_is_followed_where_the_user_says_so(session, tmp_path)
     assert len(checked_session(session, follow_links=True).trials) == 4
 
 
+@pytest.mark.parametrize("verb", ["check", "evaluate", "plan", "robot"])
+def test_every_verb_that_sees_follows_where_the_user_says_so(session, tmp_path, capsys, verb):
+    """A link out, and beside it a pipe, so that no verb goes on to look."""
+    FAULTS["folder is a link out"](session)
+    (session / "trials" / TRIAL / "high" / "000003.jpg").unlink()
+    os.mkfifo(session / "trials" / TRIAL / "high" / "000003.jpg")
+    options = [verb, str(session), *([] if verb == "check" else ["--out", str(tmp_path / "out")])]
+    for follow in ([], ["--follow-links"]):
+        assert cli.main([*options, *follow]) == 2
+        shown = "".join(capsys.readouterr())
+        assert "is no regular file" in shown
+        assert ("leads out of the session" in shown) != bool(follow)
+
+
 def test_nothing_but_footage_is_followed_out(session, tmp_path):
     (tmp_path / "deep").mkdir()
     for place in (f"trials/{TRIAL}/signals.csv", "trials/b30_3", f"trials/{TRIAL}/low/000003.jpg"):

@@ -29,7 +29,7 @@ from vision.calibration.held_out import held_out
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera
-from vision.pictures.files import Frames
+from vision.pictures.frames import Frames
 
 ROOT = Path(__file__).resolve().parents[2]
 WEBCAM_BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)

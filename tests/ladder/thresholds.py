@@ -36,7 +36,8 @@ from vision.calibration.cameras_file import read_cameras
 from vision.geometry.camera import Cameras
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rotation import apply
-from vision.pictures.files import Frames, read_picture
+from vision.pictures.files import read_picture
+from vision.pictures.frames import Frames
 from vision.truth.observe import observe_trial
 from vision.truth.trial_pictures import TrialPictures
 

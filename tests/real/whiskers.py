@@ -25,7 +25,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from vision.geometry.errors import Refused
 from vision.lines.follow import Followed, follow
 from vision.lines.points import LinePoints
-from vision.pictures.files import Frames, read_picture
+from vision.pictures.files import read_picture
+from vision.pictures.frames import Frames
 
 PIECE_PX = 6
 ZOOM = 3

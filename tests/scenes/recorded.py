@@ -8,7 +8,8 @@ import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.rods import Bar, Rods, Wire
-from vision.pictures.files import Frames, read_picture
+from vision.pictures.files import read_picture
+from vision.pictures.frames import Frames
 from vision.truth.observe import observe_trial
 from vision.truth.trial_pictures import TrialPictures
 

@@ -5,9 +5,6 @@ radiance of a cylinder, a smooth but otherwise free function of the angle round 
 before the sensor's transfer curve, grey = 255 · light^(1/gamma), so that all but position, blur and gamma is linear; it
 has wide Gaussian priors and is integrated out (marginal likelihood; MacKay, Neural Computation 4, 415, 1992). What
 light does inside the bar, highlights and dark rims, then cannot pull its axis: free radiance explains it anywhere.
-
-Each pixel is shared between the two nearest places of a regular grid across the bar, so that nothing jumps as the bar
-is looked for a little beside; on that grid the normal equations of all positions are one product of matrices.
 """
 
 from dataclasses import dataclass
@@ -16,15 +13,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
-from scipy.ndimage import uniform_filter1d
 from scipy.special import ndtr
 
-from vision.lines.bands import Pieces
+from vision.bar.profiles import OUTSIDE_PX, STEP_PX, Profiles, light_range
 
-FULL_SCALE = 255.0
-STEP_PX = 0.25  # of the grid: a third of a lens blur
-_RIM_PX = 8.0  # of a thick bar so much inside either edge is looked at
-_OUTSIDE_PX = 6.0  # beyond either edge, wherever it is looked for: a shadow's border is seldom as near
 _SPLINES = 36  # round the rod: finer than the blur, so that a highlight is explained wherever the axis is taken to be
 # What the light on neighbouring splines may differ by, one sigma: this share of what it varies by inside the bar, and
 # of a part of the whole contrast (a rim may be another than what is seen farther in). Smaller shares take a bright
@@ -32,90 +24,42 @@ _SPLINES = 36  # round the rod: finer than the blur, so that a highlight is expl
 _STEP_SHARE, _RIM_SHARE = 0.3, 0.2
 _TURN_SHARES = (0.03, 0.1, 0.3)  # the same of second differences: matt bars are smooth, polished ones mirror borders
 _RIM_BLURRED_PX = 2.0
-_SLOPE_SHARE = 0.3  # of the contrast: by so much the background changes over _OUTSIDE_PX
-_MODEL_SHARE = 0.001  # of the contrast: what no such model explains
-_SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside an edge
+_SLOPE_SHARE = 0.3  # of the contrast: by so much the background changes over OUTSIDE_PX
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
-_ALIKE_PX = 1.0  # a lens blur: how far the errors of neighbours go together
-_SMOOTHED = 5  # steps of the grid, about as much: over which texture is averaged
-_MEDIAN_SQUARED, _FEW_DIFFER = 0.455, 3.0  # of a Gaussian; times the usual variance: more is no texture
-_AS_ROUGH = 50  # steps of the grid for which a stretch counts as rough as the others
 _SIDES = 4  # columns of level and slope beyond both edges; the picture without rods has two more
 
 
 @dataclass(frozen=True)
-class Profiles:
-    """Stretches of the bar, seen across. offset_px (b,): the grid, from where the middle is expected; in each stretch
-    light, sigma, behind, steep, by_grey (k, b): light in parts of full scale, its sigma (infinite where nothing is
-    seen), the light of the picture without rods, about its median, and its slope per px, and the light's derivative by
-    grey; place_mm (k,): along the
-    bar; radius_px: half its width; alike: by how much errors that neighbours share make a mean's variance larger.
-    """
+class LitRod:
+    """A model of these profiles: a rod lit in any way that its priors allow."""
 
-    offset_px: np.ndarray
-    light: np.ndarray
-    sigma: np.ndarray
-    behind: np.ndarray
-    steep: np.ndarray
-    by_grey: np.ndarray
-    place_mm: np.ndarray
-    radius_px: float
-    alike: float
-
-    def __len__(self) -> int:
-        return len(self.place_mm)
-
-    @cached_property
-    def seen(self) -> np.ndarray:
-        """Where (k, b) anything is seen."""
-        return np.isfinite(self.sigma)
-
-    @cached_property
-    def contrast(self) -> float:
-        """What the light varies by, of the median stretch."""
-        return float(np.median([_range(light[seen]) for light, seen in zip(self.light, self.seen)]))
-
-    @cached_property
-    def weight(self) -> np.ndarray:
-        """One over the variance (k, b) of what a model leaves."""
-        return 1.0 / (self.sigma**2 + (_MODEL_SHARE * self.contrast) ** 2)
-
-    @cached_property
-    def moments(self) -> np.ndarray:
-        """Weighted products (9, k, b) of what light is made of, in the order of `_normal`'s tables."""
-        behind, steep = self.weight * self.behind, self.weight * self.steep
-        return np.stack([self.weight, behind, steep, behind * self.behind, behind * self.steep, steep * self.steep,
-                         self.weight * self.light, behind * self.light, steep * self.light])
-
-    @cached_property
-    def in_grey(self) -> np.ndarray:
-        """What makes minus twice the log evidence (k,) that of grey levels."""
-        root = np.where(self.seen, np.sqrt(self.weight) * self.by_grey, 1.0)
-        return -2.0 * np.sum(np.log(root), axis=1)
+    profiles: Profiles
 
     @cached_property
     def _level(self) -> float:
         """One sigma of how bright anything is."""
-        return 3.0 * self.contrast + float(np.median(self.light[self.seen]))
+        across = self.profiles
+        return 3.0 * across.contrast + float(np.median(across.light[across.seen]))
 
     @cached_property
     def _inside(self) -> float:
         """What the light varies by on the bar, rims apart; of one too thin for that, over all of the profile."""
-        inner = self.seen & (np.abs(self.offset_px) < self.radius_px - _RIM_BLURRED_PX)
-        ranges = [_range(light[some]) for light, some in zip(self.light, inner) if np.sum(some) >= 5]
-        return float(np.median(ranges)) if ranges else self.contrast
+        across = self.profiles
+        inner = across.seen & (np.abs(across.offset_px) < across.radius_px - _RIM_BLURRED_PX)
+        ranges = [light_range(light[some]) for light, some in zip(across.light, inner) if np.sum(some) >= 5]
+        return float(np.median(ranges)) if ranges else across.contrast
 
     @cached_property
     def _of_outside(self) -> np.ndarray:
         """Inverse prior covariance, its diagonal, of levels and slopes beyond both edges, and of the background."""
-        sides = [self._level, _SLOPE_SHARE * self.contrast]
+        sides = [self._level, _SLOPE_SHARE * self.profiles.contrast]
         return np.array([*sides, *sides, 1.0, 1.0]) ** -2.0
 
     @cached_property
     def priors(self) -> list[np.ndarray]:
         """Inverse prior covariances (splines + 6, splines + 6) of the light on the rod and beyond both edges: of light
         that turns as suddenly as it steps, and of ever smoother light."""
-        varies = np.hypot(self._inside, _RIM_SHARE * self.contrast)
+        varies = np.hypot(self._inside, _RIM_SHARE * self.profiles.contrast)
         flat = np.diag(np.concatenate([np.full(_SPLINES, self._level**-2.0), self._of_outside]))
         priors = []
         for share in _TURN_SHARES:
@@ -128,9 +72,10 @@ class Profiles:
     @cached_property
     def of_none(self) -> tuple[np.ndarray, np.ndarray]:
         """Minus twice the log evidence (k,) that there is no rod, and the misfit (k,) per bin then."""
-        columns = [np.broadcast_to(one, self.light.shape)
-                   for one in (1.0, self.offset_px / _OUTSIDE_PX, self.behind, self.light)]
-        columns = np.sqrt(self.weight)[..., None] * np.stack(columns, axis=-1)
+        across = self.profiles
+        columns = [np.broadcast_to(one, across.light.shape)
+                   for one in (1.0, across.offset_px / OUTSIDE_PX, across.behind, across.light)]
+        columns = np.sqrt(across.weight)[..., None] * np.stack(columns, axis=-1)
         normal = np.swapaxes(columns, -1, -2) @ columns
         return self.marginal(normal[:, None], np.diag(self._of_outside[[0, 1, 4]]))
 
@@ -147,106 +92,8 @@ class Profiles:
         root = np.diagonal(np.linalg.cholesky(normal), axis1=-2, axis2=-1)
         chi2 = root[..., -1] ** 2 - 1.0
         widths = 2.0 * np.sum(np.log(root[..., :-1]), axis=-1)
-        value = chi2 + widths - np.linalg.slogdet(prior)[1] + self.in_grey[:, None]
-        return value, chi2 / np.maximum(np.sum(self.seen, axis=1), 1)[:, None]
-
-
-def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profiles:
-    """So many stretches of the bar, or fewer where there are few pieces, for middles up to reach_px off."""
-    radius = float(np.median(pieces.radius_px))
-    stretched = pieces.offset_px * (radius / pieces.radius_px)[:, None]
-    half = int(np.ceil((radius + reach_px + _OUTSIDE_PX) / STEP_PX))
-    place = stretched / STEP_PX + half
-    seen = (place >= 0) & (place < 2 * half)
-    seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
-    light, slope = _light(pieces.grey, gamma)
-    weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
-    behind, by_background = _light(pieces.background, gamma)
-    order = np.argsort(pieces.place)
-    values = [np.ones_like(light), light, behind, by_background * pieces.slope, slope]
-    added = _shared(weight, values, place, 2 * half + 1)[:, order]
-    stretches = np.array_split(np.arange(len(pieces)), max(1, min(count, len(pieces) // 2)))
-    offset, place_mm = STEP_PX * np.arange(-half, half + 1), pieces.place[order]
-    return _profiles(added, stretches, offset, np.array([place_mm[some].mean() for some in stretches]), radius)
-
-
-def _shared(weight, values, place, size: int) -> np.ndarray:
-    """Weighted sums (v, s, size) of values (s, p), each pixel between the two nearest whole places."""
-    before = np.clip(np.floor(place), 0, size - 2)
-    part = np.clip(place - before, 0.0, 1.0)
-    rows = size * np.arange(len(place))[:, None] + before.astype(int)
-    both = np.concatenate([rows.ravel(), rows.ravel() + 1])
-    shares = np.concatenate([((1.0 - part) * weight).ravel(), (part * weight).ravel()])
-    return np.stack([np.bincount(both, shares * np.tile(one.ravel(), 2), len(place) * size).reshape(-1, size)
-                     for one in values])
-
-
-def _light(grey, gamma: float):
-    """Light in parts of full scale, and its derivative by grey."""
-    share = np.maximum(grey, 1.0) / FULL_SCALE
-    return share**gamma, gamma / FULL_SCALE * share ** (gamma - 1.0)
-
-
-def _profiles(added, stretches, offset_px, place_mm, radius_px: float) -> Profiles:
-    """Of sums (5, s, b) over the pieces, in their order along the bar: weights, and weighted light, light behind, its
-    slope across, and the light's derivative by grey."""
-    own = added[0]
-    of_stretch = np.zeros((len(stretches), len(own)))
-    for row, some in zip(of_stretch, stretches):
-        row[some] = 1.0
-    total = of_stretch @ own
-    seen = total > 0
-    light, behind, steep, by_grey = ((of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:])
-    each = (np.where(own > 0, part / np.where(own > 0, own, 1.0), np.nan) for part in added[1:3])
-    texture, alike = _texture(of_stretch[:, 1:-1], own, *each)
-    number = np.maximum(of_stretch @ (own > 0), 1)
-    sigma = np.where(seen, np.sqrt(1.0 / np.where(seen, total, 1.0) + texture / number), np.inf)
-    middle = [np.median(row[some]) if np.any(some) else 0.0 for row, some in zip(behind, seen)]
-    behind = behind - np.array(middle)[:, None]
-    return Profiles(offset_px, light, sigma, behind, steep, by_grey, place_mm, radius_px, alike)
-
-
-def _texture(of_stretch, weight, light, behind) -> tuple[np.ndarray, float]:
-    """Variance (k, b) of what pieces of each stretch differ by beyond noise: texture of the bench, compression; and how
-    alike neighbours across are, see `Profiles`. of_stretch (k, s - 2): 1 for its pieces, the first and last left out;
-    weight, light, behind (s, b): of each piece, NaN where it shows nothing.
-
-    By a piece and the mean of the two beside it, so that what changes steadily along the bar does not count, nor what
-    follows the picture without rods, by the share that is seen. A product of one figure a stretch and one across.
-    """
-    noise = 1.0 / np.maximum(weight[1:-1], 1e-300)
-    light, behind = (one[1:-1] - 0.5 * (one[:-2] + one[2:]) for one in (light, behind))
-    left = light - _SHARES[:, None, None] * behind
-    there = np.isfinite(left[0])
-    left = np.where(there, left, 0.0)
-    number = np.maximum(np.sum(there, axis=0), 1)
-    spread = np.sum(left**2, axis=1) / (1.5 * number)
-    best = np.argmin(spread, axis=0)
-    left = np.take_along_axis(left, best[None, None], axis=0)[0]
-    # where a tilted bar's edge passes a few pieces differ
-    usual = _median_there(left**2, there) / (1.5 * _MEDIAN_SQUARED)
-    spread = np.minimum(spread[best, np.arange(spread.shape[1])], _FEW_DIFFER * usual)
-    spread = np.maximum(uniform_filter1d(spread, _SMOOTHED), 1e-300)
-    left = left / np.sqrt(1.5 * spread)
-    noise = uniform_filter1d(np.sum(np.where(there, noise, 0.0), axis=0) / number, _SMOOTHED)
-    shown = np.sum(of_stretch @ there, axis=1)
-    rougher = (np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH) / (shown + _AS_ROUGH)
-    return np.maximum(rougher[:, None] * spread - noise, 0.0), _alike(left)
-
-
-def _median_there(values, there) -> np.ndarray:
-    """Median (b,) of values (s, b) over the pieces that are there, of an even number the upper one; 0
-    where none is."""
-    ordered, count = np.sort(np.where(there, values, np.inf), axis=0), np.sum(there, axis=0)
-    middle = ordered[np.clip(count // 2, 0, len(there) - 1), np.arange(len(count))]
-    return np.where(count > 0, middle, 0.0)
-
-
-def _alike(left) -> float:
-    """By how much the variance of a mean is larger than were neighbours across, of these (s, b), independent."""
-    lags = range(1, 1 + round(_ALIKE_PX / STEP_PX))
-    power = max(float(np.sum(left**2)), 1e-300)
-    return max(1.0, 1.0 + 2.0 * sum(float(np.sum(left[:, lag:] * left[:, :-lag])) for lag in lags) / power)
+        value = chi2 + widths - np.linalg.slogdet(prior)[1] + self.profiles.in_grey[:, None]
+        return value, chi2 / np.maximum(np.sum(self.profiles.seen, axis=1), 1)[:, None]
 
 
 @dataclass(frozen=True)
@@ -272,20 +119,21 @@ class Evidence:
         return float(np.median(np.log(np.maximum(self.misfit_of_none, 1.0) / np.maximum(self.misfit, 1.0))))
 
 
-def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
+def evidence(rod: LitRod, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
              every: int = 1, wider: float = 1.0) -> Evidence:
     """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, or at every so
     many steps, in each stretch; under all of `priors`, or the roughest only. wider: times the bar's width."""
+    seen = rod.profiles
     most = int(np.ceil(reach_px / (every * STEP_PX)))
     whole = every * np.arange(-most, most + 1)
     more_px = STEP_PX / positions * np.arange(positions)
     shift = (STEP_PX * whole[:, None] + more_px).ravel()
     normal = np.stack([_normal(seen, whole, more, blur_px, wider * seen.radius_px) for more in more_px], axis=2)
     normal = normal.reshape(len(seen), len(shift), *normal.shape[-2:])
-    under = [seen.marginal(normal, prior) for prior in (seen.priors if all_light else seen.priors[-1:])]
+    under = [rod.marginal(normal, prior) for prior in (rod.priors if all_light else rod.priors[-1:])]
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
     best = np.argmin(value.reshape(len(seen), -1), axis=1)
-    none, misfit_of_none = seen.of_none
+    none, misfit_of_none = rod.of_none
     return Evidence(blur_px, shift, value, misfit.reshape(len(seen), -1)[np.arange(len(seen)), best], none[:, 0],
                     misfit_of_none[:, 0])
 
@@ -326,11 +174,6 @@ def _layout() -> np.ndarray:
     return place
 
 
-def _range(light) -> float:
-    """From dark to bright, but for the outermost twentieths; a grey level at least."""
-    return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))) if len(light) else 0.0, 1.0 / FULL_SCALE)
-
-
 def _columns(offset_px, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Blurred pictures of a rod whose radiance is each spline of the angle round it, and of level and slope beyond each
     edge (n, splines + 4); how much of the background each side shows (n, 2); and what to take of its slope besides
@@ -343,7 +186,7 @@ def _columns(offset_px, radius_px: float, blur_px: float) -> tuple[np.ndarray, n
     beyond = np.stack([-offset_px, offset_px], axis=1) - radius_px
     cover = ndtr(beyond / blur_px)
     bell = np.exp(-0.5 * (beyond / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
-    sides = np.stack([cover, cover * beyond / _OUTSIDE_PX], axis=2).reshape(len(offset_px), _SIDES)
+    sides = np.stack([cover, cover * beyond / OUTSIDE_PX], axis=2).reshape(len(offset_px), _SIDES)
     return np.concatenate([rod, sides], axis=1), cover, blur_px * np.array([-1.0, 1.0]) * bell
 
 

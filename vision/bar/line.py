@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bar.evidence import FULL_SCALE
 from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
 from vision.bar.posterior import Posterior, closer_look, first_look, most_probable, roughly
+from vision.bar.profiles import FULL_SCALE
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.bar.evidence import STEP_PX, Evidence, Profiles, evidence, profiles
+from vision.bar.evidence import Evidence, LitRod, evidence
 from vision.bar.pieces import ARM_MM
+from vision.bar.profiles import STEP_PX, Profiles, profiles
 from vision.lines.bands import Pieces
 
 STRETCHES = 6
@@ -94,7 +95,7 @@ def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
     """The most probable line (2,) by blurred pictures, up to off_px off."""
     window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), all_light=False)
     seen = profiles(pieces, STRETCHES, off_px, 1.0)
-    under = [evidence(seen, off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
+    under = [evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
     lines, _, misfit, *_ = _over_lines(under, seen, window)
     return lines[np.argmin(misfit[:, 0, 0])]
 
@@ -116,7 +117,8 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     """
     reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
-    under = [evidence(seen, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
+    rod = LitRod(seen)
+    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
     own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
     total = np.sum(-2.0 * np.logaddexp(-0.5 * (own - own.min(axis=(0, 2), keepdims=True)), -0.5 * _MOST), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
@@ -132,7 +134,8 @@ def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) ->
     reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
     seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
     every = 1 if window.all_light or len(window.blurs_px) > 1 else _ROUGH_EVERY
-    under = [evidence(seen, reach_px, blur_px, positions, window.all_light, every) for blur_px in window.blurs_px]
+    rod = LitRod(seen)
+    under = [evidence(rod, reach_px, blur_px, positions, window.all_light, every) for blur_px in window.blurs_px]
     lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()

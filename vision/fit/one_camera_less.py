@@ -2,7 +2,7 @@
 
 One linear step from the fit's solution, on the lines already measured with the weights that they have there, gives the
 fit without a camera. What it moves has mean 0 where the cameras agree, and a covariance that follows from those of line
-points, beliefs and cameras; its square over that is a chi² (the test of Hausman, Econometrica 46, 1251, 1978).
+points, priors and cameras; its square over that is a chi² (the test of Hausman, Econometrica 46, 1251, 1978).
 
 Three cameras that disagree do not tell which of them is wrong: any two determine wire and bar with little left over. So
 none is dropped. The truth is taken to be where the fit would be without one of those that fail, each as likely.

@@ -1,4 +1,4 @@
-"""How uncertain a fit is, and by which causes: line points, touching, givens, beliefs, cameras, the rig's place."""
+"""How uncertain a fit is, and by which causes: line points, touching, givens, priors, cameras, the rig's place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from vision.geometry.silhouette import grazed
 from vision.lines.points import Observed
 
 _FARTHEST = 20  # points: beyond, nothing is shared
-CAUSES = ("wire", "bar", "touch", "diameters", "light", "beliefs", "cameras", "placement")
+CAUSES = ("wire", "bar", "touch", "diameters", "light", "priors", "cameras", "placement")
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Of the fit's parameters, (size, size) each. answer: (JᵀWJ)⁻¹, by which they answer what observations tell; noise,
-    lens: covariances, by the observations' and beliefs' own errors and by the cameras'."""
+    lens: covariances, by the observations' and priors' own errors and by the cameras'."""
 
     answer: np.ndarray
     noise: np.ndarray
@@ -71,7 +71,7 @@ def variance_by_cause(problem: Problem, state: State, fitted: Uncertainty, gradi
     """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
 
     wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their sigmas; light: lines
-    off as a whole; beliefs: the priors of rest shape and bend; cameras: lenses, and poses towards the rig board;
+    off as a whole; priors: those of rest shape and bend; cameras: lenses, and poses towards the rig board;
     placement: where the rig frame is, by rig board and free strokes (NaN where the cameras do not tell it apart: it is
     in `cameras` then). What the fit answers to an error is its row times what a parameter answers to rows, so that each
     observation's part is its own. The placement errs apart from corners and lenses, so that there are no cross-terms.
@@ -85,7 +85,7 @@ def variance_by_cause(problem: Problem, state: State, fitted: Uncertainty, gradi
     light = slice(reach + 1, touch + problem.first_bend)
     causes = {"wire": parts[:len(on_wire)][on_wire], "bar": parts[:len(on_wire)][~on_wire],
               "touch": parts[len(on_wire):touch], "diameters": parts[reach], "light": parts[light],
-              "beliefs": [parts[touch:reach].sum(), parts[touch + problem.first_bend:].sum()]}
+              "priors": [parts[touch:reach].sum(), parts[touch + problem.first_bend:].sum()]}
     whole = float(gradient @ fitted.lens @ gradient)
     placement = _by_placement(problem, state, fitted.answer, gradient)
     own = whole if np.isnan(placement) else max(whole - placement, 0.0)  # rounding may leave less than nothing

@@ -22,6 +22,7 @@ from bench.report.page.plane import (
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
 from bench.report.summary.doubts import SILENT
 from bench.session.whisker import Whisker
+from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
 
 SOUND = "sound"
@@ -98,10 +99,21 @@ def numbers(row: Row) -> list[tuple[str, str]]:
         ("moment m_z felt", told(felt.m_z_Nmm), "N·mm"),
         ("force angle φ felt", told(felt.phi_felt_rad, degrees=True), "°"),
     ]
-    if seen.beam is not None:
-        moved = seen.beam.d_x.spline - seen.beam.d_x.beam
-        found.append(("d_x by a spline, less by the beam", with_sigma(moved, seen.beam.d_x.difference_sigma), "mm"))
+    found += [] if seen.beam is None else _beam_numbers(seen.beam)
     return [(name, f"{text} {unit}") for name, text, unit in found if text != MISSING]
+
+
+def _beam_numbers(beam: BeamCheck) -> list[tuple[str, str, str]]:
+    """By how much a curve left free moves what the beam with a point load gives."""
+    compared = (("d_x", beam.d_x, 1.0, "mm"), ("touch", beam.touch, _DEGREES, "°"), ("slip", beam.slip, 1.0, "mm"))
+    return [
+        (
+            f"{name} by a spline, less by the beam",
+            with_sigma(scale * (found.spline - found.beam), scale * found.difference_sigma),
+            unit,
+        )
+        for name, found, scale, unit in compared
+    ] + [("chance that a beam departs so far", number(100.0 * beam.chance, 1), "%")]
 
 
 def _estimate(row: Row, answer: EstimateRow) -> tuple[str, ...]:
@@ -109,12 +121,12 @@ def _estimate(row: Row, answer: EstimateRow) -> tuple[str, ...]:
     truth, d_x = row.seen.d_x_mm, answer.d_x_est_mm
     sigma = math.hypot(d_x.sigma, truth.sigma)
     low, high = answer.d_x_est_low_mm, answer.d_x_est_high_mm
-    interval = f"{number(low, 1)} to {number(high, 1)} mm" if math.isfinite(low) and math.isfinite(high) else MISSING
+    interval = f"{number(low, 1)} to {number(high, 1)}" if math.isfinite(low) and math.isfinite(high) else MISSING
     error = d_x.value - truth.value
     percent = 100.0 / truth.value
     return (
         label_of(answer.estimator),
-        told(d_x) + (" mm" if math.isfinite(d_x.value) else ""),
+        told(d_x),
         interval,
         with_sigma(error, sigma, sign=True),
         with_sigma(percent * error, percent * sigma, sign=True),
@@ -127,14 +139,19 @@ def columns(estimators: list[str]) -> list[Cell]:
     fixed = [
         Cell("trial"),
         Cell("surface", wide=True),
-        Cell("°/s", wide=True),
-        Cell("β [°]"),
-        Cell("d_x [mm]"),
-        Cell("slip [mm]", wide=True),
-        Cell("felt − seen [°]", wide=True),
-        Cell("α seen [°]", wide=True),
+        _head("°/s", wide=True),
+        _head("β [°]"),
+        _head("d_x [mm]"),
+        _head("slip [mm]", wide=True),
+        _head("felt − seen [°]", wide=True),
+        _head("α seen [°]", wide=True),
     ]
-    return [*fixed, *(Cell(f"{label_of(name)} [%]") for name in estimators), Cell("status")]
+    return [*fixed, *(_head(f"{label_of(name)} [%]") for name in estimators), Cell("status")]
+
+
+def _head(text: str, *, wide: bool = False) -> Cell:
+    """Of a column of numbers."""
+    return Cell(text, math.nan, wide)
 
 
 def cells(row: Row, estimators: list[str]) -> list[Cell]:

@@ -81,6 +81,14 @@
   }
   window.addEventListener("hashchange", () => open(location.hash.slice(1)));
   open(location.hash.slice(1));
+
+  const details = Array.from(document.querySelectorAll("details")); // paper cannot unfold them
+  let folded = [];
+  window.addEventListener("beforeprint", () => {
+    folded = details.filter((one) => !one.open);
+    folded.forEach((one) => (one.open = true));
+  });
+  window.addEventListener("afterprint", () => folded.forEach((one) => (one.open = false)));
   document.getElementById("print-cards").addEventListener("change", (event) =>
     document.body.classList.toggle("print-cards", event.target.checked));
 })();

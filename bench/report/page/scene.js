@@ -5,6 +5,7 @@
   const scene = JSON.parse(data.textContent), pen = canvas.getContext("2d");
   const choose = document.getElementById("rig-whisk"), slider = document.getElementById("rig-frame");
   const said = document.getElementById("rig-said"), at = document.getElementById("rig-at");
+  const EDGE_PX = 34; // free around all of it: room for names
   const START = { turn: -0.95, tilt: 0.5, zoom: 1 };
   let look = { ...START }, whisk = null, frame = 0;
 
@@ -15,20 +16,40 @@
 
   // What is looked at: the middle of all that there is, or the contact; and how far there is something around it.
   const ends = [[0, 0, 0], [scene.whisker.length, 0, 0], ...scene.cameras.map((c) => c.centre)];
-  const low = [0, 1, 2].map((k) => Math.min(...ends.map((p) => p[k])));
-  const high = [0, 1, 2].map((k) => Math.max(...ends.map((p) => p[k])));
-  const all = { middle: low.map((v, k) => 0.5 * (v + high[k])), reach: 0.55 * size(add(high, low, -1)) + 20 };
+  if (scene.board) ends.push(...boardCorners(scene.board));
+  for (const one of scene.whisks) ends.push(...(one.bar || []));
+  const least = (points, k) => Math.min(...points.map((p) => p[k])), most = (points, k) => Math.max(...points.map((p) => p[k]));
+  const low = [0, 1, 2].map((k) => least(ends, k)), high = [0, 1, 2].map((k) => most(ends, k));
+  const all = { middle: low.map((v, k) => 0.5 * (v + high[k])), reach: 0.5 * size(add(high, low, -1)) };
+  let shown = { ...all, scale: 1, right: 0, down: 0 }; // px a unit of `seen`, and where its origin stands on the canvas
+
+  function boardCorners({ origin, x, y, squares: [i, j] }) {
+    return [[0, 0], [i, 0], [0, j], [i, j]].map(([a, b]) => add(add(origin, x, a), y, b));
+  }
 
   // Perspective from 2.6 times as far as there is something: right, down, and how far away.
-  function view(point) {
-    const { middle, reach } = at.value === "contact" && whisk ? { middle: whisk.touch, reach: 6 } : all;
+  function seen(point, { middle, reach }) {
     const [x, y, z] = add(point, middle, -1);
     const c = Math.cos(look.turn), s = Math.sin(look.turn), ct = Math.cos(look.tilt), st = Math.sin(look.tilt);
     const across = c * x - s * y, away = s * x + c * y;
     const up = ct * z - st * away, depth = ct * away + st * z;
     const near = Math.max(0.05 * reach, 2.6 * reach + depth); // what is behind the eye is not let through
-    const scale = (look.zoom * 0.5 * Math.min(canvas.clientWidth, canvas.clientHeight) * 2.6) / near;
-    return [0.5 * canvas.clientWidth + scale * across, 0.5 * canvas.clientHeight - scale * up, depth];
+    return [across / near, -up / near, depth];
+  }
+
+  // All of it fills the canvas, from wherever it is looked at; the contact stands in its middle.
+  function fit() {
+    const width = canvas.clientWidth, height = canvas.clientHeight, near = at.value === "contact" && whisk;
+    const flat = ends.map((p) => seen(p, all)), spans = [0, 1].map((k) => most(flat, k) - least(flat, k));
+    const filling = Math.min((width - 2 * EDGE_PX) / spans[0], (height - 2 * EDGE_PX) / spans[1]);
+    const scale = look.zoom * (near ? 1.3 * Math.min(width, height) : filling);
+    const [x, y] = near ? [0, 0] : [0, 1].map((k) => 0.5 * (least(flat, k) + most(flat, k)));
+    shown = { ...(near ? { middle: whisk.touch, reach: 6 } : all), scale, right: 0.5 * width - scale * x, down: 0.5 * height - scale * y };
+  }
+
+  function view(point) {
+    const [x, y, depth] = seen(point, shown);
+    return [shown.right + shown.scale * x, shown.down + shown.scale * y, depth];
   }
 
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
@@ -70,7 +91,7 @@
       for (let j = 0; j < board.squares[1]; j++)
         put([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)], {
           fill: (i + j) % 2 ? "#f2f2f2" : "#555", alpha: 0.75, stroke: "#888", thin: true });
-    put([at(board.squares[0] / 2, board.squares[1] / 2)], { label: "board" });
+    put([at(board.squares[0], 0)], { label: "board" });
   }
 
   // A beam clamped at the base with a point load at the contact: v = δ (3 s² − s³) / 2 up to it, straight beyond.
@@ -125,18 +146,23 @@
       pen.stroke();
     }
     pen.globalAlpha = 1;
-    const [x, y] = shape.points[0] || [0, 0];
     if (shape.dot) {
+      const [x, y] = shape.points[0];
       pen.beginPath();
       pen.arc(x, y, shape.dot, 0, 2 * Math.PI);
       pen.fillStyle = shape.fill;
       pen.fill();
     }
-    if (shape.label) {
-      pen.fillStyle = colour("fg");
-      pen.font = "13px system-ui, sans-serif";
-      pen.fillText(shape.label, x + 7, y - 6);
-    }
+  }
+
+  // A name on whatever lies behind it.
+  function write({ label, points: [[x, y]] }) {
+    pen.font = "13px system-ui, sans-serif";
+    pen.lineWidth = 4;
+    pen.strokeStyle = colour("bg");
+    pen.strokeText(label, x + 7, y - 6);
+    pen.fillStyle = colour("fg");
+    pen.fillText(label, x + 7, y - 6);
   }
 
   function draw() {
@@ -144,6 +170,7 @@
     canvas.width = Math.round(ratio * canvas.clientWidth);
     canvas.height = Math.round(ratio * canvas.clientHeight);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    fit();
     shapes = [];
     scene.cameras.forEach(drawCamera);
     if (scene.board) drawBoard(scene.board);
@@ -152,6 +179,7 @@
     const depth = (s) => s.points.reduce((sum, p) => sum + p[2], 0) / (s.points.length || 1);
     shapes.sort((a, b) => (a.front ? 1 : 0) - (b.front ? 1 : 0) || depth(b) - depth(a));
     shapes.filter((s) => s.points.length).forEach(paint);
+    shapes.filter((s) => s.label).forEach(write);
     canvas.dataset.look = [look.turn, look.tilt, look.zoom].map((v) => v.toFixed(3)).join(" ");
   }
 

@@ -8,7 +8,8 @@ import pytest
 from bench.base.tables import read_table
 from bench.gauges.felt import GAUGE_DELAY_S
 from bench.records.trial import EstimateRow, WithDrift
-from bench.report.ledger import COLUMNS, MAY_GO, NAMES, NEEDED, UNTOLD, Entry, ledger, ledger_lines, write_ledger
+from bench.report.ledger import COLUMNS, MAY_GO, NEEDED, NOT_KNOWN, Entry, ledger, ledger_lines, write_ledger
+from bench.report.left_out import NAMES
 from bench.session.whisker import Whisker
 from estimator import first_order
 from tests.scenes.friction_results import ALPHA, WHISKER, result
@@ -42,10 +43,10 @@ def test_a_tenth_of_a_sigma_decides():
 
 
 def test_what_is_not_known_is_not_left_out():
-    assert entry(0.0, 0.01, np.nan).verdict == UNTOLD
+    assert entry(0.0, 0.01, np.nan).verdict == NOT_KNOWN
     assert entry(0.01, 0.01, np.nan).verdict == NEEDED  # whatever the other is
     assert entry(np.nan, np.nan).verdict == MAY_GO  # no such quantity: touch is known, and does not move
-    assert entry(np.nan, 0.01).verdict == UNTOLD
+    assert entry(np.nan, 0.01).verdict == NOT_KNOWN
 
 
 def test_closed_forms_of_the_estimate():
@@ -91,8 +92,8 @@ def test_taper_drift_cross_talk_and_teeth_are_the_estimate_made_again():
 
 def test_what_no_row_has_is_missing_with_a_reason():
     found = by_name(result(50.0))
-    assert found["cross-talk"].verdict == UNTOLD and "one factor" in found["cross-talk"].status
-    assert found["clock"].verdict == UNTOLD and found["clock"].status
+    assert found["cross-talk"].verdict == NOT_KNOWN and "one factor" in found["cross-talk"].status
+    assert found["clock"].verdict == NOT_KNOWN and found["clock"].status
     assert found["psi"].status.startswith("the fit does not tell")
     assert found["drift"].effects["d_x_est_mm"] == 0 and "free stroke" in found["drift"].status
 

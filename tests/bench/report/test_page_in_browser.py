@@ -41,6 +41,8 @@ def report(exact_run, tmp_path_factory):
 def test_nothing_overflows_and_nothing_complains(report, width, dark):
     with Page(report, width, dark=dark) as page:
         assert page.run("document.documentElement.scrollWidth") <= width
+        table = "document.getElementById('table').parentElement"
+        assert width == 400 or page.run(f"{table}.scrollWidth <= {table}.clientWidth")
         page.run("document.querySelector('#table a[href=\"#w1\"]').click()")
         assert page.run("document.querySelector('dialog[open]').scrollWidth") <= width
         background = page.run("getComputedStyle(document.body).backgroundColor")
@@ -101,6 +103,16 @@ def test_the_rig_turns_by_mouse_and_keyboard(report):
         assert page.run(look) != turned
         page.key("Home")
         assert page.run(look) == first
+
+
+def test_paper_unfolds_what_is_folded(report):
+    folded = "document.querySelectorAll('details:not([open])').length"
+    with Page(report) as page:
+        before = page.run(folded)
+        page.run("dispatchEvent(new Event('beforeprint'))")
+        assert before > 0 and page.run(folded) == 0
+        page.run("dispatchEvent(new Event('afterprint'))")
+        assert page.run(folded) == before
 
 
 def test_it_prints(report, tmp_path):

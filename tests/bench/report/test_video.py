@@ -52,11 +52,12 @@ def read(path) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("name", ["film.webm", "film.avi"])
-def test_every_frame_is_there_with_its_contact(filmed, tmp_path, name, capsys):
+def test_every_frame_is_there_with_its_contact(filmed, tmp_path, name, capfd):
     out, session = filmed
     command = ["view", str(out), "b60_4", "--session", str(session), "--out", str(tmp_path / name)]
     assert main(command) == 0
-    assert capsys.readouterr().out.strip() == str(tmp_path / name)
+    said = capfd.readouterr()
+    assert said.out.strip() == str(tmp_path / name) and not said.err
     frames = json.loads((out / "trials" / "b60_4.json").read_text())["seen"]["whisks"][0]["frames"]
     film = read(tmp_path / name)
     assert len(film) == len(frames["index"])

@@ -8,7 +8,7 @@ from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import held_out
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
-from vision.pictures.files import Frames
+from vision.pictures.frames import Frames
 
 BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)
 

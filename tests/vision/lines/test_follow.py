@@ -7,7 +7,8 @@ from scipy.ndimage import gaussian_filter
 from tests.real.whiskers import MIDDLE, PIECE_PX, STILL_LINES, follow_both_ways, left_out
 from vision.geometry.errors import Refused
 from vision.lines.follow import follow, noise_of
-from vision.pictures.files import Frames, read_picture
+from vision.pictures.files import read_picture
+from vision.pictures.frames import Frames
 
 FINE = 6
 ENDS = (33, 43), (205, 118)  # 3 px off the drawn line

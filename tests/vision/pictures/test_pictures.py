@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from vision.geometry.errors import Refused
-from vision.pictures.files import Frames, natural_order, read_picture
+from vision.pictures.files import natural_order, read_picture
+from vision.pictures.frames import Frames
 
 WIDTH, HEIGHT = 322, 242  # not square, not a multiple of 16
 
