@@ -17,7 +17,7 @@ from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauges_file import given_gauges
 from bench.session.check import checked_session, find_damage
 from bench.session.footage import frame_count, read_frames
-from bench.session.frame_times import dropped, frame_times, read_trial
+from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
@@ -66,7 +66,9 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
             strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
             if trial.purpose == "gauge" and signals.kind == "V":
                 pushes += _pushes(strokes)
-            for line in [*_of_gauges(signals, strokes), *_of_strokes(trial, signals, strokes), *_of_scene(trial, rig)]:
+            times = frame_times(trial)
+            felt = [*_of_gauges(signals, strokes), *_of_strokes(signals, strokes, times)]
+            for line in [*felt, *_of_scene(trial, times, rig)]:
                 doubts.note(f"trials/{trial.name}: {line}")
     if pushes and not in_two_directions(np.array(pushes)) and given_gauges(session) is None:
         doubts.note(f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}")
@@ -116,9 +118,8 @@ def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
             yield f"channel {name} is at its rail for {share}: raise the amplifier's range"
 
 
-def _of_strokes(trial: Trial, signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
+def _of_strokes(signals: Signals, strokes: Sequence[Stroke], times: FrameTimes) -> Iterator[str]:
     """Whether each stroke has a free part, a touch that is felt, and reaches the usual pushing angle."""
-    times = frame_times(trial)
     yield from dropped(times, [times.frames_in(signals, where) for where in forward_strokes(signals)])
     for number, stroke in enumerate(strokes):
         touch = stroke.touch()
@@ -134,9 +135,8 @@ def _of_strokes(trial: Trial, signals: Signals, strokes: Sequence[Stroke]) -> It
             yield f"whisk {number} has {counted(free, 'frame')} before touch, {FEWEST_FREE} are needed"
 
 
-def _of_scene(trial: Trial, rig: dict[str, np.ndarray | None]) -> Iterator[str]:
+def _of_scene(trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray | None]) -> Iterator[str]:
     """Cameras that show another scene than the rig picture, and exposure that changes."""
-    times = frame_times(trial)
     if not len(times):
         return
     looks = np.unique(np.linspace(0, len(times) - 1, _FRAME_LOOKS).astype(int)).tolist()
