@@ -3,8 +3,8 @@
     python tests/faults/fuzz.py FIRST_SEED COUNT [evaluate]
 
 Prints a line for each mutation that ends in a fault of ours (exit code 70, a traceback, a signal), takes more than
-10 s of a processor or a minute in all, or asks for more than 2 GB; then how many were tried and how they ended. 1000
-take some minutes; with `evaluate`, which evaluates each in place of a check, some ten times as long.
+10 s of a processor, is found asleep after a minute, or asks for more than 2 GB; then how many were tried and how they
+ended. 1000 take a minute or two; with `evaluate`, which evaluates each in place of a check, some ten times as long.
 """
 
 import gc
@@ -200,10 +200,14 @@ def _arguments(verb: str, session: Path, out: Path) -> list[str]:
 
 
 def _ends(child: int) -> bool:
-    """Whether a process ends in time; waits until it does."""
+    """Whether a process ends in time; waits until it does. One that waits for a processor has its own limit."""
     handle = os.pidfd_open(child)
     try:
-        return bool(select.select([handle], [], [], MOST_WAIT_S)[0])
+        while not select.select([handle], [], [], MOST_WAIT_S)[0]:
+            threads = [one.read_text().rpartition(") ")[2] for one in Path(f"/proc/{child}/task").glob("*/stat")]
+            if not any(state.startswith("R") for state in threads):
+                return False
+        return True
     finally:
         os.close(handle)
 
