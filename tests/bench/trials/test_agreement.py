@@ -110,3 +110,19 @@ def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(tmp_path, 
     alphas = [float(s["alpha_least_squares_deg"]) for s in (sound, spoilt)]
     assert alphas[1] == pytest.approx(alphas[0], abs=0.5)
     assert float(spoilt["alpha_felt_deg"]) == pytest.approx(float(sound["alpha_felt_deg"]), abs=0.5)
+
+
+def test_signals_of_two_trials_exchanged_are_told_from_a_fault_of_one(tmp_path, exact_vision):
+    (tmp_path / "p.toml").write_text(PROTOCOL.format(shape="cylinder"))
+    session = simulate(tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4)
+    one, other = (next((session / "trials").glob(f"steel_b{slope}*")) / "signals.csv" for slope in (30, 60))
+    texts = one.read_text(), other.read_text()
+    for file, text in zip((other, one), texts):
+        file.write_text(text)
+    evaluate(session, tmp_path / "out", Settings(), workers=0)
+    names = f"{one.parent.name} and {other.parent.name}"
+    assert f"the signals of trials {names} look exchanged" in (tmp_path / "out" / "summary.txt").read_text()
+    one.write_text(texts[0].replace("y_V,z_V", "z_V,y_V", 1))
+    other.write_text(texts[1].replace("y_V,z_V", "z_V,y_V", 1))
+    evaluate(session, tmp_path / "both", Settings(), workers=0)
+    assert "look exchanged: each" not in (tmp_path / "both" / "summary.txt").read_text()
