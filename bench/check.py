@@ -22,7 +22,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.scene import evenly_exposed, other_scene
-from vision.boards.corners import MIN_CORNERS, find_corners
+from vision.boards.corners import MIN_CORNERS, edge_blur_px, find_corners
 from vision.boards.diagnosis import why_not_found
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.fit.touch import FEWEST_FREE
@@ -31,6 +31,8 @@ from vision.pictures.files import read_picture
 
 _BOARD_LOOKS = 2  # pictures of a series: a board that is in none of them is in few
 _FRAME_LOOKS = 5  # of a trial: exposure and scene
+# px, sigma: lenses in focus have 0.6 to 1.2; from 2 on the small session's boards are not found. Set by eye.
+_MOST_BLUR_PX = 1.5
 _MOST_SATURATED = 0.1  # of a channel's samples in a stroke
 
 
@@ -55,7 +57,8 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
     if session.cameras_toml is None and session.board is not None:
         with doubts.guard():  # one board for all cameras: what is wrong with it is looked for once
             for name in session.board_sources:
-                _check_boards(session, name)
+                for line in _check_boards(session, name):
+                    doubts.note(line)
     with doubts.guard():
         given_gauges(session)
     rig = {name: read_picture(picture) for name, picture in session.rig_pictures.items()}
@@ -83,8 +86,9 @@ def _pushes(strokes: Sequence[Stroke]) -> Iterator[np.ndarray]:
             yield at.values
 
 
-def _check_boards(session: Session, name: str) -> None:
-    """Raises BadInput where a camera's board is not found as entered, or not on the rig."""
+def _check_boards(session: Session, name: str) -> Iterator[str]:
+    """A line where a camera sees the board on the rig out of focus. Raises BadInput where its board is not found as
+    entered, or not on the rig."""
     source = session.board_sources[name]
     count = frame_count(source)
     if count < MIN_VIEWS:
@@ -102,6 +106,10 @@ def _check_boards(session: Session, name: str) -> None:
     if grey is not None and len(find_corners(grey, session.board)) < MIN_CORNERS:
         hint = "the board must stand in view of every camera"
         raise BadInput(f"the board on the rig is not seen; {hint}", file=f"boards/rig/{picture.name}")
+    blur_px = np.nan if grey is None else edge_blur_px(grey, session.board)
+    if blur_px > _MOST_BLUR_PX:
+        found = f"edges are blurred by {blur_px:.1f} px, {_MOST_BLUR_PX:g} is a lot"
+        yield f"boards/rig/{picture.name}: {found}: focus on the whisker, or let the camera rest"
 
 
 def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:

@@ -56,6 +56,11 @@ def test_what_stands_out_is_named(rng, spoil, said, value, within):
         assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(value, abs=within)
 
 
+def test_what_no_gauge_does_may_be_another_trials_signals(rng):
+    """Half the force from another side: y and z both change, each by a factor of its own."""
+    assert "another trial's signals" in agreement(pairs(rng, np.diag([0.4, 1.3])), GAUGES).cause
+
+
 def test_a_gauge_that_begins_to_drift_at_touch_is_told(rng):
     """0.17 V/s at 10°/s: in one whisk a drift that goes on is no other than a gauge that gives more."""
     drifting = pairs(rng)
