@@ -1,7 +1,7 @@
 """Each frame's still scene (board, bench, clamps) against the rig picture: a camera knocked by any amount, mirrored or
 exchanged, a lens cap, an exposure that changed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -103,14 +103,22 @@ def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str]]:
     return even, list(_exposure_lines(name, off, lost, mended, len(indices)))
 
 
+def _span(values: Iterable[float], digits: int) -> str:
+    """The least and the most of some numbers, or the one that both are."""
+    ends = dict.fromkeys(f"{end(values):.{digits}f}" for end in (min, max))
+    return " to ".join(ends)
+
+
 def _exposure_lines(name: str, off: dict, lost: list[int], mended: dict, count: int) -> Iterator[str]:
     if mended:
-        low, high = min(mended.values()), max(mended.values())
-        span = f"{low:.3f} to {high:.3f} times" if len(mended) > 1 else f"{low:.3f} times"
-        yield f"camera {name}: {len(mended)} of {count} frames are {span} as bright as most, made good ({_few(mended)})"
+        span = _span(mended.values(), 3)
+        yield (
+            f"camera {name}: {len(mended)} of {count} frames are {span} times as bright as most, made good "
+            f"({_few(mended)})"
+        )
     if lost:
-        low, high = min(off[k] for k in lost), max(off[k] for k in lost)
-        found = f"{len(lost)} of {count} frames are {low:.2f} to {high:.2f} times as bright as most"
+        span = _span([off[k] for k in lost], 2)
+        found = f"{len(lost)} of {count} frames are {span} times as bright as most"
         yield f"camera {name}: {found}, left out ({_few(lost)}): fix exposure and gain"
 
 
