@@ -59,7 +59,7 @@ def test_encoder_scale_or_frame_rate(rng, factor):
     assert found == pytest.approx(1.0 / factor, abs=0.01)
 
 
-@pytest.mark.parametrize("before", [3, 6])
+@pytest.mark.parametrize("before", [1, 3, 6])
 def test_an_encoder_jump(rng, before):
     said = doubt(rng, lambda motor: motor + np.radians(0.4) * (np.arange(FRAMES) >= before))
     size = float(said.split("motor_deg jumps by ")[1].split("°")[0])
