@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from vision.fit.problem import curves_of
+from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import outline_of_bar
-from vision.geometry.rods import Wire
 from vision.lines.bands import Pieces
 from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 from vision.pictures.view import View, median_of
@@ -35,9 +35,8 @@ def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     wire, sure_mm = whisk.rods.wire, float(np.min(fitted.state.arcs_mm))
     if wire.taper_per_mm > 0.0:
         return {}
-    longer = replace(wire, length_mm=_REACH * wire.length_mm)
-    curves = _some_curves(fitted, longer.length_mm)
-    told = ((view.camera.name, _end(*_seen_along(view, whisk, curves, longer), sure_mm)) for view in whisk.views)
+    curves = _some_curves(fitted, _REACH * wire.length_mm)
+    told = ((view.camera.name, _end(*_seen_along(view, whisk, curves), sure_mm)) for view in whisk.views)
     return {name: end for name, end in told if end is not None}
 
 
@@ -59,9 +58,18 @@ def _straight_on(curve: Curves, to_mm: float) -> Curves:
     return Curves(np.append(curve.arc_mm, curve.arc_mm[-1] + more), points, tangents)
 
 
-def _seen_along(view: View, whisk: WhiskPictures, curves: Mapping[int, Curves],
-                wire: Wire) -> tuple[np.ndarray, np.ndarray]:
-    """Places (b,) along a wire, mm, clear of hub and bar, and the evidence of it in one camera there."""
+def _in_picture_mm(camera: Camera, curves: Mapping[int, Curves], least_mm: float) -> float:
+    """Up to where curves stay in a picture, mm, least_mm at least: beyond, they may come up to the camera."""
+    arc = next(iter(curves.values())).arc_mm
+    px = np.stack([camera.project(curve.points_mm) for curve in curves.values()])
+    out = (arc > least_mm) & ~np.all((px >= 0.0) & (px <= np.array(camera.size_px) - 1.0), axis=(0, 2))
+    return float(arc[np.argmax(out) - 1]) if np.any(out) else float(arc[-1])
+
+
+def _seen_along(view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]) -> tuple[np.ndarray, np.ndarray]:
+    """Places (b,) along the wire, mm, clear of hub and bar, and the evidence of it in one camera there."""
+    length_mm = whisk.rods.wire.length_mm
+    wire = replace(whisk.rods.wire, length_mm=max(length_mm, _in_picture_mm(view.camera, curves, length_mm)))
     still = replace(view, background=median_of([view.frames[frame] for frame in curves]))
     pieces, standing = (wire_pieces(one, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX) for one in (view, still))
     outline = outline_of_bar(view.camera, whisk.bar.axis, whisk.rods.bar.radius_mm)
