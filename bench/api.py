@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bench.base.drawing import style
 from bench.base.settings import Settings
@@ -32,13 +31,14 @@ from bench.base.tables import read_table
 from bench.evaluate import evaluate as _evaluate
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
-from bench.report.paper import session_figures
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run import RunRecord
 from bench.trials.seeing import STANDARD, by_preset
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from bench.plan.written import Plan
 
 TABLES = (
@@ -97,8 +97,10 @@ class Run:
         """Everything of every whisk as typed records (`bench.records.trial`), and the friction of each surface."""
         return finished(read_run(self.out), self.record.whisker, self.record.settings)
 
-    def figures(self) -> dict[str, Figure]:
+    def figures(self) -> dict[str, "Figure"]:
         """The session's figures by name, to change and save as one likes."""
+        from bench.report.paper import session_figures
+
         whole = self.results()
         with style():
             return session_figures(whole.results, whole.friction, self.record.whisker, self.record.settings)

@@ -91,10 +91,8 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     """Figures where they are wanted, report and summary, which is returned. Results of a synthetic session are
     scored."""
     from bench.report.against_theta import write_against_theta
-    from bench.report.figures import write_figures
     from bench.report.ledger import write_ledger
     from bench.report.page.write import write_report
-    from bench.report.paper import write_paper_figures
     from bench.report.record import record_of, write_record
     from bench.report.score import score
     from bench.report.summary.page import summary_of
@@ -104,7 +102,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
     needed = write_ledger(out, results, evaluation.session.whisker)
     figures = [
-        *(write_figures(evaluation, pool) if drawn else []),
+        *(_figures(evaluation, pool) if drawn else []),
         *of_theta,
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
@@ -112,6 +110,15 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     summary = summary_of(evaluation, score(evaluation.session, out, evaluation.gauges), figures, by_theta, needed)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
-    write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
+    if figure_formats:
+        from bench.report.paper import write_paper_figures
+
+        write_paper_figures(out, results, evaluation.friction, record.whisker, record.settings, figure_formats)
     write_whole(out / "summary.txt", summary.text)
     return summary
+
+
+def _figures(evaluation: Evaluation, pool: Workers) -> list[str]:
+    from bench.report.figures import write_figures  # with all of matplotlib
+
+    return write_figures(evaluation, pool)

@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from PIL import Image
 
 from bench.base.atomic import whole_file
+
+if TYPE_CHECKING:  # matplotlib is loaded where something is drawn: tables and names go without
+    from matplotlib.figure import Figure
 
 COLOURS = {
     "no_slip": "#b2182b",
@@ -57,12 +59,25 @@ SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are d
 
 def style() -> AbstractContextManager[None]:
     """Context in which figures are made."""
-    return matplotlib.rc_context(_STYLE)
+    return _context(_STYLE)
 
 
 def paper_style() -> AbstractContextManager[None]:
     """Context in which figures of a journal's column are made."""
-    return matplotlib.rc_context(_STYLE | _PAPER)
+    return _context(_STYLE | _PAPER)
+
+
+def _context(settings: dict) -> AbstractContextManager[None]:
+    from matplotlib import rc_context
+
+    return rc_context(settings)
+
+
+def blank(width_in: float, height_in: float) -> "Figure":
+    """A figure of this size to draw in."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 def colour_of(estimator: str, number: int = 0) -> str:
@@ -75,17 +90,17 @@ def label_of(estimator: str) -> str:
     return LABELS.get(estimator, estimator.partition(":")[2] or estimator)
 
 
-def save(figure: Figure, path: Path, stamp: str, dpi: int = 160) -> None:
+def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
     """Write a PNG whole, with the hash of what it shows."""
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=dpi, metadata={"Software": None, _STAMP: stamp})
 
 
-def publish(figure: Figure, stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150) -> list[Path]:
+def publish(figure: "Figure", stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150) -> list[Path]:
     """Write <stem>.<format> of each of FORMATS that is asked for, whole; the same figure gives the same bytes. The
     paths written."""
     paths = [stem.with_name(f"{stem.name}.{name}") for name in formats]
-    with matplotlib.rc_context({"svg.hashsalt": stem.name}):
+    with _context({"svg.hashsalt": stem.name}):
         for path, name in zip(paths, formats):
             with whole_file(path) as temporary:
                 figure.savefig(temporary, dpi=dpi, metadata=_UNDATED[name])

@@ -8,18 +8,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from bench.base.drawing import is_drawn, save, style
+from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import hash_of
 from bench.base.tables import write_table
 from bench.friction.tables import SurfaceFriction
 from bench.records.trial import TrialResult
 from bench.trials.compare import judge
 from estimator.threshold import distance_error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 NAME = "error_map"
 COLUMNS = (
@@ -110,12 +113,12 @@ def typical_taper(found: Sequence[SurfaceFriction]) -> Callable:
     return partial(surfaces[0].beam.error_share, float(np.median([s.common_d_x_mm for s in surfaces])))
 
 
-def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float, of_taper: Callable = np.asarray) -> Figure:
+def draw_error_map(cells: Sequence[Cell], alpha_est_rad: float, of_taper: Callable = np.asarray) -> "Figure":
     """Measured on the left, predicted for the whole field on the right, in one scale of colours.
 
     of_taper: makes of a relative error on a cylinder that on the whisker.
     """
-    figure = Figure(figsize=(9.6, 3.9), layout="constrained")
+    figure = blank(9.6, 3.9)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     most = max(10.0, *(abs(c.errors.mean()) for c in cells))
     top = max(30.0, *(c.alpha_deg + _ALPHA_DEG for c in cells))
@@ -146,7 +149,7 @@ def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, n
     return field, beta, alpha
 
 
-def _tell(axes: Axes, cells: Sequence[Cell], most: float) -> None:
+def _tell(axes: "Axes", cells: Sequence[Cell], most: float) -> None:
     """Each cell's mean error in figures, light on the dark ends of the scale."""
     for cell in cells:
         colour = "white" if abs(cell.errors.mean()) > 0.6 * most else "black"

@@ -7,11 +7,11 @@ error; what remains is beam theory and slip along the whisker.
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from bench.base.drawing import is_drawn, save, style
+from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import hash_of
 from bench.base.tables import write_table
 from bench.friction.alphas import seen_friction
@@ -19,6 +19,9 @@ from bench.gauges.readings import reference_from_pictures
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.distance import with_friction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
 COLUMNS = ("trial", "whisk", "d_x_mm", "alpha_seen_deg", "alpha_seen_sigma_deg", "error_mm", *SHARES)
@@ -107,10 +110,10 @@ def mean_row(rows: Sequence[dict]) -> dict:
     return {"trial": TOTAL} | (dict(zip(names, complete.mean(axis=0).tolist())) if len(complete) else {})
 
 
-def draw_explained(rows: Sequence[dict]) -> Figure:
+def draw_explained(rows: Sequence[dict]) -> "Figure":
     """A bar a whisk, its shares stacked away from zero to either side, and a mark for their sum, the error; the mean
     last. In per cent of the true d_x."""
-    figure = Figure(figsize=(float(np.clip(2.5 + 0.45 * len(rows), 5.5, 16.0)), 4.2), layout="constrained")
+    figure = blank(float(np.clip(2.5 + 0.45 * len(rows), 5.5, 16.0)), 4.2)
     axes, place = figure.subplots(), np.arange(len(rows)) + 0.5 * (np.arange(len(rows)) == len(rows) - 1)
     up, down = np.zeros(len(rows)), np.zeros(len(rows))
     for name, (label, colour) in _LOOK.items():

@@ -149,7 +149,7 @@ class SeenTrial:
     bar_radius_mm: float = NAN
     wire_radius_mm: float = NAN
     clock: Clock | None = None
-    bar_looks: dict[str, float] = field(default_factory=dict)
+    bar_looks: dict[str, Value] = field(default_factory=dict)
     back: BackStroke | None = None
 
 

@@ -6,17 +6,20 @@ Section VII has θ small, noise has it large: where between them an estimator er
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from bench.base.drawing import colour_of, is_drawn, label_of, save, style
+from bench.base.drawing import blank, colour_of, is_drawn, label_of, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.tables import write_table
 from bench.records.trial import TrialResult, whisks
 from bench.trials.compare import is_sound
 from vision.geometry.counted import counted
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 TABLE, FIGURE = "against_theta.csv", "against_theta.png"
 COLUMNS = (
@@ -102,9 +105,9 @@ def write_against_theta(
     return rows, [FIGURE]
 
 
-def figure(rows: Sequence[AtTheta]) -> Figure:
+def figure(rows: Sequence[AtTheta]) -> "Figure":
     """RMS error solid, stated sigma dashed, as if α_est were right dotted; a ring where the error is least."""
-    drawing = Figure(figsize=(5.6, 4.8), layout="constrained")
+    drawing = blank(5.6, 4.8)
     axes = drawing.subplots()
     for number, name in enumerate(dict.fromkeys(row.estimator for row in rows)):
         mine, colour = [row for row in rows if row.estimator == name and row.whisks], colour_of(name, number)
@@ -128,10 +131,10 @@ def figure(rows: Sequence[AtTheta]) -> Figure:
     return drawing
 
 
-def _legend(drawing: Figure, axes: Axes, styles: int = 3) -> None:
+def _legend(drawing: "Figure", axes: "Axes", styles: int = 3) -> None:
     """A column of estimators, and one of what the last lines, the `styles`, stand for; the shorter one is filled up."""
     entries = list(zip(*axes.get_legend_handles_labels()))
-    columns, blank = (entries[:-styles], entries[-styles:]), (axes.plot([], [], " ")[0], "")
+    columns, nothing = (entries[:-styles], entries[-styles:]), (axes.plot([], [], " ")[0], "")
     most = max(map(len, columns))
-    filled = [entry for column in columns for entry in [*column, *[blank] * (most - len(column))]]
+    filled = [entry for column in columns for entry in [*column, *[nothing] * (most - len(column))]]
     drawing.legend(*zip(*filled), loc="outside lower center", ncols=2)

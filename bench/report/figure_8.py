@@ -1,15 +1,18 @@
 """Fig. 8 of the paper: |m| in EI/metre and φ against β, whisks of a surface and speed together, and the α that fits."""
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from bench.base.drawing import SLOPES_DEG, colour_of
+from bench.base.drawing import SLOPES_DEG, blank, colour_of
 from bench.friction.surfaces import Point, Surface
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLUMNS = (
     *("panel", "surface", "speed_deg_s", "theta_deg", "d_x_mm", "alpha_deg", "alpha_sigma_deg"),
@@ -20,11 +23,11 @@ _MOST_COLUMNS = 4
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 
 
-def figure_8(fitted: Sequence[Surface]) -> Figure:
+def figure_8(fitted: Sequence[Surface]) -> "Figure":
     """A column for each surface and speed: |m| above, φ below."""
     columns = min(len(fitted), _MOST_COLUMNS)
     blocks = -(-len(fitted) // columns)
-    figure = Figure(figsize=(1.2 + 3.2 * columns, 5.2 * blocks), layout="constrained")
+    figure = blank(1.2 + 3.2 * columns, 5.2 * blocks)
     grid = figure.subplots(2 * blocks, columns, sharex=True, sharey="row", squeeze=False)
     for number in range(blocks * columns):
         block, column = divmod(number, columns)
@@ -86,7 +89,7 @@ def _fitted(surface: Surface, beta_deg) -> tuple[np.ndarray, np.ndarray]:
     return moment_in_EI_per_metre(m, beam.rigidity_Nmm2), np.degrees(phi)
 
 
-def _panel(top: Axes, bottom: Axes, surface: Surface, letter: str) -> None:
+def _panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
     """|m| above, φ below; negative slopes are drawn at their mirror image's place."""
     points, EI = surface.points(), surface.beam.rigidity_Nmm2
     beta = [abs(p.beta_deg) for p in points]

@@ -9,6 +9,7 @@ from matplotlib.patches import Arc, Circle, Polygon, Wedge
 
 from bench.base.drawing import is_drawn, save
 from bench.records.trial import SeenTrial, SeenWhisk, TrialResult
+from bench.report.page.plane import contact_path
 
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
 _MARGIN_MM = 2.2
@@ -63,14 +64,6 @@ def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: t
         linespacing=1.5,
         bbox={"fc": "white", "ec": "none", "alpha": 0.8},
     )
-
-
-def contact_path(whisk: SeenWhisk) -> np.ndarray:
-    """Contact (n, 2) y, z of the touching frames in the contact frame, from P0."""
-    points = whisk.frames.point_mm.value[whisk.frames.touching]
-    c, s = np.cos(whisk.touch_rad.value), np.sin(whisk.touch_rad.value)
-    turned = (points - whisk.point_mm.value) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    return turned[:, 1:]
 
 
 def _draw_bar(axes: Axes, seen: SeenTrial, along, normal) -> None:

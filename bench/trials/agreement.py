@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from bench.gauges.matrix import GaugeMatrix
 from bench.gauges.readings import Pairs
@@ -68,7 +68,7 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Ag
     """What the whisk's felt moments are beside its seen ones, and the likeliest cause where they stand out."""
     slopes = Slopes.of(pairs, gauges, scale_sigma)
     found = slopes.chi2(gauges.matrix @ slopes.volts)
-    chance = float(chi2.sf(found, 2))
+    chance = float(chdtrc(2, found))
     return Agreement(found, chance, likeliest_cause(slopes, gauges.matrix) if chance < LEAST_CHANCE else "")
 
 
@@ -76,7 +76,7 @@ def likeliest_cause(slopes: Slopes, matrix: np.ndarray) -> str:
     """The cause that leaves the least χ², two for each number that it is free to choose; of those that explain all."""
     tried = list(_causes(slopes, matrix))
     left = [slopes.chi2(felt) for _, free, felt in tried]
-    explains = [chi2.sf(c, 2 - free) > _EXPLAINED for c, (_, free, _) in zip(left, tried)]
+    explains = [chdtrc(2 - free, c) > _EXPLAINED for c, (_, free, _) in zip(left, tried)]
     costs = [c + _PER_PARAMETER * free if ok else np.inf for c, ok, (_, free, _) in zip(left, explains, tried)]
     best = int(np.argmin(costs))
     return tried[best][0] if np.isfinite(costs[best]) else _OTHERWISE

@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
+from vision.bar.width import in_all
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
 from vision.truth.value import UNKNOWN, Value
@@ -25,7 +26,6 @@ _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # A whisker leans on a bar within its friction angle of the bar's normal. μ = 1 is more than rubber or coarse sandpaper
 # does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).
 _STEEPEST_FRICTION_RAD = np.radians(45.0)
-_BAR_SIGMA = 0.025  # of how thick a trial's bar looks, in the middle of 35 path-traced scenes; 8 scatter by 0.1 to 0.5
 
 
 @dataclass(frozen=True)
@@ -133,15 +133,19 @@ def _another_time(frame: int, speed_rad_s: float) -> Callable[[float], str]:
     return lambda size: f"frame {frame} looks taken {1e3 * size / speed_rad_s:+.1f} ms from its time"
 
 
-def width_doubt(bar_looks: Mapping[str, float], trial: Trial, board: Board | None) -> str:
+def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> str:
     """The bar against its diameter: a sentence where it looks thicker or thinner than said, '' where it does not, or
     where no camera tells. bar_looks: how thick over how thick it is said to be, by camera."""
     if not bar_looks:
         return ""
-    looks = np.log(list(bar_looks.values()))
-    scatter = float(np.std(looks, ddof=1) / np.sqrt(len(looks))) if len(looks) > 1 else 0.0
-    sigma = np.sqrt(_BAR_SIGMA**2 + (trial.bar_diameter_sigma_mm / trial.bar_diameter_mm) ** 2 + scatter**2)
-    difference = Difference(np.array([np.median(looks)]), np.array([[sigma**-2.0]]), 1)
+    looks, looks_sigma = in_all({name: (one.value, one.sigma) for name, one in bar_looks.items()})
+    each = np.array([[np.log(one.value / looks), (one.value / one.sigma) ** 2] for one in bar_looks.values()])
+    if len(each) > 1 and not Difference(each[:, 0], np.diag(each[:, 1]), len(each) - 1).is_chance:
+        low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))
+        found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
+        return f"{found}: check its diameter_mm, or something else is taken for it"
+    sigma = float(np.hypot(looks_sigma / looks, trial.bar_diameter_sigma_mm / trial.bar_diameter_mm))
+    difference = Difference(np.array([np.log(looks)]), np.array([[sigma**-2.0]]), 1)
     if difference.is_chance:
         return ""
     factor = float(np.exp(difference.values[0]))

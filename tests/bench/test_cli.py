@@ -44,6 +44,13 @@ def test_a_look_at_a_session_imports_no_solver(small_session):
     assert "nothing wrong or doubtful" in said and not heavy & set(said.split())
 
 
+def test_a_session_is_evaluated_without_loading_what_draws():
+    code = "import bench.api, bench.evaluate, sys; from bench.report.page import write; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "bench.trials.seen" in loaded
+    assert not {"matplotlib", "scipy.stats"} & set(loaded)
+
+
 @pytest.mark.parametrize("arguments", [[], ["no-such-verb"], ["check"], ["check", "x", "--no-such-option"]])
 def test_wrong_usage_is_exit_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as done:

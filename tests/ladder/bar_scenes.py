@@ -4,8 +4,9 @@
 
 FOLDER holds sessions of one whisk each (trials/w) with exact cameras and truth.toml: d_x_mm, touch_deg, beta_deg and
 psi_deg, which are the axis. A row a camera: how far off the line is at 20 mm to either side of the contact (px), the
-stated sigma, and z with the error that the fit takes every line to have besides (BAR_OFFSET_PX); then the share of
-scenes whose axis is within 1 px in every camera that sees it, and z's RMS and largest.
+stated sigma, and z with the error that the fit takes every line to have besides (BAR_OFFSET_PX); how
+wide the bar looks over how wide it is; then the share of scenes whose axis is within 1 px in every camera that sees it,
+and z's RMS and largest, of the line and of the width's logarithm.
 """
 
 import sys
@@ -19,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from vision.bar.find import axis_from_angles
 from vision.bar.search import SeenBar, see_bar
+from vision.bar.width import in_all, seen_over_given
 from vision.calibration.cameras_file import read_cameras
 from vision.fit.problem import BAR_OFFSET_PX
 from vision.geometry.camera import Camera
@@ -73,7 +75,7 @@ def axis_off_px(camera: Camera, true: BarAxis, found: BarAxis, radius_mm: float)
 
 def main() -> None:
     pattern = sys.argv[2] if len(sys.argv) > 2 else "*"
-    worst, every = [], []
+    worst, every, widths = [], [], []
     for folder in sorted(one for one in Path(sys.argv[1]).glob(pattern) if (one / "trials/w/truth.toml").exists()):
         views, cameras, rods, motor, true = read_scene(folder)
         try:
@@ -84,6 +86,10 @@ def main() -> None:
             continue
         worst.append(max(axis_off_px(camera, true, seen.axis, rods.bar.radius_mm) for camera in cameras))
         print(f"{folder.name:<6} axis off by {worst[-1]:.2f} px", flush=True)
+        looks = seen_over_given(views, seen, rods, motor, VisionSettings())
+        for share, sigma in [in_all(looks)] if looks else []:
+            widths.append(np.log(share) / (sigma / share))
+            print(f"       looks {share:.3f} ± {sigma:.3f} times as wide as it is", flush=True)
         every += [row for camera in cameras for row in line_rows(camera, seen, true, rods.bar.radius_mm)]
     error, sigma = np.abs(np.array(every)).T
     z = error / np.hypot(sigma, BAR_OFFSET_PX)
@@ -91,6 +97,7 @@ def main() -> None:
     print(f"{found:.0%} of {len(worst)} axes within {FOUND_PX:g} px; {len(error)} points: median error "
           f"{np.median(error):.3f} px, sigma {np.median(sigma):.3f}; z RMS {np.sqrt(np.mean(z**2)):.2f}, median "
           f"{np.median(z):.2f}, over 3 {np.mean(z > 3):.1%}, largest {z.max():.1f}")
+    print(f"z of widths: RMS {np.sqrt(np.mean(np.square(widths))):.2f}, largest {np.max(np.abs(widths)):.1f}")
 
 
 def line_rows(camera: Camera, seen: SeenBar, true: BarAxis, radius_mm: float) -> list[tuple[float, float]]:

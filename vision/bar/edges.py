@@ -42,7 +42,8 @@ def measure_edges(view: View, axis: BarAxis, radius_mm: float, wires_px: Sequenc
 
     wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be some pixels off, and its width.
     """
-    pieces, knots = _pieces(view, axis, radius_mm, wires_px, settings), bar_knots(settings)
+    noise, knots = view.noise.times(view.mean_share + 1.0), bar_knots(settings)  # of the mean beside one background
+    pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
     if len(pieces) < FEWEST_PIECES:
         return None
     found = np.append(_sweep(pieces, knots) if coarse else np.zeros(4), 0.0)
@@ -53,23 +54,6 @@ def measure_edges(view: View, axis: BarAxis, radius_mm: float, wires_px: Sequenc
     if left > NO_BAR:
         return None
     return _edges(pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4])
-
-
-def coarse_share(view: View, axis: BarAxis, radius_mm: float, wires_px: Sequence[np.ndarray],
-                 settings: VisionSettings) -> float | None:
-    """How wide the bar looks over how wide it should, to some hundredths, as `measure_edges` begins with it; None where
-    too little of the bar is clear, or where that lies far from where it was expected."""
-    pieces = _pieces(view, axis, radius_mm, wires_px, settings)
-    if len(pieces) < FEWEST_PIECES:
-        return None
-    found = _sweep(pieces, bar_knots(settings), moved=(0, 2))
-    widened = 1.0 + found[2] / float(np.median(pieces.radius_px))
-    return widened if abs(found[0]) < 0.5 * _SWEEP_MOST_PX[0] else np.inf
-
-
-def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
-    """Pieces of the bar, with the noise of the mean picture beside one picture of the background."""
-    return bar_pieces(view, view.noise.times(view.mean_share + 1.0), axis, radius_mm, wires_px, settings)
 
 
 def _misfit(rims: Pieces, knots: Knots, q) -> float:
@@ -85,9 +69,8 @@ def _placed(pieces: Pieces, q) -> Pieces:
     return replace(moved, radius_px=np.maximum(moved.radius_px + q[2] + q[3] * lever, 1.0))
 
 
-def _sweep(pieces: Pieces, knots, moved: Sequence[int] = (0, 2, 1, 3)) -> np.ndarray:
-    """Coordinate descent over shift, tilt, widening and taper, or those of them that are moved, with a coarse, blurred
-    model, near the contact."""
+def _sweep(pieces: Pieces, knots) -> np.ndarray:
+    """Coordinate descent over shift, widening, tilt and taper, with a coarse, blurred model, near the contact."""
     near = np.abs(pieces.place) < _SWEEP_REACH_MM
     some, _ = binned(pieces.select(near) if np.sum(near) >= FEWEST_PIECES else pieces, _BIN_PX)
     found = np.zeros(4)
@@ -98,7 +81,7 @@ def _sweep(pieces: Pieces, knots, moved: Sequence[int] = (0, 2, 1, 3)) -> np.nda
     most = np.array([*_SWEEP_MOST_PX, *np.median(pieces.radius_px) * _SWEEP_MOST_SHARE])
     for part in _SWEEP_PARTS:
         for _ in range(2):
-            for k in moved:
+            for k in (0, 2, 1, 3):
                 steps = part * most[k] * np.linspace(-1.0, 1.0, 9)
                 tries = [np.clip(found + step * np.eye(4)[k], -most, most) for step in steps]
                 found = min(tries, key=misfit)

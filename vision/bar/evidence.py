@@ -273,14 +273,14 @@ class Evidence:
 
 
 def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
-             every: int = 1) -> Evidence:
+             every: int = 1, wider: float = 1.0) -> Evidence:
     """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, or at every so
-    many steps, in each stretch; under all of `priors`, or the roughest only."""
+    many steps, in each stretch; under all of `priors`, or the roughest only. wider: times the bar's width."""
     most = int(np.ceil(reach_px / (every * STEP_PX)))
     whole = every * np.arange(-most, most + 1)
     more_px = STEP_PX / positions * np.arange(positions)
     shift = (STEP_PX * whole[:, None] + more_px).ravel()
-    normal = np.stack([_normal(seen, whole, more, blur_px) for more in more_px], axis=2)
+    normal = np.stack([_normal(seen, whole, more, blur_px, wider * seen.radius_px) for more in more_px], axis=2)
     normal = normal.reshape(len(seen), len(shift), *normal.shape[-2:])
     under = [seen.marginal(normal, prior) for prior in (seen.priors if all_light else seen.priors[-1:])]
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
@@ -290,14 +290,14 @@ def evidence(seen: Profiles, reach_px: float, blur_px: float, positions: int = 1
                     misfit_of_none[:, 0])
 
 
-def _normal(seen: Profiles, shifts, more_px: float, blur_px: float) -> np.ndarray:
+def _normal(seen: Profiles, shifts, more_px: float, blur_px: float, radius_px: float) -> np.ndarray:
     """Products (k, g, n, n) of the weighted columns of what the light is made of, and of the light, for middles at
-    these whole steps (g,) of the grid and so much more. Above the diagonal they are not to be used."""
+    these whole steps (g,) of the grid and so much more, of a bar so thick. Not to be used above the diagonal."""
     most = int(np.max(np.abs(shifts)))
     size = len(seen.offset_px) + 2 * most
     offset = STEP_PX * (np.arange(size) - 0.5 * (size - 1)) - more_px
     used = np.convolve(np.any(seen.seen, axis=0), np.ones(2 * most + 1)) > 0
-    own, cover, leak = _columns(offset[used], seen.radius_px, blur_px)
+    own, cover, leak = _columns(offset[used], radius_px, blur_px)
     row, column = np.tril_indices(own.shape[1])
     one, other = [0, 0, 1], [0, 1, 1]
     mixed = ((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak))

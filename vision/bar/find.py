@@ -75,7 +75,7 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
     grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
     steps, best = 0.5 * np.array([one[1] - one[0] for one in values]), grid
     for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)):
-        near = [replace(one, field=gaussian_filter(one.field, (0.0, *[spread * one.half_px] * 2))) for one in seen]
+        near = [_spread(one, spread * one.half_px) for one in seen]
         last = spread == _SPREADS[-1]
         counts, along_mm = (_COUNTS, _ALONG_MM) if last else (np.maximum(_COUNTS, 0.0), _ALONG_MM[::2])
         score = partial(_clear_in_all, near, axis_of, radius_mm, counts, along_mm)
@@ -83,6 +83,13 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
             best = _apart(grid, score(grid), 4.0 * steps, _STARTS)
         best = _apart(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
     return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(best)).values())]
+
+
+def _spread(seen: Clear, blur_px: float) -> Clear:
+    """The same, blurred; with no edges at the picture's border, where lines end that leave it."""
+    field = gaussian_filter(seen.field, (0.0, blur_px, blur_px))
+    field[:, [0, -1]] = field[:, :, [0, -1]] = 0.0
+    return replace(seen, field=field)
 
 
 def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, counts, along_mm, each) -> np.ndarray:
@@ -149,25 +156,22 @@ def _both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) 
     sideways = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
     sideways = radius_mm * sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
     px = camera.project(np.stack([along, along + sideways[:, None]]).reshape(-1, 3)).reshape(2, *along.shape[:2], 2)
-    lines = np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 1, 2) / HALF  # middle and aside, by x and y
-    tangents = np.gradient(lines, axis=-1)
-    across = np.stack([_across(seen, *(one[0] + at * one[1] for one in (lines, tangents)))
-                       for at in np.concatenate([_AT, -_AT])])
+    middle, aside = np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 1, 2).astype(np.float32) / HALF  # by x and y
+    x, y = np.gradient(middle, axis=-1)  # both edges run nearly as the middle does
+    shares = np.stack([y * y, -2.0 * x * y, x * x]) / (x * x + y * y)
+    across = np.stack([_across(seen.field, middle + at * aside, shares) for at in np.concatenate([_AT, -_AT])])
     sides = across.reshape(2, len(_AT), -1) * counts[:, None]
     best = np.max(sides, axis=1) + np.min(sides, axis=1)
     return np.sqrt(np.prod(np.maximum(best, 0.0), axis=0))
 
 
-def _across(seen: Clear, px, tangent) -> np.ndarray:
-    """Mean (n,) of the edges along lines of pixels with these tangents, both (2, n, t): by x and y."""
-    height, width = seen.field.shape[1:]
-    x, y = tangent
-    column, row = np.round(px)
-    inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-    place = np.where(inside, row * width + column, 0).astype(np.intp)
-    xx, xy, yy = (part.take(place) for part in seen.field)
-    across = (xx * y**2 - 2.0 * xy * x * y + yy * x**2) / (x**2 + y**2)
-    return np.mean(np.where(inside, across, 0.0), axis=-1)
+def _across(field, px, shares) -> np.ndarray:
+    """Mean (n,) of the edges along lines of pixels (2, n, t), by x and y. shares (3, n, t): of the field's three parts
+    across the line. Outside the picture, and at its very border, there is none."""
+    height, width = field.shape[1:]
+    column, row = (np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5 for one, size in zip(px, (width, height)))
+    seen = field.reshape(3, -1).take(row.astype(np.intp) * width + column.astype(np.intp), axis=1)
+    return np.einsum("knt,knt->n", seen, shares) / px.shape[-1]
 
 
 def climb(starts: np.ndarray, first_step: np.ndarray, score: Callable) -> tuple[np.ndarray, np.ndarray]:

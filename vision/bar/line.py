@@ -69,7 +69,7 @@ def find_lines(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px:
                settings: VisionSettings, off_px: float) -> dict[str, BarLine]:
     """The lines by one quick look, for an axis that is off_px off, or no bar's. See `measure_bars`."""
     found = {}
-    for name, pieces in _clear_pieces(views, axis, radius_mm, wires_px, settings).items():
+    for name, pieces in clear_pieces(views, axis, radius_mm, wires_px, settings).items():
         first = most_probable(pieces, off_px) if off_px > NEAR_PX else np.zeros(2)
         found[name] = _bar_line(pieces, {1.0: roughly(pieces, first, min(off_px, NEAR_PX))}, np.ones(1))
     return found
@@ -82,7 +82,7 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     wires_px: by camera lines (m, 2) where the wire lies in some frame. before: what was measured about an axis nearby,
     by which the lines are measured finely; without it, to some tenths of their sigma.
     """
-    pieces = _clear_pieces(views, axis, radius_mm, wires_px, settings)
+    pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
         return {}
     before = before or {}
@@ -106,8 +106,9 @@ def _looks(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
     return {gamma: closer_look(pieces, one, gamma, positions=1) for gamma, one in first.items()}
 
 
-def _clear_pieces(views, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> dict[str, Pieces]:
-    """By camera the pieces of the bar, where enough are clear."""
+def clear_pieces(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
+                 settings: VisionSettings) -> dict[str, Pieces]:
+    """By camera the pieces of the bar, where enough are clear. wires_px: see `measure_bars`."""
     pieces = {view.camera.name: _pieces(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings)
               for view in views}
     return {name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)}

@@ -26,6 +26,8 @@ _LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by b
 _APART_PX = 0.1  # lines of a wide window: farther apart they step over a peak
 _NEXT_BLURS = 4  # of a next look
 _LONGEST_PX = 3.0
+_ASIDE_PX = 2.0  # the middle of a bar whose width is another, from where it is expected
+_LOG_WIDTHS, _NEAR_WIDTHS = np.linspace(-0.48, 0.48, 25), slice(6, -6)  # a bar of 4 mm for 6 is 0.41 off
 _STRETCH_ARM = 1.5  # the outermost stretch's place, over ARM_MM
 _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hole in the bench says anything
 
@@ -95,6 +97,29 @@ def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
     under = [evidence(seen, off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
     lines, _, misfit, *_ = _over_lines(under, seen, window)
     return lines[np.argmin(misfit[:, 0, 0])]
+
+
+def log_width(pieces: Pieces) -> tuple[float, float]:
+    """Mean and sigma of the logarithm of the bar's width over the given one, its middle as far as _ASIDE_PX off."""
+    for logs in (_LOG_WIDTHS[_NEAR_WIDTHS], _LOG_WIDTHS):
+        against = _against_widths(pieces, logs)
+        if 0 < np.argmin(against) < len(logs) - 1:
+            break
+    fine = np.linspace(logs[0], logs[-1], 10 * len(logs))
+    chance = np.exp(-0.5 * (CubicSpline(logs, against)(fine) - against.min()))
+    mean = float(chance @ fine / chance.sum())
+    return mean, float(np.sqrt(chance @ (fine - mean) ** 2 / chance.sum()))
+
+
+def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
+    """Minus twice the log probability (n,) of widths over the given one, of these logarithms, each at its best middle.
+    """
+    reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
+    seen = profiles(pieces, STRETCHES, reach_px, 1.0)
+    under = [evidence(seen, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
+    own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
+    total = np.sum(-2.0 * np.logaddexp(-0.5 * (own - own.min(axis=(0, 2), keepdims=True)), -0.5 * _MOST), axis=1)
+    return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
 
 
 def moved(pieces: Pieces, line: np.ndarray) -> Pieces:

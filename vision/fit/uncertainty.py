@@ -41,10 +41,10 @@ def uncertainty(problem: Problem, state: State, answer: np.ndarray) -> Uncertain
     """
     by_row = answer @ weighted_jacobian(problem, state).T
     by_camera = by_lens(problem, state, answer)
-    return Uncertainty(answer, by_row @ _alike(problem, by_row).T, by_camera @ problem.cameras.covariance @ by_camera.T)
+    return Uncertainty(answer, by_row @ alike(problem, by_row).T, by_camera @ problem.cameras.covariance @ by_camera.T)
 
 
-def _alike(problem: Problem, rows) -> np.ndarray:
+def alike(problem: Problem, rows: np.ndarray) -> np.ndarray:
     """Rows (k, n) of all observations times the covariance of their residuals: 1, but that a point of the wire shares a
     part of its error with the next one, of that part as much with the one after, and so on, and has a sigma wider by as
     much as all that makes a mean of them."""
@@ -78,7 +78,7 @@ def variance_by_cause(problem: Problem, state: State, fitted: Uncertainty, gradi
     """
     weighed = weighted_jacobian(problem, state)
     by_row = weighed @ (fitted.answer @ gradient)
-    parts = by_row * _alike(problem, by_row[None])[0]
+    parts = by_row * alike(problem, by_row[None])[0]
     on_wire = np.concatenate([np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen])
     touch = len(on_wire) + int(np.sum(problem.touching))
     reach = touch + BAR + REST

@@ -16,6 +16,7 @@ from vision.bar.search import see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
@@ -29,6 +30,7 @@ from vision.pictures.scale import shrunk_cameras
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.trial_pictures import TrialPictures
+from vision.truth.value import Value
 from vision.truth.whisk import fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.wire_end import wire_ends
@@ -59,7 +61,8 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
                           left_out=tuple(behind)) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
-    bars = seen_over_given(views, used, bar_seen, rods, motor_rad, settings)
+    looks = seen_over_given(views, bar_seen, rods, motor_rad, settings)
+    bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 
 
@@ -113,7 +116,8 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk, fitted)
-    status = "; ".join(filter(None, [truth.status, beam and beam.alarm, *unexplained, *whisk.left_out]))
+    doubts = [contradiction(fitted.one_less), beam and beam.alarm, *unexplained, *whisk.left_out]
+    status = "; ".join(filter(None, [truth.status, *doubts]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
     return replace(truth, base=base, beam=beam, turns=turns, refinements=without, ends=ends, status=status)

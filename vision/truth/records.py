@@ -90,4 +90,4 @@ class TrialTruth:
     bar_direction: np.ndarray
     whisks: tuple[WhiskTruth, ...]
     notes: tuple[str, ...] = ()
-    bar_looks: dict[str, float] = field(default_factory=dict)
+    bar_looks: dict[str, Value] = field(default_factory=dict)

@@ -8,6 +8,7 @@ import numpy as np
 
 from vision.bar.search import SeenBar
 from vision.fit.exposure import Exposure, slip_in_exposure
+from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.uncertainty import Uncertainty, uncertainty
@@ -100,9 +101,15 @@ class FittedWhisk:
         return slip_in_exposure(self.problem, self.state, self.by_parameter.frame["slip"])
 
     @cached_property
+    def one_less(self) -> list[OneLess]:
+        """The fit without each of its cameras."""
+        return leave_out_each(self.problem, self.state, self.uncertainty, self.by_parameter)
+
+    @cached_property
     def covariance(self) -> np.ndarray:
-        """(size, size), of the parameters, slip within the exposure included."""
-        return self.uncertainty.covariance + self.exposure.covariance
+        """(size, size), of the parameters, slip within the exposure and cameras that contradict each other included."""
+        apart = covariance_of(self.one_less, self.problem.size)
+        return self.uncertainty.covariance + self.exposure.covariance + apart
 
     def of_whisk(self, name: str) -> Value:
         """A quantity of the whole whisk by its name."""

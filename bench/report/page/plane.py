@@ -6,9 +6,9 @@ import numpy as np
 from markupsafe import Markup
 
 from bench.gauges.readings import reference_from_pictures
+from bench.records.trial import SeenWhisk
 from bench.report.page.svg import Mark, Panel, limits
 from bench.report.page.words import Row
-from bench.report.planes import contact_path
 from bench.session.whisker import Whisker
 
 _WIDTH, _HEIGHT = 400, 300
@@ -120,3 +120,11 @@ def _over_theta(row: Row, name: str, unit: str, theta, series, at=None) -> Marku
 def _felt(row: Row, x: float, value: float, sigma: float, kind: str, name: str) -> Mark:
     title = f"{name} felt = {value:.4g} ± {sigma:.2g} at θ = {x:.2f}°"
     return Mark(x, value, sigma, kind, 3, row.key, row.trial, row.seen.whisk, title)
+
+
+def contact_path(whisk: SeenWhisk) -> np.ndarray:
+    """Contact (n, 2) y, z of the touching frames in the contact frame, from P0."""
+    points = whisk.frames.point_mm.value[whisk.frames.touching]
+    c, s = np.cos(whisk.touch_rad.value), np.sin(whisk.touch_rad.value)
+    turned = (points - whisk.point_mm.value) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return turned[:, 1:]

@@ -23,7 +23,6 @@ from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
 from bench.report.page.scene import ELLIPSOID_FACTOR, scene
 from bench.report.page.standing import standings, sureness
 from bench.report.page.words import number, rows_of
-from bench.report.paper import write_paper_figures
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run import CameraFacts, RunRecord
@@ -48,7 +47,11 @@ def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
     whole = finished(read_run(out), record.whisker, record.settings)
     of_run = whole.results, whole.friction
     with lock_output(out):
-        figures = write_paper_figures(out, *of_run, record.whisker, record.settings, figure_formats)
+        figures = []
+        if figure_formats:
+            from bench.report.paper import write_paper_figures  # with all of matplotlib
+
+            figures = write_paper_figures(out, *of_run, record.whisker, record.settings, figure_formats)
         return [*write_report(out, record, *of_run), *figures]
 
 

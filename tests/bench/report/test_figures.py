@@ -22,7 +22,8 @@ from bench.records.trial import (
 )
 from bench.report.figure_8 import figure_8
 from bench.report.figures import error_against_slope
-from bench.report.planes import contact_path, sensing_plane
+from bench.report.page.plane import contact_path
+from bench.report.planes import sensing_plane
 from bench.session.session import load_session
 from bench.trials.compare import Judged
 from estimator import slip

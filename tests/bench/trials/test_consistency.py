@@ -93,18 +93,24 @@ BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
 
 
 def test_a_bar_as_thick_as_said_is_not_doubted(trial):
-    assert width_doubt({"low": 0.97, "high": 1.0}, trial, BOARD) == ""
+    assert width_doubt({"low": Value(0.97, 0.03), "high": Value(1.0, 0.02)}, trial, BOARD) == ""
     assert width_doubt({}, trial, BOARD) == ""
 
 
 def test_a_bar_that_looks_thicker_names_both_lengths_with_what_they_would_need(trial):
-    said = width_doubt({"low": 1.45, "high": 1.52}, trial, BOARD)
-    assert said.startswith("the bar looks 1.48 ± 0.05 times as thick as said")
-    assert "diameter_mm would have to be some 8.91 for 6, or square_mm some 10.1 for 15" in said
+    said = width_doubt({"low": Value(1.45, 0.04), "high": Value(1.52, 0.04)}, trial, BOARD)
+    assert said.startswith("the bar looks 1.49 ± 0.05 times as thick as said")
+    assert "diameter_mm would have to be some 8.92 for 6, or square_mm some 10.1 for 15" in said
+
+
+def test_cameras_that_see_different_widths_do_not_see_the_bar_alone(trial):
+    said = width_doubt({"low": Value(0.98, 0.022), "high": Value(1.21, 0.042)}, trial, BOARD)
+    assert said.startswith("the bar looks 0.98 to 1.21 times as thick as said")
+    assert width_doubt({"low": Value(0.98, 0.03), "high": Value(1.08, 0.042)}, trial, BOARD) == ""
 
 
 def test_a_diameter_known_badly_is_not_contradicted(trial):
-    assert width_doubt({"low": 1.2}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD) == ""
+    assert width_doubt({"low": Value(1.2, 0.02)}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD) == ""
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,23 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.ladder.bar_lines import AWAY_MM, CENTRE, FOCAL_PX, SCENES, errors_and_sigmas, measured, noisy_view
+from tests.ladder.bar_lines import (
+    AWAY_MM,
+    CENTRE,
+    FOCAL_PX,
+    RADIUS_MM,
+    SCENES,
+    errors_and_sigmas,
+    measured,
+    noisy_view,
+)
+from vision.bar.line import clear_pieces
 from vision.bar.pieces import ARM_MM
+from vision.bar.posterior import log_width
+from vision.bar.width import SIGMA_SHARE
 from vision.fit.problem import BAR_OFFSET_PX
 from vision.geometry.contact import BarAxis
+from vision.geometry.settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 
 BARS = 4
@@ -64,3 +77,15 @@ def test_a_line_forgets_where_it_was_looked_for(bar, rng):
     at = [(one.px - CENTRE) @ across[:2] for one in points]
     moved = np.max(np.abs(np.array(at[1:]) - at[0]) / np.hypot(points[0].sigma_px, BAR_OFFSET_PX), axis=1)
     assert moved[0] < 0.2 and moved[1] < 0.5
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
+@pytest.mark.parametrize("bar", ["painted, step of a fifth", "polished, flat background"])
+def test_a_bar_of_another_width_than_given_tells_its_own(bar, factor, rng):
+    """Within three sigma, which is a twentieth at most."""
+    axis = BarAxis(0.4 * np.array([-np.sin(1.3), np.cos(1.3), 0.0]), np.array([np.cos(1.3), np.sin(1.3), 0.0]))
+    view = noisy_view(*SCENES[bar], 1.3, 0.4, rng)
+    pieces = clear_pieces([view], axis, RADIUS_MM / factor, {}, VisionSettings())[view.camera.name]
+    log, sigma = log_width(pieces)
+    assert abs(log - np.log(factor)) < 3.0 * np.hypot(sigma, SIGMA_SHARE)
+    assert sigma < 0.05

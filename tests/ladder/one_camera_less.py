@@ -1,0 +1,80 @@
+"""Each camera left out in turn, in path-traced scenes with three: how far the others move the truth, and is it told?
+
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/ladder/one_camera_less.py SCENES [PATTERN]
+
+SCENES as for path_traced.py. A row a scene: the least of the chances by which cameras that agree differ so; then the
+same with all lines of one camera shifted by SHIFT_PX, as of one that was knocked: by how many stated sigmas d_x is off,
+before and after these hold the contradiction, where one is told.
+"""
+
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.ladder.bar_scenes import read_scene
+from vision.bar.search import see_bar
+from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
+from vision.fit.problem import Problem, State
+from vision.fit.quantities import jacobians
+from vision.fit.solve import solve
+from vision.fit.uncertainty import uncertainty
+from vision.geometry.settings import VisionSettings
+from vision.truth.whisk import fit_whisk
+from vision.truth.whisk_pictures import WhiskPictures
+
+SHIFT_PX = 2.0
+
+
+def fitted(folder: Path) -> tuple[Problem, State] | None:
+    """The fit of a scene's whisk; None where fewer than three cameras see it."""
+    views, cameras, rods, motor_rad, _ = read_scene(folder)
+    if len(views) < 3:
+        return None
+    settings, time_s = VisionSettings(), np.arange(len(motor_rad), dtype=float)
+    bar = see_bar(views, cameras, rods, motor_rad, settings)
+    frames = range(len(motor_rad))
+    whisk = WhiskPictures(0, frames, time_s, motor_rad, tuple(views), cameras, rods, bar, settings)
+    found = fit_whisk(whisk.without_gaps())
+    return found.problem, found.state
+
+
+def shifted(problem: Problem, camera: int) -> Problem:
+    """With all lines of a camera shifted."""
+    seen = [one if one.camera != camera else
+            replace(one, points=replace(one.points, px=one.points.px + SHIFT_PX * one.points.normal))
+            for one in problem.seen]  # fmt: skip
+    return replace(problem, seen=seen)
+
+
+def asked(problem: Problem, state: State, d_x_mm: float):
+    """Least chance, what is told, and d_x's error in stated sigmas, before and after."""
+    state, answer = solve(problem, state)
+    own, (measured, by) = uncertainty(problem, state, answer), jacobians(problem, state)
+    found, gradient = leave_out_each(problem, state, own, by), by.whisk["d_x"]
+    wider = own.covariance + covariance_of(found, problem.size)
+    z = [(measured.whisk["d_x"] - d_x_mm) / np.sqrt(gradient @ one @ gradient) for one in (own.covariance, wider)]
+    return min(one.chance for one in found), contradiction(found), z
+
+
+def main() -> None:
+    pattern = sys.argv[2] if len(sys.argv) > 2 else "*"
+    for folder in sorted(one for one in Path(sys.argv[1]).glob(pattern) if (one / "trials/w/truth.toml").exists()):
+        fit = fitted(folder)
+        if fit is None:
+            continue
+        d_x_mm = tomllib.loads((folder / "trials/w/truth.toml").read_text())["d_x_mm"]
+        chance, said, z = asked(*fit, d_x_mm)
+        print(f"{folder.name:<6} chance {chance:.2g}  z of d_x {z[0]:+.1f}  {said}")
+        for camera in range(len(fit[0].cameras)):
+            chance, said, z = asked(shifted(fit[0], camera), fit[1], d_x_mm)
+            told = "told" if said else "silent"
+            print(f"       {camera} off: chance {chance:.0e}, z {z[0]:+.1f} → {z[1]:+.1f}, {told}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
