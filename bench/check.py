@@ -17,12 +17,12 @@ from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauges_file import given_gauges
 from bench.session.check import checked_session, find_damage
 from bench.session.footage import frame_count, read_frames
-from bench.session.frame_times import dropped, frame_times, read_trial
+from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.scene import evenly_exposed, other_scene
-from vision.boards.corners import MIN_CORNERS, find_corners
+from vision.boards.corners import MIN_CORNERS, edge_blur_px, find_corners
 from vision.boards.diagnosis import why_not_found
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.fit.touch import FEWEST_FREE
@@ -31,6 +31,8 @@ from vision.pictures.files import read_picture
 
 _BOARD_LOOKS = 2  # pictures of a series: a board that is in none of them is in few
 _FRAME_LOOKS = 5  # of a trial: exposure and scene
+# px, sigma: lenses in focus have 0.6 to 1.2; from 2 on the small session's boards are not found. Set by eye.
+_MOST_BLUR_PX = 1.5
 _MOST_SATURATED = 0.1  # of a channel's samples in a stroke
 
 
@@ -55,7 +57,8 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
     if session.cameras_toml is None and session.board is not None:
         with doubts.guard():  # one board for all cameras: what is wrong with it is looked for once
             for name in session.board_sources:
-                _check_boards(session, name)
+                for line in _check_boards(session, name):
+                    doubts.note(line)
     with doubts.guard():
         given_gauges(session)
     rig = {name: read_picture(picture) for name, picture in session.rig_pictures.items()}
@@ -66,7 +69,9 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
             strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
             if trial.purpose == "gauge" and signals.kind == "V":
                 pushes += _pushes(strokes)
-            for line in [*_of_gauges(signals, strokes), *_of_strokes(trial, signals, strokes), *_of_scene(trial, rig)]:
+            times = frame_times(trial)
+            felt = [*_of_gauges(signals, strokes), *_of_strokes(signals, strokes, times)]
+            for line in [*felt, *_of_scene(trial, times, rig)]:
                 doubts.note(f"trials/{trial.name}: {line}")
     if pushes and not in_two_directions(np.array(pushes)) and given_gauges(session) is None:
         doubts.note(f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}")
@@ -81,8 +86,9 @@ def _pushes(strokes: Sequence[Stroke]) -> Iterator[np.ndarray]:
             yield at.values
 
 
-def _check_boards(session: Session, name: str) -> None:
-    """Raises BadInput where a camera's board is not found as entered, or not on the rig."""
+def _check_boards(session: Session, name: str) -> Iterator[str]:
+    """A line where a camera sees the board on the rig out of focus. Raises BadInput where its board is not found as
+    entered, or not on the rig."""
     source = session.board_sources[name]
     count = frame_count(source)
     if count < MIN_VIEWS:
@@ -100,6 +106,10 @@ def _check_boards(session: Session, name: str) -> None:
     if grey is not None and len(find_corners(grey, session.board)) < MIN_CORNERS:
         hint = "the board must stand in view of every camera"
         raise BadInput(f"the board on the rig is not seen; {hint}", file=f"boards/rig/{picture.name}")
+    blur_px = np.nan if grey is None else edge_blur_px(grey, session.board)
+    if blur_px > _MOST_BLUR_PX:
+        found = f"edges are blurred by {blur_px:.1f} px, {_MOST_BLUR_PX:g} is a lot"
+        yield f"boards/rig/{picture.name}: {found}: focus on the whisker, or let the camera rest"
 
 
 def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
@@ -116,9 +126,8 @@ def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
             yield f"channel {name} is at its rail for {share}: raise the amplifier's range"
 
 
-def _of_strokes(trial: Trial, signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
+def _of_strokes(signals: Signals, strokes: Sequence[Stroke], times: FrameTimes) -> Iterator[str]:
     """Whether each stroke has a free part, a touch that is felt, and reaches the usual pushing angle."""
-    times = frame_times(trial)
     yield from dropped(times, [times.frames_in(signals, where) for where in forward_strokes(signals)])
     for number, stroke in enumerate(strokes):
         touch = stroke.touch()
@@ -134,9 +143,8 @@ def _of_strokes(trial: Trial, signals: Signals, strokes: Sequence[Stroke]) -> It
             yield f"whisk {number} has {counted(free, 'frame')} before touch, {FEWEST_FREE} are needed"
 
 
-def _of_scene(trial: Trial, rig: dict[str, np.ndarray | None]) -> Iterator[str]:
+def _of_scene(trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray | None]) -> Iterator[str]:
     """Cameras that show another scene than the rig picture, and exposure that changes."""
-    times = frame_times(trial)
     if not len(times):
         return
     looks = np.unique(np.linspace(0, len(times) - 1, _FRAME_LOOKS).astype(int)).tolist()

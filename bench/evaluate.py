@@ -23,6 +23,7 @@ from bench.session.check import checked_session
 from bench.session.inside import check_outside
 from bench.session.trial import Trial
 from bench.trials.estimates import estimators
+from bench.trials.exchanged import exchanged_signals
 from bench.trials.lost import evaluated
 from bench.trials.of_session import judged, placed_units, with_gauges
 
@@ -61,7 +62,7 @@ def evaluate(
         gauges, certificate, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         whole = finished(evaluated(chosen, pool), session.whisker, settings)
-        doubts.notes += filter(None, [whole.doubt])
+        doubts.notes += [*filter(None, [whole.doubt]), *exchanged_signals(chosen, whole.results)]
         write_tables(out, whole.results)
         write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
         alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)

@@ -18,6 +18,7 @@ from bench.gauges.readings import Pairs
 LEAST_CHANCE = 1e-4
 _EXPLAINED = 0.01  # of the chance that a cause must leave
 _PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
+_OTHERWISE = "no fault of the gauges alone explains it; look whether these are another trial's signals"
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def likeliest_cause(slopes: Slopes, matrix: np.ndarray) -> str:
     explains = [chdtrc(2 - free, c) > _EXPLAINED for c, (_, free, _) in zip(left, tried)]
     costs = [c + _PER_PARAMETER * free if ok else np.inf for c, ok, (_, free, _) in zip(left, explains, tried)]
     best = int(np.argmin(costs))
-    return tried[best][0] if np.isfinite(costs[best]) else "no single cause explains it"
+    return tried[best][0] if np.isfinite(costs[best]) else _OTHERWISE
 
 
 def _causes(slopes: Slopes, matrix: np.ndarray) -> Iterator[tuple[str, int, np.ndarray]]:

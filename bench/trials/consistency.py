@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bench.session.trial import Trial
+from bench.session.whisker import Whisker
 from vision.bar.width import in_all
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
@@ -152,6 +153,23 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
     bar = f"some {trial.bar_diameter_mm * factor:.3g} for {trial.bar_diameter_mm:g}"
     found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
     return f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
+
+
+def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> str:
+    """The whisker's end as seen against its length: a sentence where they are apart, '' where they are not, or where
+    no two cameras see it end in one place: before something dark a dark wire seems to end. ends: by camera, mm from
+    the base."""
+    if len(ends) < 2:
+        return ""
+    places, sigmas = (np.array([getattr(end, name) for end in ends.values()]) for name in ("value", "sigma"))
+    if not Difference(places, _without_mean(np.diag(sigmas**2)), len(ends) - 1).is_chance:
+        return ""
+    sigma = float(np.hypot(np.max(sigmas), whisker.length_sigma_mm))
+    seen_mm = float(np.average(places, weights=sigmas**-2.0))
+    if Difference(np.array([seen_mm - whisker.length_mm]), np.array([[sigma**-2.0]]), 1).is_chance:
+        return ""
+    found = f"{seen_mm:.0f} ± {sigma:.0f} mm from its base"
+    return f"the whisker is seen to end {found}, length_mm says {whisker.length_mm:g}"
 
 
 def slope_doubt(beta: Value, trial: Trial) -> str:

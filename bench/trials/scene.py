@@ -1,7 +1,7 @@
 """Each frame's still scene (board, bench, clamps) against the rig picture: a camera knocked by any amount, mirrored or
 exchanged, a lens cap, an exposure that changed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -105,18 +105,23 @@ def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str]]:
 
 def _exposure_lines(name: str, off: dict, lost: list[int], mended: dict, count: int) -> Iterator[str]:
     if mended:
-        low, high = min(mended.values()), max(mended.values())
-        span = f"{low:.3f} to {high:.3f} times" if len(mended) > 1 else f"{low:.3f} times"
-        yield f"camera {name}: {len(mended)} of {count} frames are {span} as bright as most, made good ({_few(mended)})"
+        yield f"camera {name}: {_brighter(mended, count, 3)}, made good ({_few(mended)})"
     if lost:
-        low, high = min(off[k] for k in lost), max(off[k] for k in lost)
-        found = f"{len(lost)} of {count} frames are {low:.2f} to {high:.2f} times as bright as most"
+        found = _brighter({k: off[k] for k in lost}, count, 2)
         yield f"camera {name}: {found}, left out ({_few(lost)}): fix exposure and gain"
 
 
-def _few(indices) -> str:
+def _brighter(gains: Mapping[int, float], count: int, digits: int) -> str:
+    """How many frames are how many times as bright: one number where all are alike."""
+    ends = dict.fromkeys(f"{end(gains.values()):.{digits}f}" for end in (min, max))
+    are = "is" if len(gains) == 1 else "are"
+    return f"{len(gains)} of {count} frames {are} {' to '.join(ends)} times as bright as most"
+
+
+def _few(indices: Collection[int]) -> str:
     shown = ", ".join(map(str, list(indices)[:_MOST_NAMED]))
-    return f"frames {shown}" + (", …" if len(indices) > _MOST_NAMED else "")
+    frames = "frame" if len(indices) == 1 else "frames"
+    return f"{frames} {shown}" + (", …" if len(indices) > _MOST_NAMED else "")
 
 
 def _divided(grey: np.ndarray, gain: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, strokes_of, touch_on_the_way_back
 from bench.gauges.matrix import FROM_ALL, FROM_TRIALS, Gauges
-from bench.gauges.readings import pairs_of
+from bench.gauges.readings import Pairs, pairs_of
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial import (
@@ -36,7 +36,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from bench.trials.agreement import agreement
+from bench.trials.agreement import Agreement, agreement
 from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_end
@@ -229,10 +229,15 @@ def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Read
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
         return felt
-    own_newtons = not readout.is_gauged or unit.gauges.source != FROM_TRIALS
-    found = agreement(pairs, readout.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
+    found = against_shape(unit, readout, pairs)
     status = _joined(felt.status, found.status)
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
+
+
+def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> Agreement:
+    """Felt moments against those of the seen shape. Gauges that bring newtons of their own tell the rigidity, too."""
+    whisker, own_newtons = unit.session.whisker, not readout.is_gauged or unit.gauges.source != FROM_TRIALS
+    return agreement(pairs, readout.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
 
 
 def _joined(*statuses: str) -> str:

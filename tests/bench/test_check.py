@@ -2,6 +2,7 @@
 
 import shutil
 
+import cv2
 import numpy as np
 import pytest
 
@@ -9,7 +10,7 @@ from bench.base.doubts import Doubts
 from bench.check import look_ahead
 from bench.session.check import checked_session
 from bench.session.frame_times import FrameTimes
-from tests.scenes.faults import FAULTS, TRIAL
+from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
 
 def found(folder, *, boards=False) -> Doubts:
@@ -44,6 +45,13 @@ def test_a_fault_of_a_trial(small_copy, fault, expected):
     FAULTS[fault](small_copy)
     notes = found(small_copy).notes
     assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
+
+
+def test_a_rig_picture_out_of_focus(small_copy):
+    rig = small_copy / "boards" / "rig" / "low.png"
+    change_picture(rig, lambda grey: cv2.GaussianBlur(grey, (0, 0), 1.5))
+    (line,) = [note for note in found(small_copy, boards=True).notes if note.startswith("boards/rig/low.png")]
+    assert float(line.split("blurred by ")[1].split(" px")[0]) == pytest.approx(np.hypot(1.5, 0.8), abs=0.1)
 
 
 def test_signals_of_another_trial(small_copy):

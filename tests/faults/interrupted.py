@@ -1,12 +1,15 @@
 """Runs that are killed, and disks that are full, at random moments: what is resumed is what was never disturbed.
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/faults/interrupted.py kill|full COUNT [SESSION]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/faults/interrupted.py kill|felt|full COUNT [SESSION]
 
 `kill`: an evaluation with two workers, or one of its workers, is killed (SIGKILL) at a random moment, then started
 again: each file of the output must be the same to the byte as without.
+`felt`: the same of a session's signals alone, in forks of a process that has loaded all there is to load: a tenth of
+the time, and the same files, locks, workers and tables, without pictures.
 `full`: no byte can be written from a random file on, by a limit on the size of files, which anyone may set. One line
 and exit code 2, each file that stood before stands, and what is resumed is the same to the byte.
-Prints a line each; the exit code is 1 where one of them fails. 10 of the small session take some ten minutes.
+Prints a line each; the exit code is 1 where one of them fails. 10 of the small session take some ten minutes, 100 of
+`felt` about as long.
 """
 
 import io
@@ -19,10 +22,16 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+
+from bench import cli
+from bench.base import atomic, workers
+from tests.faults.fuzz import GAUGES
 
 ROOT = Path(__file__).resolve().parents[2]
 SESSION = ROOT / "fixtures" / "small-session"
@@ -41,6 +50,61 @@ def started(session: Path, out: Path) -> subprocess.Popen:
     return subprocess.Popen(command(session, out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=where)
 
 
+class Fork:
+    """An evaluation in a fork of this process; so are its two workers, which are spawned elsewhere."""
+
+    def __init__(self, session: Path, out: Path):
+        self._said, self.returncode = out.with_name("said.txt"), None
+        self.pid = os.fork()
+        if self.pid == 0:
+            self._run(session, out)
+
+    def _run(self, session: Path, out: Path) -> None:
+        code = 99
+        try:
+            with self._said.open("w") as file, redirect_stdout(io.StringIO()), redirect_stderr(file):
+                code = cli.main(command(session, out)[3:])
+        finally:
+            os._exit(code)
+
+    def poll(self) -> int | None:
+        """The exit code, None while it runs."""
+        if self.returncode is None:
+            ended, status = os.waitpid(self.pid, os.WNOHANG)
+            self.returncode = os.waitstatus_to_exitcode(status) if ended else None
+        return self.returncode
+
+    def wait(self) -> int:
+        """The exit code, once it has ended."""
+        while self.poll() is None:
+            time.sleep(_LOOK_S)
+        return self.returncode
+
+    def communicate(self) -> tuple[None, bytes]:
+        """Nothing, and what was said of a fault, once it has ended."""
+        self.wait()
+        return None, self._said.read_bytes()
+
+
+def felt_session(folder: Path) -> Path:
+    """The small session's signals, with gauges brought along."""
+    session = folder / "felt"
+    shutil.copytree(SESSION, session, ignore=shutil.ignore_patterns("boards", "low", "high", "frames.csv"))
+    (session / "gauges.toml").write_text(GAUGES)
+    return session
+
+
+def felt(count: int) -> int:
+    """How many of so many killed runs did not come to the same bytes, of signals alone and in forks."""
+    loaded = get_context
+    workers.multiprocessing.get_context = lambda _: loaded("fork")
+    with tempfile.TemporaryDirectory() as folder:
+        session = felt_session(Path(folder))
+        with redirect_stdout(io.StringIO()):  # loads all that is loaded at first use
+            cli.main(["evaluate", str(session), "--out", str(Path(folder) / "first")])
+        return kill(count, session, Fork)
+
+
 def contents(out: Path) -> dict[str, bytes]:
     """Every file of an output, by name."""
     files = (path for path in out.rglob("*") if path.is_file() and path.name not in _OWN)
@@ -55,13 +119,13 @@ def differences(found: dict[str, bytes], wanted: dict[str, bytes]) -> list[str]:
 def _workers(pid: int) -> list[int]:
     """Processes that a run works by (Linux)."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+    return [int(child) for child in children if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
-def killed(session: Path, out: Path, files: int, rng: np.random.Generator) -> str:
+def killed(start: Callable, session: Path, out: Path, files: int, rng: np.random.Generator) -> str:
     """What was killed, a random moment after so many files stand: the run, one of its workers, or nothing where the run
     had ended."""
-    run = started(session, out)
+    run = start(session, out)
     while run.poll() is None and sum(1 for _ in out.rglob("*.*")) < files:
         time.sleep(_LOOK_S)
     time.sleep(rng.exponential(_MEAN_WAIT_S))
@@ -79,18 +143,18 @@ def killed(session: Path, out: Path, files: int, rng: np.random.Generator) -> st
     return "a worker"
 
 
-def kill(count: int, session: Path = SESSION) -> int:
-    """How many of so many killed runs did not come to the same bytes."""
+def kill(count: int, session: Path = SESSION, start: Callable = started) -> int:
+    """How many of so many killed runs did not come to the same bytes. start(session, out): a run."""
     rng, bad = np.random.default_rng(9), 0
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"  # one name: .session and messages hold none
-        assert started(session, out).wait() in (0, 1)
+        assert start(session, out).wait() in (0, 1)
         wanted = contents(out)
         for k in range(count):
             shutil.rmtree(out)
-            what = killed(session, out, int(rng.integers(len(wanted))), rng)
+            what = killed(start, session, out, int(rng.integers(len(wanted))), rng)
             stood = len(contents(out))
-            assert started(session, out).wait() in (0, 1)
+            assert start(session, out).wait() in (0, 1)
             wrong = differences(contents(out), wanted)
             bad += bool(wrong)
             told = f"differ: {wrong}" if wrong else "resumed to the same bytes"
@@ -101,8 +165,6 @@ def kill(count: int, session: Path = SESSION) -> int:
 @contextmanager
 def full_disk(first: int, files: int = sys.maxsize):
     """From the so-many-th file on, for so many files, no byte can be written. Of this process alone."""
-    from bench.base import atomic
-
     number, made = itertools.count(), atomic.tempfile.mkstemp
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
 
@@ -121,8 +183,6 @@ def full_disk(first: int, files: int = sys.maxsize):
 
 def full(count: int, session: Path = SESSION) -> int:
     """How many of so many runs onto a full disk lost something that stood, or did not go on from there."""
-    from bench import cli
-
     rng, bad = np.random.default_rng(9), 0
 
     def run(out: Path) -> tuple[int, str]:
@@ -153,5 +213,5 @@ def full(count: int, session: Path = SESSION) -> int:
 
 
 if __name__ == "__main__":
-    what, number_of = {"kill": kill, "full": full}[sys.argv[1]], int(sys.argv[2])
+    what, number_of = {"kill": kill, "felt": felt, "full": full}[sys.argv[1]], int(sys.argv[2])
     sys.exit(bool(what(number_of, *map(Path, sys.argv[3:]))))

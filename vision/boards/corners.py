@@ -65,6 +65,16 @@ def find_corners(grey: np.ndarray, board: Board) -> Corners:
     return refine_corners(grey, px, ids, board)
 
 
+def edge_blur_px(grey: np.ndarray, board: Board) -> float:
+    """Median blur of the board's edges, px, one sigma of a Gaussian; NaN where no board is seen."""
+    ids, px = detect(grey, board)
+    frames = _local_frames(px, ids, board)
+    if frames is None:
+        return float("nan")
+    saddles = fit_saddles(grey, px, frames, _border(board))
+    return float(np.median(saddles.blur_px[saddles.converged])) if np.any(saddles.converged) else float("nan")
+
+
 def detect(grey: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray]:
     """OpenCV's own corners: ids (n,) and px (n, 2), good to about 0.2 px."""
     picture = to_8_bit(grey)

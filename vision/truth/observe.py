@@ -33,6 +33,7 @@ from vision.truth.trial_pictures import TrialPictures
 from vision.truth.value import Value
 from vision.truth.whisk import fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.wire_end import wire_ends
 
 _FEWEST_FRAMES = 4
 
@@ -118,8 +119,8 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     doubts = [contradiction(fitted.one_less), beam and beam.alarm, *unexplained, *whisk.left_out]
     status = "; ".join(filter(None, [truth.status, *doubts]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
-    base = base_lines(*stroke, fitted.uncertainty.lens)
-    return replace(truth, base=base, beam=beam, turns=turns, refinements=without, status=status)
+    base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
+    return replace(truth, base=base, beam=beam, turns=turns, refinements=without, ends=ends, status=status)
 
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:

@@ -56,6 +56,11 @@ def test_what_stands_out_is_named(rng, spoil, said, value, within):
         assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(value, abs=within)
 
 
+def test_what_no_gauge_does_may_be_another_trials_signals(rng):
+    """Half the force from another side: y and z both change, each by a factor of its own."""
+    assert "another trial's signals" in agreement(pairs(rng, np.diag([0.4, 1.3])), GAUGES).cause
+
+
 def test_a_gauge_that_begins_to_drift_at_touch_is_told(rng):
     """0.17 V/s at 10°/s: in one whisk a drift that goes on is no other than a gauge that gives more."""
     drifting = pairs(rng)
@@ -110,3 +115,19 @@ def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(tmp_path, 
     alphas = [float(s["alpha_least_squares_deg"]) for s in (sound, spoilt)]
     assert alphas[1] == pytest.approx(alphas[0], abs=0.5)
     assert float(spoilt["alpha_felt_deg"]) == pytest.approx(float(sound["alpha_felt_deg"]), abs=0.5)
+
+
+def test_signals_of_two_trials_exchanged_are_told_from_a_fault_of_one(tmp_path, exact_vision):
+    (tmp_path / "p.toml").write_text(PROTOCOL.format(shape="cylinder"))
+    session = simulate(tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4)
+    one, other = (next((session / "trials").glob(f"steel_b{slope}*")) / "signals.csv" for slope in (30, 60))
+    texts = one.read_text(), other.read_text()
+    for file, text in zip((other, one), texts):
+        file.write_text(text)
+    evaluate(session, tmp_path / "out", Settings(), workers=0)
+    names = f"{one.parent.name} and {other.parent.name}"
+    assert f"the signals of trials {names} look exchanged" in (tmp_path / "out" / "summary.txt").read_text()
+    one.write_text(texts[0].replace("y_V,z_V", "z_V,y_V", 1))
+    other.write_text(texts[1].replace("y_V,z_V", "z_V,y_V", 1))
+    evaluate(session, tmp_path / "both", Settings(), workers=0)
+    assert "look exchanged: each" not in (tmp_path / "both" / "summary.txt").read_text()

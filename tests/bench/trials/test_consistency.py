@@ -8,7 +8,8 @@ import pytest
 
 from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.session import load_session
-from bench.trials.consistency import cone_doubt, nominal_slope, slope_doubt, turns_doubt, width_doubt
+from bench.session.whisker import Whisker
+from bench.trials.consistency import cone_doubt, length_doubt, nominal_slope, slope_doubt, turns_doubt, width_doubt
 from bench.trials.placing import _by_scale
 from bench.trials.unit import _against_pictures
 from tests.scenes.model_scenes import begun, scene, with_points
@@ -58,7 +59,7 @@ def test_encoder_scale_or_frame_rate(rng, factor):
     assert found == pytest.approx(1.0 / factor, abs=0.01)
 
 
-@pytest.mark.parametrize("before", [3, 6])
+@pytest.mark.parametrize("before", [1, 3, 6])
 def test_an_encoder_jump(rng, before):
     said = doubt(rng, lambda motor: motor + np.radians(0.4) * (np.arange(FRAMES) >= before))
     size = float(said.split("motor_deg jumps by ")[1].split("°")[0])
@@ -110,6 +111,22 @@ def test_cameras_that_see_different_widths_do_not_see_the_bar_alone(trial):
 
 def test_a_diameter_known_badly_is_not_contradicted(trial):
     assert width_doubt({"low": Value(1.2, 0.02)}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD) == ""
+
+
+@pytest.mark.parametrize(
+    ("ends_mm", "length_mm", "said"),
+    [
+        ((100.0, 100.0), 90.0, "the whisker is seen to end 100 ± 2 mm from its base, length_mm says 90"),
+        ((100.0, 101.0), 150.0, "length_mm says 150"),
+        ((100.0, 102.0), 97.0, ""),
+        ((80.0, 100.0), 150.0, ""),  # dark before something dark in one of them
+        ((100.0,), 150.0, ""),
+    ],
+)
+def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, said):
+    whisker = Whisker("cylinder", length_mm, 1.0, 200.0)
+    found = length_doubt({str(k): Value(end, 2.0) for k, end in enumerate(ends_mm)}, whisker)
+    assert found.endswith(said) and bool(found) == bool(said)
 
 
 def test_a_contradicted_whisk_is_apart_and_names_no_gauge(exact_record, trial):

@@ -69,7 +69,7 @@ def test_exposure_is_made_good(rng):
 def test_exposure_far_off_is_left_out(rng):
     even, lines = evenly_exposed("low", series([1.0, 1.0, 1.0, 1.5], rng))
     assert sorted(even) == [0, 1, 2]
-    assert "1 of 4 frames are 1.50 to 1.50 times as bright as most, left out (frames 3)" in lines[0]
+    assert "1 of 4 frames is 1.50 times as bright as most, left out (frame 3)" in lines[0]
 
 
 def test_even_exposure_is_left_alone(rng):
