@@ -27,7 +27,7 @@ import numpy as np
 
 from bench.base.drawing import style
 from bench.base.settings import Settings
-from bench.base.tables import read_table
+from bench.base.tables import TABLES, read_table
 from bench.evaluate import evaluate as _evaluate
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
@@ -41,10 +41,6 @@ if TYPE_CHECKING:
 
     from bench.plan.written import Plan
 
-TABLES = (
-    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature", "tilts", "ledger"),
-)
 Folder = Path | str
 
 

@@ -11,6 +11,12 @@ import numpy as np
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 
+# Of an evaluated session, beside a track a trial; one that has nothing to say has its head alone.
+TABLES = (
+    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
+    *("against_theta", "compliance", "curvature", "tilts", "sensors", "ledger"),
+)
+
 
 def sigma_name(name: str) -> str:
     """Column or key of one standard deviation: the sigma stands before the unit."""

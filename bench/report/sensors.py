@@ -93,11 +93,8 @@ def _pooled(name: str, surface: str, middle: float, alpha_deg: float, percent: n
 
 
 def write_sensors(out: Path, worth: Sequence[SensorWorth]) -> None:
-    """sensors.csv, where there is anything to say; else none, and none of an earlier run."""
-    if worth:
-        write_table(out / TABLE, COLUMNS, map(vars, worth))
-    else:
-        (out / TABLE).unlink(missing_ok=True)
+    """sensors.csv."""
+    write_table(out / TABLE, COLUMNS, map(vars, worth))
 
 
 def sensor_lines(worth: Sequence[SensorWorth]) -> Iterator[str]:

@@ -22,6 +22,7 @@ from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
 from bench.report.page.scene import ELLIPSOID_FACTOR, scene
 from bench.report.page.standing import standings, sureness
+from bench.report.page.together import together
 from bench.report.page.words import number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
@@ -37,7 +38,7 @@ _PARTS = {
     "remainder_mm": "beam theory, slip along",
 }
 _MOST_BARS = 60  # whisks; of more, those with the largest sum of shares are drawn
-_IN_FIGURES = ("Truth", "Error of d_x", "Doubtful", "Cameras", "Gauges", "Taken as exact", "Only what")
+_IN_FIGURES = ("Truth", "Error of d_x", "Doubtful", "Cameras", "Gauges", "Taken as exact", "Only what", "Sensors")
 
 
 def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
@@ -70,7 +71,7 @@ def write_report(
 
 
 def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> str:
-    """The page as HTML. out: where its pictures are taken from."""
+    """The page as HTML. out: where its pictures and the tables of whisks together are taken from."""
     rows = rows_of(results)
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
     standing = standings(results)
@@ -87,6 +88,7 @@ def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction:
         figures=list(figures(record, rows, friction)),
         explained=_stack(explained_bars(record, rows), SHARES, _PARTS),
         budget=_stack(budget_bars(rows), CAUSES, {cause: cause for cause in CAUSES}),
+        together=together(out),
         scene=as_script(drawn),
         scene_known=bool(drawn["cameras"] or drawn["whisks"]),
         settings=[(f.name, _setting(getattr(record.settings, f.name))) for f in fields(record.settings)],

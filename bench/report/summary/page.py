@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.base.tables import TABLES
 from bench.friction.curved import curved_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
@@ -23,10 +24,6 @@ from bench.trials.compare import Judged, judge
 
 DOUBTFUL = "Doubtful"
 _MOST_ON_SCREEN = 20  # lines: a screen
-_TABLES = (
-    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
-    *("against_theta", "compliance", "curvature", "tilts", "ledger"),
-)
 
 
 @dataclass(frozen=True)
@@ -102,7 +99,7 @@ def _sections(
     yield _titled(DOUBTFUL, doubtful)
     yield _titled("Score against the truth files of this synthetic session (no result knows them)", scores)
     yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))
-    yield _titled("Files", _files(figures, [*_TABLES, *["sensors"] * bool(sensors)]))
+    yield _titled("Files", _files(figures, TABLES))
 
 
 def _titled(title: str, lines: Iterable[str]) -> Section:
