@@ -118,13 +118,14 @@ def evaluate(
     preset: str = STANDARD,
     accuracy_mm: float | None = None,
     follow_links: bool = False,
-    workers: int = 1,
+    workers: int = 0,
     dask: str | None = None,
     figure_formats: Sequence[str] = (),
 ) -> Run:
     """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the screen.
 
-    The options are those of the command line. Raises BadInput, Refused.
+    The options are those of the command line; workers: 0 works in this process. More are processes of their own, which
+    read the script that asks for them: it does so below `if __name__ == "__main__":`. Raises BadInput, Refused.
     """
     settings = Settings(
         theta_deg=theta_deg,
@@ -165,10 +166,10 @@ def plan(
     theta_deg: float = 3.0,
     changes: bool = True,
     follow_links: bool = False,
-    workers: int = 1,
+    workers: int = 0,
 ) -> "Plan":
     """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does: a row a trial, with expected
-    sigmas, limits and changes. Raises BadInput."""
+    sigmas, limits and changes. workers: as of `evaluate`. Raises BadInput."""
     from bench.plan import run as planning  # with the rig and all that paints: other verbs do without
 
     quiet, options = logging.getLogger(__name__).info, planning.Options(theta_deg, changes, follow_links)

@@ -2,7 +2,7 @@
 
 Every job runs with one thread, however many processes there are, because libraries sum in another order with other
 numbers of threads: in fresh processes, or here where one is asked for and this one has a single thread itself
-(`single_thread`), which spares it from loading every library twice. Tests pass 0 workers: then jobs run here.
+(`single_thread`), which spares it from loading every library twice. With 0 workers jobs run here.
 """
 
 import multiprocessing

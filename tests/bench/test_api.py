@@ -1,13 +1,15 @@
 """The Python interface: its examples work as shown, its tables are those of the files."""
 
 import doctest
+from inspect import signature
 
 import numpy as np
 import pytest
 
 from bench import api
 from bench.base.errors import BadInput
-from bench.base.tables import TEXT, WHOLE, read_table
+from bench.base.tables import TEXT, WHOLE, read_table, write_table
+from bench.report.assembly import WHISK_COLUMNS
 from tests.scenes.formats import documented
 
 
@@ -34,6 +36,18 @@ def test_tables_are_those_of_the_files(exact_run):
     row = run.whisks[run.whisks["trial"] == "b60_4"][0]
     assert row["d_x_mm"] == pytest.approx(64.949086, abs=1e-5) and np.isnan(run.estimates["beta_est_deg"][0])
     assert len(run.track("b60_4")) == len((exact_run / "track" / "b60_4.csv").read_text().splitlines()) - 1
+
+
+def test_how_hard_pictures_were_looked_at_is_text(tmp_path):
+    row = {"trial": "b60_4", "whisk": 0, "cameras": 2, "frames_used": 11, "looked": "standard"}
+    write_table(tmp_path / "whisks.csv", WHISK_COLUMNS, [row])
+    assert read_table(tmp_path / "whisks.csv")["looked"].tolist() == ["standard"]
+
+
+def test_a_script_of_ones_own_starts_no_process_that_would_read_it_again():
+    """A process that is spawned imports the script that asks for it, and would evaluate there, too."""
+    for verb in (api.evaluate, api.plan):
+        assert signature(verb).parameters["workers"].default == 0
 
 
 def test_what_is_not_there_is_named(exact_run, tmp_path):
