@@ -41,7 +41,7 @@ lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff check .
 
 docs: $(VENV)/ready-for-docs
-	$(BIN)/mkdocs build --strict --quiet
+	$(BIN)/mkdocs build --strict
 
 clean:
 	rm -rf $(VENV) $(SETS) demo-out versions-out build/site

@@ -1,17 +1,18 @@
 """The verbs for Python: results as NumPy tables, figures as Matplotlib has them.
 
->>> run = evaluate(session, out, alpha_est_deg=12.0)
->>> run.verdict[-1]
-'sample: no pictures, so no truth; 2 measured whisks felt...'
->>> run.whisks.dtype.names[:4]
-('trial', 'whisk', 'surface', 'speed_deg_s')
->>> given = run.estimates["estimator"] == "with_friction"
->>> run.estimates["alpha_est_deg"][given].round(1).tolist()
-[12.0, 12.0, 12.0, 12.0]
->>> read(out).whisks["trial"].tolist()
-['b30_3', 'b60_4', 'gauge_roll0', 'gauge_roll90']
->>> sorted(run.figures())
-['fig8']
+Examples:
+    >>> run = evaluate(session, out, alpha_est_deg=12.0)
+    >>> run.verdict[-1]
+    'sample: no pictures, so no truth; 2 measured whisks felt...'
+    >>> run.whisks.dtype.names[:4]
+    ('trial', 'whisk', 'surface', 'speed_deg_s')
+    >>> given = run.estimates["estimator"] == "with_friction"
+    >>> run.estimates["alpha_est_deg"][given].round(1).tolist()
+    [12.0, 12.0, 12.0, 12.0]
+    >>> read(out).whisks["trial"].tolist()
+    ['b30_3', 'b60_4', 'gauge_roll0', 'gauge_roll90']
+    >>> sorted(run.figures())
+    ['fig8']
 
 `session` and `out` are folders, as on the command line, which is made of these functions. Bad input raises
 `bench.base.errors.BadInput` or `vision.geometry.errors.Refused`, whose text is the line that the command line shows.
