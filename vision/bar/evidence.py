@@ -79,6 +79,20 @@ class LitRod:
         normal = np.swapaxes(columns, -1, -2) @ columns
         return self.marginal(normal[:, None], np.diag(self._of_outside[[0, 1, 4]]))
 
+    def misfit_of_one_edge(self, at_px: np.ndarray, radius_px: float, blur_px: float) -> np.ndarray:
+        """The misfit (k,) per bin where only one of the two edges about these middles (k,) is there, left or right:
+        that of another, wider thing, beside which nothing is different."""
+        across = self.profiles
+        misfits = []
+        for side in (-1.0, 1.0):
+            beyond = ndtr((across.offset_px - at_px[:, None] - side * radius_px) / blur_px)
+            columns = [share * one for share in (1.0 - beyond, beyond)
+                       for one in (1.0, across.offset_px / OUTSIDE_PX, across.behind)]
+            columns = np.sqrt(across.weight)[..., None] * np.stack([*columns, across.light], axis=-1)
+            normal = np.swapaxes(columns, -1, -2) @ columns
+            misfits.append(self.marginal(normal[:, None], np.diag(np.tile(self._of_outside[[0, 1, 4]], 2)))[1][:, 0])
+        return np.minimum(*misfits)
+
     def marginal(self, normal: np.ndarray, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Minus twice the log evidence (k, …), and the misfit (k, …) per bin, of models with these products
         (k, …, n, n) of their weighted columns, the light the last of them, and a Gaussian prior with this inverse
@@ -99,7 +113,8 @@ class LitRod:
 @dataclass(frozen=True)
 class Evidence:
     """Under a lens blur, minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior;
-    the misfit (k,) per bin at its best; and both, (k,) each, of there being no bar."""
+    the misfit (k,) per bin at its best; the former (k,) of there being no bar, and the latter (k,) of that, or of one
+    edge alone."""
 
     blur_px: float
     shift_px: np.ndarray
@@ -115,7 +130,8 @@ class Evidence:
 
     @property
     def clearness(self) -> float:
-        """The log of how many times worse the light is explained without a bar: of the median stretch."""
+        """The log of how many times worse the light is explained without a bar, or with one edge of it: of the median
+        stretch."""
         return float(np.median(np.log(np.maximum(self.misfit_of_none, 1.0) / np.maximum(self.misfit, 1.0))))
 
 
@@ -134,8 +150,9 @@ def evidence(rod: LitRod, reach_px: float, blur_px: float, positions: int = 1, a
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
     best = np.argmin(value.reshape(len(seen), -1), axis=1)
     none, misfit_of_none = rod.of_none
+    one_edge = rod.misfit_of_one_edge(shift[best // value.shape[2]], wider * seen.radius_px, blur_px)
     return Evidence(blur_px, shift, value, misfit.reshape(len(seen), -1)[np.arange(len(seen)), best], none[:, 0],
-                    misfit_of_none[:, 0])
+                    np.minimum(misfit_of_none[:, 0], one_edge))
 
 
 def _normal(seen: Profiles, shifts, more_px: float, blur_px: float, radius_px: float) -> np.ndarray:
