@@ -59,8 +59,9 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
             for name in session.board_sources:
                 for line in _check_boards(session, name):
                     doubts.note(line)
-    with doubts.guard():
-        given_gauges(session)
+    if session.whisker is not None:
+        with doubts.guard():
+            given_gauges(session)
     rig = {name: read_picture(picture) for name, picture in session.rig_pictures.items()}
     pushes: list[np.ndarray] = []
     for trial in (trial for trial in session.trials if trial.purpose != "weight"):
@@ -73,7 +74,8 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
             felt = [*_of_gauges(signals, strokes), *_of_strokes(signals, strokes, times)]
             for line in [*felt, *_of_scene(trial, times, rig)]:
                 doubts.note(f"trials/{trial.name}: {line}")
-    if pushes and not in_two_directions(np.array(pushes)) and given_gauges(session) is None:
+    own = session.gauges_toml is None and session.gauges is None
+    if own and pushes and not in_two_directions(np.array(pushes)):
         doubts.note(f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}")
 
 

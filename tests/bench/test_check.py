@@ -1,5 +1,6 @@
 """`check` finds in seconds what `evaluate` would refuse or doubt after a minute."""
 
+import re
 import shutil
 
 import cv2
@@ -45,6 +46,15 @@ def test_a_fault_of_a_trial(small_copy, fault, expected):
     FAULTS[fault](small_copy)
     notes = found(small_copy).notes
     assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
+
+
+def test_gauges_brought_along_to_a_session_without_its_whisker(small_copy):
+    """What gauges.toml rests on cannot be looked up; that the whisker is missing is said, and nothing else."""
+    manifest = small_copy / "session.toml"
+    without = re.sub(r"(?ms)^\[whisker\].*?(?=^\[)", "", manifest.read_text())
+    manifest.write_text(without)
+    (small_copy / "gauges.toml").write_text("offset_V = [0.0, 0.0]\nmatrix_Nmm_per_V = [[11.3, 0.3], [-0.2, 10.5]]\n")
+    assert found(small_copy).refusals == ["session.toml: [whisker] is missing"]
 
 
 def test_a_rig_picture_out_of_focus(small_copy):
