@@ -18,14 +18,23 @@ from vision.truth.value import UNKNOWN, Value
 
 _GUARD_RAD = np.radians(0.2)  # rad before felt touch, beyond what that is uncertain by. Set by eye
 _LEAST_FREE = 50  # samples
-# Of the paper's 800 Hz filter ahead of the converter, taken as of fourth order (Butterworth): 0.52 ms. The session does
-# not say which filter it had.
-GAUGE_DELAY_S = 2.6131 / (2.0 * np.pi * 800.0)
+PAPERS_FILTER_HZ = 800.0  # ahead of the converter
+
+
+def gauge_delay(filter_Hz: float | None) -> Value:
+    """By how long a ramp comes late out of the gauges' filter, s: the mean of its impulse response.
+
+    Fourth-order Butterworth, √2 √(2 + √2) / (2π filter_Hz), 0 without one (0 Hz). Where no filter is named (None) the
+    paper's, and as sigma that of any delay from none to twice as much (uniform).
+    """
+    mean_s = np.sqrt(2.0) * np.sqrt(2.0 + np.sqrt(2.0)) / (2.0 * np.pi)
+    if filter_Hz is None:
+        return Value(float(mean_s / PAPERS_FILTER_HZ), float(mean_s / PAPERS_FILTER_HZ / np.sqrt(3.0)))
+    return Value(float(mean_s / filter_Hz) if filter_Hz else 0.0, 0.0)
 
 
 def lateness(seen: SeenWhisk, felt: FeltWhisk) -> Value:
-    """Felt less seen touch of a whisk, rad; the felt one's sigma holds the filter's delay. (No error of θ: touch and
-    moments are late alike.)"""
+    """Felt less seen touch of a whisk, rad."""
     sigma = float(np.hypot(seen.touch_rad.sigma, felt.touch_felt_rad.sigma))
     return Value(felt.touch_felt_rad.value - seen.touch_rad.value, sigma)
 
@@ -35,16 +44,18 @@ def motor_speed(frames: FrameTruth) -> float:
     return float(np.median(np.diff(frames.motor_rad) / np.diff(frames.time_s)))
 
 
-def touch_on_the_way_back(signals: Signals) -> Value:
-    """Where the first back stroke lets go of the bar, rad: felt touch of that stroke run backwards."""
+def touch_on_the_way_back(signals: Signals, delay_s: float) -> Value:
+    """Where the first back stroke lets go of the bar, rad: felt touch of that stroke run backwards, the gauges' delay
+    taken out. Its sigma is without the delay's."""
     where = back_stroke(signals)
     if where is None:
         return UNKNOWN
     channels = np.stack([signals.y, signals.z], axis=1)[where]
     channels = off_the_rails(channels) if signals.kind == "V" else channels
-    time_s = signals.time_s[where]
-    touch = felt_touch(signals.motor_rad[where][::-1], channels[::-1], time_s[-1] - time_s[::-1])
-    return UNKNOWN if touch.status else Value(touch.motor_rad, touch.sigma_rad)
+    time_s, motor_rad = signals.time_s[where], signals.motor_rad[where]
+    touch = felt_touch(motor_rad[::-1], channels[::-1], time_s[-1] - time_s[::-1])
+    speed_rad_s = float(np.ptp(motor_rad) / np.ptp(time_s))
+    return UNKNOWN if touch.status else Value(touch.motor_rad + delay_s * speed_rad_s, touch.sigma_rad)
 
 
 @dataclass(frozen=True)

@@ -211,9 +211,10 @@ class FeltWhisk:
     change by at one sigma of each cause that all whisks have in common. agreement_chi2: of the moments with
     those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
     elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
-    moments and estimates at other pushing angles, up to the stroke's end. sensors: what the other sensors of Table I
-    say, where a load cell was recorded. kinetic: as on the kinetic cone, where the
-    moments alone show that the contact sticks and slips. with_drift: None where no drift was taken out.
+    moments and estimates at other pushing angles, up to the stroke's end. delay_s: of the gauges' filter, taken out of
+    the touch. sensors: what the other sensors of Table I say, where a load cell was recorded. kinetic: as on the
+    kinetic cone, where the moments alone show that the contact sticks and slips. with_drift: None where no drift was
+    taken out.
     """
 
     whisk: int = 0
@@ -236,6 +237,7 @@ class FeltWhisk:
     sensors: tuple[EstimateRow, ...] = ()
     kinetic: FeltAt | None = None
     with_drift: WithDrift | None = None
+    delay_s: Value = UNKNOWN
 
     @property
     def has_moments(self) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.friction.alphas import felt_friction, seen_friction
 from bench.friction.runs import GIVEN, KINETIC
-from bench.gauges.felt import GAUGE_DELAY_S, motor_speed
+from bench.gauges.felt import motor_speed
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.whisker import Whisker
 from bench.trials.clocks import SharedTouch
@@ -171,9 +171,9 @@ def _sag_and_set(_: WhiskAtHand) -> Felt:
 
 
 def _delay(here: WhiskAtHand) -> Felt:
-    late = GAUGE_DELAY_S * here.speed_rad_s
+    late = here.felt.delay_s.value * here.speed_rad_s
     unless = "" if np.isfinite(late) else "no speed is known"
-    return Felt(-late, 0.0, unless or "a filter of 800 Hz; touch and moments are late alike")
+    return Felt(late, 0.0, unless or "touch and moments are late alike")
 
 
 def _cross_talk(here: WhiskAtHand) -> Felt:

@@ -33,6 +33,7 @@ def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
                   "dictionary": b.dictionary, "legacy": b.legacy, "inverted": b.inverted},
         "rig": rig,
         **({"cameras": cameras} if cameras else {}),
+        "trial": {"gauge_filter_Hz": g.filter_Hz},
     }
     if g.known:
         session["gauges"] = {"offset_V": list(g.offset_V), "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V]}

@@ -109,6 +109,7 @@ class TrialKeys(Keys, kw_only=True):
     frame_rate_sigma_Hz: float = 0.0
     first_frame_s: float | None = None
     first_frame_sigma_s: float = 0.0
+    gauge_filter_Hz: float | None = None
     follicle_roll_deg: float = 0.0
     follicle_roll_sigma_deg: float = 0.0
 
@@ -121,6 +122,7 @@ class TrialKeys(Keys, kw_only=True):
         "at_mm": plausible.LENGTH,
         "frame_rate_Hz": plausible.RATE,
         "first_frame_s": plausible.CLOCK,
+        "gauge_filter_Hz": plausible.FILTER,
         "follicle_roll_deg": plausible.ANGLE,
     }
 

@@ -47,6 +47,7 @@ class Trial:
     frame_rate_sigma_Hz: float
     first_frame_s: float | None
     first_frame_sigma_s: float
+    gauge_filter_Hz: float | None
     daq: DaqFile | None = None
 
     def shown(self, file: str) -> str:

@@ -3,9 +3,9 @@
     felt − seen = zero + clock · speed
 
 The speed is negative on the way back. zero: what moves either touch by an angle (diameters, light on the bar, the
-gauges' onset); clock: by how much the frames' clock runs behind the signals', plus the delay of the gauges' filter.
-Whisks at one speed and in one direction tell their sum alone. No truth is moved by what is felt: an error that is more
-than chance is a doubt, and enters the sigma of touch seen.
+gauges' onset); clock: by how much the frames' clock runs behind the signals', plus what the delay of the gauges' filter
+is longer than what was taken out. Whisks at one speed and in one direction tell their sum alone. No truth is moved by
+what is felt: an error that is more than chance is a doubt, and enters the sigma of touch seen.
 """
 
 from collections.abc import Iterable, Sequence
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from bench.gauges.felt import GAUGE_DELAY_S, motor_speed
+from bench.gauges.felt import motor_speed
 from bench.records.trial import SeenWhisk, TrialResult, whisks
 from vision.geometry.counted import counted
 from vision.truth.value import Value
@@ -82,10 +82,10 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     rows = np.array(list(_rows(results)))
     if not len(rows):
         return None
-    difference, seen, felt, speed, clock = rows.T
+    difference, seen, felt, speed, late_s = rows.T
     lever = np.stack([np.ones_like(speed), speed], axis=1)
     # What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and filter surely do.
-    late = np.hypot(GAUGE_DELAY_S, clock) * speed
+    late = late_s * speed
     weight = np.linalg.inv(np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late))
     told = lever.T @ weight @ lever
     pull = lever.T @ weight @ difference
@@ -99,20 +99,22 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
 
 def _rows(results: Iterable[TrialResult]):
     """Of each stroke felt − seen, the sigmas of seen (its clock apart) and felt (the filter's delay apart), rad; its
-    speed, and the clock's sigma, s."""
+    speed, and the sigma of clock and delay together, s."""
     for result in results:
         clock_s, back = result.seen.clock.sigma_s if result.seen.clock else 0.0, result.seen.back
+        delay_s = max((f.delay_s.sigma for f in result.felt.whisks), default=np.nan)
         pairs = [
-            (s.touch_rad, s.touch_shared_rad, Value(f.touch_felt_rad.value, f.theta_sigma_rad), motor_speed(s.frames))
+            (s.touch_rad, s.touch_shared_rad, Value(f.touch_felt_rad.value, f.theta_sigma_rad), motor_speed(s.frames),
+             f.delay_s.sigma)
             for _, s, f in whisks([result])
             if np.isfinite(s.touch_rad.value)
         ]
-        pairs += [(back.touch_rad, 0.0, result.felt.back_touch_rad, back.speed_rad_s)] if back else []
-        for seen, shared, felt, speed in pairs:
+        pairs += [(back.touch_rad, 0.0, result.felt.back_touch_rad, back.speed_rad_s, delay_s)] if back else []
+        for seen, shared, felt, speed, filter_s in pairs:
             own = np.sqrt(max(seen.sigma**2 - shared**2 - (clock_s * speed) ** 2, 0.0))
             row = felt.value - seen.value, own, felt.sigma
             if np.isfinite(row).all():
-                yield *row, speed, clock_s
+                yield *row, speed, float(np.hypot(clock_s, filter_s))
 
 
 def with_shared_touch(results: Sequence[TrialResult], shared: SharedTouch | None) -> tuple[TrialResult, ...]:

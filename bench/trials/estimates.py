@@ -10,7 +10,7 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import GAUGE_DELAY_S, Stroke
+from bench.gauges.felt import Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
@@ -126,14 +126,15 @@ def whisk_at(stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_r
     )
 
 
-def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float) -> FeltWhisk:
+def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float, delay_s: Value) -> FeltWhisk:
     """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`.
 
-    The gauges' own filter makes all that is felt late: that is in the touch's sigma, and not in θ's, since touch and
-    moments are late alike.
+    The gauges' own filter makes all that is felt late by `delay_s`. That is taken out of the touch, and is in its
+    sigma; θ has neither, since touch and moments are late alike.
     """
-    late = math.hypot(touch.sigma_rad, GAUGE_DELAY_S * speed_rad_s)
-    felt = FeltWhisk(number, Value(touch.motor_rad, late), theta_sigma_rad=touch.sigma_rad)
+    late = delay_s.value * speed_rad_s, delay_s.sigma * speed_rad_s
+    on_time = Value(touch.motor_rad - late[0], math.hypot(touch.sigma_rad, late[1]))
+    felt = FeltWhisk(number, on_time, theta_sigma_rad=touch.sigma_rad, delay_s=delay_s)
     if whisk is None:
         return felt
     m_y, m_z = _moments(whisk)

@@ -15,7 +15,7 @@ import numpy as np
 from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_result, write_result
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
-from bench.gauges.felt import Stroke, strokes_of, touch_on_the_way_back
+from bench.gauges.felt import Stroke, gauge_delay, strokes_of, touch_on_the_way_back
 from bench.gauges.matrix import FROM_ALL, FROM_TRIALS, Gauges
 from bench.gauges.readings import Pairs, pairs_of
 from bench.records.phases import NO_PHASES, Phases
@@ -169,7 +169,8 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     and are no estimate."""
     strokes = strokes_of(signals, unit.trial, unit.settings)
     whisks = tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes))
-    return FeltTrial(whisks, touch_on_the_way_back(signals) if seen.back else UNKNOWN)
+    delay = gauge_delay(unit.trial.gauge_filter_Hz)
+    return FeltTrial(whisks, touch_on_the_way_back(signals, delay.value) if seen.back else UNKNOWN)
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
@@ -182,7 +183,7 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     usable = None if status else whisk
     if usable is not None and readout.is_gauged:
         status = unit.gauges.beyond(readout.in_follicle(usable))
-    felt = as_felt(number, touch, usable, stroke.speed_rad_s)
+    felt = as_felt(number, touch, usable, stroke.speed_rad_s, gauge_delay(unit.trial.gauge_filter_Hz))
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
@@ -283,10 +284,11 @@ def _with_drift(unit: Unit, stroke: Stroke, readout: Readout) -> WithDrift | Non
         return None
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke.with_drift, readout, unit.drift_rate, beam, theta_rad)
+    felt = as_felt(0, touch, None, stroke.speed_rad_s, gauge_delay(unit.trial.gauge_filter_Hz))
     if isinstance(whisk, str):
-        return WithDrift(touch.motor_rad, NAN)
+        return WithDrift(felt.touch_felt_rad.value, NAN)
     (row,) = answers(whisk, {_TEN: ESTIMATORS[_TEN]}, unit.settings)
-    return WithDrift(touch.motor_rad, row.d_x_est_mm.value)
+    return WithDrift(felt.touch_felt_rad.value, row.d_x_est_mm.value)
 
 
 def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.base.settings import Settings
 from bench.gauges.drift import drift_rate, free_slope
-from bench.gauges.felt import strokes_of
+from bench.gauges.felt import gauge_delay, strokes_of
 from bench.gauges.gauges_file import given_gauges
 from bench.report.score import Score
 from bench.rig.simulate import simulate
@@ -68,7 +68,8 @@ def felt_rows(session_path: Path, thetas_deg: Sequence[float]) -> Iterator[dict]
             for theta_deg in thetas_deg:
                 row = {"speed": trial.speed_deg_s, "theta_deg": theta_deg}
                 touch, whisk = felt_whisk(stroke, readout, rate, session.whisker.beam, np.radians(theta_deg))
-                felt = as_felt(0, touch, whisk, stroke.speed_rad_s).touch_felt_rad
+                delay = gauge_delay(trial.gauge_filter_Hz)
+                felt = as_felt(0, touch, whisk, stroke.speed_rad_s, delay).touch_felt_rad
                 row["touch"] = np.degrees(felt.value) - truth["touch_deg"]
                 row["touch_sigma"] = np.degrees(felt.sigma)
                 said = answer("with_friction", with_friction, whisk, alpha, 0.0).d_x_est_mm

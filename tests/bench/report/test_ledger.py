@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.base.tables import read_table
-from bench.gauges.felt import GAUGE_DELAY_S
+from bench.gauges.felt import gauge_delay
 from bench.records.trial import EstimateRow, WithDrift
 from bench.report.ledger import COLUMNS, MAY_GO, NEEDED, NOT_KNOWN, Entry, ledger, ledger_lines, write_ledger
 from bench.report.left_out import NAMES
@@ -110,7 +110,7 @@ def test_the_table_and_the_lines(exact_run, tmp_path):
     trials = set(table["trial"].tolist())
     assert len(table) == len(NAMES) * len(trials)
     delay = table[(table["refinement"] == "gauges' delay") & (table["trial"] == "b60_4")]
-    assert delay["touch_felt_effect_deg"][0] == pytest.approx(-GAUGE_DELAY_S * 10.0, rel=0.02)  # 10°/s
+    assert delay["touch_felt_effect_deg"][0] == pytest.approx(gauge_delay(None).value * 10.0, rel=0.02)  # 10°/s
     assert delay["verdict"].tolist() == [NEEDED]
     lines = list(ledger_lines(write_ledger(tmp_path, [result(50.0)], WHISKER)))
     assert len(lines) == len(NAMES) and any("needed in 1 of 1" in line for line in lines)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
-from bench.gauges.felt import GAUGE_DELAY_S, lateness
+from bench.gauges.felt import gauge_delay, lateness
 from bench.records.trial import (
     Clock,
     FeltTrial,
@@ -34,21 +35,31 @@ def result(clock=None, **seen) -> TrialResult:
 
 def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
     recorded, stated = Clock("frames.csv", 0.0, True), Clock("frame_rate_Hz", 0.025, False)
-    own, other, _ = clock_lines([result(recorded), result(stated), result(stated)])
+    own, other = clock_lines([result(recorded), result(stated), result(stated)])
     assert own.endswith("(frames.csv), 1 of 3 trials; their clock is taken as that of the signals")
     assert "by frame_rate_Hz, 2 of 3 trials: no recorded edge" in other
     assert "do not tell the clock from the encoder's zero; taken as known to 25 ms" in other
 
 
-def test_felt_touch_is_late_within_the_filters_delay():
-    """At 90 deg/s 0.52 ms are 0.047 deg: what a filter of 800 Hz delays is one sigma."""
-    felt = as_felt(0, Touch(0.0508, 1e-5), None, np.radians(90.0))
-    late = lateness(SeenWhisk(0, touch_rad=Value(0.05, 1e-5)), felt)
-    assert late.value == pytest.approx(8e-4)
-    assert np.degrees(late.sigma) == pytest.approx(0.0468, abs=1e-4)
-    assert felt.touch_felt_rad.sigma == pytest.approx(late.sigma, rel=1e-3)
-    assert felt.theta_sigma_rad == 1e-5  # touch and moments are late alike
-    assert pytest.approx(0.52e-3, rel=0.01) == GAUGE_DELAY_S
+@pytest.mark.parametrize(
+    "filter_Hz, late_deg, doubt_deg", [(800.0, 0.0468, 0.0), (None, 0.0468, 0.0270), (0.0, 0.0, 0.0)]
+)
+def test_the_filters_delay_is_taken_out_of_felt_touch(filter_Hz, late_deg, doubt_deg):
+    """At 90 deg/s 0.52 ms are 0.047 deg; whose filter is not named may have any delay up to twice the paper's."""
+    own = np.radians(0.001)
+    felt = as_felt(0, Touch(0.0508, own), None, np.radians(90.0), gauge_delay(filter_Hz))
+    late = lateness(SeenWhisk(0, touch_rad=Value(0.05, own)), felt)
+    assert np.degrees(late.value) == pytest.approx(np.degrees(8e-4) - late_deg, abs=1e-4)
+    assert np.degrees(late.sigma) == pytest.approx(np.hypot(0.001 * 2**0.5, doubt_deg), abs=1e-4)
+    assert felt.theta_sigma_rad == own  # touch and moments are late alike
+
+
+@pytest.mark.parametrize("filter_Hz", [200.0, 800.0])
+def test_the_delay_is_the_mean_of_the_filters_impulse_response(filter_Hz):
+    rate_Hz = 1e5
+    sections = butter(4, filter_Hz, fs=rate_Hz, output="sos")
+    answer = sosfilt(sections, np.eye(1, 10_000)[0])
+    assert answer @ np.arange(10_000) / rate_Hz == pytest.approx(gauge_delay(filter_Hz).value, rel=1e-3)
 
 
 def test_a_rig_board_that_is_not_told_apart_is_an_empty_cell_and_a_line():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.gauges.felt import GAUGE_DELAY_S
+from bench.gauges.felt import gauge_delay
 from bench.records.trial import (
     BackStroke,
     FeltTrial,
@@ -33,7 +33,7 @@ def frames(speed_rad_s):
 def trial(seen, felt, **halves):
     """A result of one whisk, or of none that is known."""
     facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 3000.0)
-    whisk = FeltWhisk(touch_felt_rad=felt, theta_sigma_rad=felt.sigma)
+    whisk = FeltWhisk(touch_felt_rad=felt, theta_sigma_rad=felt.sigma, delay_s=gauge_delay(None))
     felt_half = FeltTrial((whisk,), halves.pop("felt_back", UNKNOWN))
     return TrialResult(*facts, 3.0, SeenTrial((seen,), **halves), felt_half)
 
@@ -80,7 +80,7 @@ def test_back_strokes_and_speeds_tell_a_clock_from_a_zero(rng, how, clock_s, zer
     shared = shared_touch(results)
     off = shared.values - [np.radians(zero_deg), clock_s]
     assert np.all(np.abs(off) < 4 * np.sqrt(np.diag(shared.covariance)))
-    assert shared.covariance[1, 1] ** 0.5 < 1.5 * GAUGE_DELAY_S
+    assert shared.covariance[1, 1] ** 0.5 < 1.5 * gauge_delay(None).value
     assert words in shared_doubt(results, shared)
 
 

@@ -8,7 +8,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import Stroke, gauge_delay
 from bench.gauges.matrix import GaugeMatrix
 from bench.trials.estimates import Readout, answer, answers, as_felt, estimators, felt_whisk
 from estimator import slip
@@ -49,7 +49,8 @@ def test_answers_carry_what_they_assumed(rng):
     assert rows["frictionless"].alpha_est_rad == 0.0
     assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
     assert np.degrees(rows["with_friction"].beta_est_rad) == pytest.approx(60.0, abs=0.2)
-    assert np.degrees(as_felt(0, touch, whisk, 0.17).phi_felt_rad.value) == pytest.approx(50.0, abs=0.2)
+    felt = as_felt(0, touch, whisk, 0.17, gauge_delay(None))
+    assert np.degrees(felt.phi_felt_rad.value) == pytest.approx(50.0, abs=0.2)
 
 
 def test_sigma_of_10_is_its_scatter(rng):
@@ -99,7 +100,7 @@ def test_no_touch_is_a_reason(rng):
     silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
     touch, reason = felt_whisk(silent, Readout.bare(), np.zeros(2), BEAM, THETA)
     assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
-    assert np.isnan(as_felt(0, touch, None, 0.17).touch_felt_rad.value)
+    assert np.isnan(as_felt(0, touch, None, 0.17, gauge_delay(None)).touch_felt_rad.value)
 
 
 @pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])
