@@ -26,6 +26,7 @@ from bench.rig import build
 from bench.rig.protocol import Protocol, load
 from bench.session.check import checked_session
 from bench.session.inside import check_outside
+from bench.session.session import MANIFEST
 from bench.trials.of_session import judged, placed_units
 from bench.trials.unit import see_unit
 from vision.calibration.views import MeasuredPose
@@ -63,6 +64,8 @@ def plan(what: Path, out: Path, options: Options, *, workers: int = 1, progress:
 
 def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
     """A rig as a protocol describes it. Raises BadInput."""
+    if path.name == MANIFEST:
+        raise BadInput("is a recorded session's; give the session's folder, or a RIG.toml", file=path)
     protocol = load(str(path))
     if not protocol.cameras:
         raise BadInput("has no [[cameras]]: there is nothing to see by", file=path)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from bench import api, cli
+from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.plan.expected import expected
 from bench.plan.outlook import QUANTITIES
 from bench.plan.recorded import SeenTask, plan_seen
-from bench.plan.run import EXAMPLE
+from bench.plan.run import EXAMPLE, Options, plan
 from bench.plan.written import Plan, lines_of
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial import Clock, SeenTrial, SeenWhisk
@@ -151,3 +152,9 @@ def test_the_example_is_printed(capsys):
 def test_a_session_without_pictures_is_refused(steel_signals, tmp_path, capsys):
     assert cli.main(["plan", str(steel_signals), "--out", str(tmp_path / "out")]) == 2
     assert "no pictures" in capsys.readouterr().err
+
+
+def test_a_sessions_manifest_is_no_rig(small_session, tmp_path):
+    with pytest.raises(BadInput, match=r"session\.toml: is a recorded session's; give the session's folder"):
+        plan(small_session / "session.toml", tmp_path / "out", Options())
+    assert not (tmp_path / "out").exists()
