@@ -117,6 +117,10 @@ class Beam:
         """Distance at which the base's cylinder is as stiff as this whisker at d_x; infinite at a cone's point."""
         return _inverse_sum(d_x_mm, -self.taper / self.length_mm)
 
+    def left(self, d_x_mm: ArrayLike) -> Numbers:
+        """Share of the base's diameter that is left at d_x."""
+        return d_x_mm / self.as_cylinder_mm(d_x_mm)
+
     def moment_Nmm(self, theta_rad: ArrayLike, d_x_mm: ArrayLike) -> Numbers:
         """m_z of (2): of a push by θ against a contact at d_x, without slip."""
         return self.C_Nmm2 * theta_rad / self.as_cylinder_mm(d_x_mm)

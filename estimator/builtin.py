@@ -80,15 +80,15 @@ ESTIMATORS = {
 def _first_order(whisk, settings, d_x):
     """The error of (10) at d_x as a share of it, by what is known of the object."""
     beam, alpha = whisk.beam, settings.alpha_est_rad
-    phi = 0.0 if _is_held(whisk) else distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    left = d_x / beam.as_cylinder_mm(d_x)
+    phi = 0.0 if is_held(whisk) else distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    left = beam.left(d_x)
     told = settings.object_radius_mm == settings.object_radius_mm
     reach = settings.object_radius_mm + settings.whisker_radius_mm * left if told else settings.object_reach_mm
     rolling = first_order.rolling(whisk.theta_at_rad, reach, phi, alpha, d_x, left)
     return rolling + (first_order.HELD_SHARE * first_order.dragging(whisk.theta_at_rad, alpha) if phi == 0 else 0.0)
 
 
-def _is_held(whisk):
+def is_held(whisk: Whisk) -> bool:
     """Is no slip to the side felt, within two sigma?"""
     return abs(whisk.m_y_at_Nmm) <= 2 * sqrt(whisk.covariance_at[0, 0])
 
@@ -160,7 +160,7 @@ def _share_left(whisk, settings, d_x, left):
         return 0.0
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     known = {"tilt_sigma": settings.tilt_sigma_rad, "left": left}
-    known["held_spread"] = first_order.HELD_SPREAD if _is_held(whisk) else 1.0
+    known["held_spread"] = first_order.HELD_SPREAD if is_held(whisk) else 1.0
     reach = settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
     return uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, reach=reach, **known)
 

@@ -37,8 +37,17 @@ def rolling(
     >>> round(rolling(0.05, 3.0, 0.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
     """
-    slope = np.where(phi == 0, 0.0, np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE))
-    return -theta * reach / d_x * np.cos(slope) * (0.5 / left - 0.125)
+    return rolling_at(theta, reach, np.where(phi == 0, 0.0, np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE)), d_x, left)
+
+
+@elementwise
+def rolling_at(theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, left: ArrayLike) -> Numbers:
+    """The same where the slope β is known, held or not.
+
+    >>> round(rolling_at(0.05, 3.0, 0.0, 60.0, 1.0), 8)
+    -0.0009375
+    """
+    return -theta * reach / d_x * np.cos(beta) * (0.5 / left - 0.125)
 
 
 @elementwise

@@ -75,6 +75,6 @@ def _noise_share(whisk: Whisk, by: np.ndarray) -> float:
 def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
     """What thickness and lean of an object nothing is known of may move the contact by, as a share of d_x."""
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    left = d_x / whisk.beam.as_cylinder_mm(d_x)
+    left = whisk.beam.left(d_x)
     rolled = load_cell.rolling(whisk.theta_at_rad, settings.object_reach_mm, phi, d_x, left)
     return hypot(rolled, load_cell.leaning(whisk.theta_at_rad, settings.tilt_sigma_rad, phi, settings.alpha_est_rad))

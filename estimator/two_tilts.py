@@ -17,6 +17,7 @@ from math import atan, cos, hypot, isnan, nan, sin, sqrt
 import numpy as np
 
 from estimator import first_order
+from estimator.builtin import is_held
 from estimator.distance import felt_slip_angle
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
@@ -26,7 +27,6 @@ _DRAWN = 0.6  # of θ d: how far a cantilever's end is drawn along itself as it 
 # Of large bending's second order and of friction along the whisker that slips, what is left unknown when they are taken
 # out: as much as exact mechanics differ from them (tests/ladder/two_tilts.py).
 _LARGE_LEFT, _DRAGGING_LEFT = 1 / 3, 1 / 3
-_HELD_SIGMAS = 2.0  # of m_y: within, the contact is held, as estimator.builtin has it
 ALIKE = "the whisks slip alike: no two of them tell friction from distance"
 NO_PUSH = "a whisk does not push: its m_z is not positive"
 BELOW_ZERO = "the friction angle came out below 0"
@@ -156,7 +156,7 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
     """By docs/maps.md, at the friction and the distance found so far. Of an object whose radius nobody tells all from
     nothing to what is allowed for is as likely. A share of d_x is 1/w of that of d, w of the diameter being left."""
     theta, alpha, d_x = whisk.theta_at_rad, max(atan(solution[1]), 0.0), whisk.beam.distance_mm(solution[0])
-    left, held = d_x / solution[0], abs(whisk.m_y_at_Nmm) <= _HELD_SIGMAS * whisk.covariance_at[0, 0] ** 0.5
+    left, held = d_x / solution[0], is_held(whisk)
     phi = 0.0 if held else abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
     bent = theta if held else theta * max(cos(phi + alpha), 0.0) / cos(alpha)
     drawn, slipped = _DRAWN * bent, sin(phi) / cos(alpha)

@@ -102,7 +102,7 @@ def _distance(at: FeltAt, alpha_rad: float, beam: Beam) -> tuple[float, float]:
 
 def _radius(d_x: float, creep: Value, phi: float, alpha: tuple[float, float], whisker: Whisker) -> Value:
     """Of the object, from the change of (10) with θ, mm/rad; phi 0 where the contact is held."""
-    left = d_x / whisker.beam.as_cylinder_mm(d_x)
+    left = whisker.beam.left(d_x)
     per_mm = float(first_order.rolling(1.0, 1.0, phi, alpha[0], 1.0, left))
     held = d_x * float(first_order.dragging(1.0, alpha[0])) if phi == 0 else 0.0
     by_alpha = 0.2 * d_x * alpha[1] * first_order.HELD_SHARE if phi == 0 else 0.0

@@ -18,7 +18,7 @@ from bench.friction.alphas import seen_friction
 from bench.gauges.readings import reference_from_pictures
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
-from bench.trials.compare import is_sound
+from bench.trials.compare import sound_whisks
 from estimator.distance import with_friction
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def write_explained(out: Path, results: Iterable[TrialResult], whisker: Whisker,
     """
     results = list(results)
     rows = list(explained_rows(results, whisker))
-    sound = {(r.trial.name, seen.whisk) for r, seen, felt in whisks(results) if is_sound(seen, felt)}
+    sound = sound_whisks(results)
     total = [mean_row([row for row in rows if (row["trial"], row["whisk"]) in sound])] if rows else []
     write_table(out / "explained.csv", COLUMNS, [*rows, *total])
     if not rows or not drawn:

@@ -142,7 +142,7 @@ def _corrected(
     place: Place, beam: Beam, bar_radius_mm: float, base_radius_mm: float, theta: float, alpha_rad: float
 ) -> float:
     """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`)."""
-    left = _left_of_diameter(beam, place)
+    left = beam.left(place.nominal_mm)
     reach = bar_radius_mm + base_radius_mm * left
     share = first_order.rolling(theta, reach, 0.0, alpha_rad, place.nominal_mm, left)
     share += first_order.HELD_SHARE * first_order.dragging(theta, alpha_rad)
@@ -151,19 +151,15 @@ def _corrected(
 
 def _left(place: Place, beam: Beam, theta: float, alpha_est: Value) -> float:
     """What is left of that in k_θ, of a cause that both places have alike: the contact is the same, and so is α."""
-    alpha, left = alpha_est.value, _left_of_diameter(beam, place)
+    alpha, left = alpha_est.value, beam.left(place.nominal_mm)
     share = model_share(theta, 0.0, alpha, 1.0, left=left, held_spread=first_order.HELD_SPREAD)
     by_alpha = first_order.dragging(theta, alpha + alpha_est.sigma) - first_order.dragging(theta, alpha)
     return float(np.hypot(share, first_order.HELD_SHARE * by_alpha)) * _compliance_of_distance(beam, place)
 
 
-def _left_of_diameter(beam: Beam, place: Place) -> float:
-    return place.nominal_mm / beam.as_cylinder_mm(place.nominal_mm)
-
-
 def _compliance_of_distance(beam: Beam, place: Place) -> float:
     """What k_θ changes by with a relative error of the distance: d_x ∂(d/C)/∂d_x."""
-    return place.nominal_mm / (beam.C_Nmm2 * _left_of_diameter(beam, place) ** 2)
+    return place.nominal_mm / (beam.C_Nmm2 * beam.left(place.nominal_mm) ** 2)
 
 
 def write_compliance(out: Path, found: Sequence[Soft]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from bench.base.tables import write_table
 from bench.friction.runs import told_of, whisk_of
+from bench.gauges.readings import NOMINAL_SHARE
 from bench.records.trial import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.compare import is_sound
@@ -24,7 +25,6 @@ COLUMNS = (
     *("error_mm", "error_percent", "status"),
 )
 _LEAST_TILT_DEG = 10.0  # °: nominal slopes that differ by less are one, set up again
-_RULER_SHARE = 0.01  # of a nominal distance whose sigma nobody gives: set by a ruler (bench.gauges.readings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def _tilted(
     session: Session, surface: str, speed_deg_s: float | None, nominal_mm: float, found: Sequence[tuple]
 ) -> Tilted:
     beam, names = session.whisker.beam, [result.trial.name for result, *_ in found]
-    sigma_mm = max(session.trial(name).d_x_sigma_mm for name in names) or _RULER_SHARE * nominal_mm
+    sigma_mm = max(session.trial(name).d_x_sigma_mm for name in names) or NOMINAL_SHARE * nominal_mm
     told = shared_contact(
         [whisk_of(felt, float(np.radians(result.theta_deg)), beam) for result, _, felt in found],
         told_of(found[0][0]),

@@ -77,7 +77,7 @@ class WhiskAtHand:
     @property
     def left(self) -> float:
         """Share of the base's diameter that is left at the contact."""
-        return 1.0 - self.whisker.beam.taper * self.given.d_x_est_mm.value / self.whisker.beam.length_mm
+        return self.whisker.beam.left(self.given.d_x_est_mm.value)
 
     @property
     def phi_rad(self) -> float:

@@ -34,16 +34,15 @@ class Region:
     bar_radius_mm: float = 3.0
     lean_sigma_deg: float = 5.0
 
-    def points(self) -> np.ndarray:
-        """(3, n): slopes and friction angles, rad, and distances, over the region."""
-        axes = (np.radians(np.linspace(*self.beta_deg, _SLOPES)), np.radians(np.linspace(*self.alpha_deg, _ALPHAS)),
-                np.linspace(*self.d_x_mm, _PLACES))  # fmt: skip
+    def points(self, slopes: int = _SLOPES, alphas: int = _ALPHAS, places: int = _PLACES) -> np.ndarray:
+        """(3, slopes · alphas · places): slopes and friction angles, rad, and distances, over the region."""
+        axes = (np.radians(np.linspace(*self.beta_deg, slopes)), np.radians(np.linspace(*self.alpha_deg, alphas)),
+                np.linspace(*self.d_x_mm, places))  # fmt: skip
         return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
 
     def corners(self) -> np.ndarray:
         """(3, 8): its corners, likewise."""
-        axes = np.radians(self.beta_deg), np.radians(self.alpha_deg), np.array(self.d_x_mm)
-        return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
+        return self.points(2, 2, 2)
 
 
 @dataclass(frozen=True)
@@ -134,7 +133,7 @@ def _left_out(design: Design, region: Region, slope, alpha, d_x, left) -> Number
     theta = design.theta_rad
     reach = region.bar_radius_mm + 0.5 * design.diameter_mm * left
     slips = np.maximum(np.abs(slope) - alpha, 0.0)
-    rolled = -theta * reach / d_x * np.cos(slope) * (0.5 / left - 0.125)
+    rolled = first_order.rolling_at(theta, reach, slope, d_x, left)
     ratio = np.tan(np.abs(slope)) / np.maximum(np.tan(alpha), 1e-9)
     held = np.where(slips > 0, 0.0, np.sqrt(np.maximum(1.0 - ratio**2, 0.0)))
     bent = theta * np.cos(slope) / np.cos(np.minimum(np.abs(slope), alpha))

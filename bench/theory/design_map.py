@@ -23,7 +23,7 @@ from estimator.whisk import EstimatorSettings, Whisk
 COLUMNS = ("beta_deg", "alpha_deg", "d_x_mm", "bias_percent", "sigma_percent", "bound_percent", "exact_percent")
 _STEPS = 6  # of the march from touch, as in bench.theory.model_error
 _THINNEST = 1e-3  # share of the base's diameter: a tip that is thinner is a cone's
-_MAP = (61, 41)  # slopes and distances of the figure
+_MAP, _MAP_ALPHAS = (61, 41), 7  # slopes and distances of the figure; friction angles of which the worst is shown
 _UNITS = {"theta_deg": "θ = {:.2f}°", "alpha_est_deg": "α_est = {:.1f}°", "diameter_mm": "diameter {:.2f} mm",
           "length_mm": "length {:.0f} mm", "taper": "taper {:.2f}", "tilt_deg": "base tilted by {:.1f}°"}  # fmt: skip
 
@@ -147,7 +147,7 @@ def draw(made: Designed) -> Figure:
     panels = figure.subplots(1, 2, sharey=True)
     beta, d_x = (np.linspace(*ends, n) for ends, n in zip((made.region.beta_deg, made.region.d_x_mm), _MAP))
     for panel, design, title in zip(panels, (made.design, Design()), ("this design", "the paper's whisker")):
-        bound = _worst_over_alpha(design, made, beta, d_x)
+        bound = _worst_over_alpha(design, made)
         shown = panel.pcolormesh(beta, d_x, np.minimum(bound, 100.0), cmap="viridis", shading="nearest",
                                  rasterized=True)  # fmt: skip
         figure.colorbar(shown, ax=panel, label="|bias| + 1.96 σ, % of d$_x$")
@@ -156,10 +156,9 @@ def draw(made: Designed) -> Figure:
     return figure
 
 
-def _worst_over_alpha(design: Design, made: Designed, beta_deg: np.ndarray, d_x_mm: np.ndarray) -> np.ndarray:
+def _worst_over_alpha(design: Design, made: Designed) -> np.ndarray:
     """(distances, slopes), %."""
-    alphas = np.radians(np.linspace(*made.region.alpha_deg, 7))
-    axes = np.meshgrid(d_x_mm, np.radians(beta_deg), alphas, indexing="ij")
-    points = np.stack([axes[1].ravel(), axes[2].ravel(), axes[0].ravel()])
-    bound = expected(design, made.region, made.means, points).bound_percent.reshape(axes[0].shape)
-    return bound.max(axis=-1)
+    slopes, places = _MAP
+    points = made.region.points(slopes, _MAP_ALPHAS, places)
+    bound = expected(design, made.region, made.means, points).bound_percent.reshape(slopes, _MAP_ALPHAS, places)
+    return bound.max(axis=1).T

@@ -59,6 +59,11 @@ def is_sound(seen: SeenWhisk, felt: FeltWhisk) -> bool:
     return not ({*seen.status.split("; "), felt.status} - {of_slip, *NO_DOUBTS})
 
 
+def sound_whisks(results: Iterable[TrialResult]) -> set[tuple[str, int]]:
+    """(trial, whisk) of those of which nothing is doubtful."""
+    return {(result.trial.name, seen.whisk) for result, seen, felt in whisks(results) if is_sound(seen, felt)}
+
+
 def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
     """β as seen; the nominal one where the session has no pictures of it."""
     beta_rad = seen.beta_rad.value

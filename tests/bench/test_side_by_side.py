@@ -1,9 +1,5 @@
 """The same bytes by any number of processes, in parts put together, and by a Dask cluster whose workers die."""
 
-import os
-import signal
-from pathlib import Path
-
 import pytest
 
 from bench.base.cluster import Cluster
@@ -11,6 +7,7 @@ from bench.base.settings import Settings
 from bench.cli import main
 from bench.evaluate import evaluate
 from tests.faults.interrupted import contents, differences
+from tests.scenes.deaths import dies
 
 
 @pytest.fixture(scope="module")
@@ -65,16 +62,6 @@ def test_a_worker_of_a_cluster_that_dies_costs_a_retry(cluster, tmp_path):
     (tmp_path / ".lock").write_text("this run")
     tasks = [(tmp_path / "fine", 0), (tmp_path / "once", 1), (tmp_path / "always", 9)]
     with Cluster(cluster, tmp_path) as pool:
-        found = pool.run(_dies, tasks, "deaths", lost=lambda task: f"{task[0].name} is lost")
+        found = pool.run(dies, tasks, "deaths", lost=lambda task: f"{task[0].name} is lost")
     assert found == ["fine", "once", "always is lost"]
     assert len((tmp_path / "once").read_text()) >= 2
-
-
-def _dies(task: tuple[Path, int]) -> str:
-    """Its worker is killed so often; a file counts, a letter each time."""
-    begun, deaths = task
-    with begun.open("a") as file:
-        file.write("x")
-    if len(begun.read_text()) <= deaths:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return begun.name

@@ -73,25 +73,31 @@ class LitRod:
     def of_none(self) -> tuple[np.ndarray, np.ndarray]:
         """Minus twice the log evidence (k,) that there is no rod, and the misfit (k,) per bin then."""
         across = self.profiles
-        columns = [np.broadcast_to(one, across.light.shape)
-                   for one in (1.0, across.offset_px / OUTSIDE_PX, across.behind, across.light)]
+        return self._explained([1.0, across.offset_px / OUTSIDE_PX, across.behind], self._of_outside[[0, 1, 4]])
+
+    def clearness(self, one: "Evidence") -> float:
+        """The log of how many times worse the light is explained without a bar, or with one edge of it, left or right,
+        as of another, wider thing beside which nothing is different: of the median stretch."""
+        others = [self.of_none[1], *(self._misfit_of_edge(one.at_px + side * self.profiles.radius_px, one.blur_px)
+                                     for side in (-1.0, 1.0))]
+        return float(np.median(np.log(np.maximum(np.min(others, axis=0), 1.0) / np.maximum(one.misfit, 1.0))))
+
+    def _misfit_of_edge(self, edge_px: np.ndarray, blur_px: float) -> np.ndarray:
+        """The misfit (k,) per bin of an edge (k,) alone."""
+        across = self.profiles
+        beyond = ndtr((across.offset_px - edge_px[:, None]) / blur_px)
+        columns = [share * one for share in (1.0 - beyond, beyond)
+                   for one in (1.0, across.offset_px / OUTSIDE_PX, across.behind)]
+        return self._explained(columns, np.tile(self._of_outside[[0, 1, 4]], 2))[1]
+
+    def _explained(self, columns: list, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`marginal` (k,) of columns (k, b) each, their prior given by its diagonal."""
+        across = self.profiles
+        columns = [np.broadcast_to(one, across.light.shape) for one in (*columns, across.light)]
         columns = np.sqrt(across.weight)[..., None] * np.stack(columns, axis=-1)
         normal = np.swapaxes(columns, -1, -2) @ columns
-        return self.marginal(normal[:, None], np.diag(self._of_outside[[0, 1, 4]]))
-
-    def misfit_of_one_edge(self, at_px: np.ndarray, radius_px: float, blur_px: float) -> np.ndarray:
-        """The misfit (k,) per bin where only one of the two edges about these middles (k,) is there, left or right:
-        that of another, wider thing, beside which nothing is different."""
-        across = self.profiles
-        misfits = []
-        for side in (-1.0, 1.0):
-            beyond = ndtr((across.offset_px - at_px[:, None] - side * radius_px) / blur_px)
-            columns = [share * one for share in (1.0 - beyond, beyond)
-                       for one in (1.0, across.offset_px / OUTSIDE_PX, across.behind)]
-            columns = np.sqrt(across.weight)[..., None] * np.stack([*columns, across.light], axis=-1)
-            normal = np.swapaxes(columns, -1, -2) @ columns
-            misfits.append(self.marginal(normal[:, None], np.diag(np.tile(self._of_outside[[0, 1, 4]], 2)))[1][:, 0])
-        return np.minimum(*misfits)
+        value, misfit = self.marginal(normal[:, None], np.diag(prior))
+        return value[:, 0], misfit[:, 0]
 
     def marginal(self, normal: np.ndarray, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Minus twice the log evidence (k, …), and the misfit (k, …) per bin, of models with these products
@@ -113,15 +119,13 @@ class LitRod:
 @dataclass(frozen=True)
 class Evidence:
     """Under a lens blur, minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior;
-    the misfit (k,) per bin at its best; the former (k,) of there being no bar, and the latter (k,) of that, or of one
-    edge alone."""
+    the misfit (k,) per bin at its best; and the former (k,) of there being no bar."""
 
     blur_px: float
     shift_px: np.ndarray
     of_bar: np.ndarray
     misfit: np.ndarray
     of_none: np.ndarray
-    misfit_of_none: np.ndarray
 
     @property
     def least(self) -> np.ndarray:
@@ -129,10 +133,10 @@ class Evidence:
         return self.of_bar.min(axis=(1, 2))
 
     @property
-    def clearness(self) -> float:
-        """The log of how many times worse the light is explained without a bar, or with one edge of it: of the median
-        stretch."""
-        return float(np.median(np.log(np.maximum(self.misfit_of_none, 1.0) / np.maximum(self.misfit, 1.0))))
+    def at_px(self) -> np.ndarray:
+        """The shift (k,) of each stretch's best."""
+        best = np.argmin(self.of_bar.reshape(len(self.of_bar), -1), axis=1)
+        return self.shift_px[best // self.of_bar.shape[2]]
 
 
 def evidence(rod: LitRod, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
@@ -149,10 +153,8 @@ def evidence(rod: LitRod, reach_px: float, blur_px: float, positions: int = 1, a
     under = [rod.marginal(normal, prior) for prior in (rod.priors if all_light else rod.priors[-1:])]
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
     best = np.argmin(value.reshape(len(seen), -1), axis=1)
-    none, misfit_of_none = rod.of_none
-    one_edge = rod.misfit_of_one_edge(shift[best // value.shape[2]], wider * seen.radius_px, blur_px)
-    return Evidence(blur_px, shift, value, misfit.reshape(len(seen), -1)[np.arange(len(seen)), best], none[:, 0],
-                    np.minimum(misfit_of_none[:, 0], one_edge))
+    misfit = misfit.reshape(len(seen), -1)[np.arange(len(seen)), best]
+    return Evidence(blur_px, shift, value, misfit, rod.of_none[0])
 
 
 def _normal(seen: Profiles, shifts, more_px: float, blur_px: float, radius_px: float) -> np.ndarray:

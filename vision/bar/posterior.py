@@ -146,7 +146,7 @@ def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) ->
     best, covariance = _best(under), (of_line * away.T) @ away
     unresolved = float(3.0 * np.sqrt(np.linalg.det(covariance)) / np.prod(window.most_px))  # 1 of a flat one
     return Posterior(line + mean, covariance, least, temper, -2.0 * np.log(total * cell),
-                     float(np.sum((best.of_none - best.least) / temper)), best.clearness, unresolved,
+                     float(np.sum((best.of_none - best.least) / temper)), rod.clearness(best), unresolved,
                      np.exp(log_blur), float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)), step)
 
 

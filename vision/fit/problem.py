@@ -21,7 +21,7 @@ BAR_PRIOR = np.array([50.0, 50.0, 1.0, 1.0])
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
 # How far a traced line may be off as a whole beyond what light and lens are said to move it by: shadows, reflections.
-# RMS of 72 path-traced views (docs/proof.md).
+# By the offset the true wires of 65 path-traced views are most probable, the tilt is the RMS of 72 (docs/proof.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.08, 0.09
 # As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
 WIRE_DRIFT_PX = 0.02

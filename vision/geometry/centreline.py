@@ -50,6 +50,10 @@ class Curves:
                 for a in (self.points_mm, self.tangents) for d in (0, 1)]
         return self._point_between(t, *take), self._tangent_between(t, *take)
 
+    def one(self, k: int) -> "Curves":
+        """The k-th of curves (f, m, 3)."""
+        return Curves(self.arc_mm, self.points_mm[k], self.tangents[k])
+
     def at_one_each(self, which: np.ndarray, arc_mm: np.ndarray) -> np.ndarray:
         """Points (…, n, 3), each on its own curve: which (n,) of the curves (…, f), at arc lengths (n,)."""
         k, t = self._place(np.asarray(arc_mm))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from vision.lines.bands import Pieces
-from vision.lines.shading import WAVE_SHARE, Equations, Knots, between_knots, contrast_of
+from vision.lines.shading import WAVE_SHARE, Equations, Knots, between_knots, contrast_of, stiffness
 
 _PARTS = np.linspace(-1.0, 1.0, 15)
 _SHIFTS_PX = 1.5 * _PARTS * np.sqrt(np.abs(_PARTS))  # denser in the middle
@@ -32,7 +32,7 @@ def common_spread_px(pieces: Pieces, blur_px: float, terms: int, knots: Knots, r
     along = knots.place_mm[sorted({0, len(knots.place_mm) // 2, len(knots.place_mm) - 1})]
     knots = Knots(along, knots.turn_rad, knots.turns)
     normal = _normal_equations(pieces, blur_px * np.exp(_LOG_BLURS), terms, knots.weights(pieces), robust)
-    doubts = _doubts(*normal, between_knots(knots), contrast_of(pieces))
+    doubts = _doubts(*normal, knots, contrast_of(pieces))
     doubts += ((_LOG_BLURS + np.log(blur_px / blur_prior[0])) / blur_prior[1]) ** 2
     shift, log_blur = (np.linspace(grid[0], grid[-1], _FINE) for grid in (_SHIFTS_PX, _LOG_BLURS))
     fine = RectBivariateSpline(_SHIFTS_PX, _LOG_BLURS, doubts)(shift, log_blur)
@@ -52,27 +52,19 @@ def _normal_equations(pieces: Pieces, blurs_px, terms: int, hats, robust) -> tup
     return left, right, power
 
 
-def _doubts(left, right, power, between, contrast: float) -> np.ndarray:
+def _doubts(left, right, power, knots: Knots, contrast: float) -> np.ndarray:
     """Minus twice the log evidence (shifts, blurs), as it counts, of such normal equations, each wave as strong as is
-    most probable; between (k, k): see `between_knots`."""
-    count, terms = len(between), left.shape[1] // len(between)
+    most probable."""
+    between, count, terms = between_knots(knots), len(knots), left.shape[1] // len(knots)
     strength = np.tile(contrast * WAVE_SHARE[:terms], (len(left), 1))
     low, high = contrast * np.array(_STRENGTHS)
     for _ in range(_ROUNDS):
-        inverse = np.linalg.inv(left + _stiffness(strength, between))
+        inverse = np.linalg.inv(left + stiffness(strength, knots))
         waves = (inverse @ right[..., None]).reshape(-1, count, terms)
         asked = np.einsum("gat,ab,gbt->gt", waves, between, waves)
         asked += np.einsum("ab,gbtat->gt", between, inverse.reshape(-1, count, terms, count, terms))
         strength[:, 1:] = np.clip(np.sqrt(asked / count), low, high)[:, 1:]
-    stiff = _stiffness(strength, between)
+    stiff = stiffness(strength, knots)
     waves = np.linalg.solve(left + stiff, right[..., None])[..., 0]
     doubts = power - np.sum(right * waves, axis=1) + np.linalg.slogdet(left + stiff)[1] - np.linalg.slogdet(stiff)[1]
     return _EVIDENCE_COUNTS * doubts.reshape(len(_SHIFTS_PX), len(_LOG_BLURS))
-
-
-def _stiffness(strength, between) -> np.ndarray:
-    """Inverse covariances (g, size, size) of the coefficients of waves this strong (g, terms)."""
-    terms = strength.shape[1]
-    size = len(between) * terms
-    both = between[None, :, None, :, None] * (strength**-2.0)[:, None, :, None, None] * np.eye(terms)[:, None]
-    return both.reshape(len(strength), size, size)

@@ -210,10 +210,12 @@ _TURNED_SHARE = 0.3
 
 
 def stiffness(prior: np.ndarray, knots: Knots) -> np.ndarray:
-    """Inverse covariance (size, size) of all coefficients: each knot's own, and its differences to its neighbours."""
-    between = between_knots(knots)
-    both, size = between[:, None, :, None] * np.diag(prior**-2.0)[None, :, None, :], len(knots) * len(prior)
-    return both.reshape(size, size)
+    """Inverse covariance (…, size, size) of all coefficients of waves with these priors (…, terms): each knot's own,
+    and its differences to its neighbours."""
+    terms = prior.shape[-1]
+    own = (np.eye(terms) * (prior**-2.0)[..., None, :])[..., None, :, None, :]
+    size = len(knots) * terms
+    return (between_knots(knots)[:, None, :, None] * own).reshape(*prior.shape[:-1], size, size)
 
 
 def between_knots(knots: Knots) -> np.ndarray:

@@ -34,7 +34,6 @@ os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 _PLANAR_GREY = frozenset({b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"})
 
 
-
 class Frames(ABC):
     """The frames of one camera, from 0. Made by `Frames.open`.
 

@@ -156,7 +156,7 @@ def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, d
     along = axis.point_mm + place[:, None] * axis.direction
     drawn: dict = {}
     for k, f in enumerate(fitted.frames):
-        one = Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k])
+        one = curves.one(k)
         contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
         drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm,
                                                   whisk.settings.picture_scale) for view in whisk.views}

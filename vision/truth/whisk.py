@@ -119,7 +119,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
 
 def _fitted_curves(problem: Problem, state: State, frames: Sequence[int]) -> dict[int, Curves]:
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
-    return {f: Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k]) for k, f in enumerate(frames)}
+    return {f: curves.one(k) for k, f in enumerate(frames)}
 
 
 def _begin(problem: Problem, look: _Look) -> State:

@@ -44,8 +44,7 @@ def _some_curves(fitted: FittedWhisk, to_mm: float) -> dict[int, Curves]:
     """Centrelines of frames spread over the whisk, up to another length."""
     chosen = np.unique(np.linspace(0, len(fitted.frames) - 1, _LOOKS).astype(int))
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    return {fitted.frames[k]: _straight_on(Curves(curves.arc_mm, curves.points_mm[k], curves.tangents[k]), to_mm)
-            for k in chosen.tolist()}
+    return {fitted.frames[k]: _straight_on(curves.one(k), to_mm) for k in chosen.tolist()}
 
 
 def _straight_on(curve: Curves, to_mm: float) -> Curves:

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from bench.base.drawing import label_of
-from bench.records.trial import TrialResult, whisks
+from bench.records.trial import TrialResult
 from bench.report.assembly import estimate_rows
-from bench.trials.compare import Judged, is_sound
+from bench.trials.compare import Judged, sound_whisks
 
 
 def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
@@ -30,7 +30,7 @@ def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """How far contact points, deflections and slip by (10) are from those seen: RMS over whisks of which nothing is
     doubtful, and what was stated of each."""
     results = list(results)
-    sound = {(r.trial.name, seen.whisk) for r, seen, felt in whisks(results) if is_sound(seen, felt)}
+    sound = sound_whisks(results)
     rows = [row for row in estimate_rows(results) if row["estimator"] == "with_friction"]
     rows = [row for row in rows if (row["trial"], row["whisk"]) in sound]
     columns = (("point", None), ("d_y", "d_y_est_sigma_mm"), ("d_z", "d_z_est_sigma_mm"), ("slip", "slip_est_sigma_mm"))

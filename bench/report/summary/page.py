@@ -99,15 +99,15 @@ def _sections(
     yield _titled(DOUBTFUL, doubtful)
     yield _titled("Score against the truth files of this synthetic session (no result knows them)", scores)
     yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))
-    yield _titled("Files", _files(figures, TABLES))
+    yield _titled("Files", _files(figures))
 
 
 def _titled(title: str, lines: Iterable[str]) -> Section:
     return Section(title, tuple(lines))
 
 
-def _files(figures: Sequence[str], tables: Iterable[str]) -> list[str]:
+def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    tables = [f"{name}.csv" for name in tables]
+    tables = [f"{name}.csv" for name in TABLES]
     return [", ".join(["report.html", *tables, "track/", *single, *(f"{folder}/" for folder in folders)])]

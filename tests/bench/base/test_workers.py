@@ -11,6 +11,7 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.workers import Workers
+from tests.scenes.deaths import dies
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 
@@ -66,7 +67,7 @@ def _refuse(_):
 def test_a_process_that_dies_costs_its_task_a_retry_and_the_third_death_is_its_result(tmp_path):
     tasks = [(tmp_path / "fine", 0), (tmp_path / "once", 1), (tmp_path / "always", 9)]
     with Workers(2) as pool:
-        found = pool.run(_dies, tasks, "deaths", lost=lambda task: f"{task[0].name} is lost")
+        found = pool.run(dies, tasks, "deaths", lost=lambda task: f"{task[0].name} is lost")
     assert found == ["fine", "once", "always is lost"]
     assert [len(file.read_text()) for file, _ in tasks] == [1, 2, 3]  # how often each was begun
 
@@ -74,17 +75,7 @@ def test_a_process_that_dies_costs_its_task_a_retry_and_the_third_death_is_its_r
 def test_a_killed_process_is_told_in_a_line(tmp_path, monkeypatch):
     monkeypatch.setattr("bench.base.workers.MOST_DEATHS", 1)
     with pytest.raises(BadInput, match="a worker process was killed three times"), Workers(2) as pool:
-        pool.run(_dies, [(tmp_path / "always", 9)], "killed")
-
-
-def _dies(task):
-    """Its process is killed so often; a file counts, a letter each time."""
-    begun, deaths = task
-    with begun.open("a") as file:
-        file.write("x")
-    if len(begun.read_text()) <= deaths:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return begun.name
+        pool.run(dies, [(tmp_path / "always", 9)], "killed")
 
 
 _LONG = """
