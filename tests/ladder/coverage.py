@@ -19,6 +19,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
@@ -90,19 +92,25 @@ def see_pictures(
     scene: Scene, most_cameras: int | None = None, settings: VisionSettings = VisionSettings()  # noqa: B008
 ) -> Seen:
     """What `observe_trial` says of rasterised pictures, of the first cameras only where a number is given."""
-    rng = np.random.default_rng([scene.seed, 23])
-    cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
-    job = Job(Path(), scene.protocol, scene.seed, False)
-    frames = {studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
-              for k, studio in enumerate(job.studios[:most_cameras])}
-    background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
-    pictures = TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background)
-    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, Rods(wire, bar), settings).whisks
+    pictures, cameras, rods = drawn(scene, most_cameras)
+    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, rods, settings).whisks
     if math.isnan(whisk.d_x_mm.value):
         return Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
     return Seen({name: one.value for name, one in found.items()}, {name: one.sigma for name, one in found.items()},
                 whisk.status)
+
+
+@lru_cache(maxsize=1)
+def drawn(scene: Scene, most_cameras: int | None) -> tuple[TrialPictures, Cameras, Rods]:
+    """A scene's pictures, its cameras as they were calibrated, and the rods as someone measured them."""
+    rng = np.random.default_rng([scene.seed, 23])
+    cameras, rods = calibrated(scene, rng), Rods(*given(scene, rng))
+    job = Job(Path(), scene.protocol, scene.seed, False)
+    frames = {studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
+              for k, studio in enumerate(job.studios[:most_cameras])}
+    background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
+    return TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background), cameras, rods
 
 
 def see_alone(scene: Scene) -> Seen:
