@@ -43,8 +43,8 @@ def apart(before: list[dict], after: list[dict]) -> Iterator[str]:
         moved = np.array([a[f"{name}_error"] - b[f"{name}_error"] for b, a in zip(before, after) if _both(b, a)])
         sigma = np.array([a[f"{name}_sigma"] for b, a in zip(before, after) if _both(b, a)])
         z = np.abs(moved / sigma)
-        yield (f"{name:10s} {np.median(z):.2f} sigma in the median, {z.max():.2f} at most, {100 * np.mean(z <= SAME):.0f} % "
-               f"within {SAME:g}")
+        within = 100 * np.mean(z <= SAME)
+        yield f"{name:10s} {np.median(z):.2f} sigma in the median, {z.max():.2f} at most, {within:.0f} % in {SAME:g}"
 
 
 def _both(*rows: dict) -> bool:
