@@ -56,11 +56,13 @@ COLUMNS = ("seed", "beta_true_deg", "d_x_true_mm", "cameras", "plane_angle_deg",
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Values and sigmas by name (touch, d_x, beta: floats; slip: (f,)), or the reason why there are none."""
+    """Values and sigmas by name (touch, d_x, beta: floats; slip: (f,)), or the reason why there are none. frames: of
+    the scene's, the indices of those that were looked at; None: of all."""
 
     value: Mapping
     sigma: Mapping
     status: str = ""
+    frames: np.ndarray | None = None
 
 
 def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
@@ -97,8 +99,8 @@ def see_pictures(
     if math.isnan(whisk.d_x_mm.value):
         return Seen({}, {}, whisk.status)
     found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
-    return Seen({name: one.value for name, one in found.items()}, {name: one.sigma for name, one in found.items()},
-                whisk.status)
+    values, sigmas = ({name: getattr(one, what) for name, one in found.items()} for what in ("value", "sigma"))
+    return Seen(values, sigmas, whisk.status, whisk.frames.index)
 
 
 @lru_cache(maxsize=1)
@@ -132,9 +134,12 @@ def row_of(scene: Scene, seen: Seen) -> dict:
            "cameras": len(scene.cameras), "plane_angle_deg": scene.plane_angle_deg, "status": seen.status}
     if not seen.value:
         return row
-    error = {name: seen.value[name] - getattr(truth, name) for name in ("touch", "d_x", "beta", "slip")}
-    touching = np.isfinite(error["slip"]) & (scene.motor_rad > truth.touch + math.radians(0.2))
-    at = int(np.argmin(np.where(touching, np.abs(scene.motor_rad - truth.touch - SLIP_AT_RAD), np.inf)))
+    error = {name: seen.value[name] - getattr(truth, name) for name in ("touch", "d_x", "beta")}
+    frames = slice(None) if seen.frames is None else seen.frames
+    error["slip"] = seen.value["slip"] - truth.slip[frames]
+    theta = scene.motor_rad[frames] - truth.touch
+    touching = np.isfinite(error["slip"]) & (theta > math.radians(0.2))
+    at = int(np.argmin(np.where(touching, np.abs(theta - SLIP_AT_RAD), np.inf)))
     if np.any(touching):  # or it was pushed by less
         row |= {"slip_rms_mm": float(np.sqrt(np.mean(error["slip"][touching] ** 2))),
                 "slip_worst_z": float(np.max(np.abs(error["slip"] / seen.sigma["slip"])[touching]))}
