@@ -51,11 +51,11 @@ def ours(nodes: int) -> tuple[np.ndarray, float]:
 
 def theirs(others: Path) -> dict:
     """What others_rods.py writes."""
-    numbers = ROD.length_mm / 1e3, ROD.diameter_mm / 1e3, ROD.youngs_modulus_GPa * 1e9, ROD.density_kg_m3, FORCE_N
+    numbers = ROD.length_mm, ROD.diameter_mm, ROD.youngs_modulus_GPa * 1e3, ROD.density_kg_m3 / 1e6, FORCE_N
     with TemporaryDirectory() as name:
         out, script = Path(name) / "out.npz", Path(__file__).with_name("others_rods.py")
         command = [others / "bin" / "python", script, *numbers, ",".join(map(str, ELEMENTS)), out]
-        subprocess.run([str(part) for part in command], check=True, stderr=subprocess.DEVNULL)
+        subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
         with np.load(out) as found:
             return dict(found)
 
@@ -69,7 +69,7 @@ def table(others: Path) -> Iterator[str]:
         yield _line(f"whisker-bench {version('whisker-bench')}, {nodes} nodes", found_mm - end_mm, spent_s)
     other = theirs(others)
     for count, end, spent_s in zip(ELEMENTS, other["end"], other["spent_s"]):
-        yield _line(f"pyelastica {other['version']}, {count} elements", 1e3 * end - end_mm, spent_s)
+        yield _line(f"pyelastica {other['version']}, {count} elements", end - end_mm, spent_s)
 
 
 def _line(name: str, off_mm: np.ndarray, spent_s: float) -> str:
