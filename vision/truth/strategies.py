@@ -33,12 +33,14 @@ STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 @dataclass
 class BarMiddles:
-    """The bar by its middle in each view; lines: as measured the time before, by which they are measured finely."""
+    """The bar by its middle in each view; lines: as measured the time before, by which they are measured finely; are
+    they so, they stay: another look at the same pixels tells nothing new."""
 
     views: Sequence[View]
     radius_mm: float
     settings: VisionSettings
     lines: dict[str, BarLine] = field(default_factory=dict)
+    are_fine: bool = False
 
     def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *,
                last: bool) -> dict[str, dict[int, LinePoints]]:
@@ -46,7 +48,9 @@ class BarMiddles:
 
         last: nothing is measured after it, so it is finely, too, where it is the first.
         """
-        for _ in range(2 if last and not self.lines else 1):
+        looks = 0 if self.are_fine else 2 if last and not self.lines else 1
+        for _ in range(looks):
+            self.are_fine = bool(self.lines)
             self.lines = measure_bars(self.views, axis, self.radius_mm, wires_px, self.settings, self.lines)
         return {name: {0: line.points} for name, line in self.lines.items() if line.is_bar}
 
