@@ -140,7 +140,7 @@ def _trace_all(whisk: WhiskPictures, bar: BarMiddles, look: _Look, *, last: bool
     """Line points of wire and bar in all cameras. Raises Refused where one of them is seen in none."""
     wires_px = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
                 for view in whisk.views}
-    bars = bar.points(look.axis, wires_px)
+    bars = bar.points(look.axis, wires_px, last=last)
     seen = []
     for number, view in enumerate(whisk.views):
         seen += trace_wire(whisk, view, look.axis, look.curves, look.blur_px, last=last)
