@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -89,12 +90,12 @@ def load_session(
     """
     path, doubts = Path(path), doubts or Doubts()
     keys = _read_manifest(path, doubts, follow_links)
-    whisker, bar = _whisker(keys.whisker), keys.bar
+    parts = partial(_whisker, keys.whisker), partial(_board, keys.board), partial(_pose, keys.rig.T_rig_board)
+    whisker, board, T_rig_board = doubts.each(parts)
+    bar = keys.bar
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
     found = _by_surface(_trials(path, keys, doubts, trials), keys.surfaces)
-    with doubts.guard():
-        _check_whole(found, whisker, bar)
     if trials is None:
         _check_surfaces(found, keys.surfaces, doubts)
     session = Session(
@@ -103,8 +104,8 @@ def load_session(
         whisker=whisker,
         bar_diameter_mm=bar and bar.diameter_mm,
         bar_diameter_sigma_mm=bar.diameter_sigma_mm if bar else 0.0,
-        board=_board(keys.board),
-        T_rig_board=_pose(keys.rig.T_rig_board),
+        board=board,
+        T_rig_board=T_rig_board,
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
         T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
         gauges=_gauges(keys.gauges),
@@ -128,8 +129,8 @@ def _read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.S
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
-    keys = as_keys(tables, manifest.SessionKeys, MANIFEST, doubts)
-    return keys
+    needed = ("whisker", "bar") if visible(path / "trials") else ()
+    return as_keys(tables, manifest.SessionKeys, MANIFEST, doubts, needed)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
@@ -215,13 +216,6 @@ def _check_surfaces(trials: Iterable[Trial], order: Sequence[str], doubts: Doubt
     for name in order:
         if there and name not in there:
             doubts.note(f"{MANIFEST}: surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}")
-
-
-def _check_whole(trials, whisker, bar) -> None:
-    """A session with trials needs its whisker and its bar."""
-    for name, given in (("whisker", whisker), ("bar", bar)):
-        if trials and given is None:
-            raise BadInput(f"[{name}] is missing", file=MANIFEST)
 
 
 def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:

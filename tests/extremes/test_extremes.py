@@ -11,8 +11,8 @@ from tests.ladder.coverage import see_points
 
 
 def row(extreme: str, value: float, seed: int = 0) -> dict:
-    made, values = POINTS[extreme]
-    return scene_row(1000 * values.index(value) + seed, extreme, made, values, see_points)
+    _, values = POINTS[extreme]
+    return scene_row(1000 * values.index(value) + seed, extreme, values, see_points)
 
 
 def test_a_scene_is_seen_and_said():
