@@ -1,6 +1,6 @@
 """The friction cone angle α from the moments: the fit of Fig. 8, and the paper's ways to do without it.
 
-Way 1, tilting the array, and way 3, confidence, are written here; way 2, consistency, in `estimator.consistency`.
+Way 1, tilting the array, and way 3, confidence, are here; way 2, consistency, needs what a session says of its objects.
 Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm.
 """
 
@@ -11,20 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from estimator import slip
-from estimator.consistency import Consistency, Contacts, most_consistent_alpha
 from estimator.domain import Numbers, elementwise, require_friction_angle, require_positive, require_sigma
-
-__all__ = [
-    "Consistency",
-    "Contacts",
-    "FrictionFit",
-    "Pushes",
-    "alpha_from_tilts",
-    "confidence",
-    "curves",
-    "fit_alpha",
-    "most_consistent_alpha",
-]
 
 READINGS = ("moments", "magnitude")
 GRID = np.radians(np.arange(0.0, 89.95, 0.25))

@@ -164,5 +164,5 @@ def _tell(axes: "Axes", cells: Sequence[Cell], most: float) -> None:
     for cell in cells:
         colour = "white" if abs(cell.errors.mean()) > 0.6 * most else "black"
         middle = cell.beta_deg + 0.5 * _BETA_DEG, cell.alpha_deg + 0.5 * _ALPHA_DEG
-        said = f"{cell.errors.mean():+.1f}".replace("-", "−")
+        said = f"{cell.errors.mean():+.1f}".replace("-", "−").replace("−0.0", "0.0")
         axes.text(*middle, said, ha="center", va="center", fontsize=6 if len(said) < 5 else 5, color=colour)

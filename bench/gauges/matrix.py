@@ -64,6 +64,11 @@ class Gauges:
     full_scale_Nmm: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def of_wire(self) -> bool:
+        """Whether their newtons are those of this wire's bending, and go with its C."""
+        return self.source in (FROM_TRIALS, FROM_ALL)
+
     def scaled(self, factor: float) -> "Gauges":
         """The same gauges in another unit of stiffness: everything in N·mm times `factor`."""
         without = {name: matrix and matrix.scaled(factor) for name, matrix in self.without.items()}

@@ -37,8 +37,9 @@ def figure_8(fitted: Sequence[Surface]) -> "Figure":
         else:
             for axes in pair:
                 axes.set_visible(False)
-    for axes in grid[::2, 0]:
+    for axes in grid[::2, 0]:  # once all panels of the row are drawn, which share their limits
         axes.set_ylabel("|m|  [EI/m]")
+        axes.set_ylim(bottom=0)
     for axes in grid[1::2, 0]:
         axes.set_ylabel("slip angle φ  [°]")
     named = {label: line for axes in grid.flat for line, label in zip(*axes.get_legend_handles_labels())}
@@ -114,7 +115,6 @@ def _panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
     else:
         held = ""
     top.set_title(f"{letter} {surface.title}", loc="left")
-    top.set_ylim(bottom=0)
     bottom.set(xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""), xlim=(-2, 82), ylim=(-3, 82))
     spread = 100.0 * float(np.median([p.m_sd_Nmm / p.m_Nmm for p in points]))
     told = f"{held}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"

@@ -81,6 +81,10 @@ class Readout:
         """The whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
         return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
+    def moments_Nmm(self, stroke: Stroke, touch: Touch) -> np.ndarray:
+        """(n, 2): of the stroke's samples as recorded, unfiltered."""
+        return (stroke.channels - touch.offset) @ self.matrix.T
+
     def covariance(self, channels: np.ndarray, of_channels: np.ndarray) -> np.ndarray:
         """Covariance (2, 2) of the moments of `channels` (2,): from the channels', the gauges' and the turn's."""
         shared = self._shared(channels)

@@ -9,13 +9,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.records.trial import EstimateRow
+from bench.gauges.felt import Stroke
+from bench.records.trial import EstimateRow, FeltAt
+from bench.trials.estimates import Readout, felt_at
 from bench.trials.phases import Rest, rests_of
+from estimator.signal import Touch
 from estimator.whisk import Whisk
 
 _FEWEST = 2  # teeth: one jump may be a knock
 # Teeth of the stroke that serve: from this part of the wanted angle to as much beyond. Near touch they are short.
 _FROM_SHARE, _TO_SHARE = 0.5, 1.5
+
+
+def kinetic_of(stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, given: EstimateRow) -> FeltAt | None:
+    """What a stroke shows of `kinetic_end`."""
+    theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)
+    found = kinetic_end(stroke.time_s, theta, moments, whisk, given)
+    return None if found is None else felt_at(found)
 
 
 def kinetic_end(

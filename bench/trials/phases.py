@@ -12,9 +12,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import find_objects, label
 
+from bench.gauges.felt import Stroke
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial import SeenWhisk
+from bench.session.trial import Trial
+from bench.trials.estimates import Readout
 from estimator.beam import Beam
+from estimator.signal import Touch
 from vision.truth.records import FrameTruth
 
 _LEAST_SLIP_MM, _LEAST_FRAMES = 0.1, 3  # mm, frames: less slip, or fewer frames, show neither rest nor jump. Set by eye
@@ -67,6 +71,18 @@ def _touching(frames: FrameTruth) -> np.ndarray:
 def _runs(mask) -> list[tuple[int, int]]:
     """(first, one past the last) of each unbroken stretch of True."""
     return [(run.start, run.stop) for (run,) in find_objects(label(mask)[0])]
+
+
+def phases_of(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, beam: Beam) -> Phases:
+    """Phases felt, with the slope and distance as seen, or the nominal ones where no picture tells of them."""
+    if seen.deflection is not None:
+        beta_rad, d_x_mm = (seen.beta_rad.value, seen.d_x_mm.value) if slips(seen) else (None, None)
+    else:
+        beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
+    if not beta_rad or not d_x_mm:
+        return NO_PHASES
+    theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)
+    return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
 
 
 def felt_phases(

@@ -16,13 +16,11 @@ from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_r
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import Stroke, gauge_delay, strokes_of, touch_on_the_way_back
-from bench.gauges.matrix import FROM_ALL, FROM_TRIALS, Gauges
+from bench.gauges.matrix import Gauges
 from bench.gauges.readings import Pairs, pairs_of
-from bench.records.phases import NO_PHASES, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial import (
     EstimateRow,
-    FeltAt,
     FeltTrial,
     FeltWhisk,
     SeenTrial,
@@ -38,15 +36,14 @@ from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import Agreement, agreement
 from bench.trials.consistency import cone_doubt, nominal_slope
-from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
-from bench.trials.gate import kinetic_end
-from bench.trials.phases import felt_phases, slips
+from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
+from bench.trials.gate import kinetic_of
+from bench.trials.phases import phases_of
 from bench.trials.seen import see_trial
 from bench.trials.sensors import with_others
-from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS
 from estimator.sensors import SENSORS
-from estimator.signal import NOT_REACHED, Touch
+from estimator.signal import NOT_REACHED
 from estimator.whisk import Whisk
 from vision.truth.value import NAN, UNKNOWN
 
@@ -190,16 +187,16 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     felt = replace(felt, shared_Nmm=readout.shared_Nmm(usable))
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     told = {"settings": unit.settings, "radii_mm": _radii_mm(unit)}
-    known = {"force_drift_rate": unit.force_drift_rate, "scale_sigma": _newtons_sigma(unit, readout)}
+    known = {"force_drift_rate": unit.force_drift_rate, "scale_sigma": _C_share(unit, readout, of_wire=True)}
     sensing = partial(with_others, stroke=stroke, readout=readout, touch=touch, **known)
     answered = partial(_answered, sensing if unit.settings.estimators else None,
                        asked=estimators(unit.settings.estimators), **told)  # fmt: skip
     estimates = answered(usable)
     return replace(
         felt,
-        phases=_phases(unit.trial, stroke, touch, readout, seen, beam),
+        phases=phases_of(unit.trial, stroke, touch, readout, seen, beam),
         estimates=estimates,
-        kinetic=_kinetic(stroke, touch, readout, usable, estimates),
+        kinetic=kinetic_of(stroke, touch, readout, usable, next(row for row in estimates if row.estimator == _TEN)),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         sensors=() if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told),
         one_factor=_one_factor(unit, kind, stroke),
@@ -212,12 +209,11 @@ def _answered(sensing: Callable[[Whisk], Whisk] | None, whisk: Whisk, **asked) -
     return answers(whisk if sensing is None else sensing(whisk), **asked)
 
 
-def _newtons_sigma(unit: Unit, readout: Readout) -> float:
-    """Share by which a load cell's newtons and the moments' may disagree: gauges fitted to this wire's bending have
-    newtons that go with its C."""
-    whisker = unit.session.whisker
-    of_wire = readout.is_gauged and unit.gauges.source in (FROM_TRIALS, FROM_ALL)
-    return whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if of_wire else 0.0
+def _C_share(unit: Unit, readout: Readout, *, of_wire: bool) -> float:
+    """How well the wire's C is known where the moments' newtons are those of the wire's bending (of_wire), or where
+    gauges or recording bring their own; else 0."""
+    whisker, fitted = unit.session.whisker, readout.is_gauged and unit.gauges.of_wire
+    return whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if fitted == of_wire else 0.0
 
 
 def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:
@@ -236,36 +232,12 @@ def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Read
 
 
 def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> Agreement:
-    """Felt moments against those of the seen shape. Gauges that bring newtons of their own tell the rigidity, too."""
-    whisker, own_newtons = unit.session.whisker, not readout.is_gauged or unit.gauges.source != FROM_TRIALS
-    return agreement(pairs, readout.gauges, whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if own_newtons else 0.0)
+    """Felt moments against those of the seen shape. Moments that have newtons of their own tell the rigidity, too."""
+    return agreement(pairs, readout.gauges, _C_share(unit, readout, of_wire=False))
 
 
 def _joined(*statuses: str) -> str:
     return "; ".join(filter(None, statuses))
-
-
-def _phases(trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, beam: Beam) -> Phases:
-    """With the slope and distance as seen, or the nominal ones where no picture tells of them."""
-    if seen.deflection is not None:
-        beta_rad, d_x_mm = (seen.beta_rad.value, seen.d_x_mm.value) if slips(seen) else (None, None)
-    else:
-        beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
-    if not beta_rad or not d_x_mm:
-        return NO_PHASES
-    moments = (stroke.channels - touch.offset) @ readout.matrix.T
-    theta = stroke.motor_rad - touch.motor_rad
-    return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
-
-
-def _kinetic(
-    stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, estimates: tuple[EstimateRow, ...]
-) -> FeltAt | None:
-    """The whisk on the kinetic cone, where its moments show teeth; no picture and no manifest has a part in it."""
-    given = next(row for row in estimates if row.estimator == _TEN)
-    moments = (stroke.channels - touch.offset) @ readout.matrix.T
-    found = kinetic_end(stroke.time_s, stroke.motor_rad - touch.motor_rad, moments, whisk, given)
-    return None if found is None else felt_at(found)
 
 
 def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, str]:

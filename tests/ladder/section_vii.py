@@ -29,6 +29,7 @@ from vision.truth.value import Value
 SLOPES_DEG, D_X_MM, THETA_RAD = (-60, -45, -30, 0, 30, 45, 60), 60.0, np.radians(3.0)
 SCATTER_DEG, SCATTER_MM, GAUGE_SHARE, NOISE_NMM, WHISKS = 0.4, 0.4, 0.004, 0.02, 3
 SHIFT_MM, SHIFT_SIGMA_MM = 20.0, 0.1  # of the base, along the whisker
+DRAWS = 10  # of noise and gauges, of a soft object at its two distances
 ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG = 12.0, 5.0  # as assumed
 WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=E_GPA)
 
@@ -47,21 +48,26 @@ def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> 
             yield Contact(np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, shared, f"b{beta_deg}")
 
 
-def two_places(shape: str, stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Soft:
-    """What whisks against an object of that stiffness [N/mm] tell of it, at a distance and SHIFT_MM farther."""
+def two_places(shape: str, stiffness: float, alpha_deg: float, rng: np.random.Generator) -> Iterator[Soft]:
+    """What whisks against an object of that stiffness [N/mm] tell of it, at a distance and SHIFT_MM farther: DRAWS of
+    noise and gauges."""
     rod, _ = rod_and_beam(shape)
     tip = TIP_MM if shape == "tapered" else None
     whisker = Whisker(shape, LENGTH_MM, DIAMETER_MM, youngs_modulus_GPa=E_GPA, tip_diameter_mm=tip)
-    near, gauge = rng.uniform(35.0, 55.0), 1.0 + GAUGE_SHARE * rng.normal()
-    places = []
+    near, exact = rng.uniform(35.0, 55.0), []
     for nominal in (near, near + SHIFT_MM):
         d_x = nominal + SHIFT_SIGMA_MM / np.sqrt(2.0) * rng.normal()
-        _, (_, exact) = push(rod, 0.0, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD, stiffness)
-        m_z = gauge * exact + NOISE_NMM * rng.normal()
-        k, shared = THETA_RAD / m_z, np.array([GAUGE_SHARE])
-        places.append(Place(nominal, SHIFT_SIGMA_MM / np.sqrt(2.0), k, k / m_z * NOISE_NMM, 1, k * shared))
+        exact.append((nominal, push(rod, 0.0, 0.0, d_x, 3.0, np.radians(alpha_deg), THETA_RAD, stiffness)[1][1]))
     facts = TrialFacts("soft", "measure", "soft", 10.0, bar_diameter_mm=6.0)
-    return softness(whisker, facts, *places, THETA_RAD, Value(*np.radians([ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG])))
+    for _ in range(DRAWS):
+        gauge = 1.0 + GAUGE_SHARE * rng.normal()
+        places = [_place(nominal, gauge * m_z + NOISE_NMM * rng.normal()) for nominal, m_z in exact]
+        yield softness(whisker, facts, *places, THETA_RAD, Value(*np.radians([ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG])))
+
+
+def _place(nominal_mm: float, m_z: float) -> Place:
+    k = THETA_RAD / m_z
+    return Place(nominal_mm, SHIFT_SIGMA_MM / np.sqrt(2.0), k, k / m_z * NOISE_NMM, 1, k * np.array([GAUGE_SHARE]))
 
 
 def soft_study(shape: str, count: int, seed: int) -> Score:
@@ -70,7 +76,7 @@ def soft_study(shape: str, count: int, seed: int) -> Score:
     for k in range(count):
         stiffness = np.inf if k % 4 == 0 else 10.0 ** rng.uniform(-1.0, 1.0)
         found = two_places(shape, stiffness, rng.uniform(5.0, 24.0), rng)
-        rows.append((found.give_mm_N - 1.0 / stiffness, found.give_sigma_mm_N))
+        rows += [(one.give_mm_N - 1.0 / stiffness, one.give_sigma_mm_N) for one in found]
     return Score(f"softness, {shape}", "mm/N", *np.array(rows).T)
 
 

@@ -122,7 +122,7 @@ def _scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
     found = scatter(smooth, name, theta_rad)
     if not found.freedom or found.freedom * found.left**2 <= chdtri(found.freedom, _CHANCE) * found.expected**2:
         return found.left
-    weights = _local_fit(smooth.theta_rad, theta_rad)[0] / _growth(smooth, name, theta_rad)
+    weights = _local_fit(smooth.theta_rad, theta_rad)[0] * _share(smooth, name, theta_rad)
     of_jumps = (found.left**2 - found.expected**2) * (1.0 + weights @ weights)
     return float(stdtrit(found.freedom, 0.975) / Z_95 * np.sqrt(of_jumps))
 
@@ -149,7 +149,7 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
     degree = _degree(int(np.sum(near)))
     if np.sum(near) <= degree + 1:
         return Scatter()
-    grows = _growth(smooth, name, theta_rad)[near]
+    grows = 1.0 / _share(smooth, name, theta_rad)[near]
     rows = grows[:, None] * smooth.jacobians[name][near]
     covariance = rows @ smooth.covariance @ rows.T
     weights = 1.0 / np.sqrt(np.diag(covariance))
@@ -162,9 +162,9 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
     return Scatter(float(np.sqrt(left @ left / total)), float(np.sqrt(np.sum(by_noise) / total)), float(freedom))
 
 
-def _growth(smooth: Smooth, name: str, theta_rad: float) -> np.ndarray:
-    """What a quantity grows by from each frame's pushing angle (f,) to theta as the force keeps its direction."""
-    return np.ones(len(smooth.theta_rad)) if name in _ANGLES else theta_rad / smooth.theta_rad
+def _share(smooth: Smooth, name: str, theta_rad: float) -> np.ndarray:
+    """What each frame (f,) has of a quantity's size at theta where the force keeps its direction."""
+    return np.ones(len(smooth.theta_rad)) if name in _ANGLES else smooth.theta_rad / theta_rad
 
 
 def _sigmas(smooth: Smooth, name: str, frames: np.ndarray, slope: float = 0.0) -> np.ndarray:

@@ -1,12 +1,16 @@
 """Fig. 8 from signals alone, end to end: simulate, evaluate without pictures, the friction angle that comes back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
+from bench.report.figure_8 import figure_8
 from bench.report.pooled import pooled
 from bench.rig.simulate import simulate
+from estimator.beam import moment_in_EI_per_metre
 
 KINETIC_DEG, STATIC_DEG = 12.3, 17.0
 # One coefficient on "smooth", stick–slip on "rough"; people set everything as they wanted, so few slopes are enough.
@@ -67,3 +71,17 @@ def test_one_coefficient_comes_back(panels):
 def test_with_stick_slip_the_fit_lies_between_the_two(panels):
     """A saw-tooth between the static and the kinetic cone, low-passed."""
     assert KINETIC_DEG + 0.5 < np.degrees(panels["rough"].alpha_rad) < STATIC_DEG
+
+
+def test_panels_stand_in_the_order_of_the_protocols_surfaces(panels):
+    assert list(panels) == ["smooth", "rough"]
+
+
+def test_a_row_of_panels_shows_the_largest_moments_of_all(panels):
+    """Panels of a row share their axis: the second's moments are a third larger."""
+    small = panels["smooth"]
+    larger = [replace(f, m_y_Nmm=1.3 * f.m_y_Nmm, m_z_Nmm=1.3 * f.m_z_Nmm) for f in small.felt]
+    figure = figure_8([small, replace(small, felt=tuple(larger))])
+    top = moment_in_EI_per_metre(max(f.m_Nmm for f in larger), small.beam.rigidity_Nmm2)
+    low, high = figure.axes[0].get_ylim()
+    assert low == 0.0 and high > top

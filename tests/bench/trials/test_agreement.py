@@ -1,15 +1,18 @@
 """Felt moments against those of the seen shape: what stands out, with its likeliest cause, spoils no other whisk."""
 
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.gauges.matrix import FROM_ALL, FROM_FILE, FROM_TRIALS, GaugeMatrix, Gauges, to_follicle
 from bench.gauges.readings import Pairs
 from bench.rig.simulate import simulate
 from bench.trials.agreement import LEAST_CHANCE, agreement
+from bench.trials.estimates import Readout
+from bench.trials.unit import against_shape
 from tests.scenes.results import table
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
@@ -28,6 +31,16 @@ def pairs(rng, spoil=None) -> Pairs:
     moments = exact + 0.01 * rng.normal(size=exact.shape)
     nothing = np.full(2, np.nan)
     return Pairs("t", 0, 0.0, THETA, moments, of_moments, volts, of_volts, nothing, nothing, 0.001)
+
+
+@pytest.mark.parametrize("source, tells", [(FROM_TRIALS, True), (FROM_ALL, True), (FROM_FILE, False)])
+def test_gauges_fitted_to_the_wire_agree_with_it_whatever_its_stiffness(rng, source, tells):
+    """C cancels between such gauges and the seen shape: moments 5 % too large are a fault, however badly C is known.
+    Gauges with newtons of their own may show another C."""
+    wire = SimpleNamespace(C_Nmm2=9000.0, C_sigma_Nmm2=450.0)
+    unit = SimpleNamespace(session=SimpleNamespace(whisker=wire), gauges=Gauges(GAUGES, source))
+    found = against_shape(unit, Readout(GAUGES, is_gauged=True), pairs(rng, 1.05 * np.eye(2)))
+    assert (found.chance < LEAST_CHANCE) == tells
 
 
 def turned(degrees):
