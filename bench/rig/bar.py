@@ -1,7 +1,7 @@
 """The round bar that the whisker is pushed against, and where a whisker first touches it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,9 +49,15 @@ class Bar:
         point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
         return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm, stiffness_N_mm)
 
+    def seen_from(self, pose: np.ndarray) -> "Bar":
+        """The same bar in the frame of a pose (3, 4), T_rig_base, in which its axis' z is positive too."""
+        axis = pose[:, :3].T @ self.axis
+        point = pose[:, :3].T @ (self.point_mm - pose[:, 3])
+        return replace(self, point_mm=point, axis=axis if axis[2] >= 0 else -axis)
+
     def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
-        """The axis' point nearest to a point."""
-        return self.point_mm + ((point_mm - self.point_mm) @ self.axis) * self.axis
+        """The axis' points nearest to points (..., 3)."""
+        return self.point_mm + np.multiply.outer((point_mm - self.point_mm) @ self.axis, self.axis)
 
     def slope(self, touch_rad: float) -> tuple[float, float]:
         """(β, ψ) in the contact frame, as in the conventions: β = atan2(a_y, a_z), ψ = asin(a_x)."""

@@ -20,8 +20,21 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
     for camera in protocol.cameras:
         if (camera.focal_mm is None) != (camera.pixel_um is None):
             raise BadInput(f"camera {camera.name}: focal_mm and pixel_um go together", file=path)
+    _check_columns(protocol, path)
     for run in protocol.runs():
         _check_run(protocol, run, path)
+
+
+def _check_columns(protocol: "Protocol", path: Path) -> None:
+    names = [column.name for column in protocol.columns or ()]
+    if len(set(names)) < len(names):
+        raise BadInput(f"[[columns]] need names of their own; found {names}", file=path)
+    for column in protocol.columns or ():
+        for key in ("length_mm", "diameter_mm"):
+            given, count = getattr(column, key), len(column.heights_mm)
+            if isinstance(given, list) and len(given) != count:
+                found = f"{key} has {len(given)} values, heights_mm {count}"
+                raise BadInput(f"[[columns]] {column.name}: {found}; one for all, or one a height", file=path)
 
 
 def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:

@@ -48,6 +48,16 @@ def read_table(path: Path, shown: str) -> Table:
     return Table(dict(zip(names, values.T)), np.arange(2, len(values) + 2))
 
 
+def column_names(path: Path, shown: str) -> list[str]:
+    """Of a CSV file's first line, which alone is read. Raises BadInput as `read_table` does."""
+    with path.open("rb") as file:
+        first = file.readline(_MOST_BYTES)
+    try:
+        return _header([first.decode("utf-8-sig").rstrip("\r\n")], shown)
+    except UnicodeDecodeError:
+        raise BadInput("is not UTF-8 text; export it as CSV, UTF-8", file=shown) from None
+
+
 def forward_in_time(table: Table, time: str, shown: str) -> tuple[Table, int]:
     """The table without rows that repeat the one before them, and how many those were.
 
