@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from bench.base.errors import BadInput
 from bench.rig import build
 from bench.rig.bar import Bar, Touch, first_touch, unloaded
 from bench.rig.gauges import Gauges
@@ -84,10 +85,10 @@ class ArrayRecording:
         cls, protocol: Protocol, run: Run, whiskers: Sequence[Mounted], rngs: Sequence[np.random.Generator]
     ) -> "ArrayRecording":
         """The trial that seeded generators make of a run: the first of where the bar stands, then one a whisker.
-        Raises ArithmeticError, naming the whisker, where one cannot go on."""
+        Raises ArithmeticError, naming the whisker, where one cannot go on, BadInput where one cannot begin."""
         bar, near_rad, _ = placed_bar(protocol, run, build.rod(protocol), rngs[0])
         bars = {w.name: bar.seen_from(w.pose) for w in whiskers}
-        touches = {w.name: touch_from_afar(w.rod, bars[w.name], _towards(w, near_rad)) for w in whiskers}
+        touches = {w.name: _touch(w, bars[w.name], near_rad) for w in whiskers}
         strokes = _strokes(protocol, run, whiskers, touches, near_rad)
         times = _frame_times_s(protocol, run, next(iter(strokes.values())))
         channels, recordings = {}, {}
@@ -110,16 +111,23 @@ def _towards(whisker: Mounted, angle_rad: float) -> float:
     return math.atan2(y, x)
 
 
+def _touch(whisker: Mounted, bar: Bar, near_rad: float) -> Touch | None:
+    try:
+        return touch_from_afar(whisker.rod, bar, _towards(whisker, near_rad))
+    except ValueError as problem:
+        raise BadInput(f"whisker {whisker.name} {problem}; its base_mm or the trial's d_x_mm is another") from None
+
+
 def touch_from_afar(rod: Rod, bar: Bar, towards_rad: float) -> Touch | None:
     """First touch of a whisker that comes from lower motor angles, looked for within 60° of a direction; None where it
-    meets nothing there. Raises ArithmeticError where it lies within the bar from the beginning."""
+    meets nothing there. Raises ValueError where it lies within the bar from the beginning."""
     arcs = np.linspace(0.0, rod.length_mm, _ARCS)
     for angle in towards_rad + _SWEPT_RAD:
         points = unloaded(rod, angle, arcs)[0]
         gaps = np.linalg.norm(points - bar.foot_mm(points), axis=-1) - bar.radius_mm - rod.radius_mm(arcs)
         if gaps.min() <= 0.0:
             if angle == towards_rad + _SWEPT_RAD[0]:
-                raise ArithmeticError("it stands in the bar before it moves")
+                raise ValueError("stands in the bar before it moves")
             return first_touch(rod, bar, angle, float(arcs[gaps.argmin()]))
     return None
 
