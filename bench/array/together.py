@@ -80,6 +80,8 @@ def read_array_record(out: Path) -> ArrayRecord:
     """The array of a folder. Raises BadInput where it is none, or of another version."""
     try:
         return from_plain(ArrayRecord, json.loads((out / ARRAY).read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise BadInput(f"is no array's run (there is no {ARRAY} in it)", file=out) from None
     except (OSError, ValueError, KeyError):
         raise BadInput("is damaged or of an older version; evaluate the session again", file=out / ARRAY) from None
 

@@ -20,6 +20,9 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+_STRAIGHT = np.zeros((3, 3))  # how the axis of a straight bar turns
+
+
 @dataclass(frozen=True)
 class Bar:
     """A round bar in the rig frame: a point of its axis, the axis' unit direction (its z positive), its radius, and how
@@ -59,9 +62,20 @@ class Bar:
         """The axis' points nearest to points (..., 3)."""
         return self.point_mm + np.multiply.outer((point_mm - self.point_mm) @ self.axis, self.axis)
 
-    def slope(self, touch_rad: float) -> tuple[float, float]:
-        """(β, ψ) in the contact frame, as in the conventions: β = atan2(a_y, a_z), ψ = asin(a_x)."""
-        x, y, z = turned(self.axis, -touch_rad)
+    def around(self, point_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What a contact at a point (3,) sees: the way there (3,) from the axis' nearest point, and its derivative by
+        the point, (3, 3); the axis' direction there (3,), and its derivative (3, 3)."""
+        flat = np.eye(3) - np.outer(self.axis, self.axis)
+        return flat @ (point_mm - self.point_mm), flat, self.axis, _STRAIGHT
+
+    def axis_at(self, point_mm: np.ndarray) -> np.ndarray:
+        """The axis' direction (3,) nearest to a point (3,), its z positive."""
+        return self.around(point_mm)[2]
+
+    def slope(self, touch_rad: float, point_mm: np.ndarray | None = None) -> tuple[float, float]:
+        """(β, ψ) in the contact frame, as in the conventions: β = atan2(a_y, a_z), ψ = asin(a_x). point_mm: where it is
+        touched; a straight bar leans alike everywhere."""
+        x, y, z = turned(self.axis if point_mm is None else self.axis_at(point_mm), -touch_rad)
         return math.atan2(y, z), math.asin(x)
 
 

@@ -46,6 +46,8 @@ def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
         raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside {_NEAREST:g} to 1.05 of the whisker's length", file=path)
     if not 0.01 <= run.speed_deg_s <= 2000:
         raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 2000 is allowed", file=path)
+    if (table.object == "ring") != bool(table.ring_diameter_mm):
+        raise BadInput('ring_diameter_mm belongs to object = "ring", and to no other', file=path)
     if table.static_friction is not None and table.static_friction < table.friction:
         raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
     if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:

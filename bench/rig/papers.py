@@ -10,8 +10,10 @@ import tomli_w
 
 from bench.rig import build
 from bench.rig.array import ArrayRecording, Mounted, base_keys
+from bench.rig.bar import Bar
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
+from bench.rig.rounded import Ring, Sphere
 
 _GAUGED, _FORCES = ("time_s", "motor_deg", "y_V", "z_V"), ("f_x_N", "f_y_N", "f_z_N")
 _TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"
@@ -109,8 +111,16 @@ def array_trial_toml(recording: ArrayRecording) -> str:
     trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "purpose": table.purpose}
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
-    trial["object"] = {"shape": "bar", "point_mm": recording.bar.point_mm.tolist(), "axis": recording.bar.axis.tolist()}
+    trial["object"] = _object(recording.bar)
     return tomli_w.dumps(trial)
+
+
+def _object(bar: Bar) -> dict:
+    """Where it stands, as session.toml has it."""
+    stated = {"shape": "bar", "point_mm": bar.point_mm.tolist(), "axis": bar.axis.tolist()}
+    if isinstance(bar, Sphere):
+        return {"shape": "sphere", "point_mm": stated["point_mm"]}
+    return stated | {"shape": "ring", "ring_diameter_mm": 2 * bar.ring_radius_mm} if isinstance(bar, Ring) else stated
 
 
 def array_signals_csv(recording: ArrayRecording) -> str:
@@ -156,7 +166,7 @@ def truth_toml(recording: Recording) -> str:
 
 
 def _whisk_truth(whisk):
-    beta, psi = whisk.bar.slope(whisk.touch.motor_rad)
+    beta, psi = whisk.bar.slope(whisk.touch.motor_rad, whisk.touch.point_mm)
     return {
         "touch_deg": math.degrees(whisk.touch.motor_rad), "d_x_mm": whisk.touch.d_x_mm,
         "beta_deg": math.degrees(beta), "psi_deg": math.degrees(psi),

@@ -218,6 +218,8 @@ class TrialTable(Table):
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
+    object: Literal["ring", "sphere"] | msgspec.UnsetType = msgspec.UNSET  # by default a straight bar
+    ring_diameter_mm: Positive | msgspec.UnsetType = msgspec.UNSET  # of the circle that a ring's axis is
     purpose: Literal["measure", "gauge"] = "measure"
     follicle_roll_deg: float = 0.0
     name: str = ""

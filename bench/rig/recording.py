@@ -8,13 +8,14 @@ from functools import partial
 import numpy as np
 
 from bench.rig import build
-from bench.rig.bar import Bar, Touch, first_touch
+from bench.rig.bar import Bar, Touch, first_touch, turned
 from bench.rig.friction import Friction
 from bench.rig.gauges import Gauges
 from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.rod import Rod
+from bench.rig.rounded import Ring, Sphere
 from bench.rig.stroke import Stroke
 
 _STEP_RAD = math.radians(0.1)  # rad: half of it changes nothing that is seen (tests/bench/rig/test_contact_march.py)
@@ -86,7 +87,17 @@ def placed_bar(protocol: Protocol, run: Run, rod: Rod, rng: np.random.Generator)
     bar = Bar.placed(d_x_mm=d_x, beta_rad=math.radians(beta), psi_rad=math.radians(psi), touch_rad=math.radians(touch),
                      radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2, whisker_radius_mm=whisker,
                      stiffness_N_mm=table.stiffness_N_mm or math.inf)
-    return bar, math.radians(touch), d_x
+    return _rounded(table, bar, touch, d_x), math.radians(touch), d_x
+
+
+def _rounded(table, bar: Bar, touch_deg: float, d_x_mm: float) -> Bar:
+    """What is touched in the bar's place, at the same point with the same slope."""
+    if table.object == "sphere":
+        return Sphere(bar.point_mm, bar.axis, bar.radius_mm, bar.stiffness_N_mm)
+    if table.object == "ring":
+        touched = turned(np.array([d_x_mm, 0.0, 0.0]), math.radians(touch_deg))
+        return Ring.bent(bar, touched, 0.5 * table.ring_diameter_mm)
+    return bar
 
 
 def _stroke(protocol, run, touch):

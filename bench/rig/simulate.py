@@ -76,10 +76,16 @@ def _check_can_be_built(job, name):
 
 
 def _check_can_be_rendered(job, name):
-    if not job.signals_only and job.protocol.cameras and any(t.stiffness_N_mm for t in job.protocol.trials):
-        raise BadInput("a soft bar (stiffness_N_mm) is simulated in signals alone; add --signals-only", file=name)
-    if not job.signals_only and job.protocol.cameras and job.whiskers:
-        raise BadInput("an array ([[columns]]) is simulated in signals alone; add --signals-only", file=name)
+    if job.signals_only or not job.protocol.cameras:
+        return
+    felt_alone = {
+        "a soft bar (stiffness_N_mm)": any(t.stiffness_N_mm for t in job.protocol.trials),
+        "a ring or sphere (object)": any(t.object for t in job.protocol.trials),
+        "an array ([[columns]])": bool(job.whiskers),
+    }
+    for what, there in felt_alone.items():
+        if there:
+            raise BadInput(f"{what} is simulated in signals alone; add --signals-only", file=name)
 
 
 def _claim(job):

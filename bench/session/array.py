@@ -24,6 +24,7 @@ from bench.session.trial import Trial
 _PARALLEL = 1e-6  # rounding of cosines: axes of bases on one motor
 _OWN = (*VOLTS, *MOMENTS, *FORCES)  # columns that no two whiskers share
 
+_NO_PICTURES = {"camera_names": (), "board_sources": {}, "rig_pictures": {}, "cameras_toml": None}
 _OWN_GAUGES = "give each of [[whiskers]] its own: [whiskers.gauges]"
 
 
@@ -53,6 +54,8 @@ def load_views(
         with doubts.guard():
             channels[trial.name] = _channels_of_all(trial, named)
             _check_motors(bases, channels[trial.name])
+    if any(trial.camera_sources for trial in session.trials):
+        doubts.note("pictures of several whiskers are not looked at: what is felt has no truth beside it")
     readable = tuple(trial for trial in session.trials if trial.name in channels)
     return tuple(_view(session, named[base.name], base, readable, channels) for base in bases)
 
@@ -140,7 +143,7 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
 
 
 def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels) -> Session:
-    """The session as that whisker alone would have recorded it, in its base frame; no picture is looked at."""
+    """The session as that whisker alone would have recorded it, in its base frame, without pictures."""
     own = tuple(
         replace(trial, daq=channels[trial.name][base.name], whisker=base.name, camera_sources={}) for trial in trials
     )
@@ -151,4 +154,5 @@ def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels)
         gauges=given_gauges(keys.gauges),
         trials=own,
         base=base,
+        **_NO_PICTURES,
     )

@@ -9,6 +9,7 @@ import pytest
 
 from bench import api
 from bench.api import ArrayRun, Run
+from bench.array.compare import compare_arrays
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.check import check
@@ -95,10 +96,22 @@ def test_the_report_is_made_again_of_the_runs_alone(out):
     assert {name: (out / name).read_bytes() for name in before} == before
 
 
-def test_verbs_of_one_run_ask_for_one_whisker(out, tmp_path):
-    for asked in (lambda: compare_runs([out / "whiskers" / "w1", out], None), lambda: write_video(out, "steel_b30_v10")):
-        with pytest.raises(BadInput, match="is of several whiskers; give the folder of one of them"):
-            asked()
+def test_verbs_of_one_run_ask_for_one_whisker(out):
+    several = "is of several whiskers; give the folder of one of them"
+    with pytest.raises(BadInput, match=several):
+        compare_runs([out / "whiskers" / "w1", out], None)
+    with pytest.raises(BadInput, match=several):
+        write_video(out, "steel_b30_v10")
+
+
+def test_arrays_are_compared_whisker_by_whisker(out, tmp_path):
+    again = tmp_path / "again"
+    shutil.copytree(out, again)
+    lines, code = compare_arrays([out, again], tmp_path / "changes.csv")
+    assert code == 0 and sum("1 whisks in both" in line for line in lines) == 2
+    assert (tmp_path / "changes@w2.csv").is_file()
+    with pytest.raises(BadInput, match="is no array's run"):
+        compare_arrays([out, out / "whiskers" / "w1"], None)
 
 
 def test_check_takes_arrays(session, capsys):

@@ -6,8 +6,16 @@ import pytest
 from bench.array.cloud import Mount, contacts
 from bench.array.surface import Surface
 from bench.array.verdict import surface_lines, surface_verdict
-from bench.records.trial import EstimateRow, FeltTrial, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts, TrialResult
-from bench.records.trial import WhiskerFacts
+from bench.records.trial import (
+    EstimateRow,
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
 from vision.geometry.rods import Wire
@@ -19,9 +27,10 @@ BASE = Base("w1", np.column_stack([TURN, [10.0, 20.0, 5.0]]), 0.1, 0.002)
 ALPHA = np.radians(10.0)
 
 
-def felt(d_x=Value(60.0, 0.5), touch=Value(0.3, 0.004), both=0.001, beta=0.5, status="") -> TrialResult:
-    row = EstimateRow("with_friction", d_x, ALPHA, beta, touch_covariance_mm_rad=both)
-    whisk = FeltWhisk(touch_felt_rad=touch, phi_felt_rad=Value(beta - ALPHA, 0.03), estimates=(row,), status=status)
+def felt(d_x_mm=60.0, touch_rad=0.3, beta=0.5, status="") -> TrialResult:
+    row = EstimateRow("with_friction", Value(d_x_mm, 0.5), ALPHA, beta, touch_covariance_mm_rad=0.001)
+    touch, phi = Value(touch_rad, 0.004), Value(beta - ALPHA, 0.03)
+    whisk = FeltWhisk(touch_felt_rad=touch, phi_felt_rad=phi, estimates=(row,), status=status)
     facts = TrialFacts("t", "measure", "steel", 10.0, *[np.nan] * 3)
     return TrialResult(facts, WhiskerFacts("cylinder", 100.0, 1.0, 2945.0, None), 3.0,
                        SeenTrial((SeenWhisk(0),)), FeltTrial((whisk,)))  # fmt: skip
@@ -67,10 +76,10 @@ def test_a_contact_on_the_surface_is_on_it():
 
 def test_an_error_of_distance_shows_along_the_whisker_and_one_of_touch_across_it():
     surface, base = bar(0.0)
-    (far,) = cloud(felt(Value(61.0, 0.5)), surface, base)
+    (far,) = cloud(felt(61.0), surface, base)
     assert far.along_mm.value == pytest.approx(1.0, abs=1e-5)
     assert far.distance_mm.value == pytest.approx(np.hypot(3.5, 1.0) - 3.5, abs=1e-9)
-    (early,) = cloud(felt(touch=Value(0.299, 0.004)), surface, base)
+    (early,) = cloud(felt(touch_rad=0.299), surface, base)
     assert early.distance_mm.value == pytest.approx(60.0 * 0.001 * np.cos(0.5), rel=0.02)
     (leaning,) = cloud(felt(beta=0.6), surface, base)
     assert leaning.normal_off_rad == pytest.approx(0.1, abs=1e-9)
@@ -88,7 +97,7 @@ def test_distances_from_rings_and_spheres():
 
 def test_doubtful_contacts_are_in_the_table_and_not_in_the_verdict():
     surface, base = bar(0.0)
-    sound, doubtful = cloud(felt(), surface, base), cloud(felt(Value(80.0, 0.5), status="odd"), surface, base)
+    sound, doubtful = cloud(felt(), surface, base), cloud(felt(80.0, status="odd"), surface, base)
     (line,) = surface_verdict([*sound, *doubtful])
     assert "1 contact felt by 1 whisker lie 0.00 mm RMS off the object (manifest)" in line
     assert not list(surface_verdict(doubtful)) and not list(surface_lines(doubtful))

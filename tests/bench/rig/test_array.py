@@ -72,7 +72,8 @@ def test_a_whisker_that_reaches_nothing_feels_nothing():
 
 
 def test_columns_move_motors_of_their_own():
-    columns = [ColumnTable(name=name, base_mm=(0.0, y, 0.0), heights_mm=[0.0]) for name, y in (("a", 0.0), ("b", -20.0))]
+    bases = {"a": (0.0, 0.0, 0.0), "b": (0.0, -20.0, 0.0)}
+    columns = [ColumnTable(name=name, base_mm=base, heights_mm=[0.0]) for name, base in bases.items()]
     array = recorded(Protocol(trials=[TRIAL], columns=columns))
     assert list(array.channels)[:2] == ["time_s", "motor_deg@a"] and "motor_deg@b" in array.channels
     starts = [array.channels[f"motor_deg@{name}"][0] for name in "ab"]

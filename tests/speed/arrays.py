@@ -1,6 +1,6 @@
 """What several whiskers cost: CPU seconds to simulate and to evaluate arrays of 1, 5 and 25 whiskers, signals alone.
 
-    python tests/speed/array.py [WHISKERS …]
+    python tests/speed/arrays.py [WHISKERS …]
 
 A trial of one whisk each, without figures, in this process; seconds of one core, and those a whisker.
 """
@@ -52,7 +52,8 @@ def main() -> None:
     for whiskers in [int(a) for a in sys.argv[1:]] or [1, 5, 25]:
         with TemporaryDirectory() as folder:
             made, judged = cost(whiskers, Path(folder))
-        print(f"{whiskers:>8}{made:>12.2f}{made / whiskers:>11.2f}{judged:>12.2f}{judged / whiskers:>11.2f}", flush=True)
+        each = f"{made:>12.2f}{made / whiskers:>11.2f}{judged:>12.2f}{judged / whiskers:>11.2f}"
+        print(f"{whiskers:>8}{each}", flush=True)
 
 
 if __name__ == "__main__":
