@@ -25,7 +25,7 @@ class Contact:
     normal (3,): of the surface, towards the whisker, as felt; NaN where the estimator gives no slope. normal_sigma_rad:
     of it, in the plane across the whisker. distance_mm: from the object's surface to the whisker's, positive outside;
     along_mm: how far beyond the place where this whisker comes nearest to the object, along the whisker;
-    normal_off_rad: between the normal and the object's own. All NaN where the object is not known. source: of it.
+    normal_off_rad: between the normal and the object's own there. All NaN where the object is not known. source: of it.
     """
 
     whisker: str
@@ -113,15 +113,16 @@ def _beside(contact: Contact, surface: Surface, wire: Wire, base: Base) -> Conta
     start = base.T_rig_base[:, 3]
     arc = float(np.linalg.norm(contact.point_mm - start))
     towards = (contact.point_mm - start) / arc
-    (outside,), (normal,) = surface.distance_mm(contact.point_mm[None])
+    nearest = surface.nearest_arc_mm(start, towards, wire.length_mm)
+    (outside, _), (normal, own) = surface.distance_mm(np.array([contact.point_mm, start + nearest * towards]))
     across, along = (
         float(np.sqrt(way @ contact.covariance_mm2 @ way + surface.sigma_mm**2)) for way in (normal, towards)
     )
-    cosine = np.clip(contact.normal @ normal, -1.0, 1.0)
+    cosine = np.clip(contact.normal @ own, -1.0, 1.0)
     return replace(
         contact,
         distance_mm=Value(float(outside - wire.radius_mm(arc)), across),
-        along_mm=Value(arc - surface.nearest_arc_mm(start, towards, wire.length_mm), along),
+        along_mm=Value(arc - nearest, along),
         normal_off_rad=float(np.arccos(cosine)),
         source=surface.source,
     )

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from bench.array.cloud import SEEN, Contact
 from bench.array.surface import Surface
-from bench.base.drawing import OTHER_COLOURS, blank, is_drawn, save, style
+from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.records.plain import to_plain
 
@@ -38,7 +39,7 @@ def figure(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Fig
     crosses."""
     drawn = blank(7.2, 3.6)
     names = dict.fromkeys(contact.whisker for contact in cloud)
-    colours = {name: OTHER_COLOURS[k % len(OTHER_COLOURS)] for k, name in enumerate(names)}
+    colours = {name: colormaps["tab20"](k % 20) for k, name in enumerate(names)}
     for axes, (x, y, x_name, y_name) in zip(drawn.subplots(1, 2), _VIEWS):
         points = np.array([c.point_mm for c in cloud])
         if surface is not None:
@@ -48,8 +49,8 @@ def figure(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Fig
         axes.set(xlabel=x_name, ylabel=y_name, aspect="equal", xlim=_span(points[:, x]), ylim=_span(points[:, y]))
     for name, colour in colours.items():
         axes.plot([], [], "o", color=colour, label=name)
-    drawn.legend(*axes.get_legend_handles_labels(), loc="outside right upper", title="whisker")
-    drawn.suptitle(f"{trial}: contacts felt (ellipses: one sigma), seen (crosses), and the object")
+    drawn.legend(*axes.get_legend_handles_labels(), loc="outside right center", title="whisker")
+    drawn.suptitle(f"{trial}: contacts felt (ellipses: one sigma), seen (crosses), and the object", fontsize=9)
     return drawn
 
 
@@ -57,7 +58,7 @@ def _span(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()) - _MARGIN_MM, float(values.max()) + _MARGIN_MM
 
 
-def _draw_contact(axes, contact: Contact, x: int, y: int, colour: str) -> None:
+def _draw_contact(axes, contact: Contact, x: int, y: int, colour) -> None:
     place = contact.point_mm[[x, y]]
     if contact.estimator == SEEN:
         axes.plot(*place, "x", color=colour, markersize=5)

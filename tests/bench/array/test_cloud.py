@@ -79,6 +79,7 @@ def test_an_error_of_distance_shows_along_the_whisker_and_one_of_touch_across_it
     (far,) = cloud(felt(61.0), surface, base)
     assert far.along_mm.value == pytest.approx(1.0, abs=1e-5)
     assert far.distance_mm.value == pytest.approx(np.hypot(3.5, 1.0) - 3.5, abs=1e-9)
+    assert far.normal_off_rad == pytest.approx(0.0, abs=1e-6)
     (early,) = cloud(felt(touch_rad=0.299), surface, base)
     assert early.distance_mm.value == pytest.approx(60.0 * 0.001 * np.cos(0.5), rel=0.02)
     (leaning,) = cloud(felt(beta=0.6), surface, base)
