@@ -205,6 +205,7 @@ class SessionKeys(Keys, kw_only=True):
 
     format: int
     name: str = ""
+    surfaces: tuple[str, ...] = ()
     whisker: WhiskerKeys | None = None
     whiskers: tuple[ArrayWhiskerKeys, ...] = ()
     bar: BarKeys | None = None
