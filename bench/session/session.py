@@ -109,7 +109,7 @@ def load_session(
     path, doubts = Path(path), doubts or Doubts()
     keys = read_manifest(path, doubts, follow_links)
     if keys.whiskers:
-        raise BadInput("has several whiskers ([[whiskers]]); evaluate, check and report alone take them", file=MANIFEST)
+        raise BadInput("has several whiskers ([[whiskers]]); evaluate and check alone take them", file=MANIFEST)
     return loaded(path, keys, doubts, lenses_known=lenses_known, trials=trials)
 
 
