@@ -26,6 +26,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.array.together import TABLES as ARRAY_TABLES
+from bench.array.together import folder_of, is_array, read_array_record, write_array
+from bench.base.atomic import lock_output
 from bench.base.drawing import style
 from bench.base.settings import Settings
 from bench.base.tables import TABLES, read_table
@@ -103,6 +106,27 @@ class Run:
             return session_figures(whole.results, whole.friction, self.record.whisker, self.record.settings)
 
 
+@dataclass(frozen=True, eq=False)
+class ArrayRun:
+    """An evaluated session of several whiskers: verdict and doubts of all; whiskers: each one's own run, by name."""
+
+    out: Path
+    verdict: tuple[str, ...]
+    doubts: tuple[str, ...]
+    whiskers: dict[str, Run]
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether anything is doubtful; the command line's exit code is then 1."""
+        return bool(self.doubts)
+
+    def table(self, name: str) -> np.ndarray:
+        """A table of all whiskers by its name: whisks, estimates or surface. Raises KeyError for another."""
+        if name not in ARRAY_TABLES:
+            raise KeyError(f"{name!r} is no table; there are {', '.join(ARRAY_TABLES)}")
+        return read_table(self.out / f"{name}.csv")
+
+
 def evaluate(
     session: Folder,
     out: Folder,
@@ -122,7 +146,7 @@ def evaluate(
     workers: int = 0,
     dask: str | None = None,
     figure_formats: Sequence[str] = (),
-) -> Run:
+) -> Run | ArrayRun:
     """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the screen.
 
     The options are those of the command line; workers: 0 works in this process. More are processes of their own, which
@@ -147,7 +171,7 @@ def evaluate(
 
 def evaluate_with(
     session: Path, out: Path, settings: Settings, workers: int = 1, figure_formats: Sequence[str] = (), **shown: Any
-) -> Run:
+) -> Run | ArrayRun:
     """The same with the options in one object. shown: progress, announce and dask of
     `bench.evaluate.evaluate`."""
     quiet = {"announce": logging.getLogger(__name__).info}
@@ -155,9 +179,15 @@ def evaluate_with(
     return read(out)
 
 
-def read(out: Folder) -> Run:
+def read(out: Folder) -> Run | ArrayRun:
     """A run that was evaluated before. Raises BadInput where the folder is none."""
-    return Run(Path(out), read_record(Path(out)))
+    out = Path(out)
+    if not is_array(out):
+        return Run(out, read_record(out))
+    array = read_array_record(out)
+    folders = {base.name: folder_of(out, base.name) for base in array.bases}
+    whiskers = {name: Run(folder, read_record(folder)) for name, folder in folders.items()}
+    return ArrayRun(out, array.verdict, array.doubtful, whiskers)
 
 
 def plan(
@@ -180,4 +210,11 @@ def plan(
 def report(out: Folder, figure_formats: Sequence[str] = ()) -> list[Path]:
     """report.html, methods.md and results.bib again, and figures for a paper in these formats ("png", "pdf", "svg").
     The paths written. Raises BadInput where the folder is no run."""
-    return report_again(Path(out), figure_formats)
+    out = Path(out)
+    if not is_array(out):
+        return report_again(out, figure_formats)
+    names = [base.name for base in read_array_record(out).bases]
+    written = [path for name in names for path in report_again(folder_of(out, name), figure_formats)]
+    with lock_output(out):
+        write_array(out)
+    return [*written, out / "report.html"]

@@ -15,7 +15,7 @@ from bench.gauges.checks import check_alive
 from bench.gauges.felt import Stroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauges_file import given_gauges
-from bench.session.check import checked_session, find_damage
+from bench.session.check import checked_views, find_damage
 from bench.session.footage import frame_count, read_frames
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.session import Session
@@ -40,15 +40,18 @@ def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
     """Print refusals and notes. Returns the exit code: 2 where there is a refusal, 1 where a note, else 0."""
     doubts = Doubts(stop_at_first=False)
     with doubts.guard():
-        session = checked_session(path, doubts, follow_links=follow_links)
+        views = checked_views(path, doubts, follow_links=follow_links)
+        session = views[0]
         find_damage(session, doubts, each=partial(tqdm, desc="pictures", disable=not progress, leave=False))
-        look_ahead(session, doubts)
+        for view in views:
+            look_ahead(view, doubts)
     for line in dict.fromkeys(doubts.refusals):
         print(f"bad: {line}")
     for line in dict.fromkeys(doubts.notes):
         print(f"doubtful: {line}")
     if not (doubts.refusals or doubts.notes):
-        print(f"{session.name}: {counted(len(session.trials), 'trial')}, nothing wrong or doubtful")
+        whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
+        print(f"{session.whole_name}{whiskers}: {counted(len(session.trials), 'trial')}, nothing wrong or doubtful")
     return 2 if doubts.refusals else 1 if doubts.notes else 0
 
 
@@ -73,7 +76,7 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
             times = frame_times(trial)
             felt = [*_of_gauges(signals, strokes), *_of_strokes(signals, strokes, times)]
             for line in [*felt, *_of_scene(trial, times, rig)]:
-                doubts.note(f"trials/{trial.name}: {line}")
+                doubts.note(f"{trial.place}: {line}")
     own = session.gauges_toml is None and session.gauges is None
     if own and pushes and not in_two_directions(np.array(pushes)):
         doubts.note(f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}")

@@ -35,9 +35,12 @@ def add_compare(verbs: Verbs) -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
+    from bench.array.compare import compare_arrays
+    from bench.array.together import is_array
     from bench.report.compare import compare_runs
 
-    lines, code = compare_runs(options.runs, options.out)
+    compare = compare_arrays if is_array(options.runs[0]) else compare_runs
+    lines, code = compare(options.runs, options.out)
     print(*lines, sep="\n")
     return code
 

@@ -17,8 +17,10 @@ from bench.friction.tilted import tilted_whisks, write_tilts
 from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation, finished
 from bench.report.summary.page import Summary
-from bench.session.check import checked_session
+from bench.session.check import checked_views
 from bench.session.inside import check_outside
+from bench.session.session import Session
+from bench.session.trial import Trial
 from bench.trials.estimates import estimators
 from bench.trials.exchanged import exchanged_signals
 from bench.trials.lost import evaluated
@@ -50,29 +52,66 @@ def evaluate(
         session_path, out = session_path.absolute(), out.absolute()  # its workers stand elsewhere
     check_outside(out, session_path)
     doubts = Doubts()
-    session = checked_session(session_path, doubts, trials, follow_links=settings.follow_links)
-    recorded = judged(session)
-    require_some(recorded, settings)
+    views = checked_views(session_path, doubts, trials, follow_links=settings.follow_links)
+    recorded = [judged(view) for view in views]
+    require_some(recorded[0], settings)
     with lock_output(out), _workers(dask, workers, out, progress) as pool:
-        calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
-        gauges, certificate, units = with_gauges(units, pool, doubts)
-        chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-        whole = finished(evaluated(chosen, pool), session.whisker, settings)
-        doubts.notes += [*filter(None, [whole.doubt]), *exchanged_signals(chosen, whole.results)]
-        write_tables(out, whole.results)
-        write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
-        alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)
-        soft = tuple(soft_objects(session, whole.results, *alpha))
-        write_compliance(out, soft)
-        shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
-        write_curvature(out, shapes)
-        tilted = tuple(tilted_whisks(session, whole.results))
-        write_tilts(out, tilted)
-        recordings = {unit.trial.name: unit.files for unit in chosen}
-        found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
-        summary = report(Evaluation(session, out, settings, *found, certificate, tilted), pool, figure_formats)
+        if views[0].base is None:
+            summary = _evaluated(views[0], recorded[0], out, settings, pool, doubts, figure_formats)
+        else:
+            summary = _array(views, recorded, out, settings, pool, doubts, figure_formats)
     announce(summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
+
+
+def _array(
+    views: Sequence[Session],
+    recorded: Sequence[Sequence[Trial]],
+    out: Path,
+    settings: Settings,
+    pool: Workers,
+    doubts: Doubts,
+    figure_formats: Sequence[str],
+) -> Summary:
+    """Each whisker of an array as a run of its own, and then what they tell together."""
+    from bench.array.together import array_record, folder_of, write_array, write_array_record
+    from bench.report.score import score_all
+
+    folders = [folder_of(out, view.base.name) for view in views]
+    for view, trials, folder in zip(views, recorded, folders):
+        with lock_output(folder):
+            _evaluated(view, trials, folder, settings, pool, Doubts(), figure_formats)
+    write_array_record(out, array_record(views, doubts.notes, score_all(list(zip(views, folders)))))
+    return write_array(out)
+
+
+def _evaluated(
+    session: Session,
+    recorded: Sequence[Trial],
+    out: Path,
+    settings: Settings,
+    pool: Workers,
+    doubts: Doubts,
+    figure_formats: Sequence[str],
+) -> Summary:
+    """The recorded trials of one whisker's session into the folder `out`, which is locked."""
+    calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
+    gauges, certificate, units = with_gauges(units, pool, doubts)
+    chosen = [unit for unit in units if settings.takes(unit.trial.name)]
+    whole = finished(evaluated(chosen, pool), session.whisker, settings)
+    doubts.notes += [*filter(None, [whole.doubt]), *exchanged_signals(chosen, whole.results)]
+    write_tables(out, whole.results)
+    write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)
+    alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)
+    soft = tuple(soft_objects(session, whole.results, *alpha))
+    write_compliance(out, soft)
+    shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
+    write_curvature(out, shapes)
+    tilted = tuple(tilted_whisks(session, whole.results))
+    write_tilts(out, tilted)
+    recordings = {unit.trial.name: unit.files for unit in chosen}
+    found = whole.results, whole.friction, gauges, calibration, tuple(doubts.notes), recordings, soft, shapes
+    return report(Evaluation(session, out, settings, *found, certificate, tilted), pool, figure_formats)
 
 
 def _workers(dask: str | None, count: int, out: Path, progress: bool) -> Workers:

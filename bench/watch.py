@@ -14,7 +14,7 @@ from pathlib import Path
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.evaluate import DONE, evaluate
-from bench.session.check import checked_session
+from bench.session.check import checked_views
 from bench.session.footage import visible
 from bench.session.inside import check_outside
 from bench.trials.estimates import estimators
@@ -52,7 +52,7 @@ class _Watched:
         """Whether the trial can be evaluated."""
         self.asked[name], before, self.refused[name] = (self.around, self.last[name]), self.refused.get(name), ""
         try:
-            checked_session(self.path, trials={name}, follow_links=self.follow_links)
+            checked_views(self.path, trials={name}, follow_links=self.follow_links)
         except BadInput as problem:
             self.refused[name] = str(problem)
             if self.refused[name] != before:

@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
@@ -14,7 +15,7 @@ import numpy as np
 
 from bench.base.atomic import write_whole
 
-_TRUTH_FILES = ("truth.csv", "truth.toml", "truth.json")
+_TRUTH_FILES = re.compile(r"truth(@.+)?\.(csv|toml|json)")  # of one whisker, or of each of an array
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
 SEEING = (
     *("vision", "bench/session", "bench/cameras", "bench/gauges/felt.py", "bench/trials/seen.py"),
@@ -50,7 +51,7 @@ def hash_of_files(paths: Iterable[Path]) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for path in sorted(set(paths)):
         for file in [path] if path.is_file() else sorted(_below(path)):
-            if file.name not in _TRUTH_FILES and not file.name.startswith("."):
+            if not _TRUTH_FILES.fullmatch(file.name) and not file.name.startswith("."):
                 digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
                 with file.open("rb") as content:  # a video may be larger than the memory
                     digest.update(hashlib.file_digest(content, hashlib.blake2b).digest())

@@ -37,8 +37,8 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> Non
 
 
 # Columns that hold text, and whole numbers that are never missing; all others are numbers.
-TEXT = ("trial", "surface", "looked", "estimator", "beta_from", "record", "kind", "notes", "status")
-TEXT += ("refinement", "verdict")
+TEXT = ("whisker", "trial", "surface", "looked", "estimator", "beta_from", "record", "kind", "notes", "status")
+TEXT += ("refinement", "verdict", "surface_from")
 SAID = ("status", "notes")  # sentences of ours
 _ASCII = {
     **{"°": " deg", "±": "+-", "·": "*", "×": "x", "≥": ">=", "≤": "<=", "²": "2", "−": "-", "–": "-", "…": "..."},

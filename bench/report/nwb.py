@@ -35,6 +35,7 @@ def check_nwb(path: Path, session: Path) -> None:
     if path.suffix != ".nwb":
         raise BadInput(f"--nwb {path} must end in .nwb")
     check_outside(path, session, "--nwb")
+    load_session(session, lenses_known=True, follow_links=True)
     try:
         import pynwb
     except ImportError:

@@ -16,6 +16,7 @@ from bench.report.summary.page import Summary
 from bench.session.session import Session
 
 RECORD, SESSION = "run.json", ".session"
+ARRAY, RUNS = "array.json", "whiskers"  # of several whiskers: each one's run stands in a folder of its own
 _AGAIN = "evaluate the session again into this folder"
 
 
@@ -74,6 +75,8 @@ def write_record(out: Path, record: RunRecord, session: Path) -> RunRecord:
 
 def read_record(out: Path) -> RunRecord:
     """The run of a folder. Raises BadInput where it is no finished run of this version."""
+    if (out / ARRAY).is_file():
+        raise BadInput(f"is of several whiskers; give the folder of one of them, {RUNS}/<name> in it", file=out)
     if not (out / RECORD).is_file():
         raise BadInput(f"is no evaluated run (there is no {RECORD} in it); give the OUT of `evaluate`", file=out)
     try:

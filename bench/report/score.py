@@ -4,7 +4,7 @@ that computes a result does; what it finds is printed and changes nothing."""
 import csv
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,15 +48,26 @@ class Score:
 
 def score(session: Session, out: Path, gauges: Gauges | None = None) -> list[str]:
     """Lines on bias, RMS and the share of 95 % intervals that hold; empty where the session has no truth files."""
+    return score_all([(session, out)], gauges)
+
+
+def score_all(runs: Sequence[tuple[Session, Path]], gauges: Gauges | None = None) -> list[str]:
+    """The same of several runs (the whiskers of an array), each with its folder, taken together."""
     try:
-        scores = list(_scores(session, out))
-        lines = list(_gauge_lines(session, gauges))
+        found = [one for session, out in runs for one in _scores(session, out)]
+        lines = list(_gauge_lines(runs[0][0], gauges))
     except (OSError, ValueError, KeyError, IndexError) as problem:
         return [f"the truth files cannot be read: {type(problem).__name__} {problem}"]
-    if not scores:
+    if not found:
         return lines
+    scores = [_together([s for s in found if s.name == name]) for name in dict.fromkeys(s.name for s in found)]
     head = f"{'':<28}{'n':>5}  {'bias':>9}  {'RMS':>8}     in 95 %  most |z|"
     return [head, *(s.line() for s in scores), *lines]
+
+
+def _together(scores: Sequence[Score]) -> Score:
+    errors, sigmas = (np.concatenate([getattr(s, key) for s in scores]) for key in ("errors", "sigmas"))
+    return Score(scores[0].name, scores[0].unit, errors, sigmas)
 
 
 def _scores(session: Session, out: Path) -> Iterator[Score]:
@@ -112,7 +123,7 @@ def _truth(session: Session, row: dict) -> dict | None:
 def truth_of(session: Session, trial: str, number: int) -> dict | None:
     """truth.toml of a whisk; where a recording holds several, each value is a list in their order. None where the
     session is no synthetic one."""
-    path = session.trial(trial).folder / "truth.toml"
+    path = session.trial(trial).own("truth.toml")
     if not path.is_file():
         return None
     values = tomllib.loads(path.read_text())
@@ -126,7 +137,7 @@ def truth_of(session: Session, trial: str, number: int) -> dict | None:
 def _frames(session: Session, out: Path, column: str) -> Iterator[tuple[dict, float]]:
     """Rows of the tracks in which the whisker touches, seen and true, with the true value."""
     for trial in session.trials:
-        path = trial.folder / "truth.csv"
+        path = trial.own("truth.csv")
         track = out / "track" / f"{trial.name}.csv"
         if path.is_file() and track.is_file():
             truth = {int(float(row["frame"])): row for row in _read(path)}

@@ -51,6 +51,7 @@ def write_video(
     session: where its pictures are, by default where they were. Raises BadInput where there is no such trial, no
     pictures, or OpenCV cannot write such a film.
     """
+    record = read_record(out)
     result = _result(out, trial)
     path = out / "video" / f"{trial}.webm" if path is None else path
     code = FOURCC.get(path.suffix.lower())
@@ -59,7 +60,6 @@ def write_video(
     if not (math.isfinite(rate_Hz) and 0.1 <= rate_Hz <= 240.0):
         raise BadInput(f"--rate-Hz is {rate_Hz:g}; from 0.1 to 240 is allowed")
     source = _session_folder(out) if session is None else session
-    record = read_record(out)
     recorded = load_session(source, lenses_known=True, follow_links=record.settings.follow_links).trial(trial)
     cameras = {c.name: c for c in record.cameras if c.name in recorded.camera_sources}
     if not cameras:

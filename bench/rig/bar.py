@@ -1,7 +1,7 @@
 """The round bar that the whisker is pushed against, and where a whisker first touches it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,9 @@ def turned(vectors: np.ndarray, angle_rad: float) -> np.ndarray:
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross product of two vectors; numpy's own takes ten times as long for one pair."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+_STRAIGHT = np.zeros((3, 3))  # how the axis of a straight bar turns
 
 
 @dataclass(frozen=True)
@@ -49,13 +52,30 @@ class Bar:
         point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
         return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm, stiffness_N_mm)
 
-    def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
-        """The axis' point nearest to a point."""
-        return self.point_mm + ((point_mm - self.point_mm) @ self.axis) * self.axis
+    def seen_from(self, pose: np.ndarray) -> "Bar":
+        """The same bar in the frame of a pose (3, 4), T_rig_base, in which its axis' z is positive too."""
+        axis = pose[:, :3].T @ self.axis
+        point = pose[:, :3].T @ (self.point_mm - pose[:, 3])
+        return replace(self, point_mm=point, axis=axis if axis[2] >= 0 else -axis)
 
-    def slope(self, touch_rad: float) -> tuple[float, float]:
-        """(β, ψ) in the contact frame, as in the conventions: β = atan2(a_y, a_z), ψ = asin(a_x)."""
-        x, y, z = turned(self.axis, -touch_rad)
+    def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
+        """The axis' points nearest to points (..., 3)."""
+        return self.point_mm + np.multiply.outer((point_mm - self.point_mm) @ self.axis, self.axis)
+
+    def around(self, point_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What a contact at a point (3,) sees: the way there (3,) from the axis' nearest point, and its derivative by
+        the point, (3, 3); the axis' direction there (3,), and its derivative (3, 3)."""
+        flat = np.eye(3) - np.outer(self.axis, self.axis)
+        return flat @ (point_mm - self.point_mm), flat, self.axis, _STRAIGHT
+
+    def axis_at(self, point_mm: np.ndarray) -> np.ndarray:
+        """The axis' direction (3,) nearest to a point (3,), its z positive."""
+        return self.around(point_mm)[2]
+
+    def slope(self, touch_rad: float, point_mm: np.ndarray | None = None) -> tuple[float, float]:
+        """(β, ψ) in the contact frame, as in the conventions: β = atan2(a_y, a_z), ψ = asin(a_x). point_mm: where it is
+        touched; a straight bar leans alike everywhere."""
+        x, y, z = turned(self.axis if point_mm is None else self.axis_at(point_mm), -touch_rad)
         return math.atan2(y, z), math.asin(x)
 
 

@@ -187,14 +187,15 @@ class _Problem:
         """The equations at unknowns, the elastica starting from `angle`."""
         pose = _Pose.of(self.contact, self.turn, unknowns, angle)
         bar = self.contact.bar
-        flat = np.eye(3) - np.outer(bar.axis, bar.axis)
-        apart = flat @ (pose.point - bar.point_mm)
+        apart, flat, axis, turning = bar.around(pose.point)
+        axis_by = turning @ pose.point_by
         distance = math.sqrt(apart @ apart)
         normal = apart / distance
         normal_by = (flat - np.outer(normal, normal)) @ pose.point_by / distance
-        side, side_by = cross(bar.axis, normal), _cross_matrix(bar.axis) @ normal_by
-        press, press_by, shear, shear_by = self._forces(unknowns, normal, normal_by, side, side_by)
-        motion, motion_by = self._motion(unknowns[3], pose, side, side_by)
+        side, side_by = cross(axis, normal), _cross_matrix(axis) @ normal_by - _cross_matrix(normal) @ axis_by
+        ways = (axis, axis_by), (side, side_by)
+        press, press_by, shear, shear_by = self._forces(unknowns, normal, normal_by, *ways)
+        motion, motion_by = self._motion(unknowns[3], pose, *ways)
         laws, laws_by = self.law(press, press_by, shear, shear_by, motion, motion_by, unknowns[4:])
         jacobian = np.zeros((len(unknowns), len(unknowns)))
         nearest, jacobian[0, :4] = self._nearest(unknowns[3], pose, flat, apart)
@@ -211,22 +212,22 @@ class _Problem:
             return arc - self.contact.rod.length_mm, np.array([0, 0, 0, 1.0])
         return apart @ pose.tangent, pose.tangent @ (flat @ pose.point_by) + apart @ pose.tangent_by
 
-    def _forces(self, unknowns, normal, normal_by, side, side_by):
+    def _forces(self, unknowns, normal, normal_by, along, around):
         """Normal and shear force, the latter along the bar and round it."""
-        axis, force = self.contact.bar.axis, self.turn @ unknowns[:3]
+        force = self.turn @ unknowns[:3]
         force_by = np.concatenate([self.turn, np.zeros((3, 1))], 1)
         press, press_by = force @ normal, normal @ force_by + force @ normal_by
-        shear = np.array([force @ axis, force @ side])
-        return press, press_by, shear, np.stack([axis @ force_by, side @ force_by + force @ side_by])
+        shear = np.array([force @ way for way, _ in (along, around)])
+        return press, press_by, shear, np.stack([way @ force_by + force @ by for way, by in (along, around)])
 
-    def _motion(self, arc, pose, side, side_by):
+    def _motion(self, arc, pose, along, around):
         """How far the material that is now at the contact has moved since `old`. The old rod was straight there."""
-        axis, old = self.contact.bar.axis, self.old
+        old = self.old
         moved = pose.point - old.point_mm - old.tangent * (arc - old.arc_mm)
         moved_by = pose.point_by.copy()
         moved_by[:, 3] -= old.tangent
-        motion = np.array([moved @ axis, moved @ side])
-        return motion, np.stack([axis @ moved_by, side @ moved_by + moved @ side_by])
+        motion = np.array([moved @ way for way, _ in (along, around)])
+        return motion, np.stack([way @ moved_by + moved @ by for way, by in (along, around)])
 
     def nearer(self, unknowns, here, step):
         """The unknowns after as much of a step as is good, and the equations there."""

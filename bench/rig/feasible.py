@@ -20,8 +20,21 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
     for camera in protocol.cameras:
         if (camera.focal_mm is None) != (camera.pixel_um is None):
             raise BadInput(f"camera {camera.name}: focal_mm and pixel_um go together", file=path)
+    _check_columns(protocol, path)
     for run in protocol.runs():
         _check_run(protocol, run, path)
+
+
+def _check_columns(protocol: "Protocol", path: Path) -> None:
+    names = [column.name for column in protocol.columns or ()]
+    if len(set(names)) < len(names):
+        raise BadInput(f"[[columns]] need names of their own; found {names}", file=path)
+    for column in protocol.columns or ():
+        for key in ("length_mm", "diameter_mm"):
+            given, count = getattr(column, key), len(column.heights_mm)
+            if isinstance(given, list) and len(given) != count:
+                found = f"{key} has {len(given)} values, heights_mm {count}"
+                raise BadInput(f"[[columns]] {column.name}: {found}; one for all, or one a height", file=path)
 
 
 def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
@@ -33,6 +46,8 @@ def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
         raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside {_NEAREST:g} to 1.05 of the whisker's length", file=path)
     if not 0.01 <= run.speed_deg_s <= 2000:
         raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 2000 is allowed", file=path)
+    if (table.object == "ring") != bool(table.ring_diameter_mm):
+        raise BadInput('ring_diameter_mm belongs to object = "ring", and to no other', file=path)
     if table.static_friction is not None and table.static_friction < table.friction:
         raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
     if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:

@@ -203,4 +203,5 @@ class March:
         """Normal of the contact and axis of the bar in the hub frame."""
         bar = self.contact.bar
         apart = state.point_mm - bar.foot_mm(state.point_mm)
-        return turned(apart / np.linalg.norm(apart), -state.motor_rad), turned(bar.axis, -state.motor_rad)
+        axis = bar.axis_at(state.point_mm)
+        return turned(apart / np.linalg.norm(apart), -state.motor_rad), turned(axis, -state.motor_rad)

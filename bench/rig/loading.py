@@ -14,17 +14,18 @@ _TICK_S = 5e-4  # s: over which the motor's speed, and its changes, are taken
 
 def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
     """(n, 2): m_y, m_z in the hub frame at times, without vibration."""
-    return _over_time(stroke, whisks, times_s, Instants.moments_at)
+    return _over_time(stroke, whisks, times_s, Instants.moments_at, 2)
 
 
 def base_force_N(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
     """(n, 3): force of the base on the whisker in the hub frame at times, likewise."""
-    return _over_time(stroke, whisks, times_s, Instants.forces_at)
+    return _over_time(stroke, whisks, times_s, Instants.forces_at, 3)
 
 
-def _over_time(stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.ndarray]) -> np.ndarray:
+def _over_time(stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.ndarray], count) -> np.ndarray:
+    """(n, count): zeros where there is no whisk."""
     motor = stroke.angle_rad(times_s)
-    found = np.zeros_like(at(whisks[0].forward, motor))
+    found = np.zeros((len(times_s), count))
     for whisk, start, turn, end in _periods(stroke, whisks):
         rising, falling = (times_s >= start) & (times_s <= turn), (times_s > turn) & (times_s < end)
         found[rising] = at(whisk.forward, motor[rising])

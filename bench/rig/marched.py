@@ -112,8 +112,8 @@ class MarchedWhisk:
         return cls(rod, bar, touch, friction, forward, Instants.of(np.append(path[-1], down), [states[-1], *returned]))
 
     def slip_mm(self, point_mm: np.ndarray) -> np.ndarray:
-        """Along the bar since first touch."""
-        return (np.asarray(point_mm) - self.touch.point_mm) @ self.bar.axis
+        """Along the bar since first touch, in the direction that its axis has there."""
+        return (np.asarray(point_mm) - self.touch.point_mm) @ self.bar.axis_at(self.touch.point_mm)
 
     def way(self, back: bool) -> Instants:
         """The forward or the back stroke. Raises ValueError where there was no back stroke."""

@@ -2,21 +2,25 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import tomli_w
 
 from bench.rig import build
+from bench.rig.array import ArrayRecording, Mounted, base_keys
+from bench.rig.bar import Bar
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
+from bench.rig.rounded import Ring, Sphere
 
 _GAUGED, _FORCES = ("time_s", "motor_deg", "y_V", "z_V"), ("f_x_N", "f_y_N", "f_z_N")
 _TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"
 
 
-def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
-    """session.toml, with T_rig_board (3, 4) as someone would have measured it."""
+def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray, whiskers: Sequence[Mounted] = ()) -> str:
+    """session.toml, with T_rig_board (3, 4) as someone would have measured it. whiskers: of an array."""
     w, b, g = protocol.whisker, protocol.board, protocol.gauges
     rig = {"T_rig_board": [[round(float(x), 9) for x in row] for row in stated_T_rig_board]}
     for unit, sigma in (("mm", b.pose_sigma_mm), ("deg", b.pose_sigma_deg)):
@@ -36,13 +40,18 @@ def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
         **({"cameras": cameras} if cameras else {}),
         "trial": {"gauge_filter_Hz": g.filter_Hz},
     }
-    if g.known:
+    if whiskers:
+        session.pop("whisker")
+        several = len({w.column.name for w in whiskers}) > 1
+        session["whiskers"] = [base_keys(whisker, several) for whisker in whiskers]
+    elif g.known:
         session["gauges"] = {"offset_V": list(g.offset_V), "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V]}
     return tomli_w.dumps(session)
 
 
-def truth_json(protocol: Protocol, seed: int) -> str:
-    """Exact cameras, board pose, gauges and friction; the seed and the protocol's fingerprint."""
+def truth_json(protocol: Protocol, seed: int, whiskers: Sequence[Mounted] = ()) -> str:
+    """Exact cameras, board pose, gauges and friction; the seed and the protocol's fingerprint. whiskers: of an array,
+    whose gauges are each one's own."""
     cameras = {c.name: {"name": c.name, "K": c.matrix.tolist(), "dist": c.distortion.tolist(), "width": c.size_px[0],
                         "height": c.size_px[1], "R": c.rotation.tolist(), "t": c.translation_mm.tolist()}
                for c in build.cameras(protocol)}
@@ -58,6 +67,12 @@ def truth_json(protocol: Protocol, seed: int) -> str:
         "seed": seed,
         "protocol": protocol.fingerprint(),
     }
+    if whiskers:
+        own = ("gauge_matrix_Nmm_per_V", "gauge_offset_V")
+        for key in own:
+            truth.pop(key)
+        truth["whiskers"] = {w.name: dict(zip(own, (w.gauges.matrix_Nmm_per_V.tolist(), w.gauges.offset_V.tolist())))
+                             for w in whiskers}
     return json.dumps(truth, indent=1) + "\n"
 
 
@@ -91,6 +106,37 @@ def signals_csv(recording: Recording) -> str:
     return "\n".join([",".join(_GAUGED + _FORCES * has_forces), *lines]) + "\n"
 
 
+def array_trial_toml(recording: ArrayRecording) -> str:
+    """trial.toml of an array's recording: slope and distance are not those of any one whisker."""
+    run, table = recording.run, recording.run.table
+    trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "purpose": table.purpose}
+    if table.bar_diameter_mm:
+        trial["bar_diameter_mm"] = table.bar_diameter_mm
+    trial["object"] = _object(recording.bar)
+    return tomli_w.dumps(trial)
+
+
+def _object(bar: Bar) -> dict:
+    """Where it stands, as session.toml has it."""
+    stated = {"shape": "bar", "point_mm": bar.point_mm.tolist(), "axis": bar.axis.tolist()}
+    if isinstance(bar, Sphere):
+        return {"shape": "sphere", "point_mm": stated["point_mm"]}
+    return stated | {"shape": "ring", "ring_diameter_mm": 2 * bar.ring_radius_mm} if isinstance(bar, Ring) else stated
+
+
+def array_signals_csv(recording: ArrayRecording) -> str:
+    """signals.csv of an array's recording."""
+    form = ",".join("%.5f" if name.startswith("motor_deg") else "%.6f" for name in recording.channels)
+    lines = [form % tuple(row) for row in np.column_stack(list(recording.channels.values())).tolist()]
+    return "\n".join([",".join(recording.channels), *lines]) + "\n"
+
+
+def array_frames_csv(recording: ArrayRecording) -> str:
+    """frames.csv of an array's recording."""
+    lines = [f"{i},{time:.6f}" for i, time in enumerate(np.concatenate(recording.frame_times_s))]
+    return "\n".join(["frame,time_s", *lines]) + "\n"
+
+
 def truth_csv(recording: Recording) -> str:
     """A row a frame. A frame at the angle of a jump shows what came after it. `status`: free, held, sliding or tip."""
     rows = (_truth_row(i, recording.whisks[w], t, m, back) for i, (t, m, w, back) in enumerate(recording.frames))
@@ -121,7 +167,7 @@ def truth_toml(recording: Recording) -> str:
 
 
 def _whisk_truth(whisk):
-    beta, psi = whisk.bar.slope(whisk.touch.motor_rad)
+    beta, psi = whisk.bar.slope(whisk.touch.motor_rad, whisk.touch.point_mm)
     return {
         "touch_deg": math.degrees(whisk.touch.motor_rad), "d_x_mm": whisk.touch.d_x_mm,
         "beta_deg": math.degrees(beta), "psi_deg": math.degrees(psi),

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.rig import boards, build, papers
 from bench.rig.album import write_frames, write_picture
+from bench.rig.array import ArrayRecording, Mounted, mounted
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
@@ -17,7 +18,7 @@ from bench.rig.scene import HUB_FRONT_MM
 from bench.rig.studio import Moment, Studio
 from bench.rig.tube import Tube
 
-_BOARDS, _RIG, _TRIAL, _POSE = range(4)  # first words of the random streams
+_BOARDS, _RIG, _TRIAL, _POSE, _ARRAY = range(5)  # first words of the random streams
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,13 @@ class Job:
     def papers(self) -> dict[str, str]:
         """The session's own text files."""
         stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
-        return {"session.toml": papers.session_toml(self.protocol, stated),
-                "truth.json": papers.truth_json(self.protocol, self.seed)}
+        return {"session.toml": papers.session_toml(self.protocol, stated, self.whiskers),
+                "truth.json": papers.truth_json(self.protocol, self.seed, self.whiskers)}
+
+    @cached_property
+    def whiskers(self) -> list[Mounted]:
+        """Of an array; none where there is one whisker at the origin."""
+        return mounted(self.protocol, self.stream(_ARRAY)) if self.protocol.columns else []
 
     @cached_property
     def studios(self) -> list[Studio]:
@@ -64,7 +70,8 @@ class Part:
 
     def write(self, job: Job, folder: Path) -> None:
         """Fill a folder. Raises ArithmeticError where a trial's whisker cannot go on."""
-        {"rig": _rig_views, "board": _board_views, "trial": _trial}[self.kind](job, self.number, folder)
+        trial = _array_trial if job.whiskers else _trial
+        {"rig": _rig_views, "board": _board_views, "trial": trial}[self.kind](job, self.number, folder)
 
 
 @lru_cache(maxsize=2)
@@ -100,6 +107,19 @@ def _trial(job, number, folder):
         return
     for i, studio in enumerate(job.studios):
         write_frames(folder, studio.camera.name, pictures.moving, frames_of(job, number, i, recording))
+
+
+def _array_trial(job, number, folder):
+    run, streams = job.protocol.runs()[number], [job.stream(_TRIAL, number)]
+    streams += [job.stream(_ARRAY, number, whisker) for whisker in range(len(job.whiskers))]
+    recording = ArrayRecording.make(job.protocol, run, job.whiskers, streams)
+    texts = {"trial.toml": papers.array_trial_toml(recording), "signals.csv": papers.array_signals_csv(recording),
+             "frames.csv": papers.array_frames_csv(recording)}
+    for name, one in recording.recordings.items():
+        if one is not None:
+            texts |= {f"truth@{name}.csv": papers.truth_csv(one), f"truth@{name}.toml": papers.truth_toml(one)}
+    for name, text in texts.items():
+        papers.write(folder / name, text)
 
 
 def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterator[np.ndarray]:

@@ -186,6 +186,18 @@ class LoadCellTable(Table):
     step_N: Zero = 0.0  # of its converter; 0: none
 
 
+class ColumnTable(Table, kw_only=True):
+    """One [[columns]] of a protocol: a motor and its whiskers, one a height along its axis, named <name>1, <name>2 …"""
+
+    name: Name = "w"
+    base_mm: Three = (0.0, 0.0, 0.0)  # of height 0, rig frame
+    base_deg: Three = (0.0, 0.0, 0.0)  # turned about the rig's x, then y, then z
+    heights_mm: Annotated[list[float], msgspec.Meta(min_length=1)]
+    length_mm: Positive | list[Positive] | None = None  # one of all, or one a height; by default [whisker]'s
+    diameter_mm: Positive | list[Positive] | None = None
+    gauge_scatter: Zero = 0.03  # sigma of each whisker's own coefficients, in parts of [gauges]'
+
+
 def _many(value):
     return value if isinstance(value, list) else [value]
 
@@ -206,6 +218,8 @@ class TrialTable(Table):
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
+    object: Literal["ring", "sphere"] | msgspec.UnsetType = msgspec.UNSET  # by default a straight bar
+    ring_diameter_mm: Positive | msgspec.UnsetType = msgspec.UNSET  # of the circle that a ring's axis is
     purpose: Literal["measure", "gauge"] = "measure"
     follicle_roll_deg: float = 0.0
     name: str = ""
@@ -231,6 +245,7 @@ class Protocol(Table, kw_only=True):
     friction: FrictionTable = FrictionTable()
     gauges: GaugesTable = GaugesTable()
     load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET  # none, and no channels of it
+    columns: list[ColumnTable] | msgspec.UnsetType = msgspec.UNSET  # an array's; without any, one whisker at the origin
     trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
 
     def runs(self) -> list["Run"]:

@@ -1,18 +1,21 @@
 """One trial as it is recorded: bar, whisks, frame times, signals. Its pictures are taken from it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from bench.rig import build
-from bench.rig.bar import Bar, Touch, first_touch
+from bench.rig.bar import Bar, Touch, first_touch, turned
 from bench.rig.friction import Friction
+from bench.rig.gauges import Gauges
 from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.rod import Rod
+from bench.rig.rounded import Ring, Sphere
 from bench.rig.stroke import Stroke
 
 _STEP_RAD = math.radians(0.1)  # rad: half of it changes nothing that is seen (tests/bench/rig/test_contact_march.py)
@@ -52,20 +55,30 @@ class Recording:
     def make(cls, protocol: Protocol, run: Run, rng: np.random.Generator) -> "Recording":
         """The trial that a seeded generator makes of a run. Raises ArithmeticError where the whisker cannot go on."""
         rod = build.rod(protocol)
-        bar, touch = _placed(protocol, run, rod, rng)
+        bar, *near = placed_bar(protocol, run, rod, rng)
+        touch = first_touch(rod, bar, *near)
         stroke = _stroke(protocol, run, touch)
         frames = _frames(protocol, run, touch, stroke)
+        return cls.pushed(protocol, run, rod, bar, touch, stroke, frames, build.gauges(protocol), rng)
+
+    @classmethod
+    def pushed(
+        cls, protocol: Protocol, run: Run, rod: Rod, bar: Bar, touch: Touch, stroke: Stroke, frames: Frames,
+        gauges: Gauges, rng: np.random.Generator
+    ) -> "Recording":
+        """What a whisker feels on a stroke that takes it to a bar. Raises ArithmeticError as `make`."""
         frictions = _frictions(protocol, run.table, len(stroke.forward), rng)
         end_rad, stops_rad = float(stroke.angles_rad.max()), frames.motor_rad[(frames.whisk == 0) & ~frames.back]
         march = partial(MarchedWhisk.run, rod, bar, touch=touch, end_rad=end_rad, step_rad=_STEP_RAD,
                         stops_rad=stops_rad, back=bool(stroke.back))
         made = {friction: march(friction) for friction in dict.fromkeys(frictions)}  # whisks of one friction are alike
         whisks = tuple(made[friction] for friction in frictions)
-        return cls(run, rod, bar, touch, stroke, whisks, frames, _signals(protocol, run, stroke, whisks, rng))
+        recorded = signals(protocol, run, stroke, whisks, gauges, rng)
+        return cls(run, rod, bar, touch, stroke, whisks, frames, recorded)
 
 
-def _placed(protocol, run, rod, rng):
-    """The bar as people set it, near what they wanted, and where the whisker first touches it."""
+def placed_bar(protocol: Protocol, run: Run, rod: Rod, rng: np.random.Generator) -> tuple[Bar, float, float]:
+    """The bar as people set it, near what they wanted; about the motor angle (rad) and arc (mm) of first touch."""
     table = run.table
     wanted = (run.beta_deg, run.psi_deg, run.d_x_mm, table.touch_deg)
     scatter = (table.beta_scatter_deg, table.psi_scatter_deg, table.d_x_scatter_mm, table.touch_scatter_deg)
@@ -74,7 +87,17 @@ def _placed(protocol, run, rod, rng):
     bar = Bar.placed(d_x_mm=d_x, beta_rad=math.radians(beta), psi_rad=math.radians(psi), touch_rad=math.radians(touch),
                      radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2, whisker_radius_mm=whisker,
                      stiffness_N_mm=table.stiffness_N_mm or math.inf)
-    return bar, first_touch(rod, bar, math.radians(touch), d_x)
+    return _rounded(table, bar, touch, d_x), math.radians(touch), d_x
+
+
+def _rounded(table, bar: Bar, touch_deg: float, d_x_mm: float) -> Bar:
+    """What is touched in the bar's place, at the same point with the same slope."""
+    if table.object == "sphere":
+        return Sphere(bar.point_mm, bar.axis, bar.radius_mm, bar.stiffness_N_mm)
+    if table.object == "ring":
+        touched = turned(np.array([d_x_mm, 0.0, 0.0]), math.radians(touch_deg))
+        return Ring.bent(bar, touched, 0.5 * table.ring_diameter_mm)
+    return bar
 
 
 def _stroke(protocol, run, touch):
@@ -114,11 +137,15 @@ def _rests(irregular: float, rng) -> tuple[float, ...]:
     return tuple(np.exp(irregular * rng.standard_normal(_RESTS)).tolist()) if irregular else (1.0,)
 
 
-def _signals(protocol, run, stroke, whisks, rng):
-    gauges, step = build.gauges(protocol), protocol.motor.encoder_step_deg
+def signals(
+    protocol: Protocol, run: Run, stroke: Stroke, whisks: Sequence[MarchedWhisk], gauges: Gauges,
+    rng: np.random.Generator
+) -> np.ndarray:
+    """What the DAQ writes of a whisker's whisks, as `Recording.signals`; of one that touches nothing without any."""
+    step = protocol.motor.encoder_step_deg
     fine = gauges.fine_times_s(stroke.end_s)
     moments = quasi_static_Nmm(stroke, whisks, fine)
-    if protocol.gauges.vibration:
+    if protocol.gauges.vibration and whisks:
         moments += ringing_Nmm(stroke, whisks, fine, protocol.gauges.damping)
     volts = gauges.volts(moments, math.radians(run.table.follicle_roll_deg), rng)
     times = gauges.times_s(stroke.end_s)

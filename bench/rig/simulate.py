@@ -50,7 +50,7 @@ def simulate(
 def forecast(job: Job, workers: int) -> str:
     """What a session will hold, how big it will be and how long it will take."""
     runs, pictures, cameras = job.protocol.runs(), job.protocol.pictures, job.protocol.cameras
-    whisks = sum(run.table.whisks for run in runs)
+    whisks = sum(run.table.whisks for run in runs) * max(1, len(job.whiskers))
     frames = sum(run.table.whisks * pictures.frames_a_whisk(run.speed_deg_s) for run in runs)
     seen = 0 if job.signals_only else (frames + job.protocol.board.views + 1) * len(cameras)
     scale = sum(c.size_px[0] * c.size_px[1] for c in cameras) / (1280 * 720 * max(len(cameras), 1))
@@ -62,7 +62,7 @@ def forecast(job: Job, workers: int) -> str:
 def _signal_megabytes(job, run):
     stroke_s = (run.before_deg + run.after_deg) / run.speed_deg_s + job.protocol.motor.pause_s
     seconds = stroke_s * run.table.whisks * (2 if job.protocol.goes_back(run) else 1)
-    return seconds * job.protocol.gauges.rate_Hz * 38e-6
+    return seconds * job.protocol.gauges.rate_Hz * 38e-6 * max(1, len(job.whiskers))
 
 
 def _check_can_be_built(job, name):
@@ -76,8 +76,16 @@ def _check_can_be_built(job, name):
 
 
 def _check_can_be_rendered(job, name):
-    if not job.signals_only and job.protocol.cameras and any(t.stiffness_N_mm for t in job.protocol.trials):
-        raise BadInput("a soft bar (stiffness_N_mm) is simulated in signals alone; add --signals-only", file=name)
+    if job.signals_only or not job.protocol.cameras:
+        return
+    felt_alone = {
+        "a soft bar (stiffness_N_mm)": any(t.stiffness_N_mm for t in job.protocol.trials),
+        "a ring or sphere (object)": any(t.object for t in job.protocol.trials),
+        "an array ([[columns]])": bool(job.whiskers),
+    }
+    for what, there in felt_alone.items():
+        if there:
+            raise BadInput(f"{what} is simulated in signals alone; add --signals-only", file=name)
 
 
 def _claim(job):

@@ -1,12 +1,13 @@
 """What can be checked of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.results import hash_of_files
+from bench.session.array import load_views
 from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import forward_strokes, read_signals
@@ -29,12 +30,27 @@ def checked_session(
     """
     doubts = doubts or Doubts()
     session = load_session(path, doubts, trials=trials, follow_links=follow_links)
-    for trial in session.trials:
-        check_recording(trial, doubts)
-    check_sizes(session, doubts)
-    for line in _copies(session):
-        doubts.note(line)
+    _check((session,), doubts)
     return session
+
+
+def checked_views(
+    path: Path | str, doubts: Doubts | None = None, trials: Collection[str] | None = None, *, follow_links: bool = False
+) -> tuple[Session, ...]:
+    """The same with `load_views`: one session, or a view for each whisker of an array."""
+    doubts = doubts or Doubts()
+    views = load_views(path, doubts, trials=trials, follow_links=follow_links)
+    _check(views, doubts)
+    return views
+
+
+def _check(views: Sequence[Session], doubts: Doubts) -> None:
+    """Every recording of each whisker; pictures and files are the same for all."""
+    for trial in (trial for view in views for trial in view.trials):
+        check_recording(trial, doubts)
+    check_sizes(views[0], doubts)
+    for line in _copies(views[0]):
+        doubts.note(line)
 
 
 def _copies(session: Session) -> Iterator[str]:

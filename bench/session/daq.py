@@ -14,7 +14,7 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.session import manifest
 from bench.session.strict_toml import values
-from bench.session.table import Table, read_table
+from bench.session.table import Table, column_names, read_table
 
 _TIME, _FRAME = "time_s", "frame_V"
 _MOST_BYTES = 1 << 31  # bytes: no larger file is read at once
@@ -114,10 +114,11 @@ def _missing(name: str, there, shown: str) -> BadInput:
 
 
 def _csv(path: Path, names: list[str], shown: str) -> list:
-    table = read_table(path, shown)
+    there = column_names(path, shown)
     for name in names:
-        if name not in table.columns:
-            raise _missing(name, table.columns, shown)
+        if name not in there:
+            raise _missing(name, there, shown)
+    table = read_table(path, shown, only=names)
     return [table[name] for name in names]
 
 

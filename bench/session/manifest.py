@@ -9,6 +9,7 @@ from bench.session.strict_toml import Keys
 
 Row4 = Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]
 Pair = Annotated[list[float], msgspec.Meta(min_length=2, max_length=2)]
+Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 
 
 class WhiskerKeys(Keys, kw_only=True):
@@ -88,6 +89,46 @@ class GaugeKeys(Keys, kw_only=True):
     matrix_sigma_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)] | None = None
 
 
+class ChannelNames(Keys, kw_only=True):
+    """[whiskers.channels] of session.toml: the file's own names of a whisker's columns."""
+
+    motor_deg: str | None = None
+    y_V: str | None = None
+    z_V: str | None = None
+    m_y_Nmm: str | None = None
+    m_z_Nmm: str | None = None
+    f_x_N: str | None = None
+    f_y_N: str | None = None
+    f_z_N: str | None = None
+
+
+class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
+    """One [[whiskers]] of session.toml."""
+
+    name: str
+    base_mm: Three
+    base_sigma_mm: float = 0.0
+    base_deg: Three = msgspec.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    base_sigma_deg: float = 0.0
+    gauges: GaugeKeys | None = None
+    channels: ChannelNames = ChannelNames()
+
+    windows: ClassVar = WhiskerKeys.windows | {"base_mm": plausible.PLACE, "base_deg": plausible.ANGLE}
+    tables: ClassVar = {"gauges": GaugeKeys, "channels": ChannelNames}
+
+
+class ObjectKeys(Keys, kw_only=True):
+    """[object] of trial.toml: where the object stands, in the rig frame."""
+
+    shape: Literal["bar", "ring", "sphere"] = "bar"
+    point_mm: Three
+    point_sigma_mm: float = 0.0
+    axis: Three = msgspec.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    ring_diameter_mm: float | None = None
+
+    windows: ClassVar = {"point_mm": plausible.PLACE, "ring_diameter_mm": plausible.LENGTH}
+
+
 class TrialKeys(Keys, kw_only=True):
     """trial.toml, and [trial] of session.toml for all trials."""
 
@@ -112,7 +153,9 @@ class TrialKeys(Keys, kw_only=True):
     gauge_filter_Hz: float | None = None
     follicle_roll_deg: float = 0.0
     follicle_roll_sigma_deg: float = 0.0
+    object: ObjectKeys | None = None
 
+    tables: ClassVar = {"object": ObjectKeys}
     windows: ClassVar = {
         "speed_deg_s": plausible.SPEED,
         "beta_deg": plausible.SLOPE,
@@ -164,6 +207,7 @@ class SessionKeys(Keys, kw_only=True):
     name: str = ""
     surfaces: tuple[str, ...] = ()
     whisker: WhiskerKeys | None = None
+    whiskers: tuple[ArrayWhiskerKeys, ...] = ()
     bar: BarKeys | None = None
     board: BoardKeys | None = None
     rig: RigKeys = RigKeys()
@@ -174,6 +218,7 @@ class SessionKeys(Keys, kw_only=True):
 
     tables: ClassVar = {
         "whisker": WhiskerKeys,
+        "whiskers": ArrayWhiskerKeys,
         "bar": BarKeys,
         "board": BoardKeys,
         "rig": RigKeys,

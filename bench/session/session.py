@@ -42,10 +42,22 @@ class GivenGauges:
 
 
 @dataclass(frozen=True)
+class Base:
+    """Where a whisker of an array stands: T_rig_base is (3, 4), mm; its z is the axis that the whisker turns about, its
+    x the whisker at motor angle 0. Sigmas are of each shift and each turn."""
+
+    name: str
+    T_rig_base: np.ndarray
+    sigma_mm: float
+    sigma_rad: float
+
+
+@dataclass(frozen=True)
 class Session:
     """What session.toml and the folders say; T_rig_board is (3, 4), mm; sigmas are 0 where taken as exact.
 
-    whisker and bar are given wherever there are trials; board wherever there is no cameras.toml but pictures.
+    whisker and bar are given wherever there are trials; board wherever there is no cameras.toml but pictures. base: of
+    the whisker whose view of an array this is (`bench.session.array`), None where the session is one whisker's.
     """
 
     path: Path
@@ -64,6 +76,12 @@ class Session:
     trials: tuple[Trial, ...]
     cameras_toml: Path | None
     gauges_toml: Path | None
+    base: Base | None = None
+
+    @property
+    def whole_name(self) -> str:
+        """Its name without that of the whisker whose view it is."""
+        return self.name.removesuffix(f", whisker {self.base.name}") if self.base else self.name
 
     def trial(self, name: str) -> Trial:
         """The trial of that name. Raises BadInput, naming those that there are."""
@@ -89,7 +107,21 @@ def load_session(
     Raises BadInput at the first thing that is wrong; with a collecting `doubts`, reads on where it can.
     """
     path, doubts = Path(path), doubts or Doubts()
-    keys = _read_manifest(path, doubts, follow_links)
+    keys = read_manifest(path, doubts, follow_links)
+    if keys.whiskers:
+        raise BadInput("has several whiskers ([[whiskers]]); evaluate and check alone take them", file=MANIFEST)
+    return loaded(path, keys, doubts, lenses_known=lenses_known, trials=trials)
+
+
+def loaded(
+    path: Path,
+    keys: manifest.SessionKeys,
+    doubts: Doubts,
+    *,
+    lenses_known: bool = False,
+    trials: Collection[str] | None = None,
+) -> Session:
+    """The session of a manifest that is read; options and errors of `load_session`."""
     parts = partial(_whisker, keys.whisker), partial(_board, keys.board), partial(_pose, keys.rig.T_rig_board)
     whisker, board, T_rig_board = doubts.each(parts)
     bar = keys.bar
@@ -108,7 +140,7 @@ def load_session(
         T_rig_board=T_rig_board,
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
         T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
-        gauges=_gauges(keys.gauges),
+        gauges=given_gauges(keys.gauges),
         camera_names=_camera_names(board_sources, found),
         board_sources=board_sources,
         rig_pictures=single_pictures(path / "boards" / "rig", "boards/rig"),
@@ -120,7 +152,8 @@ def load_session(
     return session
 
 
-def _read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.SessionKeys:
+def read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.SessionKeys:
+    """session.toml of a folder that holds nothing else than a session may. Raises BadInput."""
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
     if not (path / MANIFEST).is_file():
@@ -129,22 +162,26 @@ def _read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.S
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
-    needed = ("whisker", "bar") if visible(path / "trials") else ()
+    named = ("bar",) if "whiskers" in tables else ("whisker", "bar")
+    needed = named if visible(path / "trials") else ()
     return as_keys(tables, manifest.SessionKeys, MANIFEST, doubts, needed)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
-    if keys is None:
-        return None
+    return None if keys is None else stated_whisker(keys, "[whisker]")
+
+
+def stated_whisker(keys: manifest.WhiskerKeys, table: str) -> Whisker:
+    """The whisker of a table, which messages name so. Raises BadInput for one that cannot be."""
     try:
-        whisker = Whisker(**values(keys))
+        whisker = Whisker(**{name: getattr(keys, name) for name in manifest.WhiskerKeys.__struct_fields__})
     except ValueError as problem:
-        raise BadInput(f"[whisker] {problem}", file=MANIFEST) from None
-    _check_rigidity(whisker)
+        raise BadInput(f"{table} {problem}", file=MANIFEST) from None
+    _check_rigidity(whisker, table)
     return whisker
 
 
-def _check_rigidity(whisker: Whisker) -> None:
+def _check_rigidity(whisker: Whisker, table: str) -> None:
     """Rigidity and diameter must amount to a material. Raises BadInput."""
     modulus_GPa = whisker.implied_modulus_GPa
     if YOUNGS_MODULUS.holds(modulus_GPa):
@@ -152,7 +189,7 @@ def _check_rigidity(whisker: Whisker) -> None:
     in_metres = YOUNGS_MODULUS.holds(modulus_GPa * NMM2_PER_NM2)
     hint = f" Is it in N m2? Then write {whisker.EI_Nmm2 * NMM2_PER_NM2:.6g}." if in_metres else ""
     found = f"flexural_rigidity_Nmm2 and diameter_mm amount to a Young's modulus of {modulus_GPa:.3g} GPa"
-    raise BadInput(f"[whisker] {found}; {YOUNGS_MODULUS.allowed} is allowed.{hint}", file=MANIFEST)
+    raise BadInput(f"{table} {found}; {YOUNGS_MODULUS.allowed} is allowed.{hint}", file=MANIFEST)
 
 
 def _board(keys: manifest.BoardKeys | None) -> Board | None:
@@ -183,7 +220,8 @@ def _pose(rows: list[list[float]] | None) -> np.ndarray | None:
     return np.column_stack([nearest_rotation(rotation), pose[:, 3]])
 
 
-def _gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
+def given_gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
+    """Gauges as a table states them; None without one."""
     if keys is None:
         return None
     given = {name: np.array(value) for name, value in values(keys).items() if value is not None}

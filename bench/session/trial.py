@@ -15,12 +15,24 @@ SIGNALS = "signals.csv"
 
 
 @dataclass(frozen=True)
+class StatedObject:
+    """Where the object stands, in the rig frame, with one sigma of each coordinate. point_mm (3,): of a bar's axis, or
+    the centre of a ring or sphere; axis (3,): the bar's direction, or the normal of the ring's plane."""
+
+    shape: str
+    point_mm: tuple[float, ...]
+    point_sigma_mm: float
+    axis: tuple[float, ...]
+    ring_diameter_mm: float | None
+
+
+@dataclass(frozen=True)
 class Trial:
     """Settings of one recording; nominal values are None where not given, sigmas 0 where taken as exact.
 
     purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
     the follicle was turned about the whisker. camera_sources: camera to folder of pictures or video, empty
-    where the trial has none.
+    where the trial has none. whisker: of an array, whose channels `daq` names; '' where there is one whisker.
     """
 
     name: str
@@ -48,11 +60,27 @@ class Trial:
     first_frame_s: float | None
     first_frame_sigma_s: float
     gauge_filter_Hz: float | None
+    object: StatedObject | None = None
     daq: DaqFile | None = None
+    whisker: str = ""
+
+    @property
+    def place(self) -> str:
+        """How messages name it: by the path inside the session, and the whisker of an array."""
+        return f"trials/{self.name}{self._of_whisker}"
 
     def shown(self, file: str) -> str:
-        """How messages name one of its files: by the path inside the session."""
-        return f"trials/{self.name}/{file}"
+        """How messages name one of its files, likewise."""
+        return f"trials/{self.name}/{file}{self._of_whisker}"
+
+    @property
+    def _of_whisker(self) -> str:
+        return f" (whisker {self.whisker})" if self.whisker else ""
+
+    def own(self, file: str) -> Path:
+        """The path of a file that each whisker of an array has its own of: truth.toml, or truth@NAME.toml."""
+        stem, _, suffix = file.rpartition(".")
+        return self.folder / (f"{stem}@{self.whisker}.{suffix}" if self.whisker else file)
 
 
 def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq: DaqFile | None = None) -> Trial:
@@ -69,7 +97,7 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq:
         camera_sources=camera_sources(folder, shown),
         signals_path=signals_path,
         daq=daq,
-        **values(keys) | _bar(keys, session.bar),
+        **values(keys) | _bar(keys, session.bar) | {"object": _object(keys.object, f"{shown}/{MANIFEST}")},
     )
 
 
@@ -90,6 +118,18 @@ def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: 
 def _check_weight(keys: manifest.TrialKeys, shown: str) -> None:
     if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
         raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
+
+
+def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None:
+    """Raises BadInput for one that cannot be."""
+    if keys is None:
+        return None
+    if (keys.shape == "ring") != (keys.ring_diameter_mm is not None):
+        raise BadInput('[object] ring_diameter_mm belongs to shape = "ring", and to no other shape', file=shown)
+    if not any(keys.axis):
+        raise BadInput("[object] axis is a direction, not zero", file=shown)
+    point, axis = tuple(keys.point_mm), tuple(keys.axis)
+    return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, keys.ring_diameter_mm)
 
 
 def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:

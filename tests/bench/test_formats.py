@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench import robot_trade, tradeoff
+from bench.array import verdict as contacts
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction import curved, error_map, explained, soft, tables, tilted
@@ -27,6 +28,9 @@ ROOT = Path(__file__).resolve().parents[2]
 TOML = {
     "[session.toml] top": manifest.SessionKeys,
     "[whisker]": manifest.WhiskerKeys,
+    "[[whiskers]]": manifest.ArrayWhiskerKeys,
+    "[whiskers.channels]": manifest.ChannelNames,
+    "[object]": manifest.ObjectKeys,
     "[bar]": manifest.BarKeys,
     "[board]": manifest.BoardKeys,
     "[rig]": manifest.RigKeys,
@@ -40,6 +44,7 @@ TOML = {
 CSV = {
     "whisks.csv": assembly.WHISK_COLUMNS,
     "estimates.csv": assembly.ESTIMATE_COLUMNS,
+    "surface.csv": contacts.COLUMNS,
     "track/<trial>.csv": assembly.TRACK_COLUMNS,
     "budget.csv": assembly.BUDGET_COLUMNS,
     "beam.csv": assembly.BEAM_COLUMNS,

@@ -21,6 +21,7 @@ FOLDERS = {
         "trials",
         "friction",
         "report",
+        "array",
         "theory",
         "plan",
         "",

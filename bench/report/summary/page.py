@@ -37,7 +37,7 @@ class Summary:
     @property
     def text(self) -> str:
         """As summary.txt has it."""
-        return "\n".join([*self.verdict, "", *_lines(self.sections)]).rstrip() + "\n"
+        return "\n".join([*self.verdict, "", *section_lines(self.sections)]).rstrip() + "\n"
 
     def on_screen(self, out: Path) -> str:
         """What is seen at a glance: the verdict, what is doubtful, and where the rest is."""
@@ -45,10 +45,11 @@ class Summary:
         more = len(self.doubtful) - len(shown)
         doubtful = [_titled(DOUBTFUL, [*shown, *([f"and {more} more, in summary.txt"] if more else [])])]
         rest = f"All of it: {out / 'report.html'}, {out / 'summary.txt'}"
-        return "\n".join([*self.verdict, "", *(_lines(doubtful) if shown else ()), rest])
+        return "\n".join([*self.verdict, "", *(section_lines(doubtful) if shown else ()), rest])
 
 
-def _lines(sections: Iterable[Section]) -> Iterator[str]:
+def section_lines(sections: Iterable[Section]) -> Iterator[str]:
+    """Titles with their lines below them, and an empty line after each."""
     return (line for s in sections for line in (s.title, *(f"  {line}" for line in s.lines), ""))
 
 
@@ -64,7 +65,8 @@ def summary_of(
     errors against θ; needed: which refinements are; sensors: what each is worth, where a load cell was recorded."""
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
     judged = judge(evaluation.results)
-    said = verdict(evaluation.session, evaluation.results, judged, evaluation.settings, len(doubtful))
+    name, pictures = evaluation.session.name, any(trial.camera_sources for trial in evaluation.session.trials)
+    said = verdict(name, pictures, evaluation.results, judged, evaluation.settings, len(doubtful))
     said = (*said, *gauges_of_all(evaluation.gauges), *looked_at(evaluation.results, evaluation.settings))
     sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta, needed, sensors)
     return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))

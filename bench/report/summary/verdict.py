@@ -10,7 +10,6 @@ from bench.base.settings import Seeing, Settings
 from bench.friction.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial import TrialResult, whisks
-from bench.session.session import Session
 from bench.trials.compare import Judged
 from vision.geometry.counted import counted
 
@@ -18,9 +17,11 @@ _SIGNIFICANT = 2.0  # sigmas: no whisk beyond this, and the estimator may be rig
 
 
 def verdict(
-    session: Session, results: Iterable[TrialResult], judged: Sequence[Judged], settings: Settings, doubtful: int
+    session: str, pictures: bool, results: Iterable[TrialResult], judged: Sequence[Judged], settings: Settings,
+    doubtful: int,
 ) -> Iterator[str]:
-    """How wrong each estimator is, and of how many whisks the truth is known. doubtful: how many lines are."""
+    """How wrong each estimator is, and of how many whisks the truth is known. session: its name; pictures: whether it
+    has any; doubtful: how many lines are."""
     measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     with_truth = sum(s.has_truth for s in seen)
@@ -31,11 +32,10 @@ def verdict(
         yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + missing
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
-    pictures = any(trial.camera_sources for trial in session.trials)
     yield (
-        f"{session.name}: truth for {with_truth} of {counted(len(seen), 'measured whisk')}"
+        f"{session}: truth for {with_truth} of {counted(len(seen), 'measured whisk')}"
         if pictures
-        else f"{session.name}: no pictures, so no truth; {counted(len(seen), 'measured whisk')} felt"
+        else f"{session}: no pictures, so no truth; {counted(len(seen), 'measured whisk')} felt"
     ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
 
 

@@ -1,0 +1,79 @@
+"""The object that an array feels: where its surface is, from the manifest or from pictures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.records.trial import SeenTrial
+from bench.session.session import Base
+from bench.session.trial import Trial
+
+STATED, SEEN = "manifest", "pictures"
+_ARC_MM = 1e-6  # mm: as near as an arc is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """All points at one distance (radius_mm) from a centreline, in the rig frame: a straight one ("bar"), a circle
+    ("ring") or a point ("sphere").
+
+    point_mm (3,): of the straight line, or the centre; axis (3,), unit: the line's direction, or the normal of the
+    circle's plane; ring_radius_mm: of the circle, 0 of others. sigma_mm: of each of the point's coordinates; source:
+    STATED or SEEN.
+    """
+
+    shape: str
+    point_mm: np.ndarray
+    axis: np.ndarray
+    radius_mm: float
+    ring_radius_mm: float = 0.0
+    sigma_mm: float = 0.0
+    source: str = STATED
+
+    def foot_mm(self, points_mm: np.ndarray) -> np.ndarray:
+        """The centreline's points (n, 3) that are nearest to points (n, 3), mm."""
+        apart = points_mm - self.point_mm
+        along = np.outer(apart @ self.axis, self.axis)
+        if self.shape == "bar":
+            return self.point_mm + along
+        if self.shape == "sphere":
+            return np.broadcast_to(self.point_mm, points_mm.shape)
+        flat = apart - along
+        return self.point_mm + self.ring_radius_mm * flat / np.linalg.norm(flat, axis=1, keepdims=True)
+
+    def distance_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far points (n, 3) are outside of the surface, (n,), negative within; its normals there, (n, 3)."""
+        apart = points_mm - self.foot_mm(points_mm)
+        length = np.linalg.norm(apart, axis=1)
+        return length - self.radius_mm, apart / length[:, None]
+
+    def nearest_arc_mm(self, base_mm: np.ndarray, towards: np.ndarray, length_mm: float) -> float:
+        """Where a straight whisker of this length comes nearest to the object: arc from its base (3,), mm.
+        towards (3,): its direction, unit."""
+        low, high = 0.0, length_mm
+        while high - low > _ARC_MM:
+            arcs = np.linspace(low, high, 21)
+            outside, _ = self.distance_mm(base_mm + np.outer(arcs, towards))
+            best = int(outside.argmin())
+            low, high = arcs[max(best - 1, 0)], arcs[min(best + 1, 20)]
+        return 0.5 * (low + high)
+
+
+def stated_surface(trial: Trial) -> Surface | None:
+    """The object as the manifest states it; None where it does not, or does not say how thick it is."""
+    given = trial.object
+    if given is None or trial.bar_diameter_mm is None:
+        return None
+    point, axis = np.array(given.point_mm, dtype=float), np.array(given.axis, dtype=float)
+    radii = 0.5 * trial.bar_diameter_mm, 0.5 * (given.ring_diameter_mm or 0.0)
+    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, given.point_sigma_mm)
+
+
+def seen_surface(seen: SeenTrial, base: Base) -> Surface | None:
+    """The bar as one whisker's cameras show it, in the rig frame; None where they do not."""
+    if seen.bar is None or not np.isfinite(seen.bar.point_mm).all():
+        return None
+    turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
+    point, axis = turn @ seen.bar.point_mm + shift, turn @ seen.bar.direction
+    return Surface("bar", point, axis, seen.bar_radius_mm, source=SEEN)
+

@@ -1,0 +1,119 @@
+"""An array from its signals to its verdict: each whisker's run is what its own session would give."""
+
+import re
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+
+from bench import api
+from bench.api import ArrayRun, Run
+from bench.array.compare import compare_arrays
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.check import check
+from bench.evaluate import evaluate
+from bench.report.compare import compare_runs
+from bench.report.video import write_video
+from bench.rig.simulate import simulate
+from tests.scenes.rig_sessions import protocol_file
+
+PROTOCOL = """
+name = "two"
+[[columns]]
+heights_mm = [0, 9]
+length_mm = [100, 90]
+[[trials]]
+beta_deg = 30
+"""
+QUIET = Settings(figures=False)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("array")
+    return simulate(folder / "session", protocol=protocol_file(folder, PROTOCOL), seed=3, signals_only=True)
+
+
+@pytest.fixture(scope="module")
+def out(session, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    evaluate(session, out, QUIET, workers=0, announce=lambda _: None)
+    return out
+
+
+def test_each_row_names_its_whisker(out):
+    run = api.read(out)
+    assert isinstance(run, ArrayRun) and list(run.whiskers) == ["w1", "w2"] and not run.doubtful
+    assert isinstance(run.whiskers["w2"], Run)
+    assert run.table("whisks")["whisker"].tolist() == ["w1", "w2"]
+    for name in run.whiskers:
+        mine = run.table("estimates")
+        mine = mine[mine["whisker"] == name]
+        np.testing.assert_array_equal(mine["d_x_est_mm"], run.whiskers[name].estimates["d_x_est_mm"])
+    with pytest.raises(KeyError):
+        run.table("beam")
+
+
+def test_felt_contacts_lie_on_the_bar(out):
+    """The rig's bar, by the manifest: nothing is off by more than four stated sigmas, across and along."""
+    rows = api.read(out).table("surface")
+    rows = rows[rows["estimator"] == "with_friction"]
+    assert rows["surface_from"].tolist() == ["manifest", "manifest"]
+    assert (np.abs(rows["distance_mm"]) < 4 * rows["distance_sigma_mm"]).all()
+    assert (np.abs(rows["along_mm"]) < 4 * rows["along_sigma_mm"]).all()
+    assert (rows["normal_off_deg"] < 4 * rows["normal_sigma_deg"]).all()
+    summary = (out / "summary.txt").read_text()
+    assert summary.startswith("Surface by (10) with friction: 2 contacts felt by 2 whiskers lie")
+    assert "Score against the truth files" in summary and '<a href="whiskers/w2/report.html">' in (
+        out / "report.html"
+    ).read_text()
+
+
+def test_a_whisker_of_an_array_gives_what_its_own_session_gives(session, out, tmp_path):
+    """Byte for byte: its columns under their usual names, its tables as [whisker] and [gauges]."""
+    alone = tmp_path / "alone"
+    shutil.copytree(session, alone)
+    text = (alone / "session.toml").read_text()
+    keys = tomllib.loads(text)["whiskers"][1]
+    assert keys["name"] == "w2"
+    head, _, table = text.split("[[whiskers]]\n")[0], *text.split("[[whiskers]]\n")[1:]
+    table = re.sub(r'name = .*\nbase_mm = \[[^]]*\]\nbase_deg = \[[^]]*\]\n', "", table)
+    (alone / "session.toml").write_text(head + "[whisker]\n" + table.replace("[whiskers.gauges]", "[gauges]"))
+    (signals,) = alone.glob("trials/*/signals.csv")
+    rows = [line.split(",") for line in signals.read_text().splitlines()]
+    signals.write_text("\n".join(",".join([*row[:2], *row[4:]]) for row in rows).replace("@w2", "") + "\n")
+    evaluate(alone, tmp_path / "out", QUIET, workers=0, announce=lambda _: None)
+    for name in ("whisks.csv", "estimates.csv", "against_theta.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (out / "whiskers" / "w2" / name).read_bytes()
+
+
+def test_the_report_is_made_again_of_the_runs_alone(out):
+    before = {name: (out / name).read_bytes() for name in ("report.html", "summary.txt", "surface.csv", "array.json")}
+    (out / "surface.csv").unlink()
+    assert out / "report.html" in api.report(out)
+    assert {name: (out / name).read_bytes() for name in before} == before
+
+
+def test_verbs_of_one_run_ask_for_one_whisker(out):
+    several = "is of several whiskers; give the folder of one of them"
+    with pytest.raises(BadInput, match=several):
+        compare_runs([out / "whiskers" / "w1", out], None)
+    with pytest.raises(BadInput, match=several):
+        write_video(out, "steel_b30_v10")
+
+
+def test_arrays_are_compared_whisker_by_whisker(out, tmp_path):
+    again = tmp_path / "again"
+    shutil.copytree(out, again)
+    lines, code = compare_arrays([out, again], tmp_path / "changes.csv")
+    assert code == 0 and sum("1 whisks in both" in line for line in lines) == 2
+    assert (tmp_path / "changes@w2.csv").is_file()
+    with pytest.raises(BadInput, match="is no array's run"):
+        compare_arrays([out, out / "whiskers" / "w1"], None)
+
+
+def test_check_takes_arrays(session, capsys):
+    assert check(session, progress=False) == 0
+    assert "two, 2 whiskers: 1 trial, nothing wrong or doubtful" in capsys.readouterr().out
