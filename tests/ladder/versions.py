@@ -14,11 +14,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SESSION = ROOT / "fixtures" / "small-session"
-# What rounding does to the bar's line, from one start of its fit to another (tests/ladder/bar_starts.py). OpenCV 4.14
-# with NumPy 1.26 and SciPy 1.12 beside 5.0, 2.4 and 1.17: 0.13; NumPy 2.5 and SciPy 1.18 on Python 3.13: 0.02.
-# Later 0.38, in d_x of one gauge trial: as much as two cameras.toml that differ by 1e-12 show in one environment, so it
-# is no version's but a choice within seeing, likely of the bar's line, that rounding tips over.
-MOST_SIGMAS = 0.2
+# Asked for. OpenCV 4.14 with NumPy 1.26 and SciPy 1.12 beside 5.0, 2.4 and 1.17: 0.014.
+MOST_SIGMAS = 0.1
 
 
 def verb(python: str, *arguments) -> str:
