@@ -36,7 +36,8 @@ def common_spread_px(pieces: Pieces, blur_px: float, terms: int, knots: Knots, r
     return float(np.sqrt(np.average(shift**2, weights=chance)))
 
 
-def doubts_of(pieces: Pieces, shifts_px, blurs_px, terms: int, knots: Knots, robust: np.ndarray) -> np.ndarray:
+def doubts_of(pieces: Pieces, shifts_px: np.ndarray, blurs_px: np.ndarray, terms: int, knots: Knots,
+              robust: np.ndarray) -> np.ndarray:
     """Minus twice the log evidence (m, b) of common shifts, shifts_px (m,), and blurs, blurs_px (b,), by so many waves
     at the first, middle and last of the knots along the rod, each wave as strong as is most probable. robust (s,):
     weight of each piece."""
