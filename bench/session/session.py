@@ -1,6 +1,6 @@
 """A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -95,7 +95,9 @@ def load_session(
     bar = keys.bar
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
-    found = _trials(path, keys, doubts, trials)
+    found = _by_surface(_trials(path, keys, doubts, trials), keys.surfaces)
+    if trials is None:
+        _check_surfaces(found, keys.surfaces, doubts)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
@@ -200,6 +202,20 @@ def _trials(
             with doubts.guard():
                 found.append(load_trial(entry, keys, doubts, daq))
     return tuple(found)
+
+
+def _by_surface(trials: Iterable[Trial], order: Sequence[str]) -> tuple[Trial, ...]:
+    """The trials in the session's order of surfaces, within one by name; other surfaces after those named."""
+    place = {name: k for k, name in enumerate(dict.fromkeys(order))}
+    return tuple(sorted(trials, key=lambda trial: place.get(trial.surface, len(place))))
+
+
+def _check_surfaces(trials: Iterable[Trial], order: Sequence[str], doubts: Doubts) -> None:
+    """A surface that no trial has was misspelt, or is not recorded yet."""
+    there = {t.surface for t in trials}
+    for name in order:
+        if there and name not in there:
+            doubts.note(f"{MANIFEST}: surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}")
 
 
 def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:
