@@ -2,7 +2,8 @@
 # make test       the default tests;  make test-slow: the long ones;  make lint: ruff
 # make docs:      the documents as a site, in build/site
 # make test-browser: the report in a headless Chromium (apt install chromium)
-# make test-versions: the small session with the oldest and the newest versions that are allowed, and whether they agree
+# make test-lowest: the small session with the oldest versions that are allowed, and whether it comes to the same numbers
+# make test-versions: the same with the newest ones, too
 # PYTHON=python3.12 make demo   takes another Python (3.11 or newer)
 
 PYTHON ?= python3
@@ -17,7 +18,7 @@ WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)')
 NEWEST_PYTHON ?= $(PYTHON)
 SETS := $(VENV)-lowest $(VENV)-newest
 
-.PHONY: demo test test-slow test-browser test-versions lint docs clean
+.PHONY: demo test test-slow test-browser test-lowest test-versions lint docs clean
 
 demo: $(VENV)/ready
 	@$(BIN)/whisker-bench evaluate fixtures/small-session --out demo-out --workers $(WORKERS); code=$$?; \
@@ -32,6 +33,10 @@ test-slow: $(VENV)/ready-for-tests
 
 test-browser: $(VENV)/ready-for-tests
 	$(BIN)/python -m pytest -q -m browser
+
+test-lowest: $(VENV)/ready $(VENV)-lowest/ready
+	@rm -rf versions-out
+	@$(BIN)/python tests/ladder/versions.py versions-out $(BIN)/python $(VENV)-lowest/bin/python
 
 test-versions: $(VENV)/ready $(SETS:=/ready)
 	@rm -rf versions-out
@@ -66,8 +71,8 @@ $(VENV)/ready-for-tests: $(VENV)/ready
 # OpenCV's wheel asks for NumPy 2 and runs with 1.26, so it is installed without what it asks for.
 $(VENV)-lowest/ready: pyproject.toml constraints-lowest.txt
 	@$(PYTHON) -m venv $(VENV)-lowest
-	@$(VENV)-lowest/bin/python -m pip install -qq --no-compile $$(grep -v opencv constraints-lowest.txt)
-	@$(VENV)-lowest/bin/python -m pip install -qq --no-compile --no-deps $$(grep opencv constraints-lowest.txt)
+	@$(VENV)-lowest/bin/python -m pip install -qq --no-compile --only-binary :all: $$(grep -v opencv constraints-lowest.txt)
+	@$(VENV)-lowest/bin/python -m pip install -qq --no-compile --only-binary :all: --no-deps $$(grep opencv constraints-lowest.txt)
 	@touch $@
 
 $(VENV)-newest/ready: pyproject.toml

@@ -108,7 +108,7 @@ def _moments_seen(seen: SeenWhisk, theta: float, whisker: Whisker) -> tuple[floa
 def mean_row(rows: Sequence[dict]) -> dict:
     """Mean error and mean shares over the whisks for which all are known; shares keep their signs, so they add up."""
     names = ("d_x_mm", "error_mm", *SHARES)
-    values = np.array([[row[name] for name in names] for row in rows])
+    values = np.array([[row[name] for name in names] for row in rows]).reshape(-1, len(names))
     complete = values[np.isfinite(values).all(axis=1)]
     return {"trial": TOTAL} | (dict(zip(names, complete.mean(axis=0).tolist())) if len(complete) else {})
 

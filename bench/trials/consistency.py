@@ -155,6 +155,26 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
     return f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
 
 
+def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> str:
+    """The whisker's diameter as seen against its own: a sentence where cameras that agree with each other see a thinner
+    one, '' where they do not, or where fewer than two tell. Shadows beside a wire, bloom and movement make it look
+    thicker, in all cameras alike, and nothing thinner. looks: how thick over how thick it is said to be, by camera."""
+    if len(looks) < 2:
+        return ""
+    logs = np.log([one.value for one in looks.values()])
+    variances = np.array([(one.sigma / one.value) ** 2 for one in looks.values()])
+    stated = (whisker.diameter_sigma_mm / whisker.diameter_mm) ** 2
+    of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
+    if of_all.is_chance or not Difference(logs, _without_mean(np.diag(variances)), len(looks) - 1).is_chance:
+        return ""
+    factor, sigma = float(np.exp(np.average(logs, weights=1.0 / variances))), float(np.sum(1.0 / variances) ** -0.5)
+    if factor > 1.0:
+        return ""
+    found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
+    cure = f"its diameter_mm would have to be some {whisker.diameter_mm * factor:.2g} for {whisker.diameter_mm:g}"
+    return f"the whisker looks {found}: {cure}"
+
+
 def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> str:
     """The whisker's end as seen against its length: a sentence where they are apart, '' where they are not, or where
     no two cameras see it end in one place: before something dark a dark wire seems to end. ends: by camera, mm from

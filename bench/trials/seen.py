@@ -14,7 +14,7 @@ from bench.session.frame_times import FrameTimes, dropped, frame_times, read_tri
 from bench.session.session import Session
 from bench.session.signals import Signals, back_stroke, forward_strokes
 from bench.session.trial import Trial
-from bench.trials.consistency import cone_doubt, length_doubt, slope_doubt, turns_doubt, width_doubt
+from bench.trials.consistency import cone_doubt, length_doubt, slope_doubt, turns_doubt, width_doubt, wire_doubt
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
@@ -75,8 +75,9 @@ def _see(
     for rung in harder:
         looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
     thick, left_out = width_doubt(truth.bar_looks, trial, session.board), scene.left_out.values()
-    odd = [[thick, length_doubt(one.ends, session.whisker), slope_doubt(one.beta_rad, trial), _leaning(one, settings)]
-           for _, one in looked]
+    wide = wire_doubt(next((one.looks for one in truth.whisks if one.looks), {}), session.whisker)
+    odd = [[thick, wide, length_doubt(one.ends, session.whisker), slope_doubt(one.beta_rad, trial),
+            _leaning(one, settings)] for _, one in looked]  # fmt: skip
     whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
         tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),

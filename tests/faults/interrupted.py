@@ -103,7 +103,7 @@ def felt_session(folder: Path) -> Path:
 def seen_session(folder: Path) -> Path:
     """The small session's measured trials, with cameras and gauges brought along."""
     session = folder / "seen"
-    shutil.copytree(SESSION, session, ignore=shutil.ignore_patterns("boards", "gauge_*"))
+    shutil.copytree(SESSION, session, ignore=shutil.ignore_patterns("gauge_*"))
     (session / "gauges.toml").write_text(GAUGES)
     with redirect_stdout(io.StringIO()):
         cli.main(["calibrate", "cameras", str(SESSION), "--out", str(session / "cameras.toml")])

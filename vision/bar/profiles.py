@@ -18,10 +18,10 @@ STEP_PX = 0.25  # of the grid: a third of a lens blur
 OUTSIDE_PX = 6.0  # beyond either edge, wherever it is looked for: a shadow's border is seldom as near
 _RIM_PX = 8.0  # of a thick bar so much inside either edge is looked at
 _MODEL_SHARE = 0.001  # of the contrast: what no model of the light explains
-_SHARES = np.linspace(0.0, 1.0, 9)  # of the background that may be seen beside an edge
 _ALIKE_PX = 1.0  # a lens blur: how far the errors of neighbours go together
 _SMOOTHED = 5  # steps of the grid, about as much: over which texture is averaged
 _MEDIAN_SQUARED, _FEW_DIFFER = 0.455, 3.0  # of a Gaussian; times the usual variance: more is no texture
+_NOTHING = 1e-100  # in place of none, where it is divided by
 _AS_ROUGH = 50  # steps of the grid for which a stretch counts as rough as the others
 
 
@@ -96,14 +96,16 @@ def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profi
 
 
 def _shared(weight, values, place, size: int) -> np.ndarray:
-    """Weighted sums (v, s, size) of values (s, p), each pixel between the two nearest whole places."""
+    """Weighted sums (v + 1, s, size) of values (s, p), each pixel between the two nearest whole places; and of the
+    shares themselves, which make variances of weighted means."""
     before = np.clip(np.floor(place), 0, size - 2)
     part = np.clip(place - before, 0.0, 1.0)
     rows = size * np.arange(len(place))[:, None] + before.astype(int)
     both = np.concatenate([rows.ravel(), rows.ravel() + 1])
-    shares = np.concatenate([((1.0 - part) * weight).ravel(), (part * weight).ravel()])
-    return np.stack([np.bincount(both, shares * np.tile(one.ravel(), 2), len(place) * size).reshape(-1, size)
-                     for one in values])
+    share = np.concatenate([(1.0 - part).ravel(), part.ravel()])
+    weighted = share * np.tile(weight.ravel(), 2)
+    return np.stack([np.bincount(both, weighted * one, len(place) * size).reshape(-1, size)
+                     for one in (*(np.tile(one.ravel(), 2) for one in values), share)])
 
 
 def _light(grey, gamma: float):
@@ -113,58 +115,56 @@ def _light(grey, gamma: float):
 
 
 def _profiles(added, stretches, offset_px, place_mm, radius_px: float) -> Profiles:
-    """Of sums (5, s, b) over the pieces, in their order along the bar: weights, and weighted light, light behind, its
-    slope across, and the light's derivative by grey."""
+    """Of sums (6, s, b) over the pieces, in their order along the bar: weights, and weighted light, light behind, its
+    slope across, the light's derivative by grey, and shares of pixels."""
     own = added[0]
     of_stretch = np.zeros((len(stretches), len(own)))
     for row, some in zip(of_stretch, stretches):
         row[some] = 1.0
     total = of_stretch @ own
     seen = total > 0
-    light, behind, steep, by_grey = ((of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:])
-    each = (np.where(own > 0, part / np.where(own > 0, own, 1.0), np.nan) for part in added[1:3])
-    texture, alike = _texture(of_stretch[:, 1:-1], own, *each)
-    number = np.maximum(of_stretch @ (own > 0), 1)
+    light, behind, steep, by_grey = ((of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:5])
+    there = np.where(own > 0, own, 1.0)
+    texture, alike = _texture(of_stretch[:, 1:-1], own, added[1] / there, added[2] / there, added[5] / there**2)
+    number = np.where(seen, total**2 / np.where(seen, of_stretch @ own**2, 1.0), 1.0)
     sigma = np.where(seen, np.sqrt(1.0 / np.where(seen, total, 1.0) + texture / number), np.inf)
     middle = [np.median(row[some]) if np.any(some) else 0.0 for row, some in zip(behind, seen)]
     behind = behind - np.array(middle)[:, None]
     return Profiles(offset_px, light, sigma, behind, steep, by_grey, place_mm, radius_px, alike)
 
 
-def _texture(of_stretch, weight, light, behind) -> tuple[np.ndarray, float]:
+def _texture(of_stretch, weight, light, behind, noise) -> tuple[np.ndarray, float]:
     """Variance (k, b) of what pieces of each stretch differ by beyond noise: texture of the bench, compression; and how
     alike neighbours across are, see `Profiles`. of_stretch (k, s - 2): 1 for its pieces, the first and last left out;
-    weight, light, behind (s, b): of each piece, NaN where it shows nothing.
+    weight, light, behind, noise (s, b): of each piece, the last one's a variance.
 
     By a piece and the mean of the two beside it, so that what changes steadily along the bar does not count, nor what
-    follows the picture without rods, by the share that is seen. A product of one figure a stretch and one across.
+    follows the picture without rods, by the share that is seen. A product of one figure a stretch and one across. A
+    piece of which a place has hardly a part of a pixel counts as little: whether it has any, rounding may say.
     """
-    noise = 1.0 / np.maximum(weight[1:-1], 1e-300)
     light, behind = (one[1:-1] - 0.5 * (one[:-2] + one[2:]) for one in (light, behind))
-    left = light - _SHARES[:, None, None] * behind
-    there = np.isfinite(left[0])
-    left = np.where(there, left, 0.0)
-    number = np.maximum(np.sum(there, axis=0), 1)
-    spread = np.sum(left**2, axis=1) / (1.5 * number)
-    best = np.argmin(spread, axis=0)
-    left = np.take_along_axis(left, best[None, None], axis=0)[0]
+    doubt, noise = (one[1:-1] + 0.25 * (one[:-2] + one[2:]) for one in (1.0 / np.maximum(weight, _NOTHING), noise))
+    told = np.where(doubt < 0.1 / _NOTHING, 1.0 / doubt, 0.0)
+    share = np.sum(told * light * behind, axis=0) / np.maximum(np.sum(told * behind**2, axis=0), _NOTHING)
+    left = light - np.clip(share, 0.0, 1.0) * behind
+    counts = told * np.sum(told, axis=0) / np.maximum(np.sum(told**2, axis=0), _NOTHING)  # 1 where all tell as much
+    number = np.maximum(np.sum(counts, axis=0), _NOTHING)
+    spread, noise = (np.sum(counts * one, axis=0) / (1.5 * number) for one in (left**2, noise))
     # where a tilted bar's edge passes a few pieces differ
-    usual = _median_there(left**2, there) / (1.5 * _MEDIAN_SQUARED)
-    spread = np.minimum(spread[best, np.arange(spread.shape[1])], _FEW_DIFFER * usual)
-    spread = np.maximum(uniform_filter1d(spread, _SMOOTHED), 1e-300)
-    left = left / np.sqrt(1.5 * spread)
-    noise = uniform_filter1d(np.sum(np.where(there, noise, 0.0), axis=0) / number, _SMOOTHED)
-    shown = np.sum(of_stretch @ there, axis=1)
-    rougher = (np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH) / (shown + _AS_ROUGH)
-    return np.maximum(rougher[:, None] * spread - noise, 0.0), _alike(left)
+    usual = _weighted_median(left**2, told) / (1.5 * _MEDIAN_SQUARED)
+    spread = np.maximum(uniform_filter1d(np.minimum(spread, _FEW_DIFFER * usual), _SMOOTHED), _NOTHING)
+    left = left * np.sqrt(counts / (1.5 * spread))
+    rougher = ((np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH)
+               / (np.sum(of_stretch @ counts, axis=1) + _AS_ROUGH))
+    return np.maximum(rougher[:, None] * spread - uniform_filter1d(noise, _SMOOTHED), 0.0), _alike(left)
 
 
-def _median_there(values, there) -> np.ndarray:
-    """Median (b,) of values (s, b) over the pieces that are there, of an even number the upper one; 0
-    where none is."""
-    ordered, count = np.sort(np.where(there, values, np.inf), axis=0), np.sum(there, axis=0)
-    middle = ordered[np.clip(count // 2, 0, len(there) - 1), np.arange(len(count))]
-    return np.where(count > 0, middle, 0.0)
+def _weighted_median(values, weight) -> np.ndarray:
+    """Of each column (b,) of values (s, b)."""
+    order = np.argsort(values, axis=0)
+    summed = np.cumsum(np.take_along_axis(weight, order, axis=0), axis=0)
+    middle = np.argmax(summed >= 0.5 * summed[-1], axis=0)
+    return np.take_along_axis(values, np.take_along_axis(order, middle[None], axis=0), axis=0)[0]
 
 
 def _alike(left) -> float:

@@ -12,7 +12,7 @@ class VisionSettings:
     fit. clock_sigma_s: how well the cameras' clock is known against the motor's; 0 takes frame times as exact.
     bar_reach_mm: length of bar used on either side of the contact. picture_scale: pictures are shrunk by so much, a
     whole number. every_frame: of a stroke's frames one in so many is looked at. check_beam: whether the wire is fitted
-    once more as a curve that is no beam, to see whether it is one.
+    once more as a curve that is no beam, and looked at for another width, to see whether it is the one that is stated.
     """
 
     wire_piece_px: int = 12

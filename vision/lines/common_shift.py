@@ -19,20 +19,16 @@ _STRENGTHS = 0.05, 1.0  # of the contrast: less does not show, more is more than
 _ROUNDS = 12
 # What the evidence counts: strengths are fitted to the pixels that they explain, and what the model lacks of the light
 # is alike in all pieces. In 65 views the true shift is most probable so (tests/ladder/wire_scenes.py).
-_EVIDENCE_COUNTS = 0.5
+EVIDENCE_COUNTS = 0.5
 
 
 def common_spread_px(pieces: Pieces, blur_px: float, terms: int, knots: Knots, robust: np.ndarray,
                      blur_prior: tuple[float, float]) -> float:
     """RMS distance from where pieces lie of all common shifts, each as it is probable, px.
 
-    By so many waves at the first, middle and last of the knots along the rod. robust (s,): weight of each piece;
-    blur_px: found where they lie; blur_prior: blur, px, and sigma of its logarithm.
+    terms, robust: see `doubts_of`; blur_px: found where they lie; blur_prior: blur, px, and sigma of its logarithm.
     """
-    along = knots.place_mm[sorted({0, len(knots.place_mm) // 2, len(knots.place_mm) - 1})]
-    knots = Knots(along, knots.turn_rad, knots.turns)
-    normal = _normal_equations(pieces, blur_px * np.exp(_LOG_BLURS), terms, knots.weights(pieces), robust)
-    doubts = _doubts(*normal, knots, contrast_of(pieces))
+    doubts = EVIDENCE_COUNTS * doubts_of(pieces, _SHIFTS_PX, blur_px * np.exp(_LOG_BLURS), terms, knots, robust)
     doubts += ((_LOG_BLURS + np.log(blur_px / blur_prior[0])) / blur_prior[1]) ** 2
     shift, log_blur = (np.linspace(grid[0], grid[-1], _FINE) for grid in (_SHIFTS_PX, _LOG_BLURS))
     fine = RectBivariateSpline(_SHIFTS_PX, _LOG_BLURS, doubts)(shift, log_blur)
@@ -40,10 +36,21 @@ def common_spread_px(pieces: Pieces, blur_px: float, terms: int, knots: Knots, r
     return float(np.sqrt(np.average(shift**2, weights=chance)))
 
 
-def _normal_equations(pieces: Pieces, blurs_px, terms: int, hats, robust) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def doubts_of(pieces: Pieces, shifts_px: np.ndarray, blurs_px: np.ndarray, terms: int, knots: Knots,
+              robust: np.ndarray) -> np.ndarray:
+    """Minus twice the log evidence (m, b) of common shifts, shifts_px (m,), and blurs, blurs_px (b,), by so many waves
+    at the first, middle and last of the knots along the rod, each wave as strong as is most probable. robust (s,):
+    weight of each piece."""
+    along = knots.place_mm[sorted({0, len(knots.place_mm) // 2, len(knots.place_mm) - 1})]
+    knots = Knots(along, knots.turn_rad, knots.turns)
+    normal = _normal_equations(pieces, shifts_px, blurs_px, terms, knots.weights(pieces), robust)
+    return _doubts(*normal, knots, contrast_of(pieces)).reshape(len(shifts_px), len(blurs_px))
+
+
+def _normal_equations(pieces: Pieces, shifts_px, blurs_px, terms: int, hats, robust):
     """Normal matrices (g, size, size), right sides (g, size) and squares (g,) at each shift and blur."""
     normal = []
-    for shift in _SHIFTS_PX:
+    for shift in shifts_px:
         moved = pieces.moved(np.full(len(pieces), shift))
         for blur in blurs_px:
             equations = Equations(moved, blur, terms)
@@ -53,8 +60,7 @@ def _normal_equations(pieces: Pieces, blurs_px, terms: int, hats, robust) -> tup
 
 
 def _doubts(left, right, power, knots: Knots, contrast: float) -> np.ndarray:
-    """Minus twice the log evidence (shifts, blurs), as it counts, of such normal equations, each wave as strong as is
-    most probable."""
+    """Minus twice the log evidence (g,) of such normal equations, each wave as strong as is most probable."""
     between, count, terms = between_knots(knots), len(knots), left.shape[1] // len(knots)
     strength = np.tile(contrast * WAVE_SHARE[:terms], (len(left), 1))
     low, high = contrast * np.array(_STRENGTHS)
@@ -66,5 +72,4 @@ def _doubts(left, right, power, knots: Knots, contrast: float) -> np.ndarray:
         strength[:, 1:] = np.clip(np.sqrt(asked / count), low, high)[:, 1:]
     stiff = stiffness(strength, knots)
     waves = np.linalg.solve(left + stiff, right[..., None])[..., 0]
-    doubts = power - np.sum(right * waves, axis=1) + np.linalg.slogdet(left + stiff)[1] - np.linalg.slogdet(stiff)[1]
-    return _EVIDENCE_COUNTS * doubts.reshape(len(_SHIFTS_PX), len(_LOG_BLURS))
+    return power - np.sum(right * waves, axis=1) + np.linalg.slogdet(left + stiff)[1] - np.linalg.slogdet(stiff)[1]

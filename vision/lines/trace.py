@@ -20,7 +20,7 @@ NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
 WIRE_WAVES = 11  # round a wire: with fewer, what they lack of a highlight passes for blur and for position
 # A lens blur to begin with. Narrow: one too wide can be the best nearby, for light that darkens at the rims mends it.
 _BLUR_PX = 0.8
-_BIN_PX = 0.3
+BIN_PX = 0.3
 _NODES = 81  # of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel
 _WORST_SIGMA_PX = 0.5
 # A piece whose misfit is this many times the median piece's is not a picture of the rod alone.
@@ -75,7 +75,7 @@ def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: f
     earlier look that told where these pieces are expected, which are then some tenths of a pixel off at most. All steps
     are taken with averaged pixels, but for the last where this is the last look.
     """
-    rough, blurred = binned(pieces, _BIN_PX)
+    rough, blurred = binned(pieces, BIN_PX)
     believed, seen = (one and float(np.hypot(one, np.sqrt(blurred))) for one in (blur_px, seen_blur_px))
     solved = solve_jointly(Task(rough, terms, knots, believed, blur_sigma, seen), last=last)
     blur_px = without(solved.blur_px, blurred)

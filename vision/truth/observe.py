@@ -34,6 +34,7 @@ from vision.truth.value import Value
 from vision.truth.whisk import fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.wire_end import wire_ends
+from vision.truth.wire_width import wire_looks
 
 _FEWEST_FRAMES = 4
 
@@ -120,7 +121,9 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     status = "; ".join(filter(None, [truth.status, *doubts]))
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
-    return replace(truth, base=base, beam=beam, turns=turns, refinements=without, ends=ends, status=status)
+    looks = wire_looks(whisk, fitted) if whisk.settings.check_beam and whisk.number == 0 else {}
+    told = {"base": base, "beam": beam, "turns": turns, "refinements": without, "ends": ends, "looks": looks}
+    return replace(truth, **told, status=status)
 
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:

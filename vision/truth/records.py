@@ -50,7 +50,8 @@ class WhiskTruth:
     overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
     the frames before touch. beam: the same by a curve that is no beam. turns: the whisker's turn in each frame of the
     fit beyond the motor's. refinements: what the truth would be without each part of the model, by name. lines: what
-    each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end.
+    each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end; looks: how
+    thick it looks over how thick it is said to be, of a trial's first whisk.
     point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit.
     """
 
@@ -73,6 +74,7 @@ class WhiskTruth:
     refinements: dict[str, LeftOut] = field(default_factory=dict)
     lines: dict[str, LineNoise] = field(default_factory=dict)
     ends: dict[str, Value] = field(default_factory=dict)
+    looks: dict[str, Value] = field(default_factory=dict)
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
 

@@ -12,6 +12,7 @@ from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, one_curve
 from vision.geometry.contact import BarAxis, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused
+from vision.lines.bands import Pieces
 from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import Observed
 from vision.lines.shading import Knots
@@ -164,16 +165,25 @@ def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[
     seen_blur_px: by camera, of an earlier look that told the curves. Fills whisk.light with how the camera sees the
     wire.
     """
-    wire, settings = whisk.rods.wire, whisk.settings
-    pieces = wire_pieces(view, curves, wire, settings.wire_piece_px, settings.wire_margin_px)
-    pieces = pieces.below(SATURATED * view.full_scale)
-    outline = outline_of_bar(view.camera, axis, whisk.rods.bar.radius_mm)
-    pieces = pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
+    pieces = clear_pieces(whisk, view, axis, curves)
     if len(pieces) == 0:
         return []
-    knots = Knots.of_turning(np.arange(NEAR_CLAMP_MM, wire.length_mm, _WIRE_KNOT_MM), whisk.motor)
-    traced = trace(pieces, knots, seen_blur_px=(seen_blur_px or {}).get(view.camera.name), last=last)
+    traced = trace(pieces, wire_knots(whisk), seen_blur_px=(seen_blur_px or {}).get(view.camera.name), last=last)
     whisk.light[view.camera.name] = WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px),
                                                    float(np.sqrt(traced.misfit)))
     points, source = to_points(traced)
     return observed(points, source, whisk.cameras.names.index(view.camera.name), list(curves))
+
+
+def clear_pieces(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[int, Curves]) -> Pieces:
+    """Pieces of the wire beside curves, clear of clamp and bar, in one of a whisk's cameras."""
+    settings = whisk.settings
+    pieces = wire_pieces(view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    pieces = pieces.below(SATURATED * view.full_scale)
+    outline = outline_of_bar(view.camera, axis, whisk.rods.bar.radius_mm)
+    return pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
+
+
+def wire_knots(whisk: WhiskPictures) -> Knots:
+    """Between what the wire's shading is linear."""
+    return Knots.of_turning(np.arange(NEAR_CLAMP_MM, whisk.rods.wire.length_mm, _WIRE_KNOT_MM), whisk.motor)

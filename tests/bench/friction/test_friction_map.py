@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.friction.error_map import draw_error_map, measured_cells, write_error_map
-from bench.friction.explained import SHARES, draw_explained, mean_row
+from bench.friction.explained import SHARES, TOTAL, draw_explained, mean_row
 from bench.friction.tables import friction_of
 from tests.scenes.friction_results import WHISKER, result
 
@@ -36,6 +36,10 @@ def test_cells_without_a_whisk_stay_empty():
 def test_nothing_measured_no_picture(tmp_path):
     assert write_error_map(tmp_path, [], [], ALPHA_EST) == []
     assert (tmp_path / "error_map.csv").read_text().count("\n") == 1
+
+
+def test_where_every_whisk_is_doubtful_there_is_no_mean():
+    assert mean_row([]) == {"trial": TOTAL}
 
 
 def test_mean_shares_add_up_and_leave_out_what_is_not_known():

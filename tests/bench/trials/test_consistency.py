@@ -9,7 +9,15 @@ import pytest
 from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
-from bench.trials.consistency import cone_doubt, length_doubt, nominal_slope, slope_doubt, turns_doubt, width_doubt
+from bench.trials.consistency import (
+    cone_doubt,
+    length_doubt,
+    nominal_slope,
+    slope_doubt,
+    turns_doubt,
+    width_doubt,
+    wire_doubt,
+)
 from bench.trials.placing import _by_scale
 from bench.trials.unit import _against_pictures
 from tests.scenes.model_scenes import begun, scene, with_points
@@ -127,6 +135,24 @@ def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, 
     whisker = Whisker("cylinder", length_mm, 1.0, 200.0)
     found = length_doubt({str(k): Value(end, 2.0) for k, end in enumerate(ends_mm)}, whisker)
     assert found.endswith(said) and bool(found) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("looks", "sigma_mm", "said"),
+    [
+        # what the small session's two cameras say where 1.5 mm are stated for 1
+        ((Value(0.69, 0.063), Value(0.83, 0.07)), 0.0, "0.76 ± 0.05 times as thick as said: its diameter_mm would"),
+        ((Value(0.69, 0.063), Value(0.83, 0.07)), 0.4, ""),
+        ((Value(1.4, 0.05), Value(1.0, 0.05)), 0.0, ""),  # a shadow beside the wire in one of them
+        ((Value(1.4, 0.08), Value(1.4, 0.08)), 0.0, ""),  # bloom in both
+        ((Value(1.0, 0.14), Value(0.87, 0.1)), 0.0, ""),
+        ((Value(0.5, 0.05),), 0.0, ""),
+    ],
+)
+def test_a_whisker_of_another_diameter_is_told_by_cameras_that_agree(looks, sigma_mm, said):
+    whisker = Whisker("cylinder", 100.0, 1.5, 60.0, diameter_sigma_mm=sigma_mm)
+    found = wire_doubt({str(k): one for k, one in enumerate(looks)}, whisker)
+    assert said in found and bool(found) == bool(said)
 
 
 def test_a_contradicted_whisk_is_apart_and_names_no_gauge(exact_record, trial):
