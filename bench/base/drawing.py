@@ -57,6 +57,7 @@ _UNDATED = {
     "svg": {"Date": None},
 }
 _STAMP = "Source"
+_COMPRESSION = 3  # of a PNG, 0 to 9. Of an overlay 6 saves a fiftieth of the bytes
 SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
 
 
@@ -95,14 +96,25 @@ def label_of(estimator: str) -> str:
 
 def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
     """Write a PNG whole, with the hash of what it shows."""
+    _lay_out(figure)
     with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=dpi, metadata={"Software": None, _STAMP: stamp})
+        about = {"Software": None, _STAMP: stamp}
+        figure.savefig(temporary, dpi=dpi, metadata=about, pil_kwargs={"compress_level": _COMPRESSION})
+
+
+def _lay_out(figure: "Figure") -> None:
+    """Places all axes. Left to `savefig`, everything is drawn twice, its pictures too."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def publish(figure: "Figure", stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150) -> list[Path]:
     """Write <stem>.<format> of each of FORMATS that is asked for, whole; the same figure gives the same bytes. The
     paths written."""
     paths = [stem.with_name(f"{stem.name}.{name}") for name in formats]
+    _lay_out(figure)
     with _context({"svg.hashsalt": stem.name}):
         for path, name in zip(paths, formats):
             with whole_file(path) as temporary:

@@ -65,9 +65,9 @@ def _draw(axes: Axes, picture, lines: dict[str, np.ndarray]) -> None:
         axes.set_axis_off()
         return
     contact = lines["contact"]
-    inset = axes.inset_axes((0.76, 0.02, 0.23, 0.41))
+    inset, white = axes.inset_axes((0.76, 0.02, 0.23, 0.41)), np.percentile(picture, 99.8)
     for target in (axes, inset):
-        target.imshow(picture, cmap="gray", vmax=np.percentile(picture, 99.8), interpolation="nearest")
+        target.imshow(picture, cmap="gray", vmax=white, interpolation="nearest")
         for name, colour in (("bar_left", _BAR), ("bar_right", _BAR), ("wire", _WIRE)):
             target.plot(*lines[name].T, color=colour, lw=0.7)
         target.plot(*contact, "+", color=_CONTACT, ms=9, mew=1.2)

@@ -16,7 +16,7 @@ import elastica as ea
 import numpy as np
 
 _LEVER = 4.0  # a section turns against its shear as fast as sound crosses its diameter over this
-_SETTLED = 60.0  # of the damping's own times
+_SETTLED = 40.0  # of the damping's own times
 
 
 class Bench(ea.BaseSystemCollection, ea.Constraints, ea.Forcing, ea.Damping):
@@ -42,7 +42,8 @@ def bent(length: float, diameter: float, modulus: float, density: float, force: 
     early = 9 * steps // 10
     ea.integrate(stepper, bench, early * step, early, progress_bar=False)
     before = rod.position_collection[:2, -1].copy()
-    ea.integrate(stepper, bench, steps * step, steps - early, restart_time=early * step, progress_bar=False)
+    late = steps - early
+    ea.integrate(stepper, bench, late * step, late, restart_time=early * step, progress_bar=False)
     end = rod.position_collection[:2, -1].copy()
     return end, float(np.linalg.norm(end - before))
 
