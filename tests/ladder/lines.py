@@ -212,7 +212,7 @@ def look_again(scene: Scene, pictures, background, seen: Traced) -> tuple[Traced
     if scene.bar is not None:
         clear = clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX)
         pieces, bound = pieces.select(clear), bound[clear]
-    return trace(pieces, KNOTS, seen.blur_px), bound
+    return trace(pieces, KNOTS, seen_blur_px=seen.blur_px), bound
 
 
 def find(scene: Scene, rng) -> Measured:

@@ -65,9 +65,9 @@ def trace_first(scene) -> float:
 
 
 def trace_again(scene, blur_px: float) -> None:
-    """The same from a nearer start with the blur known."""
+    """The same as a whisk's second look: from a nearer start, with the blur seen."""
     pieces = cut_pieces(rough_bands(*scene, 0.2), 12, Noise(NOISE**2, 0.0))
-    to_points(trace(pieces, KNOTS, blur_px))
+    to_points(trace(pieces, KNOTS, seen_blur_px=blur_px))
 
 
 def cpu_ms(call) -> float:

@@ -12,7 +12,6 @@ its own, or as good as the best: several starts are followed, and the sigma of s
 what is shared is found with pixels weighed by no more than that leaves them.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,8 +28,6 @@ BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 p
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
 _STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
-# In shift and logarithm of the blur: two descents that come so near to each other end at the same place.
-_SAME_PX, _SAME_BLUR = 0.1, 0.05
 _TOLD_BY = 120  # pieces that tell how probable a common shift is
 _MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
@@ -136,10 +133,7 @@ def _start(task: Task) -> tuple[float, float]:
     for one in begins:
         if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
             chosen.append(one)
-    ends: list[Shared] = []
-    for one in chosen[:_MOST_STARTS]:
-        end = _descend(_Point.at(task, one.shift_px, one.log_blur, robust), ends)
-        ends += [end] if end else []
+    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust)) for one in chosen[:_MOST_STARTS])
     best = min(ends, key=lambda one: one.doubt)
     return float(np.median(best.shift_px)), float(np.log(best.blur_px))
 
@@ -148,9 +142,9 @@ def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
     return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
 
 
-def _descend(here: "_Point", ends: Sequence[Shared] = ()) -> Shared | None:
+def _descend(here: "_Point") -> Shared:
     """Downhill from a point, the pieces weighed as there: weighed anew at each step, those that a shift spoils would
-    count ever less. None where the way leads past one of these ends.
+    count ever less.
 
     The last step is taken without looking again: what is told of the pieces is as it was before it.
     """
@@ -167,8 +161,6 @@ def _descend(here: "_Point", ends: Sequence[Shared] = ()) -> Shared | None:
             continue
         damped = damped / _EASIER if damped > _UNDAMPED * _DAMPED else 0.0
         here = there
-        if any(here.is_near(end) for end in ends):
-            return None
         arrow = _Arrow(here)
     return arrow.solved(damped)
 
@@ -210,11 +202,6 @@ class _Point:
     def doubt(self) -> float:
         """Minus twice the log evidence of positions and blur, the shading integrated out."""
         return float(self.misfit + np.linalg.slogdet(self.left)[1] - np.linalg.slogdet(self.stiff)[1])
-
-    def is_near(self, end: Shared) -> bool:
-        """Whether a descent has ended nearby."""
-        apart_px = float(np.median(self.shift_px)) - float(np.median(end.shift_px))
-        return abs(apart_px) < _SAME_PX and abs(self.log_blur - np.log(end.blur_px)) < _SAME_BLUR
 
     def moved(self, step_px, by_blur: float) -> "_Point":
         """The point a step farther on, weighed as here."""
