@@ -1,7 +1,7 @@
 """The round bar that the whisker is pushed against, and where a whisker first touches it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,12 +23,18 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True)
 class Bar:
     """A round bar in the rig frame: a point of its axis, the axis' unit direction (its z positive), its radius, and how
-    stiff its surface is: it gives way by force over stiffness, along its normal, where the whisker presses."""
+    stiff its surface is: it gives way by force over stiffness, along its normal, where the whisker presses.
+
+    velocity_mm_rad (3,): of a bar that moves, per radian of the motor's steady way; it is at its point at first touch,
+    motor angle touch_rad. None: it stands.
+    """
 
     point_mm: np.ndarray
     axis: np.ndarray
     radius_mm: float
     stiffness_N_mm: float = math.inf
+    velocity_mm_rad: np.ndarray | None = None
+    touch_rad: float = 0.0
 
     @classmethod
     def placed(
@@ -48,6 +54,21 @@ class Bar:
         towards_whisker = np.array([0.0, -math.cos(beta_rad), math.sin(beta_rad)])
         point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
         return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm, stiffness_N_mm)
+
+    def moving(self, velocity_mm_rad: np.ndarray, touch_rad: float) -> "Bar":
+        """The bar as one that moves."""
+        return replace(self, velocity_mm_rad=np.asarray(velocity_mm_rad, float), touch_rad=touch_rad)
+
+    def moved_mm(self, motor_rad: float | np.ndarray) -> np.ndarray:
+        """How far (..., 3) a bar that moves has come since first touch, at motor angles."""
+        since = np.asarray(motor_rad, float)[..., None] - self.touch_rad
+        return since * (np.zeros(3) if self.velocity_mm_rad is None else self.velocity_mm_rad)
+
+    def at(self, motor_rad: float) -> "Bar":
+        """The bar where it is at a motor angle, standing."""
+        if self.velocity_mm_rad is None:
+            return self
+        return replace(self, point_mm=self.point_mm + self.moved_mm(motor_rad), velocity_mm_rad=None)
 
     def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
         """The axis' point nearest to a point."""

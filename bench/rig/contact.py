@@ -96,11 +96,14 @@ class Contact:
 
     def foot_side(self, state: ContactState) -> float:
         """Positive where the bar's nearest point lies behind the contact along the whisker, negative ahead of it."""
-        return float((state.point_mm - self.bar.foot_mm(state.point_mm)) @ state.tangent)
+        foot = self.bar.at(state.motor_rad).foot_mm(state.point_mm)
+        return float((state.point_mm - foot) @ state.tangent)
 
     def _solve(self, motor_rad, old, unknowns, law, tip):
         """Newton's method with Deuflhard's monotonicity test: a step is halved until the next one would be smaller."""
-        problem = _Problem(self, _turn(motor_rad), old, law, tip)
+        bar = self.bar
+        went = bar.moved_mm(motor_rad) - bar.moved_mm(old.motor_rad)
+        problem = _Problem(self, bar.at(motor_rad), went, _turn(motor_rad), old, law, tip)
         here = problem.at(unknowns, old.angle)
         for _ in range(40):
             step = solved(here.jacobian, here.residual)
@@ -175,9 +178,11 @@ class _Here:
 
 @dataclass(frozen=True)
 class _Problem:
-    """What stays the same while Newton's method runs."""
+    """What stays the same while Newton's method runs. bar: where it is now; went: how far it has come since `old`."""
 
     contact: Contact
+    bar: Bar
+    went: np.ndarray
     turn: np.ndarray
     old: ContactState
     law: Sliding | Oiled | Held
@@ -186,7 +191,7 @@ class _Problem:
     def at(self, unknowns, angle) -> _Here:
         """The equations at unknowns, the elastica starting from `angle`."""
         pose = _Pose.of(self.contact, self.turn, unknowns, angle)
-        bar = self.contact.bar
+        bar = self.bar
         flat = np.eye(3) - np.outer(bar.axis, bar.axis)
         apart = flat @ (pose.point - bar.point_mm)
         distance = math.sqrt(apart @ apart)
@@ -213,16 +218,17 @@ class _Problem:
 
     def _forces(self, unknowns, normal, normal_by, side, side_by):
         """Normal and shear force, the latter along the bar and round it."""
-        axis, force = self.contact.bar.axis, self.turn @ unknowns[:3]
+        axis, force = self.bar.axis, self.turn @ unknowns[:3]
         force_by = np.concatenate([self.turn, np.zeros((3, 1))], 1)
         press, press_by = force @ normal, normal @ force_by + force @ normal_by
         shear = np.array([force @ axis, force @ side])
         return press, press_by, shear, np.stack([axis @ force_by, side @ force_by + force @ side_by])
 
     def _motion(self, arc, pose, side, side_by):
-        """How far the material that is now at the contact has moved since `old`. The old rod was straight there."""
-        axis, old = self.contact.bar.axis, self.old
-        moved = pose.point - old.point_mm - old.tangent * (arc - old.arc_mm)
+        """How far the material that is now at the contact has moved over the bar since `old`. The old rod was straight
+        there."""
+        axis, old = self.bar.axis, self.old
+        moved = pose.point - old.point_mm - old.tangent * (arc - old.arc_mm) - self.went
         moved_by = pose.point_by.copy()
         moved_by[:, 3] -= old.tangent
         motion = np.array([moved @ axis, moved @ side])

@@ -206,6 +206,8 @@ class TrialTable(Table):
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
+    object_velocity_mm_s: Three | None = None  # of the bar in the rig frame, all the while; by default it stands
+    object_velocity_sigma_mm_s: Zero = 0.0  # of what trial.toml states of it, each way
     purpose: Literal["measure", "gauge"] = "measure"
     follicle_roll_deg: float = 0.0
     name: str = ""

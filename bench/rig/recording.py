@@ -37,7 +37,8 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too."""
+    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too.
+    `stated_velocity_mm_s` (3,): of the bar, as trial.toml has it; None where it stands."""
 
     run: Run
     rod: Rod
@@ -47,6 +48,7 @@ class Recording:
     whisks: tuple[MarchedWhisk, ...]
     frames: Frames
     signals: np.ndarray
+    stated_velocity_mm_s: np.ndarray | None = None
 
     @classmethod
     def make(cls, protocol: Protocol, run: Run, rng: np.random.Generator) -> "Recording":
@@ -61,7 +63,8 @@ class Recording:
                         stops_rad=stops_rad, back=bool(stroke.back))
         made = {friction: march(friction) for friction in dict.fromkeys(frictions)}  # whisks of one friction are alike
         whisks = tuple(made[friction] for friction in frictions)
-        return cls(run, rod, bar, touch, stroke, whisks, frames, _signals(protocol, run, stroke, whisks, rng))
+        signals = _signals(protocol, run, stroke, whisks, rng)
+        return cls(run, rod, bar, touch, stroke, whisks, frames, signals, _stated_velocity(run.table, rng))
 
 
 def _placed(protocol, run, rod, rng):
@@ -74,7 +77,17 @@ def _placed(protocol, run, rod, rng):
     bar = Bar.placed(d_x_mm=d_x, beta_rad=math.radians(beta), psi_rad=math.radians(psi), touch_rad=math.radians(touch),
                      radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2, whisker_radius_mm=whisker,
                      stiffness_N_mm=table.stiffness_N_mm or math.inf)
-    return bar, first_touch(rod, bar, math.radians(touch), d_x)
+    touched = first_touch(rod, bar, math.radians(touch), d_x)
+    if table.object_velocity_mm_s is not None:
+        bar = bar.moving(np.array(table.object_velocity_mm_s) / math.radians(run.speed_deg_s), touched.motor_rad)
+    return bar, touched
+
+
+def _stated_velocity(table, rng) -> np.ndarray | None:
+    """What people say of a bar that moves."""
+    if table.object_velocity_mm_s is None:
+        return None
+    return np.array(table.object_velocity_mm_s) + table.object_velocity_sigma_mm_s * rng.standard_normal(3)
 
 
 def _stroke(protocol, run, touch):
