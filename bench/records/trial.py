@@ -101,6 +101,7 @@ class SeenWhisk:
     lines: dict[str, LineNoise] = field(default_factory=dict)
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
+    velocity_mm_s: Value | None = None
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None

@@ -66,6 +66,8 @@ def _see(
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
         calibration.background,
+        trial.object_velocity_mm_s and np.array(trial.object_velocity_mm_s),
+        trial.object_velocity_sigma_mm_s,
     )
     rods = Rods(wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))
     observe = partial(observe_trial, pictures, cameras=calibration.cameras, rods=rods)
