@@ -40,6 +40,7 @@ from bench.trials.agreement import Agreement, agreement
 from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_end
+from bench.trials.moving import ASKED, MOVING, with_motion
 from bench.trials.phases import felt_phases, slips
 from bench.trials.seen import see_trial
 from bench.trials.sensors import with_others
@@ -156,7 +157,8 @@ def described(unit: Unit) -> tuple[TrialFacts, WhiskerFacts, float]:
 def _described(trial: Trial) -> TrialFacts:
     given = trial.d_x_mm, trial.beta_deg, trial.bar_diameter_mm
     nominal = (NAN if value is None else float(value) for value in given)
-    return TrialFacts(trial.name, trial.purpose, trial.surface, trial.speed_deg_s, *nominal)
+    purpose = trial.purpose if trial.object_velocity_mm_s is None else MOVING
+    return TrialFacts(trial.name, purpose, trial.surface, trial.speed_deg_s, *nominal)
 
 
 def _whisker(whisker: Whisker) -> WhiskerFacts:
@@ -192,6 +194,9 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     told = {"settings": unit.settings, "radii_mm": _radii_mm(unit)}
     known = {"force_drift_rate": unit.force_drift_rate, "scale_sigma": _newtons_sigma(unit, readout)}
     sensing = partial(with_others, stroke=stroke, readout=readout, touch=touch, **known)
+    sensors = () if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told)
+    if unit.trial.object_velocity_mm_s is not None:
+        sensors += answers(with_motion(usable, unit.trial, stroke, felt.touch_felt_rad.value), ASKED, **told)
     answered = partial(_answered, sensing if unit.settings.estimators else None,
                        asked=estimators(unit.settings.estimators), **told)  # fmt: skip
     estimates = answered(usable)
@@ -201,7 +206,7 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
         estimates=estimates,
         kinetic=_kinetic(stroke, touch, readout, usable, estimates),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
-        sensors=() if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told),
+        sensors=sensors,
         one_factor=_one_factor(unit, kind, stroke),
         with_drift=_with_drift(unit, stroke, readout),
     )
