@@ -24,7 +24,7 @@ from estimator.whisk import Estimate, EstimatorSettings, Whisk
 NOT_TOLD = "nobody says how the object moves (object_velocity_mm_s)"
 RUNS_AWAY = "an object that moves as told would be touched nowhere on the whisker"
 AMBIGUOUS = "or {:.1f} mm: an object that runs away is felt alike at both"
-_BESIDE = 1 / 3  # of the distance: a nearer one at which the object runs at three quarters of the whisker's speed
+_BESIDE = 0.1  # of the distance: at one as near the object would run at nine tenths of the whisker's own speed
 _HELD_SIGMAS = 2.0  # of m_y, as in `estimator.builtin.is_held`
 _STEPS = np.array([1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5])  # of differences: θ, m_y, m_z, α in parts of 1, u in mm
 
@@ -91,8 +91,8 @@ def _one_way(way, theta, m_y, m_z, alpha, u, beam) -> tuple[Contact, float]:
 def _distances(standing_mm: float, gains_mm: float, beam: Beam) -> tuple[float, float]:
     """The farther and the nearer x with d = standing (1 + gains/x) on the base's cylinder, 1/d = 1/x − τ; NaN of none.
 
-    An object that runs away (gains < 0) is felt alike at both. The farther is that at which it does so at less than
-    half the speed with which the whisker follows, and is taken, but where no whisker is as long.
+    An object that runs away (gains < 0) is felt alike at both: at the farther it does so at less than half the speed
+    with which the whisker follows, at the nearer at more. The farther is taken, but where the whisker is not as long.
     """
     tau = beam.taper / beam.length_mm
     square, linear, constant = 1 + standing_mm * tau, standing_mm * (1 - tau * gains_mm), standing_mm * gains_mm

@@ -36,6 +36,7 @@ LABELS = {
     "moment_rate": "rate of the moment",
     "force_and_moment": "force and moment",
     "known_motion": "(10), motion known",
+    "both_ways": "there and back",
     "estimator.builtin:printed_17": "(17) as printed",
 }
 _STYLE = {

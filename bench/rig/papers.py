@@ -71,6 +71,8 @@ def trial_toml(recording: Recording) -> str:
              "d_x_mm": float(run.d_x_mm), "purpose": table.purpose}
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
+    if table.both_ways:
+        trial["both_ways"] = True
     if recording.stated_velocity_mm_s is not None:
         trial["object_velocity_mm_s"] = [round(float(v), 6) for v in recording.stated_velocity_mm_s]
         trial["object_velocity_sigma_mm_s"] = table.object_velocity_sigma_mm_s

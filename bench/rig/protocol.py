@@ -206,6 +206,7 @@ class TrialTable(Table):
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
+    both_ways: bool = False  # the way back is recorded, and to be evaluated
     object_velocity_mm_s: Three | None = None  # of the bar in the rig frame, all the while; by default it stands
     object_velocity_sigma_mm_s: Zero = 0.0  # of what trial.toml states of it, each way
     purpose: Literal["measure", "gauge"] = "measure"
@@ -242,7 +243,7 @@ class Protocol(Table, kw_only=True):
 
     def goes_back(self, run: "Run") -> bool:
         """Whether a trial's recording holds back strokes."""
-        return run.table.whisks > 1 or self.motor.back_stroke or self.pictures.back_stroke
+        return run.table.whisks > 1 or run.table.both_ways or self.motor.back_stroke or self.pictures.back_stroke
 
     def fingerprint(self) -> str:
         """Changes with any value."""

@@ -111,6 +111,7 @@ class TrialKeys(Keys, kw_only=True):
     first_frame_s: float | None = None
     first_frame_sigma_s: float = 0.0
     gauge_filter_Hz: float | None = None
+    both_ways: bool = False
     object_velocity_mm_s: Triple | None = None
     object_velocity_sigma_mm_s: float = 0.0
     follicle_roll_deg: float = 0.0

@@ -19,9 +19,9 @@ class Trial:
     """Settings of one recording; nominal values are None where not given, sigmas 0 where taken as exact.
 
     purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
-    the follicle was turned about the whisker. object_velocity_mm_s: (3,) in the rig frame, of an object that moves at
-    constant speed, with one sigma each way. camera_sources: camera to folder of pictures or video, empty
-    where the trial has none.
+    the follicle was turned about the whisker. both_ways: each way back is evaluated, too. object_velocity_mm_s: (3,) in
+    the rig frame, of an object that moves at constant speed, with one sigma each way. camera_sources: camera to folder
+    of pictures or video, empty where the trial has none.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Trial:
     first_frame_s: float | None
     first_frame_sigma_s: float
     gauge_filter_Hz: float | None
+    both_ways: bool = False
     object_velocity_mm_s: list[float] | None = None
     object_velocity_sigma_mm_s: float = 0.0
     daq: DaqFile | None = None

@@ -37,6 +37,7 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import Agreement, agreement
+from bench.trials.both_ways import feel_back
 from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_at, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_end
@@ -172,7 +173,9 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     strokes = strokes_of(signals, unit.trial, unit.settings)
     whisks = tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes))
     delay = gauge_delay(unit.trial.gauge_filter_Hz)
-    return FeltTrial(whisks, touch_on_the_way_back(signals, delay.value) if seen.back else UNKNOWN)
+    there = touch_on_the_way_back(signals, delay.value) if seen.back else UNKNOWN
+    back = feel_back(partial(_feel, unit, signals.kind), unit, signals, seen, whisks) if unit.trial.both_ways else ()
+    return FeltTrial(whisks, there, back)
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
