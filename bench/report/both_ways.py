@@ -13,6 +13,7 @@ from bench.base.drawing import label_of
 from bench.base.tables import write_table
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from vision.geometry.counted import counted
+from vision.truth.value import UNKNOWN, Value
 
 TABLE = "both_ways.csv"
 COLUMNS = (
@@ -25,10 +26,12 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class WayBack:
-    """What one estimator says of one way back, or why none does; there: the way there, as felt."""
+    """What one estimator says of one way back, or why none does; there: the way there, as felt; d_x_mm: the contact's,
+    as seen on the way back, else on the way there."""
 
     result: TrialResult
     seen: SeenWhisk
+    d_x_mm: Value
     felt: FeltWhisk
     there: FeltWhisk
     answer: EstimateRow
@@ -36,14 +39,14 @@ class WayBack:
     @property
     def error_mm(self) -> float:
         """Estimate less truth."""
-        return self.answer.d_x_est_mm.value - self.seen.d_x_mm.value
+        return self.answer.d_x_est_mm.value - float(self.d_x_mm.value)
 
     @property
     def inside(self) -> bool | None:
         """Whether the 95 % interval holds the truth; None where either is not known."""
         ends = self.answer.d_x_est_low_mm, self.answer.d_x_est_high_mm
-        known = np.isfinite([*ends, self.seen.d_x_mm.value]).all()
-        return bool(ends[0] <= self.seen.d_x_mm.value <= ends[1]) if known else None
+        known = np.isfinite([*ends, self.d_x_mm.value]).all()
+        return bool(ends[0] <= self.d_x_mm.value <= ends[1]) if known else None
 
 
 def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
@@ -51,8 +54,9 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
     found = []
     for result in results:
         seen = result.seen.ways_back or tuple(SeenWhisk(f.whisk) for f in result.felt.ways_back)
-        for one, felt, there in zip(seen, result.felt.ways_back, result.felt.whisks):
-            found += [WayBack(result, one, felt, there, a) for a in felt.estimates or (EstimateRow(""),)]
+        for one, forth, felt, there in zip(seen, result.seen.whisks, result.felt.ways_back, result.felt.whisks):
+            d_x = one.d_x_mm if one.has_truth else forth.d_x_mm
+            found += [WayBack(result, one, d_x, felt, there, a) for a in felt.estimates or (EstimateRow("", UNKNOWN),)]
     return found
 
 
@@ -68,7 +72,7 @@ def _row(one: WayBack) -> dict:
     angles = {"touch": seen.touch_rad, "touch_felt": felt.touch_felt_rad, "beta": seen.beta_rad}
     for name, value in angles.items():
         row |= {f"{name}_deg": float(np.degrees(value.value)), f"{name}_sigma_deg": float(np.degrees(value.sigma))}
-    row |= {"d_x_mm": float(seen.d_x_mm.value), "d_x_sigma_mm": float(seen.d_x_mm.sigma)}
+    row |= {"d_x_mm": float(one.d_x_mm.value), "d_x_sigma_mm": float(one.d_x_mm.sigma)}
     row["phi_seen_deg"] = float(np.degrees(seen.at.phi_rad.value)) if seen.at is not None else np.nan
     row |= {"phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value))}
     row |= {"phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value))}
@@ -76,7 +80,7 @@ def _row(one: WayBack) -> dict:
     row |= {"d_x_est_mm": answer.d_x_est_mm.value, "d_x_est_sigma_mm": answer.d_x_est_mm.sigma}
     row |= {name: getattr(answer, name) for name in ("d_x_est_low_mm", "d_x_est_high_mm")}
     row |= {f"{name}_est_deg": float(np.degrees(getattr(answer, f"{name}_est_rad"))) for name in ("beta", "alpha")}
-    row |= {"error_mm": one.error_mm, "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value)}
+    row |= {"error_mm": one.error_mm, "error_percent": 100.0 * one.error_mm / float(one.d_x_mm.value)}
     inside, said = one.inside, (seen.status, felt.status, answer.status)
     row["inside"] = None if inside is None else int(inside)
     return row | {"status": "; ".join(dict.fromkeys(filter(None, said)))}
@@ -87,7 +91,7 @@ def both_ways_lines(found: Sequence[WayBack]) -> Iterator[str]:
     judged = [one for one in found if np.isfinite(one.error_mm)]
     for name in dict.fromkeys(one.answer.estimator for one in judged):
         mine = [one for one in judged if one.answer.estimator == name]
-        percent = [100.0 * one.error_mm / one.seen.d_x_mm.value for one in mine]
+        percent = [100.0 * one.error_mm / float(one.d_x_mm.value) for one in mine]
         held = sum(bool(one.inside) for one in mine)
         yield (
             f"{label_of(name)}: error of d_x {np.sqrt(np.mean(np.square(percent))):.2g} % RMS; its 95 % interval holds "

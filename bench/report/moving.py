@@ -6,6 +6,7 @@ Only where a trial says how its object moves (object_velocity_mm_s).
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from bench.session.trial import Trial
 from bench.trials.compare import is_sound
 from bench.trials.moving import in_contact_frame
 from vision.geometry.counted import counted
+
+if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
+    from matplotlib.figure import Figure
 
 TABLE, FIGURE = "moving.csv", "moving.png"
 _WAYS = ("x", "y", "z")
@@ -90,8 +94,10 @@ def _row(one: Moved) -> dict:
     row |= {"beta_deg": float(np.degrees(seen.beta_rad.value)), "velocity_share_percent": one.share_percent}
     told, as_seen = trial.object_velocity_mm_s, seen.velocity_mm_s
     for k, way in enumerate(_WAYS):
-        row |= {f"velocity_{way}_mm_s": float(told[k]), f"velocity_seen_{way}_mm_s": float(as_seen.value[k])}
-        row |= {f"velocity_seen_{way}_sigma_mm_s": float(as_seen.sigma[k])}
+        row[f"velocity_{way}_mm_s"] = float(told[k])
+        if as_seen is not None:
+            row[f"velocity_seen_{way}_mm_s"] = float(as_seen.value[k])
+            row[f"velocity_seen_{way}_sigma_mm_s"] = float(as_seen.sigma[k])
     row |= {"velocity_sigma_mm_s": trial.object_velocity_sigma_mm_s, "estimator": answer.estimator}
     row |= {"d_x_mm": float(seen.d_x_mm.value), "d_x_sigma_mm": float(seen.d_x_mm.sigma)}
     row |= {"d_x_est_mm": answer.d_x_est_mm.value, "d_x_est_sigma_mm": answer.d_x_est_mm.sigma}
@@ -99,7 +105,7 @@ def _row(one: Moved) -> dict:
     return row | {"inside": None if one.inside is None else int(one.inside)}
 
 
-def error_over_speed(found: Sequence[Moved]):
+def error_over_speed(found: Sequence[Moved]) -> "Figure":
     """Error of d_x over the object's speed along the push, estimator by estimator."""
     figure = blank(6.0, 4.0)
     axes = figure.subplots()

@@ -50,7 +50,7 @@ def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
 def _check_moving(protocol: "Protocol", run: "Run", path: Path) -> None:
     """The march goes by the motor's angle: a bar moves by it as long as the motor goes steadily one way."""
     velocity = run.table.object_velocity_mm_s
-    if velocity is None:
+    if not velocity:
         return
     if protocol.goes_back(run) or protocol.motor.ramp_s or protocol.motor.pause_s:
         found = "is simulated for single forward strokes without ramps and pauses"

@@ -75,7 +75,7 @@ def trial_toml(recording: Recording) -> str:
         trial["both_ways"] = True
     if recording.stated_velocity_mm_s is not None:
         trial["object_velocity_mm_s"] = [round(float(v), 6) for v in recording.stated_velocity_mm_s]
-        trial["object_velocity_sigma_mm_s"] = table.object_velocity_sigma_mm_s
+        trial["object_velocity_sigma_mm_s"] = table.object_velocity_sigma_mm_s or 0.0
     if table.purpose == "gauge":
         trial["follicle_roll_deg"] = table.follicle_roll_deg
     return tomli_w.dumps(trial)

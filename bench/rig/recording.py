@@ -78,16 +78,16 @@ def _placed(protocol, run, rod, rng):
                      radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2, whisker_radius_mm=whisker,
                      stiffness_N_mm=table.stiffness_N_mm or math.inf)
     touched = first_touch(rod, bar, math.radians(touch), d_x)
-    if table.object_velocity_mm_s is not None:
+    if table.object_velocity_mm_s:
         bar = bar.moving(np.array(table.object_velocity_mm_s) / math.radians(run.speed_deg_s), touched.motor_rad)
     return bar, touched
 
 
 def _stated_velocity(table, rng) -> np.ndarray | None:
     """What people say of a bar that moves."""
-    if table.object_velocity_mm_s is None:
+    if not table.object_velocity_mm_s:
         return None
-    return np.array(table.object_velocity_mm_s) + table.object_velocity_sigma_mm_s * rng.standard_normal(3)
+    return np.array(table.object_velocity_mm_s) + (table.object_velocity_sigma_mm_s or 0.0) * rng.standard_normal(3)
 
 
 def _stroke(protocol, run, touch):
