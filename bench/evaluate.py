@@ -1,12 +1,10 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from itertools import islice
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from bench.base.atomic import lock_output, write_whole
 from bench.base.doubts import Doubts
-from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.friction.curved import curved_whisks, write_curvature
@@ -21,14 +19,12 @@ from bench.report.evaluation import Evaluation, finished
 from bench.report.summary.page import Summary
 from bench.session.check import checked_session
 from bench.session.inside import check_outside
-from bench.session.trial import Trial
 from bench.trials.estimates import estimators
 from bench.trials.exchanged import exchanged_signals
 from bench.trials.lost import evaluated
-from bench.trials.of_session import judged, placed_units, with_gauges
+from bench.trials.of_session import judged, placed_units, require_some, with_gauges
 
 DONE, DOUBTFUL = 0, 1
-_MOST_NAMED = 8  # names in one line
 
 
 def evaluate(
@@ -56,7 +52,7 @@ def evaluate(
     doubts = Doubts()
     session = checked_session(session_path, doubts, trials, follow_links=settings.follow_links)
     recorded = judged(session)
-    _require_some(recorded, settings)
+    require_some(recorded, settings)
     with lock_output(out), _workers(dask, workers, out, progress) as pool:
         calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
         gauges, certificate, units = with_gauges(units, pool, doubts)
@@ -86,22 +82,6 @@ def _workers(dask: str | None, count: int, out: Path, progress: bool) -> Workers
     from bench.base.cluster import Cluster
 
     return Cluster(dask, out, progress)
-
-
-def _require_some(trials: Sequence[Trial], settings: Settings) -> None:
-    """Raises BadInput where the settings take none of the trials, or ask a camera that has no pictures of any."""
-    if not any(settings.takes(trial.name) for trial in trials):
-        names = _some(trial.name for trial in trials)
-        raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
-    there = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
-    for name in settings.seeing.cameras:
-        if name not in there:
-            raise BadInput(f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some(there)}")
-
-
-def _some(names: Iterable[str]) -> str:
-    first = list(islice(names, _MOST_NAMED + 1))
-    return ", ".join([*first[:_MOST_NAMED], *["…"] * (len(first) > _MOST_NAMED)])
 
 
 def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> Summary:

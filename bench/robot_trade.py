@@ -28,7 +28,7 @@ from bench.session.check import checked_session
 from bench.session.inside import check_outside
 from bench.session.signals import read_signals
 from bench.trials.lost import evaluated
-from bench.trials.of_session import judged, placed_units, with_gauges
+from bench.trials.of_session import judged, placed_units, require_some, with_gauges
 
 TABLE, FIGURE = "robot_trade.csv", "robot_trade"
 AS_RECORDED = Converter()
@@ -79,8 +79,10 @@ def robot_trade(
     check_outside(out, session_path)
     doubts = Doubts()
     session = checked_session(session_path, doubts, follow_links=settings.follow_links)
+    recorded = judged(session)
+    require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
-        _, units = placed_units(session, judged(session), out, settings, pool, doubts)
+        _, units = placed_units(session, recorded, out, settings, pool, doubts)
         *_, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         results = finished(evaluated(chosen, pool), session.whisker, settings).results

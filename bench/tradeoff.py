@@ -23,6 +23,7 @@ from bench.base.workers import Workers
 from bench.records.trial import SeenTrial
 from bench.report.score import truth_of
 from bench.session.check import checked_session
+from bench.session.inside import check_outside
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.trials.of_session import judged, placed_units
@@ -77,6 +78,7 @@ def tradeoff(
 
     Returns 0. Raises BadInput.
     """
+    check_outside(out, path)
     doubts, settings = Doubts(), Settings(trials=trials)
     session = checked_session(path, doubts, follow_links=follow_links)
     if not any(settings.takes(trial.name) and trial.camera_sources for trial in judged(session)):

@@ -1,8 +1,9 @@
 """What is wrong or doubtful in the input: `evaluate` stops at the first refusal, `check` collects all."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 from bench.base.errors import BadInput
 
@@ -24,6 +25,17 @@ class Doubts:
             if self.stop_at_first:
                 raise
             self.refusals.append(str(bad))
+
+    def each(self, loaders: Iterable[Callable[[], Any]]) -> list:
+        """What each loader gives. Raises the first one's BadInput when all have been run, and what they refuse is kept.
+        """
+        before, given = len(self.refusals), []
+        for load in loaders:
+            with self.guard():
+                given.append(load())
+        if len(self.refusals) > before:
+            raise BadInput(self.refusals[before])
+        return given
 
     def note(self, line: str) -> None:
         """Keep a line that the user should read; the run goes on."""

@@ -49,12 +49,12 @@ class Curved:
 
 def curved(felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sigma_rad: float) -> Curved:
     """What the moments of a whisk at successive pushing angles tell, α_est and its sigma in rad."""
-    chosen = _apart(felt)
+    chosen = apart(felt)
     if len(chosen) < _FEWEST:
         return Curved(len(chosen), status=TOO_FEW)
     theta, moments = np.array([at.theta_rad for at in chosen]), np.array([(at.m_y_Nmm.value, at.m_z_Nmm.value)
                                                                         for at in chosen])  # fmt: skip
-    phi, phi_rate = _rate(theta, np.arctan2(*moments.T), [_phi_sigma(at) for at in chosen])
+    phi, phi_rate = _rate(theta, np.arctan2(*moments.T), [phi_sigma(at) for at in chosen])
     beam, held = whisker.beam, abs(phi.value) <= _HELD_SIGMAS * phi.sigma
     distances = [_distance(at, alpha_rad, beam) for at in chosen]
     if not np.isfinite(distances).all():
@@ -66,7 +66,7 @@ def curved(felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sig
     return Curved(len(chosen), radius, phi, *_lateral(phi.value, phi_rate, d_x.value, alpha_rad))
 
 
-def _apart(felt: Iterable[FeltAt]) -> list[FeltAt]:
+def apart(felt: Iterable[FeltAt]) -> list[FeltAt]:
     """Those whose moments share no sample."""
     chosen: list[FeltAt] = []
     for at in sorted(felt, key=lambda at: at.theta_rad):
@@ -84,7 +84,8 @@ def _rate(theta: np.ndarray, values, sigmas) -> tuple[Value, Value]:
     return Value(float(found[0]), float(spread[0])), Value(float(found[1]), float(spread[1]))
 
 
-def _phi_sigma(at: FeltAt) -> float:
+def phi_sigma(at: FeltAt) -> float:
+    """One sigma of φ by the moments, rad."""
     m_y, m_z = at.m_y_Nmm.value, at.m_z_Nmm.value
     gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
     return float(np.sqrt(gradient @ at.covariance_at @ gradient))

@@ -16,6 +16,7 @@ import numpy as np
 from bench.base.settings import Settings
 from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
+from bench.friction.turning import turn, with_turn
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, answer, whisk_of
@@ -101,7 +102,9 @@ def _answers(
         alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
         kinetic = whisk_of(felt.kinetic, theta_rad, beam)
         runs.append(answer(KINETIC, with_friction, kinetic, alpha, doubt.sigma_rad, radii_mm))
-    return (*given, *runs)
+    rate, ten = turn(felt.by_theta), {*ASSUMING, *RUNS}
+    return tuple(with_turn(row, felt.phi_felt_rad.value, rate, theta_rad) if row.estimator in ten else row
+                 for row in (*given, *runs))  # fmt: skip
 
 
 def _given(

@@ -9,7 +9,7 @@ from bench.plan.expected import Expected
 from bench.plan.sight import ALONG_RAD
 from vision.fit.line_noise import LineNoise
 from vision.fit.uncertainty import variance_by_cause
-from vision.truth.at_angle import expected_scatter
+from vision.truth.at_angle import scatter
 from vision.truth.records import WhiskTruth
 
 # Quantities of a row by their columns: the fit's name, and what turns its unit into the column's.
@@ -63,9 +63,9 @@ def sigmas(truth: WhiskTruth, theta_rad: float) -> dict[str, float]:
     found = {"d_x_mm": truth.d_x_mm, "touch_deg": truth.touch_rad, "beta_deg": truth.beta_rad, "slip_mm": at.slip_mm,
              "phi_deg": at.phi_rad, "alpha_deg": at.alpha_rad}
     one_fit = truth.smooth is not None and not at.status
-    scatter = {name: expected_scatter(truth.smooth, key, theta_rad) if one_fit else 0.0
-               for name, (key, _) in AT_THETA.items()}
-    return {name: float(np.hypot(found[name].sigma, scatter.get(name, 0.0))) * scale
+    expected = {name: scatter(truth.smooth, key, theta_rad).expected if one_fit else 0.0
+                for name, (key, _) in AT_THETA.items()}
+    return {name: float(np.hypot(found[name].sigma, expected.get(name, 0.0))) * scale
             for name, (_, scale) in (AT_TOUCH | AT_THETA).items()}
 
 

@@ -116,7 +116,8 @@ def _panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
     top.set_title(f"{letter} {surface.title}", loc="left")
     top.set_ylim(bottom=0)
     bottom.set(xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""), xlim=(-2, 82), ylim=(-3, 82))
-    told = f"{held}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm"
+    spread = 100.0 * float(np.median([p.m_sd_Nmm / p.m_Nmm for p in points]))
+    told = f"{held}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
     top.annotate(told, (0.04, 0.04), xycoords="axes fraction", fontsize=7, color="0.25", va="bottom", linespacing=1.5)
 
 

@@ -14,6 +14,7 @@ from bench.report.page.plane import contact_path
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
 _MARGIN_MM = 2.2
 _LEAST_DEG, _ROOM_DEG = 3.0, 25.0  # of an angle that is drawn, and of one that its name fits into
+_LABEL_MM = 0.4  # of room that a name takes
 _LEG = {"fontsize": 9, "color": "0.25"}
 
 
@@ -147,20 +148,25 @@ def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual, radius_mm: floa
     axes.annotate("d$_y$", 0.5 * (virtual + corner) - [0, 0.25 * side], ha="center", va="center", **_LEG)
     if abs(contact[1] - virtual[1]) > 0.4:  # its label stands beside what the circle leaves of the leg
         free = max(abs(contact[1] - virtual[1]) - radius_mm, 0.3)
-        axes.annotate("d$_z$", corner + np.array([-0.12, 0.5 * side * free]), ha="right", va="center", **_LEG)
+        by_first = np.linalg.norm(contact) < 2.0 * radius_mm + _LABEL_MM  # P0's circle lies to the left of it
+        at, ha = (0.12, "left") if by_first else (-0.12, "right")
+        axes.annotate("d$_z$", corner + np.array([at, 0.5 * side * free]), ha=ha, va="center", **_LEG)
     if abs(phi) > _LEAST_DEG:
-        _draw_angle(axes, virtual, min(1.6, 0.9 * abs(virtual[0] - contact[0])), 180.0, 180.0 - phi, "φ")
+        _draw_angle(axes, virtual, min(1.6, 0.9 * abs(virtual[0] - contact[0])), 180.0, 180.0 - phi, "φ", contact)
     axes.plot([0, 0], [0, 2.0], color="0.35", lw=0.8, ls=":", zorder=2)
     if abs(beta) > _LEAST_DEG:
-        _draw_angle(axes, np.zeros(2), 1.6, 90.0, 90.0 - beta, "β")
+        _draw_angle(axes, np.zeros(2), 1.6, 90.0, 90.0 - beta, "β", contact)
 
 
-def _draw_angle(axes: Axes, corner, radius_mm: float, first_deg: float, last_deg: float, name: str) -> None:
-    """An arc from one direction to another; its name within, or past its end where there is no room."""
+def _draw_angle(axes: Axes, corner, radius_mm: float, first_deg: float, last_deg: float, name: str, contact) -> None:
+    """An arc from one direction to another; its name within, before it where P's circle is within, or past its end
+    where there is no room."""
     low, high = sorted((first_deg, last_deg))
     axes.add_patch(Arc(corner, 2 * radius_mm, 2 * radius_mm, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
     if high - low > _ROOM_DEG:
         way, at = np.radians(0.5 * (first_deg + last_deg)), 0.72 * radius_mm
+        if np.linalg.norm(corner + at * np.array([np.cos(way), np.sin(way)]) - contact) < 2.0 * _LABEL_MM:
+            at = radius_mm + 0.5 * _LABEL_MM
     else:
         way, at = np.radians(last_deg + np.copysign(9.0, last_deg - first_deg)), radius_mm
     place = corner + at * np.array([np.cos(way), np.sin(way)])

@@ -25,6 +25,7 @@ def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray) -> str:
     cameras = [{"name": c.name, "exposure_s": protocol.pictures.exposure_s} for c in protocol.cameras]
     session = {
         "format": 1, "name": protocol.name,
+        "surfaces": list(dict.fromkeys(t.surface for t in protocol.trials if t.purpose == "measure")),
         "whisker": {"shape": w.shape, "length_mm": w.length_mm, "diameter_mm": w.diameter_mm,
                     **({"tip_diameter_mm": w.tip_diameter_mm} if w.tip_diameter_mm else {}),
                     "youngs_modulus_GPa": w.youngs_modulus_GPa},

@@ -102,7 +102,7 @@ class PicturesTable(Table):
     """[pictures] of a protocol."""
 
     format: Literal["jpg", "png", "mkv"] = "jpg"  # JPEG quality 95, PNG, lossless FFV1
-    bits: Literal[8, 12] = 8
+    bits: Literal[8, 12, 16] = 8
     blur_px: Annotated[float, msgspec.Meta(ge=0.3, le=6)] = 0.9  # sigma of lens and defocus
     vignetting: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.15
     read_noise: Zero = 0.8  # grey levels of 255

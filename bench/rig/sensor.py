@@ -10,7 +10,7 @@ class Sensor:
     """Noise in grey levels of an 8-bit scale: `read` of every pixel, `shot` of one level, `grain` in parts of the
     level.
 
-    `vignetting`: light lost in the picture's corner; `bits` 8 or 12.
+    `vignetting`: light lost in the picture's corner; `bits` 8, 12 or 16.
     """
 
     blur_px: float

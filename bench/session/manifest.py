@@ -167,6 +167,7 @@ class SessionKeys(Keys, kw_only=True):
 
     format: int
     name: str = ""
+    surfaces: tuple[str, ...] = ()
     whisker: WhiskerKeys | None = None
     bar: BarKeys | None = None
     board: BoardKeys | None = None

@@ -1,7 +1,8 @@
 """A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -89,20 +90,22 @@ def load_session(
     """
     path, doubts = Path(path), doubts or Doubts()
     keys = _read_manifest(path, doubts, follow_links)
-    whisker, bar = _whisker(keys.whisker), keys.bar
+    parts = partial(_whisker, keys.whisker), partial(_board, keys.board), partial(_pose, keys.rig.T_rig_board)
+    whisker, board, T_rig_board = doubts.each(parts)
+    bar = keys.bar
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
-    found = _trials(path, keys, doubts, trials)
-    with doubts.guard():
-        _check_whole(found, whisker, bar)
+    found = _by_surface(_trials(path, keys, doubts, trials), keys.surfaces)
+    if trials is None:
+        _check_surfaces(found, keys.surfaces, doubts)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
         whisker=whisker,
         bar_diameter_mm=bar and bar.diameter_mm,
         bar_diameter_sigma_mm=bar.diameter_sigma_mm if bar else 0.0,
-        board=_board(keys.board),
-        T_rig_board=_pose(keys.rig.T_rig_board),
+        board=board,
+        T_rig_board=T_rig_board,
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
         T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
         gauges=_gauges(keys.gauges),
@@ -126,8 +129,8 @@ def _read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.S
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
-    keys = as_keys(tables, manifest.SessionKeys, MANIFEST, doubts)
-    return keys
+    needed = ("whisker", "bar") if visible(path / "trials") else ()
+    return as_keys(tables, manifest.SessionKeys, MANIFEST, doubts, needed)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
@@ -201,11 +204,18 @@ def _trials(
     return tuple(found)
 
 
-def _check_whole(trials, whisker, bar) -> None:
-    """A session with trials needs its whisker and its bar."""
-    for name, given in (("whisker", whisker), ("bar", bar)):
-        if trials and given is None:
-            raise BadInput(f"[{name}] is missing", file=MANIFEST)
+def _by_surface(trials: Iterable[Trial], order: Sequence[str]) -> tuple[Trial, ...]:
+    """The trials in the session's order of surfaces, within one by name; other surfaces after those named."""
+    place = {name: k for k, name in enumerate(dict.fromkeys(order))}
+    return tuple(sorted(trials, key=lambda trial: place.get(trial.surface, len(place))))
+
+
+def _check_surfaces(trials: Iterable[Trial], order: Sequence[str], doubts: Doubts) -> None:
+    """A surface that no trial has was misspelt, or is not recorded yet."""
+    there = {t.surface for t in trials}
+    for name in order:
+        if there and name not in there:
+            doubts.note(f"{MANIFEST}: surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}")
 
 
 def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:

@@ -3,7 +3,8 @@
 import difflib
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -52,19 +53,25 @@ def _bad_toml(problem: str, text: str, shown: str) -> BadInput:
     return BadInput(f"is not TOML: {problem}; found {line!r}", file=shown, row=row)
 
 
-def as_keys(tables: dict[str, Any], kind: type[Keys], shown: str, doubts: Doubts) -> Keys:
+def as_keys(
+    tables: dict[str, Any], kind: type[Keys], shown: str, doubts: Doubts, needed: Sequence[str] = ()
+) -> Keys:
     """Check tables against `kind`: names, types, plausible values. Raises BadInput with the key's path.
 
-    With a collecting `doubts` every unknown key is kept there and left out.
+    needed: tables that must be there.
+
+    With a collecting `doubts` every key that is unknown, missing or implausible is kept there; unknown ones are left
+    out.
     """
-    for line in _unknown_keys(tables, kind, top=kind):
+    without = (f"[{name}] is missing" for name in needed if name not in tables)
+    for line in (*_unknown_keys(tables, kind, top=kind), *without, *_missing_keys(tables, kind)):
         with doubts.guard():
             raise BadInput(line, file=shown)
     try:
         keys = msgspec.convert(_only_keys_of(tables, kind), kind, strict=True)
     except msgspec.ValidationError as problem:
         raise BadInput(_in_plain_words(str(problem)), file=shown) from None
-    _check_values(keys, "", shown)
+    doubts.each(_value_checks(keys, "", shown))
     return keys
 
 
@@ -73,15 +80,16 @@ def values(keys: Keys, leave_out: tuple[str, ...] = ()) -> dict[str, Any]:
     return {name: getattr(keys, name) for name in keys.__struct_fields__ if name not in leave_out}
 
 
-def _check_values(keys: Keys, table: str, shown: str) -> None:
+def _value_checks(keys: Keys, table: str, shown: str) -> Iterator[Callable[[], None]]:
+    """A check of each value, tables within included."""
     for name in keys.__struct_fields__:
         value = getattr(keys, name)
         if name in keys.tables:
             listed = isinstance(value, tuple)
             for inner in value if listed else [value] if value else []:
-                _check_values(inner, f"[[{name}]] " if listed else f"[{name}] ", shown)
+                yield from _value_checks(inner, f"[[{name}]] " if listed else f"[{name}] ", shown)
         elif value is not None:
-            _check_value(value, name, keys.windows.get(name), table, shown)
+            yield partial(_check_value, value, name, keys.windows.get(name), table, shown)
 
 
 def _check_value(value: Any, name: str, window: plausible.Window | None, table: str, shown: str) -> None:
@@ -109,6 +117,19 @@ def _unknown_keys(value: Any, kind: type[Keys], top: type[Keys], path: tuple[str
             elif key in kind.tables:
                 name = f"{key}[]" if isinstance(inner, list) else key
                 yield from _unknown_keys(inner, kind.tables[key], top, (*path, name))
+
+
+def _missing_keys(value: Any, kind: type[Keys], path: tuple[str, ...] = ()) -> Iterator[str]:
+    """A line for each key that `kind` needs and a table, or one of a list of tables, lacks; tables within included."""
+    for table in value if isinstance(value, list) else [value]:
+        if not isinstance(table, dict):
+            continue
+        for field in msgspec.structs.fields(kind):
+            if field.required and field.name not in table:
+                yield f"{_key_path([*path, field.name])} is missing"
+        for key in filter(kind.tables.__contains__, table):
+            name = f"{key}[]" if isinstance(table[key], list) else key
+            yield from _missing_keys(table[key], kind.tables[key], (*path, name))
 
 
 def _only_keys_of(value: Any, kind: type[Keys] | None) -> Any:

@@ -106,6 +106,7 @@ _TEMPLATE = """\
 # Every key: docs/formats.md. `whisker-bench check` on this folder lists all that is wrong or doubtful.
 format = 1
 {named}
+# surfaces = ["steel", "sandpaper"]  # their order in tables and figures
 
 [whisker]
 shape = "cylinder"              # "cone": base diameter to a point; "tapered": to tip_diameter_mm

@@ -24,6 +24,7 @@ ALPHA_DEG = np.unique(np.concatenate([np.linspace(0.0, 40.0, 321), *(
 EQUATIONS = {"(10)": "with_friction", "(2)": "no_slip"}
 THETA_DEG = (1.0, 3.0, 5.0)
 FRICTION_DEG = (0.0, 20.0)
+_TOP_DEG = 94.0  # of the axis: a cusp at 90° is seen whole
 R_N = np.geomspace(0.1, 10.0, 81)
 COLOURS = {1.0: "tab:blue", 3.0: "tab:green", 5.0: "tab:orange", 10.0: "tab:red"}
 
@@ -90,7 +91,7 @@ def figure_6() -> Iterator[Curve]:
                         "theta_deg": theta,
                         "alpha_deg": alpha,
                     }
-                    label = f"θ = {theta:g}°, α = {alpha:g}°"
+                    label = rf"$\theta$ = {theta:g}°, $\alpha$ = {alpha:g}°"
                     yield Curve(panel, form, parameters, R_N, beta, COLOURS[theta], alpha == 0, label)
 
 
@@ -125,9 +126,10 @@ def _figure(number, curves):
     entries = {label: handle for ax in grid.flat for handle, label in zip(*ax.get_legend_handles_labels())}
     figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=7, frameon=False)
     for ax in grid[:, 0]:
-        ax.set_ylabel("β$_{thresh}$  [°]")
+        ax.set_ylabel(r"$\beta_\mathrm{thresh}$  [°]")
     for ax in grid[-1]:
-        ax.set_xlabel("true friction cone angle α  [°]" if number == 5 else "normalized radius of curvature r$_n$")
+        x_label = r"true friction cone angle $\alpha$  [°]" if number == 5 else r"normalized radius of curvature $r_n$"
+        ax.set_xlabel(x_label)
     return figure
 
 
@@ -139,7 +141,7 @@ def _panel(ax, number, curves) -> None:
     points = np.array(PRINTED_POINTS[number].get(curves[0].panel, ()))
     if points.size and curves[0].row != "exact":
         ax.plot(*points.T, "ko", ms=4, mfc="none", label="printed in the text")
-    ax.set(ylim=(0, 90), title=_title(number, curves[0]))
+    ax.set(ylim=(0, _TOP_DEG), yticks=range(0, 91, 15), title=_title(number, curves[0]))
     ax.grid(alpha=0.3)
     if number == 6:
         ax.set_xscale("log")
@@ -147,6 +149,6 @@ def _panel(ax, number, curves) -> None:
 
 def _title(number, curve) -> str:
     if number == 5:
-        return f"α$_{{est}}$ = {curve.parameters['alpha_est_deg']:g}°"
+        return rf"$\alpha_\mathrm{{est}}$ = {curve.parameters['alpha_est_deg']:g}°"
     form = "as printed" if curve.row == "printed" else "exact slip angle"
     return f"{curve.parameters['error_percent']:g} % error, {form}"

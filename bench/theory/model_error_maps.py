@@ -18,6 +18,7 @@ from bench.theory.model_error import Panel, Push, radius_map, tilt_map
 COLUMNS = (*(f.name for f in fields(Push)), "error_percent", "predicted_percent", "corrected_percent")
 _LEVELS = np.array([-5.0, -2.0, -1.0, -0.5, -0.2, -0.1, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
 _LINES = {"levels": _LEVELS, "linewidths": 0.8}
+_LABEL_ROOM = 0.03  # of a panel's sides: a line's number nearer to an edge would be cut off
 _NAMES = {
     "beta_deg": "slope β  [°]",
     "psi_deg": "tilt ψ  [°], from the base where positive",
@@ -86,8 +87,14 @@ def _errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:
     finite = np.ma.masked_invalid(percent)
     drawn = axes.contourf(*_axes(panel), finite, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both")
     lines = axes.contour(*_axes(panel), finite, **_LINES, colors="black", linestyles="-")
-    axes.clabel(lines, fmt=lambda level: f"{level:+g} %" if level else "0", fontsize=7)
+    for label in axes.clabel(lines, fmt=_percent, fontsize=7):
+        x, y = axes.transAxes.inverted().transform(axes.transData.transform(label.get_position()))
+        label.set_visible(bool(min(x, y, 1.0 - x, 1.0 - y) > _LABEL_ROOM))
     return drawn
+
+
+def _percent(level: float) -> str:
+    return f"{level:+g} %".replace("-", "−") if level else "0"
 
 
 def _axes(panel: Panel) -> tuple[np.ndarray, np.ndarray]:

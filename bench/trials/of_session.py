@@ -1,8 +1,9 @@
 """The steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges. `evaluate` and
 `calibrate gauges` share them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, kept_seen
 
 _MORE = "or let the other trials serve: --gauges-from-all"
+_MOST_NAMED = 8  # trials in one line
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 
 
@@ -42,6 +44,22 @@ def judged(session: Session) -> list[Trial]:
         found = "the motor goes forward in none of them; motor_deg grows as the whisker goes towards the bar"
         raise BadInput(f"there is no whisk: {found}", file="trials")
     return trials
+
+
+def require_some(trials: Sequence[Trial], settings: Settings) -> None:
+    """Raises BadInput where the settings take none of the trials, or ask a camera that has no pictures of any."""
+    if not any(settings.takes(trial.name) for trial in trials):
+        names = _some_of(trial.name for trial in trials)
+        raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
+    there = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
+    for name in settings.seeing.cameras:
+        if name not in there:
+            raise BadInput(f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some_of(there)}")
+
+
+def _some_of(names: Iterable[str]) -> str:
+    first = list(islice(names, _MOST_NAMED + 1))
+    return ", ".join([*first[:_MOST_NAMED], *["…"] * (len(first) > _MOST_NAMED)])
 
 
 def placed_units(

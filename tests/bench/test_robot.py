@@ -95,3 +95,9 @@ def test_a_recorded_session(steel_signals, exact_vision, monkeypatch, tmp_path):
 def test_nothing_to_judge_is_one_line(steel_signals, exact_vision, tmp_path):
     with pytest.raises(BadInput, match="no whisk has both"):
         robot_trade.robot_trade(steel_signals, tmp_path, Settings(trials="gauge_roll0"), workers=0)
+
+
+def test_no_trial_of_that_name_is_said_before_anything_is_seen(steel_signals, tmp_path):
+    with pytest.raises(BadInput, match=r"--trials zz\*: no trial has such a name; there are "):
+        robot_trade.robot_trade(steel_signals, tmp_path, Settings(trials="zz*"), workers=0)
+    assert not any(tmp_path.iterdir())

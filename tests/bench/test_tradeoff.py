@@ -51,3 +51,8 @@ def test_a_table_and_files_to_give_back(tmp_path, monkeypatch, capsys):
 def test_no_trial_of_that_name(tmp_path):
     with pytest.raises(BadInput, match=r"--trials c\*: no trial with pictures has such a name"):
         tradeoff.tradeoff(RING, tmp_path, trials="c*")
+
+
+def test_nothing_is_written_into_the_session():
+    with pytest.raises(BadInput, match="lies in the session"):
+        tradeoff.tradeoff(RING, RING / "out")

@@ -1,22 +1,25 @@
 """The truth at the extremes: where does its stated interval still hold, and what does it say beyond?
 
     python tests/extremes/chain.py points FOLDER --count 6
-    python tests/extremes/chain.py painted FOLDER --count 2 --preset standard
+    python tests/extremes/chain.py painted FOLDER --count 2
 
 One thing at a time departs from a usual scene (two cameras, a bar at 30° and 60 mm, a cylinder of 1 mm): slope, tilt,
 distance, push, frames, friction, taper, the angle between sights, noise; of painted pictures thickness and picture
-size, contrast over noise, blur, bits, and the wire's direction in the picture. `points` fits noisy line points, which
-is cheap; `painted` has the rig draw each frame and looks at it with `observe_trial`. A scene is a row of
-FOLDER/<extreme>.csv; one that is there is not made again. Prints a line a value. docs/extremes.md is made from it.
+size, contrast over noise, blur, bits, frame rate and speed, and the wire's direction in the picture. `points` fits
+noisy line points, which is cheap; `painted` has the rig draw each frame once and looks at it with `observe_trial` at
+every preset. A scene is a row of FOLDER/<extreme>.csv for each preset; one that is there is not made again. Prints a
+line a value and preset, with the largest memory of the process so far. docs/extremes.md is made from it.
 """
 
 import argparse
 import math
+import resource
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -26,7 +29,7 @@ from bench.trials.seeing import PRESETS
 from tests.ladder.coverage import COLUMNS as OF_SCENE
 from tests.ladder.coverage import Seen, row_of, see_pictures, see_points
 from tests.ladder.rows import HALF_WIDTH_95, all_rows
-from tests.ladder.scenes import Sigmas, make_scene
+from tests.ladder.scenes import Scene, Sigmas, make_scene
 from vision.geometry.errors import Refused
 
 COLUMNS = ("key", "value", *OF_SCENE, "beta_sigma_deg")
@@ -94,6 +97,26 @@ def thick(wire_px: float) -> Protocol:
     return protocol(cameras=cameras(scale=wire_px * AWAY_MM / FOCAL_PX))
 
 
+def wide(megapixels: float) -> Protocol:
+    """A larger sensor behind the same lens: more round a wire that is as thick as before."""
+    scale = math.sqrt(1e6 * megapixels / math.prod(SIZE_PX))
+    size = tuple(int(round(scale * n)) for n in SIZE_PX)
+    return protocol(cameras=[msgspec.structs.replace(camera, size_px=size) for camera in cameras()])
+
+
+def filmed(rate_Hz: float) -> Protocol:
+    """As fast as leaves 0.7° between frames, up to the 1500°/s that a whisk has; exposed for a tenth of a frame: up to
+    2 kHz the same picture whatever the rate."""
+    pictures = PicturesTable(rate_Hz=rate_Hz, exposure_s=0.1 / rate_Hz)
+    return protocol(speed_deg_s=min(0.7 * rate_Hz, 1500.0), pictures=pictures)
+
+
+def fast(speed_deg_s: float) -> Protocol:
+    """0.7° between frames whatever the speed, exposed for a millisecond, or as long as they last."""
+    exposure_s = min(0.001, 0.7 / speed_deg_s)
+    return protocol(speed_deg_s=speed_deg_s, pictures=PicturesTable(step_deg=0.7, exposure_s=exposure_s))
+
+
 def noisy(snr: float) -> Protocol:
     pictures = PicturesTable(step_deg=0.7, grain=0.0, shot_noise=0.0, read_noise=_CONTRAST / snr)
     return protocol(pictures=pictures)
@@ -104,32 +127,46 @@ POINTS: Mapping[str, tuple[Callable[[float], Protocol], Sequence[float]]] = {
     "psi_deg": (lambda psi: protocol(psi_deg=psi), (-60, -30, 30, 60)),
     "d_x_mm": (lambda d_x: protocol(d_x_mm=d_x), (5, 10, 15, 30, 80, 95, 99)),
     "cone_d_x_mm": (cone, (10, 30, 60, 80, 90, 95)),
-    "push_deg": (pushed, (0.5, 1, 2, 5, 10, 20)),
+    "push_deg": (pushed, (0.2, 0.5, 1, 2, 5, 10, 20)),
     "friction": (lambda mu: protocol(friction=mu), (0, 0.2, 0.6, 1.0, 2.5)),
-    "sights_deg": (apart, (1, 2, 5, 10, 30, 60, 90)),
+    "sights_deg": (apart, (1, 2, 5, 10, 30, 60, 90, 120)),
     "noise_px": (lambda _: protocol(), (0.005, 0.05, 0.2, 0.5, 1.0)),
     "one_plane_deg": (above_each_other, (-150, -120, -90, -60)),
 }
 PAINTED: Mapping[str, tuple[Callable[[float], Protocol], Sequence[float]]] = {
-    "wire_px": (thick, (1.0, 1.5, 2.5, 5.0, 10.0)),
+    "wire_px": (thick, (1.0, 1.5, 2.5, 5.0, 10.0, 15.0)),
     "snr": (noisy, (3, 5, 10, 30, 100)),
     "blur_px": (lambda blur: protocol(pictures=PicturesTable(step_deg=0.7, blur_px=blur)), (0.3, 0.9, 2, 4)),
-    "bits": (lambda bits: protocol(pictures=PicturesTable(step_deg=0.7, bits=int(bits))), (8, 12)),
+    "bits": (lambda bits: protocol(pictures=PicturesTable(step_deg=0.7, bits=int(bits))), (8, 12, 16)),
     "roll_deg": (lambda roll: protocol(cameras=cameras(roll_deg=roll)), (0, 45, 90)),
     "touching": (touching_frames, (1, 2, 3)),
     "push_painted_deg": (pushed, (0.2, 0.5, 20)),
     "beta_painted_deg": (lambda beta: protocol(beta_deg=beta), (-80, 70, 80, 85)),
     "d_x_painted_mm": (lambda d_x: protocol(d_x_mm=d_x), (5, 10, 95)),
+    "sights_painted_deg": (apart, (1, 5, 20, 60, 120)),
+    "one_plane_painted_deg": (above_each_other, (-120, -90)),
+    "rate_Hz": (filmed, (1, 10000)),
+    "speed_deg_s": (fast, (5, 50, 200, 500, 1500)),
+    "megapixels": (wide, (0.3, 3, 8, 20)),
 }
 
+Look = Callable[[Scene], Seen]
 
-def scene_row(key: int, extreme: str, made: Callable[[float], Protocol], values, see: Callable) -> dict:
+
+@lru_cache(maxsize=1)
+def scene_at(extreme: str, value: float, seed: int) -> Scene:
+    """A scene of POINTS or PAINTED. Raises ArithmeticError where the rig has none."""
+    made, _ = (POINTS | PAINTED)[extreme]
+    sigmas = Sigmas(wire_px=value) if extreme == "noise_px" else Sigmas()
+    return make_scene(made(value), sigmas, seed)
+
+
+def scene_row(key: int, extreme: str, values: Sequence[float], see: Look) -> dict:
     """A row of the table; what keeps the rig from having such a scene is its status."""
     value, seed = values[key // _MOST_SEEDS], key % _MOST_SEEDS
     about = {"key": key, "value": float(value)}
-    sigmas = Sigmas(wire_px=value) if extreme == "noise_px" else Sigmas()
     try:
-        scene = make_scene(made(value), sigmas, seed)
+        scene = scene_at(extreme, value, seed)
     except ArithmeticError as problem:
         return about | {"seed": seed, "status": f"the rig: {problem}"}
     try:
@@ -180,15 +217,28 @@ def _said(rows: Sequence[dict]) -> str:
     return f" [{' | '.join(list(said)[:2])}]" if said else ""
 
 
-def study(what: str, folder: Path, count: int, preset: str, only: str = "") -> Iterator[str]:
+def study(what: str, folder: Path, count: int, only: str = "") -> Iterator[str]:
     """All extremes of a way of looking, or one of them."""
-    see = see_points if what == "points" else partial(see_pictures, settings=PRESETS[preset])
-    for extreme, (made, values) in (POINTS if what == "points" else PAINTED).items():
+    looks: dict[str, Look] = {"": see_points}
+    if what == "painted":
+        looks = {f" {name}": partial(see_pictures, settings=settings) for name, settings in PRESETS.items()}
+    for extreme, (_, values) in (POINTS if what == "points" else PAINTED).items():
         if only in ("", extreme):
-            keys = [k * _MOST_SEEDS + seed for k in range(len(values)) for seed in range(count)]
-            make = partial(scene_row, extreme=extreme, made=made, values=values, see=see)
-            suffix = "" if what == "points" else f"_{preset}"
-            yield from lines(extreme, all_rows(folder / f"{extreme}{suffix}.csv", COLUMNS, keys, make))
+            rows = _rows(folder, extreme, values, count, looks)
+            for name in looks:
+                yield from lines(f"{extreme}{name}", rows[name])
+            yield f"    {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB at most so far"
+
+
+def _rows(folder: Path, extreme: str, values: Sequence[float], count: int, looks: Mapping[str, Look]) -> dict:
+    """Rows by the name of the look. Each scene is drawn once and seen by all."""
+    rows = {}
+    for key in (k * _MOST_SEEDS + seed for k in range(len(values)) for seed in range(count)):
+        for name, see in looks.items():
+            table = folder / f"{extreme}{name.replace(' ', '_')}.csv"
+            make = partial(scene_row, extreme=extreme, values=values, see=see)
+            rows[name] = all_rows(table, COLUMNS, [key], make)
+    return rows
 
 
 def main() -> None:
@@ -196,10 +246,9 @@ def main() -> None:
     parser.add_argument("what", choices=("points", "painted"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=6)
-    parser.add_argument("--preset", choices=PRESETS, default="standard")
     parser.add_argument("--only", default="", help="one extreme by its name")
     options = parser.parse_args()
-    for line in study(options.what, options.folder, options.count, options.preset, options.only):
+    for line in study(options.what, options.folder, options.count, options.only):
         print(line, flush=True)
 
 

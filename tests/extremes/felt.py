@@ -4,12 +4,13 @@
 
 One thing at a time departs from a usual push (60 mm, 30°, θ = 3°, a bar of 6 mm, α = 10.5°, a wire of 1 mm × 100 mm),
 by the rig's exact mechanics, with noise of half a per cent in the moments and 0.01° in touch, α_est drawn about α with
-the 5° that it is said to be known to. Prints, a line a value, the answers, the 95 % intervals that hold, the error and
-what is said instead. docs/extremes.md is made from it.
+the 5° that it is said to be known to; the stroke goes on to 5°. Prints, a line a value, the answers, the 95 % intervals
+that hold, the error, and how often what is said. docs/extremes.md is made from it.
 """
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,18 +19,22 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from bench.friction.turning import turn, with_turn
+from bench.records.trial import EstimateRow, FeltAt
 from bench.rig.bar import Bar, first_touch
 from bench.rig.contact import moments_Nmm
 from bench.rig.friction import Friction, March
 from bench.rig.rod import Rod
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD
+from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
-from estimator.uncertainty import Z_95
-from estimator.whisk import Estimate, EstimatorSettings, Whisk
+from estimator.distance import felt_slip_angle
+from estimator.whisk import Whisk
+from vision.truth.value import Value
 
 MOMENT_NOISE, TOUCH_SIGMA_RAD, ALPHA_SIGMA_RAD = 0.005, np.radians(0.01), np.radians(5.0)
 _STEPS = 8  # of the march from touch
+STROKE_RAD = np.radians([1.0, 2.0, 3.0, 4.0, 5.0])  # at which moments tell whether φ turns
 
 
 @dataclass(frozen=True)
@@ -57,43 +62,55 @@ EXTREMES: Mapping[str, tuple[Push, Sequence[float]]] = {
 }
 
 
-def exact(push: Push) -> tuple[np.ndarray, Beam]:
-    """Moments (2,) of the push, N·mm, and the whisker. Raises ArithmeticError where there is no such push."""
+@dataclass(frozen=True)
+class Exact:
+    """Moments (2,) of a push at its angle and at those of STROKE_RAD that it reaches (n, 2), N·mm; and the whisker."""
+
+    moments_Nmm: np.ndarray
+    stroke_rad: np.ndarray
+    stroke_Nmm: np.ndarray
+    beam: Beam
+
+
+def exact(push: Push) -> Exact:
+    """Raises ArithmeticError where there is no such push."""
     rod = Rod(push.shape, length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
     theta, alpha, beta, psi = np.radians([push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg])
     thickness = 0.5 * rod.diameter_mm * (1.0 - (push.d_x_mm / rod.length_mm if push.shape == "cone" else 0.0))
     bar = Bar.placed(d_x_mm=push.d_x_mm, beta_rad=beta, psi_rad=psi, touch_rad=0.0, radius_mm=push.bar_radius_mm,
                      whisker_radius_mm=thickness)  # fmt: skip
     touch = first_touch(rod, bar, 0.0, push.d_x_mm)
-    march = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
-    *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
-    if state is None:
+    angles = np.unique(np.concatenate([theta * np.arange(1, _STEPS + 1) / _STEPS, STROKE_RAD]))
+    states = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch).along(touch.motor_rad + angles)[1]
+    felt = {a: np.array(moments_Nmm(state)) for a, state in zip(angles, states) if state is not None}
+    if theta not in felt:
         raise ArithmeticError("the whisker slips off the bar")
-    return np.array(moments_Nmm(state)), Beam(3.0 * rod.rigidity_Nmm2, rod.length_mm, push.shape)
+    stroke = np.array([a for a in STROKE_RAD if a in felt])
+    beam = Beam(3.0 * rod.rigidity_Nmm2, rod.length_mm, push.shape)
+    return Exact(felt[theta], stroke, np.array([felt[a] for a in stroke]).reshape(-1, 2), beam)
 
 
-def answers(push: Push, draws: int, rng: np.random.Generator) -> list[Estimate]:
-    """What (10) says of the push with noise."""
-    true, beam = exact(push)
-    sigma = MOMENT_NOISE * np.linalg.norm(true)
-    found = []
+def answers(push: Push, draws: int, rng: np.random.Generator) -> list[EstimateRow]:
+    """What (10) says of the push with noise, and of the stroke that it is part of."""
+    true = exact(push)
+    sigma = MOMENT_NOISE * np.linalg.norm(true.moments_Nmm)
+    covariance, found = sigma**2 * np.eye(2), []
     for _ in range(draws):
-        felt = true + sigma * rng.standard_normal(2)
+        felt = true.moments_Nmm + sigma * rng.standard_normal(2)
         theta = np.radians(push.theta_deg) + TOUCH_SIGMA_RAD * rng.standard_normal()
         alpha = np.clip(np.radians(push.alpha_deg) + ALPHA_SIGMA_RAD * rng.standard_normal(), 0.0, np.radians(89.0))
-        covariance = sigma**2 * np.eye(2)
-        whisk = Whisk(*(np.zeros(0),) * 4, theta, *felt.tolist(), covariance, TOUCH_SIGMA_RAD, beam)
-        told = EstimatorSettings(float(alpha), ALPHA_SIGMA_RAD, OBJECT_REACH_MM, TILT_SIGMA_RAD)
-        found.append(with_friction(whisk, told))
+        whisk = Whisk(*(np.zeros(0),) * 4, theta, *felt.tolist(), covariance, TOUCH_SIGMA_RAD, true.beam)
+        row = answer("with_friction", with_friction, whisk, float(alpha), ALPHA_SIGMA_RAD)
+        stroke = true.stroke_Nmm + sigma * rng.standard_normal(true.stroke_Nmm.shape)
+        rate = turn([FeltAt(a, *(Value(m, sigma) for m in pair), TOUCH_SIGMA_RAD, covariance, np.zeros(2))
+                     for a, pair in zip(true.stroke_rad, stroke)])  # fmt: skip
+        found.append(with_turn(row, felt_slip_angle(*felt), rate, theta))
     return found
 
 
-def holds(estimate: Estimate, d_x_mm: float) -> bool:
+def holds(row: EstimateRow, d_x_mm: float) -> bool:
     """Whether its 95 % interval has the truth in it."""
-    ends = estimate.low_mm, estimate.high_mm
-    if np.isnan(ends).all():
-        ends = (estimate.d_x_mm - Z_95 * estimate.sigma_mm, estimate.d_x_mm + Z_95 * estimate.sigma_mm)
-    return bool(ends[0] <= d_x_mm <= ends[1])
+    return bool(row.d_x_est_low_mm <= d_x_mm <= row.d_x_est_high_mm)
 
 
 def line(extreme: str, value: float, push: Push, draws: int, rng: np.random.Generator) -> str:
@@ -102,16 +119,21 @@ def line(extreme: str, value: float, push: Push, draws: int, rng: np.random.Gene
         found = answers(push, draws, rng)
     except ArithmeticError as problem:
         return f"{extreme} {value:g}: the rig: {problem}"
-    known = [one for one in found if np.isfinite(one.d_x_mm)]
-    said = sorted({one.status.split(":")[0].split(" (")[0][:60] for one in found if one.status})
+    known = [one for one in found if np.isfinite(one.d_x_est_mm.value)]
     text = f"{extreme} {value:g}: {len(known)} of {draws} answer"
     if known:
-        errors = 100.0 * (np.array([one.d_x_mm for one in known]) / push.d_x_mm - 1.0)
-        width = float(np.median([100.0 * one.sigma_mm / push.d_x_mm for one in known]))
-        inside = 100.0 * np.mean([holds(one, push.d_x_mm) for one in known])
-        text += f", {inside:.0f} % of intervals hold, {errors.mean():+.2f} % in the mean, {errors.std():.2f} % scatter,"
-        text += f" {width:.2f} % stated"
-    return text + (f" [{' | '.join(said[:3])}]" if said else "")
+        d_x, sigma = np.array([(one.d_x_est_mm.value, one.d_x_est_mm.sigma) for one in known]).T
+        errors, inside = 100.0 * (d_x / push.d_x_mm - 1.0), np.array([holds(one, push.d_x_mm) for one in known])
+        text += f", {100.0 * inside.mean():.0f} % of intervals hold, {errors.mean():+.2f} % in the mean, "
+        text += f"{errors.std():.2f} % scatter, {100.0 * np.median(sigma) / push.d_x_mm:.2f} % stated"
+    return text + "".join(f" [{share:.0f} %: {said}]" for said, share in _said(found))
+
+
+def _said(found: Sequence[EstimateRow]) -> list[tuple[str, float]]:
+    """The three statuses said most, and in how many per cent."""
+    short = ("".join(c for c in row.status.split(":")[0] if c not in "+-.0123456789")[:60] for row in found)
+    counts = Counter(filter(None, short)).most_common(3)
+    return [(said, 100.0 * n / len(found)) for said, n in counts]
 
 
 def study(draws: int) -> Iterator[str]:

@@ -11,8 +11,8 @@ from tests.ladder.coverage import see_points
 
 
 def row(extreme: str, value: float, seed: int = 0) -> dict:
-    made, values = POINTS[extreme]
-    return scene_row(1000 * values.index(value) + seed, extreme, made, values, see_points)
+    _, values = POINTS[extreme]
+    return scene_row(1000 * values.index(value) + seed, extreme, values, see_points)
 
 
 def test_a_scene_is_seen_and_said():
@@ -36,13 +36,22 @@ def test_what_is_far_off_without_a_word_is_counted():
 def test_the_mechanics_are_those_of_10_where_it_is_exact():
     """A thin bar, no friction, a small push: (13) and (14) to a thousandth (θ²/6 = 5e-5, ⅜ θ R/d_x = 1e-4)."""
     push = felt.Push(beta_deg=30.0, alpha_deg=0.0, theta_deg=1.0, bar_radius_mm=0.01)
-    (m_y, m_z), beam = felt.exact(push)
+    found = felt.exact(push)
+    (m_y, m_z), beam = found.moments_Nmm, found.beam
     assert math.atan2(m_y, m_z) == pytest.approx(math.radians(30.0), rel=1e-3)
     assert beam.C_Nmm2 * math.radians(1.0) * math.cos(math.radians(30.0)) / math.hypot(m_y, m_z) == pytest.approx(
         60.0, rel=1e-3
     )
     answered = felt.answers(push, 40, np.random.default_rng(5))
     assert sum(felt.holds(one, 60.0) for one in answered) >= 25
+
+
+@pytest.mark.parametrize("psi_deg, told", [(-75.0, True), (5.0, False)])
+def test_an_object_that_leans_far_is_told_by_its_stroke(psi_deg, told):
+    """At −75° φ turns by 1.6 rad a radian, seven sigma of moments to 0.5 %; at 5° by as much as is allowed for."""
+    rows = felt.answers(felt.Push(psi_deg=psi_deg), 40, np.random.default_rng(3))
+    said = sum("phi turns by" in row.status for row in rows)
+    assert said >= 36 if told else said <= 2
 
 
 @pytest.mark.slow

@@ -1,11 +1,13 @@
 """Runs that are killed, and disks that are full, at random moments: what is resumed is what was never disturbed.
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/faults/interrupted.py kill|felt|full COUNT [SESSION]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/faults/interrupted.py kill|felt|seen|full COUNT [SESSION]
 
-`kill`: an evaluation with two workers, or one of its workers, is killed (SIGKILL) at a random moment, then started
-again: each file of the output must be the same to the byte as without.
+`kill`: an evaluation with two workers, or one of its workers, is killed (SIGKILL) at a random moment of the time that
+it takes, then started again: each file of the output must be the same to the byte as without. COUNT is of those that
+found it alive; the time is measured before the first, and again where a run had ended.
 `felt`: the same of a session's signals alone, in forks of a process that has loaded all there is to load: a tenth of
-the time, and the same files, locks, workers and tables, without pictures.
+the time, and the same files, locks, workers and tables, without pictures. `seen`: of two trials with their pictures and
+known cameras, in forks as well.
 `full`: no byte can be written from a random file on, by a limit on the size of files, which anyone may set. One line
 and exit code 2, each file that stood before stands, and what is resumed is the same to the byte.
 Prints a line each; the exit code is 1 where one of them fails. 10 of the small session take some ten minutes, 100 of
@@ -22,8 +24,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -35,7 +39,9 @@ from tests.faults.fuzz import GAUGES
 
 ROOT = Path(__file__).resolve().parents[2]
 SESSION = ROOT / "fixtures" / "small-session"
-_LOOK_S, _MEAN_WAIT_S = 0.05, 0.5
+_LOOK_S = 0.02
+_OF_WORKERS = 0.25  # of the kills
+_MOST_ENDED = 3  # times as many runs may have ended before they were to be killed
 ENDED_S = 2.0  # a worker notices within a second that its run was killed
 _OWN = (".lock",)  # holds the run's process id
 
@@ -94,12 +100,22 @@ def felt_session(folder: Path) -> Path:
     return session
 
 
-def felt(count: int) -> int:
-    """How many of so many killed runs did not come to the same bytes, of signals alone and in forks."""
+def seen_session(folder: Path) -> Path:
+    """The small session's measured trials, with cameras and gauges brought along."""
+    session = folder / "seen"
+    shutil.copytree(SESSION, session, ignore=shutil.ignore_patterns("boards", "gauge_*"))
+    (session / "gauges.toml").write_text(GAUGES)
+    with redirect_stdout(io.StringIO()):
+        cli.main(["calibrate", "cameras", str(SESSION), "--out", str(session / "cameras.toml")])
+    return session
+
+
+def in_forks(make: Callable[[Path], Path], count: int) -> int:
+    """How many of so many killed runs did not come to the same bytes, in forks. make(folder): their session."""
     loaded = get_context
     workers.multiprocessing.get_context = lambda _: loaded("fork")
     with tempfile.TemporaryDirectory() as folder:
-        session = felt_session(Path(folder))
+        session = make(Path(folder))
         with redirect_stdout(io.StringIO()):  # loads all that is loaded at first use
             cli.main(["evaluate", str(session), "--out", str(Path(folder) / "first")])
         return kill(count, session, Fork)
@@ -122,44 +138,62 @@ def _workers(pid: int) -> list[int]:
     return [int(child) for child in children if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
-def killed(start: Callable, session: Path, out: Path, files: int, rng: np.random.Generator) -> str:
-    """What was killed, a random moment after so many files stand: the run, one of its workers, or nothing where the run
-    had ended."""
-    run = start(session, out)
-    while run.poll() is None and sum(1 for _ in out.rglob("*.*")) < files:
-        time.sleep(_LOOK_S)
-    time.sleep(rng.exponential(_MEAN_WAIT_S))
+def killed(start: Callable, session: Path, out: Path, after_s: float, rng: np.random.Generator) -> str:
+    """What was killed so long after the start, the run or one of its workers; nothing where the run had ended."""
+    begin, run = time.monotonic(), start(session, out)
+    while run.poll() is None and time.monotonic() < begin + after_s:
+        time.sleep(min(_LOOK_S, max(begin + after_s - time.monotonic(), 0.0)))
     if run.poll() is not None:
         run.communicate()
-        return "nothing, it had ended"
-    victim = int(rng.choice([run.pid, *_workers(run.pid)]))
+        return ""
+    others = _workers(run.pid) if rng.random() < _OF_WORKERS else []
+    victim = int(rng.choice(others or [run.pid]))
     with suppress(ProcessLookupError):
         os.kill(victim, signal.SIGKILL)
     said = run.communicate()[1].decode()
     time.sleep(ENDED_S)
-    if victim == run.pid:
+    if run.returncode == -signal.SIGKILL:
         return "the run"
+    if victim == run.pid:
+        return ""  # it ended as it was looked up
     assert run.returncode in (0, 1), said  # its trial was given to another
     return "a worker"
 
 
 def kill(count: int, session: Path = SESSION, start: Callable = started) -> int:
     """How many of so many killed runs did not come to the same bytes. start(session, out): a run."""
-    rng, bad = np.random.default_rng(9), 0
+    rng, bad, ended, alive = np.random.default_rng(9), 0, 0, Counter()
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"  # one name: .session and messages hold none
-        assert start(session, out).wait() in (0, 1)
+        takes_s = _takes_s(start, session, out)
         wanted = contents(out)
-        for k in range(count):
+        while alive.total() < count:
             shutil.rmtree(out)
-            what = killed(start, session, out, int(rng.integers(len(wanted))), rng)
+            after_s = rng.uniform(0.0, takes_s)
+            what = killed(start, session, out, after_s, rng)
+            if not what:
+                ended += 1
+                assert ended < _MOST_ENDED * count, "hardly a run was still there to be killed"
+                shutil.rmtree(out)
+                takes_s = min(takes_s, _takes_s(start, session, out))
+                continue
+            alive[what] += 1
             stood = len(contents(out))
             assert start(session, out).wait() in (0, 1)
             wrong = differences(contents(out), wanted)
             bad += bool(wrong)
             told = f"differ: {wrong}" if wrong else "resumed to the same bytes"
-            print(f"{k}: killed {what}, {stood} of {len(wanted)} files stood; {told}", flush=True)
+            when = f"after {after_s:.2f} of {takes_s:.2f} s, {stood} of {len(wanted)} files stood"
+            print(f"{alive.total()}: killed {what} {when}; {told}", flush=True)
+    print(f"killed alive: {dict(alive)}, {bad} not resumed to the same bytes; {ended} had ended before", flush=True)
     return bad
+
+
+def _takes_s(start: Callable, session: Path, out: Path) -> float:
+    """How long an undisturbed run takes."""
+    begin = time.monotonic()
+    assert start(session, out).wait() in (0, 1)
+    return time.monotonic() - begin
 
 
 @contextmanager
@@ -213,5 +247,6 @@ def full(count: int, session: Path = SESSION) -> int:
 
 
 if __name__ == "__main__":
-    what, number_of = {"kill": kill, "felt": felt, "full": full}[sys.argv[1]], int(sys.argv[2])
-    sys.exit(bool(what(number_of, *map(Path, sys.argv[3:]))))
+    forks = {"felt": partial(in_forks, felt_session), "seen": partial(in_forks, seen_session)}
+    ways = {"kill": kill, "full": full, **forks}
+    sys.exit(bool(ways[sys.argv[1]](int(sys.argv[2]), *map(Path, sys.argv[3:]))))

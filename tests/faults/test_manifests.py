@@ -181,6 +181,39 @@ def test_check_collects_every_unknown_key(session):
     ]
 
 
+def refusals(session) -> list[str]:
+    """All that `check` would refuse, where a manifest cannot be used."""
+    doubts = Doubts(stop_at_first=False)
+    with doubts.guard():
+        checked_session(session, doubts)
+    return list(dict.fromkeys(doubts.refusals))
+
+
+def test_check_names_every_missing_key(session):
+    for text in ("format = 1", "length_mm = 100.0", "[bar]\ndiameter_mm = 6.0", "squares = [8, 6]", 'name = "high"'):
+        edit(session / "session.toml", text, "")
+    assert refusals(session) == [
+        "session.toml: [bar] is missing",
+        "session.toml: format is missing",
+        "session.toml: [whisker] length_mm is missing",
+        "session.toml: [board] squares is missing",
+        "session.toml: [[cameras]] name is missing",
+    ]
+
+
+def test_check_names_every_implausible_value(session):
+    edit(session / "session.toml", "length_mm = 100.0", "length_mm = 0.1")
+    edit(session / "session.toml", "diameter_mm = 6.0", "diameter_mm = -6.0")
+    found = [line.split(" is ")[0] for line in refusals(session)]
+    assert found == ["session.toml: [whisker] length_mm", "session.toml: [bar] diameter_mm"]
+
+
+def test_check_names_what_does_not_go_together(session):
+    edit(session / "session.toml", "youngs_modulus_GPa = 60.0", "")
+    edit(session / "session.toml", "marker_mm = 11.0", "marker_mm = 16.0")
+    assert ["[whisker] give either" in refusals(session)[0], "marker_mm = 16.0" in refusals(session)[1]] == [True, True]
+
+
 def test_implausible_value_of_one_camera(session):
     edit(session / "session.toml", 'name = "high"', 'name = "high"\nexposure_s = 2.0')
     assert re.search(r"\[\[cameras\]\] exposure_s is 2;.*milliseconds\? Then write 0.002", refusal(session))

@@ -19,6 +19,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.fit.uncertainty import uncertainty
+from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
@@ -54,11 +56,13 @@ COLUMNS = ("seed", "beta_true_deg", "d_x_true_mm", "cameras", "plane_angle_deg",
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Values and sigmas by name (touch, d_x, beta: floats; slip: (f,)), or the reason why there are none."""
+    """Values and sigmas by name (touch, d_x, beta: floats; slip: (f,)), or the reason why there are none. frames: of
+    the scene's, the indices of those that were looked at; None: of all."""
 
     value: Mapping
     sigma: Mapping
     status: str = ""
+    frames: np.ndarray | None = None
 
 
 def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
@@ -90,19 +94,25 @@ def see_pictures(
     scene: Scene, most_cameras: int | None = None, settings: VisionSettings = VisionSettings()  # noqa: B008
 ) -> Seen:
     """What `observe_trial` says of rasterised pictures, of the first cameras only where a number is given."""
+    pictures, cameras, rods = drawn(scene, most_cameras)
+    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, rods, settings).whisks
+    if math.isnan(whisk.d_x_mm.value):
+        return Seen({}, {}, whisk.status)
+    found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
+    values, sigmas = ({name: getattr(one, what) for name, one in found.items()} for what in ("value", "sigma"))
+    return Seen(values, sigmas, whisk.status, whisk.frames.index)
+
+
+@lru_cache(maxsize=1)
+def drawn(scene: Scene, most_cameras: int | None) -> tuple[TrialPictures, Cameras, Rods]:
+    """A scene's pictures, its cameras as they were calibrated, and the rods as someone measured them."""
     rng = np.random.default_rng([scene.seed, 23])
-    cameras, (wire, bar) = calibrated(scene, rng), given(scene, rng)
+    cameras, rods = calibrated(scene, rng), Rods(*given(scene, rng))
     job = Job(Path(), scene.protocol, scene.seed, False)
     frames = {studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
               for k, studio in enumerate(job.studios[:most_cameras])}
     background = {s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios}
-    pictures = TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background)
-    (whisk,) = observe_trial(pictures, [slice(0, len(scene.motor_rad))], cameras, Rods(wire, bar), settings).whisks
-    if math.isnan(whisk.d_x_mm.value):
-        return Seen({}, {}, whisk.status)
-    found = {"touch": whisk.touch_rad, "d_x": whisk.d_x_mm, "beta": whisk.beta_rad, "slip": whisk.frames.slip_mm}
-    return Seen({name: one.value for name, one in found.items()}, {name: one.sigma for name, one in found.items()},
-                whisk.status)
+    return TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background), cameras, rods
 
 
 def see_alone(scene: Scene) -> Seen:
@@ -124,9 +134,12 @@ def row_of(scene: Scene, seen: Seen) -> dict:
            "cameras": len(scene.cameras), "plane_angle_deg": scene.plane_angle_deg, "status": seen.status}
     if not seen.value:
         return row
-    error = {name: seen.value[name] - getattr(truth, name) for name in ("touch", "d_x", "beta", "slip")}
-    touching = np.isfinite(error["slip"]) & (scene.motor_rad > truth.touch + math.radians(0.2))
-    at = int(np.argmin(np.where(touching, np.abs(scene.motor_rad - truth.touch - SLIP_AT_RAD), np.inf)))
+    error = {name: seen.value[name] - getattr(truth, name) for name in ("touch", "d_x", "beta")}
+    frames = slice(None) if seen.frames is None else seen.frames
+    error["slip"] = seen.value["slip"] - truth.slip[frames]
+    theta = scene.motor_rad[frames] - truth.touch
+    touching = np.isfinite(error["slip"]) & (theta > math.radians(0.2))
+    at = int(np.argmin(np.where(touching, np.abs(theta - SLIP_AT_RAD), np.inf)))
     if np.any(touching):  # or it was pushed by less
         row |= {"slip_rms_mm": float(np.sqrt(np.mean(error["slip"][touching] ** 2))),
                 "slip_worst_z": float(np.max(np.abs(error["slip"] / seen.sigma["slip"])[touching]))}

@@ -17,6 +17,7 @@ def all_rows(table: Path, columns: Sequence[str], keys: Iterable[int], make: Cal
         writer = csv.DictWriter(file, columns)
         writer.writeheader()
         writer.writerows(rows)
+        file.flush()  # a row may take long, and be interrupted
         for key in sorted(set(keys) - {row[columns[0]] for row in rows}):
             rows.append(make(key))
             writer.writerow(rows[-1])

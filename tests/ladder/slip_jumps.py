@@ -22,7 +22,8 @@ from tests.ladder.estimates_montecarlo import rod_and_beam
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
 from vision.truth.value import FIELDS
 
-CASES = ((45.0, 0.30, 0.36), (45.0, 0.30, 0.50), (60.0, 0.34, 0.43), (30.0, 0.10, 0.30))  # β in deg, μ kinetic, static
+CASES = ((45.0, 0.30, 0.36), (45.0, 0.30, 0.50), (60.0, 0.34, 0.43), (30.0, 0.10, 0.30),
+         (60.0, 0.20, 0.24))  # β in deg, μ kinetic, static
 STEPS_DEG, D_X_MM = (0.1, 0.35, 0.7), 60.0
 SIGMAS, TOUCH_SIGMA_RAD = {"slip": 0.004, "phi": 0.001}, np.radians(0.02)
 

@@ -91,7 +91,7 @@ def looked_twice(background, frames, off_px: float, phase_rad: float) -> Traced:
         points = seen.pieces.foot_px[seen.pieces.source == number]
         curve = Polynomial.fit(*points.T, 7)(X)
         bands.append(read_band(frame, background, np.stack([X, curve], axis=1), X, np.full(len(X), RADIUS_PX), HALF_PX))
-    return trace(cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0)), KNOTS, seen.blur_px)
+    return trace(cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0)), KNOTS, seen_blur_px=seen.blur_px)
 
 
 def whole_sigma_px(traced: Traced) -> np.ndarray:

@@ -42,8 +42,8 @@ class Recorder:
     def __init__(self, touch_rad: float):
         self.touch_rad, self.rows, self._trace = touch_rad, {}, seeing.trace_wire
 
-    def __call__(self, whisk, view, axis, curves, **options):
-        found = self._trace(whisk, view, axis, curves, **options)
+    def __call__(self, whisk, view, axis, curves, *seen, **options):
+        found = self._trace(whisk, view, axis, curves, *seen, **options)
         angles = [whisk.motor[frame] for frame in curves]
         free = [one.points for one in found if angles[one.frame] < self.touch_rad]
         if free:

@@ -1,15 +1,20 @@
 """Beside what a user would take instead, on the same frames in one run: error and seconds of each, with its version.
 
-    python -m venv OTHERS
-    OTHERS/bin/pip install whisk-janelia==1.2.5 av==12.3.0 scikit-image
+    for each in lines boards rods; do python -m venv OTHERS/$each; done
+    OTHERS/lines/bin/pip install whisk-janelia==1.2.5 av==12.3.0 scikit-image
+    OTHERS/boards/bin/pip install aniposelib
+    OTHERS/rods/bin/pip install pyelastica
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/speed/beside.py OTHERS
 
-The frames are those of tests/speed/tracer.py, in grey levels of 8 bits: a wire 5.6 px wide, before an even background
-and before a chessboard. Our tracer is told where the wire is to 1 px, as a whisk's fit tells it, and learns shading and
-blur from all 13 frames. whisk and the ridge filter are told nothing, but of whisk's segments the one that is nearest to
-the truth is taken in each frame, and of both what lies within 5 px of it. whisk traces what is dark, in pictures that
-have something dark beside: it is given the frames' negative with a black strip beyond the columns judged. Its programs
-ask for FFmpeg's libraries by their plain names: PyAV brings them, and links to them are made for the run.
+An environment that is not there is said so and left out. Cameras are compared in beside_boards.py, rods in
+beside_rods.py.
+
+Lines: the frames are those of tests/speed/tracer.py, in grey levels of 8 bits: a wire 5.6 px wide, before an even
+background and before a chessboard. Our tracer is told where the wire is to 1 px, as a whisk's fit tells it, and learns
+shading and blur from all 13 frames. whisk and the ridge filter are told nothing, but of whisk's segments the one that
+is nearest to the truth is taken in each frame, and of both what lies within 5 px of it. whisk traces what is dark, in
+pictures that have something dark beside: it is given the frames' negative with a black strip beyond the columns judged.
+Its programs ask for FFmpeg's libraries by their plain names: PyAV brings them, and links to them are made for the run.
 """
 
 import re
@@ -24,6 +29,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from tests.speed import beside_boards, beside_rods
 from tests.speed.tracer import KNOTS, NOISE, cpu_ms, rough_bands, wire_frames
 from vision.lines.bands import cut_pieces
 from vision.lines.trace import to_points, trace
@@ -116,6 +122,17 @@ def table(others: Path, step: float) -> Iterator[str]:
     yield line(name, found["ridges"], heights, 1000 * float(found["ridges_s"]))
 
 
+def main() -> None:
+    others = Path(sys.argv[1])
+    tables = {"lines": lambda place: (line for step in (0.0, 40.0) for line in table(place, step)),
+              "boards": beside_boards.table, "rods": beside_rods.table}  # fmt: skip
+    for name, lines in tables.items():
+        place = others / name
+        if (place / "bin" / "python").exists():
+            print(*lines(place), "", sep="\n", flush=True)
+        else:
+            print(f"{name}: there is no environment {place}\n")
+
+
 if __name__ == "__main__":
-    for step in (0.0, 40.0):
-        print(*table(Path(sys.argv[1]), step), sep="\n")
+    main()

@@ -12,6 +12,7 @@ its own, or as good as the best: several starts are followed, and the sigma of s
 what is shared is found with pixels weighed by no more than that leaves them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,8 @@ BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 p
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
 _STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
+# In shift and logarithm of the blur: two descents that come so near to each other end at the same place.
+_SAME_PX, _SAME_BLUR = 0.1, 0.05
 _TOLD_BY = 120  # pieces that tell how probable a common shift is
 _MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
@@ -64,13 +67,17 @@ class Solved(Shared):
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be explained: pieces, by so many waves at these knots, and a belief about the lens blur."""
+    """What is to be explained: pieces, by so many waves at these knots, and a belief about the lens blur.
+
+    seen_blur_px: what the blur was in an earlier look, which told where the pieces are expected.
+    """
 
     pieces: Pieces
     terms: int
     knots: Knots
     blur_px: float
     blur_sigma: float = BLUR_SIGMA
+    seen_blur_px: float | None = None
 
 
     def of(self, some: slice) -> "Task":
@@ -88,13 +95,13 @@ class Task:
 
 
 def solve_jointly(task: Task, *, last: bool = True) -> Solved:
-    """The most probable positions, shading and blur of pieces that lie where they are expected, or all to one side.
+    """The most probable positions, shading and blur of pieces that lie where they are expected, or, before an earlier
+    look, all to one side.
 
     Unless this is the last look, other common shifts that are as probable are not asked for.
     """
-    begin = _start(task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered())
     tempered = task.tempered()
-    shared = _descend(_begin(tempered, np.median(begin.shift_px), np.log(begin.blur_px)).weighted())
+    shared = _descend(_begin(tempered, *_start(task)).weighted())
     return settled(task, _with_all_shifts(tempered, shared) if last else shared)
 
 
@@ -118,25 +125,32 @@ def settled(task: Task, shared: Shared) -> Solved:
                   slopes.contrast, _widened(slopes, shared.blur_px, np.maximum(chi2, 1.0)))
 
 
-def _start(task: Task) -> Shared:
-    """The most probable end of descents from several common shifts and blurs."""
+def _start(task: Task) -> tuple[float, float]:
+    """Common shift and logarithm of the blur: of an earlier look, or of the most probable end of several descents."""
+    if task.seen_blur_px is not None:
+        return 0.0, float(np.log(task.seen_blur_px))
+    task = task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered()
     blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
     begins = sorted((_begin(task, shift, blur) for shift in _SHIFTS_PX for blur in blurs), key=lambda one: one.doubt)
     robust, chosen = begins[0].weighted().robust, []
     for one in begins:
         if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
             chosen.append(one)
-    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust)) for one in chosen[:_MOST_STARTS])
-    return min(ends, key=lambda one: one.doubt)
+    ends: list[Shared] = []
+    for one in chosen[:_MOST_STARTS]:
+        end = _descend(_Point.at(task, one.shift_px, one.log_blur, robust), ends)
+        ends += [end] if end else []
+    best = min(ends, key=lambda one: one.doubt)
+    return float(np.median(best.shift_px)), float(np.log(best.blur_px))
 
 
 def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
     return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
 
 
-def _descend(here: "_Point") -> Shared:
+def _descend(here: "_Point", ends: Sequence[Shared] = ()) -> Shared | None:
     """Downhill from a point, the pieces weighed as there: weighed anew at each step, those that a shift spoils would
-    count ever less.
+    count ever less. None where the way leads past one of these ends.
 
     The last step is taken without looking again: what is told of the pieces is as it was before it.
     """
@@ -153,6 +167,8 @@ def _descend(here: "_Point") -> Shared:
             continue
         damped = damped / _EASIER if damped > _UNDAMPED * _DAMPED else 0.0
         here = there
+        if any(here.is_near(end) for end in ends):
+            return None
         arrow = _Arrow(here)
     return arrow.solved(damped)
 
@@ -194,6 +210,11 @@ class _Point:
     def doubt(self) -> float:
         """Minus twice the log evidence of positions and blur, the shading integrated out."""
         return float(self.misfit + np.linalg.slogdet(self.left)[1] - np.linalg.slogdet(self.stiff)[1])
+
+    def is_near(self, end: Shared) -> bool:
+        """Whether a descent has ended nearby."""
+        apart_px = float(np.median(self.shift_px)) - float(np.median(end.shift_px))
+        return abs(apart_px) < _SAME_PX and abs(self.log_blur - np.log(end.blur_px)) < _SAME_BLUR
 
     def moved(self, step_px, by_blur: float) -> "_Point":
         """The point a step farther on, weighed as here."""

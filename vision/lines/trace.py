@@ -68,14 +68,16 @@ class Traced:
 
 
 def trace(pieces: Pieces, knots: Knots, blur_px: float = _BLUR_PX, blur_sigma: float = BLUR_SIGMA,
-          terms: int = WIRE_WAVES, *, last: bool = True) -> Traced:
+          terms: int = WIRE_WAVES, *, seen_blur_px: float | None = None, last: bool = True) -> Traced:
     """Where the rod is that shows in these pieces, a few pixels off at most.
 
-    blur_px: what the lens blur is believed to be, to blur_sigma of its logarithm. All steps are taken with averaged
-    pixels, but for the last where this is the last look.
+    blur_px: what the lens blur is believed to be, to blur_sigma of its logarithm; seen_blur_px: what it was in an
+    earlier look that told where these pieces are expected, which are then some tenths of a pixel off at most. All steps
+    are taken with averaged pixels, but for the last where this is the last look.
     """
     rough, blurred = binned(pieces, _BIN_PX)
-    solved = solve_jointly(Task(rough, terms, knots, float(np.hypot(blur_px, np.sqrt(blurred))), blur_sigma), last=last)
+    believed, seen = (one and float(np.hypot(one, np.sqrt(blurred))) for one in (blur_px, seen_blur_px))
+    solved = solve_jointly(Task(rough, terms, knots, believed, blur_sigma, seen), last=last)
     blur_px = without(solved.blur_px, blurred)
     if last:
         solved = settled(Task(pieces, terms, knots, blur_px, blur_sigma), replace(solved, blur_px=blur_px))

@@ -20,6 +20,10 @@ _SURE_SIGMAS = 4.0  # of touch: which frames surely come before a wanted angle, 
 _CHANCE = 1e-3  # of frames that scatter as far as their sigmas let them
 Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 _FEWEST_FOR_PARABOLA = 5  # frames: two more than it has coefficients
+_FEWEST_FOR_SCATTER = 12  # frames: nine more than a parabola has coefficients, Student's t is 15 % above the normal
+
+
+_ANGLES = ("phi", "alpha")  # of FIELDS; the others are lengths
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,33 +117,54 @@ def _local_fit(theta, at):
 
 def _scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
     """One sigma of how far a value between the frames may be from the local fit: as far as the frames are. Where chance
-    hardly leaves them that far, small jumps do, of which so few frames tell the size by Student's t only."""
-    left, freedom = _unfitted(smooth, name, theta_rad), _beside_fit(smooth, smooth.values[name], theta_rad)[1]
-    expected = expected_scatter(smooth, name, theta_rad)
-    if not freedom or freedom * left**2 <= chdtri(freedom, _CHANCE) * expected**2:
-        return left
-    return float(stdtrit(freedom, 0.975) / Z_95 * np.sqrt(left**2 - expected**2))
+    hardly leaves them that far, small jumps do: each frame's own moves the fit, too, and so few frames tell their size
+    by Student's t only."""
+    found = scatter(smooth, name, theta_rad)
+    if not found.freedom or found.freedom * found.left**2 <= chdtri(found.freedom, _CHANCE) * found.expected**2:
+        return found.left
+    weights = _local_fit(smooth.theta_rad, theta_rad)[0] / _growth(smooth, name, theta_rad)
+    of_jumps = (found.left**2 - found.expected**2) * (1.0 + weights @ weights)
+    return float(stdtrit(found.freedom, 0.975) / Z_95 * np.sqrt(of_jumps))
 
 
-def _unfitted(smooth: Smooth, name: str, theta_rad: float) -> float:
-    """How far the frames scatter about the local fit: small jumps are in no frame's sigma, but in what lies between."""
-    left, freedom = _beside_fit(smooth, smooth.values[name], theta_rad)
-    return float(np.sqrt(np.sum(left**2) / freedom)) if freedom else 0.0
+@dataclass(frozen=True)
+class Scatter:
+    """How far frames are from a smooth curve, RMS at the wanted angle; how far where nothing jumps and they err as
+    their covariance says; degrees of freedom, 0 where there are no more frames than the curve has coefficients."""
+
+    left: float = 0.0
+    expected: float = 0.0
+    freedom: float = 0.0
 
 
-def expected_scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
-    """What `_unfitted` is, RMS, where nothing jumps and frames err as their covariance says."""
-    left, freedom = _beside_fit(smooth, smooth.jacobians[name], theta_rad)
-    return float(np.sqrt(np.einsum("fi,ij,fj->", left, smooth.covariance, left) / freedom)) if freedom else 0.0
+def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
+    """Of frames about theta, further than the local fit where those are few: small jumps are in no frame's sigma, but
+    in what lies between.
+
+    Teeth go from one friction angle to another: the force's angle jumps by as much in all of them, and lengths by as
+    much for their pushing angle. Each frame weighs as it is known. With weights W and the projection M off the curve,
+    what scatters by τ in all of them leaves τ² tr(M W²), with tr(M W²)² / tr((M W²)²) degrees of freedom.
+    """
+    near = _nearest(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
+    degree = _degree(int(np.sum(near)))
+    if np.sum(near) <= degree + 1:
+        return Scatter()
+    grows = _growth(smooth, name, theta_rad)[near]
+    rows = grows[:, None] * smooth.jacobians[name][near]
+    covariance = rows @ smooth.covariance @ rows.T
+    weights = 1.0 / np.sqrt(np.diag(covariance))
+    design = weights[:, None] * np.vander(smooth.theta_rad[near] / theta_rad - 1.0, degree + 1)
+    off = np.eye(len(design)) - design @ np.linalg.pinv(design)
+    left, by_noise = off @ (weights * grows * smooth.values[name][near]), off * np.outer(weights, weights) * covariance
+    alike = off * weights**2
+    total = np.trace(alike)
+    freedom = total**2 / np.sum(alike * alike.T)
+    return Scatter(float(np.sqrt(left @ left / total)), float(np.sqrt(np.sum(by_noise) / total)), float(freedom))
 
 
-def _beside_fit(smooth: Smooth, values: np.ndarray, theta_rad: float) -> tuple[np.ndarray, int]:
-    """What a polynomial through the frames nearby leaves of values (f, …) there, and how many frames are more than its
-    coefficients."""
-    near = _near(smooth.theta_rad - theta_rad)
-    x, degree = smooth.theta_rad[near] - theta_rad, _degree(int(np.sum(near)))
-    fit = np.polyfit(x, values[near], degree)
-    return values[near] - np.vander(x, degree + 1) @ fit, len(x) - degree - 1
+def _growth(smooth: Smooth, name: str, theta_rad: float) -> np.ndarray:
+    """What a quantity grows by from each frame's pushing angle (f,) to theta as the force keeps its direction."""
+    return np.ones(len(smooth.theta_rad)) if name in _ANGLES else theta_rad / smooth.theta_rad
 
 
 def _sigmas(smooth: Smooth, name: str, frames: np.ndarray, slope: float = 0.0) -> np.ndarray:
@@ -151,11 +176,15 @@ def _sigmas(smooth: Smooth, name: str, frames: np.ndarray, slope: float = 0.0) -
 
 def _near(x) -> np.ndarray:
     """Frames (f,) within the window of the angle, the two nearest where there are fewer."""
+    return _nearest(x, 2)
+
+
+def _nearest(x, fewest: int) -> np.ndarray:
+    """Frames (f,) within the window of the angle, so many of the nearest where there are fewer."""
     near = np.abs(x) <= _WINDOW_RAD
-    if np.sum(near) >= 2:
-        return near
-    near = np.zeros(len(x), dtype=bool)
-    near[np.argsort(np.abs(x))[:2]] = True
+    if np.sum(near) < fewest:
+        near = np.zeros(len(x), dtype=bool)
+        near[np.argsort(np.abs(x))[:fewest]] = True
     return near
 
 

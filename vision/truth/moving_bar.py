@@ -24,13 +24,14 @@ class BarInFrames:
     each: dict[int, BarMiddles] = field(default_factory=dict)
 
     def observed(self, axis: BarAxis, came_mm: np.ndarray, frames: Sequence[int],
-                 wires_px: Mapping[str, Sequence[np.ndarray]]) -> dict[str, list[tuple[int, int, LinePoints]]]:
+                 wires_px: Mapping[str, Sequence[np.ndarray]], *,
+                 last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
         """See `BarMiddles.observed`; in frame k the bar is came_mm[k] (f, 3) away from the axis."""
         found: dict[str, list] = {}
         for k in np.unique(np.linspace(0, len(frames) - 1, _MOST_FRAMES).round().astype(int)).tolist():
             there = BarAxis(axis.point_mm + came_mm[k], axis.direction)
             wires = {name: [lines[k]] for name, lines in wires_px.items()}
-            for name, sides in self._in(frames[k]).points(there, wires).items():
+            for name, sides in self._in(frames[k]).points(there, wires, last=last).items():
                 found.setdefault(name, []).extend((k, side, points) for side, points in sides.items())
         return found
 

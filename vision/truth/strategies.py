@@ -33,22 +33,32 @@ STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
 @dataclass
 class BarMiddles:
-    """The bar by its middle in each view; lines: as measured the time before, by which they are measured finely."""
+    """The bar by its middle in each view; lines: as measured the time before, by which they are measured finely; are
+    they so, they stay: another look at the same pixels tells nothing new."""
 
     views: Sequence[View]
     radius_mm: float
     settings: VisionSettings
     lines: dict[str, BarLine] = field(default_factory=dict)
+    are_fine: bool = False
 
-    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]]) -> dict[str, dict[int, LinePoints]]:
-        """By camera and side of the bar (0: its middle, see `Observed`), about an axis. See `measure_bars`."""
-        self.lines = measure_bars(self.views, axis, self.radius_mm, wires_px, self.settings, self.lines)
+    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *,
+               last: bool) -> dict[str, dict[int, LinePoints]]:
+        """By camera and side of the bar (0: its middle, see `Observed`), about an axis. See `measure_bars`.
+
+        last: nothing is measured after it, so it is finely, too, where it is the first.
+        """
+        looks = 0 if self.are_fine else 2 if last and not self.lines else 1
+        for _ in range(looks):
+            self.are_fine = bool(self.lines)
+            self.lines = measure_bars(self.views, axis, self.radius_mm, wires_px, self.settings, self.lines)
         return {name: {0: line.points} for name, line in self.lines.items() if line.is_bar}
 
     def observed(self, axis: BarAxis, came_mm: np.ndarray, frames: Sequence[int],
-                 wires_px: Mapping[str, Sequence[np.ndarray]]) -> dict[str, list[tuple[int, int, LinePoints]]]:
+                 wires_px: Mapping[str, Sequence[np.ndarray]], *,
+                 last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
         """By camera (frame of the fit, side, points) of the bar's lines; one that stands is seen in no frame alone."""
-        seen = self.points(axis, wires_px)
+        seen = self.points(axis, wires_px, last=last)
         return {name: [(0, side, points) for side, points in sides.items()] for name, sides in seen.items()}
 
 
@@ -56,9 +66,10 @@ class BarEdges(BarMiddles):
     """The bar by its two edges (sides -1 and 1), which tell how far away it is; by its middle where these are not
     seen."""
 
-    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]]) -> dict[str, dict[int, LinePoints]]:
+    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *,
+               last: bool) -> dict[str, dict[int, LinePoints]]:
         """See `BarMiddles.points`."""
-        found = super().points(axis, wires_px)
+        found = super().points(axis, wires_px, last=last)
         for view in self.views:
             name = view.camera.name
             edges = measure_edges(view, axis, self.radius_mm, wires_px[name], self.settings)

@@ -1,7 +1,7 @@
 """One whisk: wire and bar traced in all its frames and fitted together, by turns."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,8 +32,8 @@ _MOST_SCATTER_PX = 0.7  # where a wire is seen at all its points lie on one line
 @dataclass(frozen=True)
 class _Look:
     """What is taken for known before a round: bar, and where it is in each frame from there (f, 3) if it moves, rest
-    shape (2, 4), bend (f, 2) and contact arc (f,) in each frame, the curves by frame, and which frames touch or are
-    free (f,)."""
+    shape (2, 4), bend (f, 2) and contact arc (f,) in each frame, the curves by frame, which frames touch or are free
+    (f,), and by a round before each camera's lens blur, px."""
 
     axis: BarAxis
     came_mm: np.ndarray
@@ -43,6 +43,7 @@ class _Look:
     curves: Mapping[int, Curves]
     touching: np.ndarray
     free: np.ndarray
+    blur_px: Mapping[str, float] = field(default_factory=dict)
 
 
 def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
@@ -78,7 +79,8 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, touch: Touch
         _check_scatter(problem, state)
         look = _Look(upward(bar_axis(problem, state.vector)), shifts_mm(problem, state.vector),
                      rest_shape(state.vector), bends(problem, state.vector), state.arcs_mm,
-                     _fitted_curves(problem, state, whisk.frames), *touch.parted(problem, state, answer))
+                     _fitted_curves(problem, state, whisk.frames), *touch.parted(problem, state, answer),
+                     _blurs_px(whisk))
     return FittedWhisk.of(*_fit(whisk, look, _trace_all(whisk, bar, look, last=True), touch), whisk.frames)
 
 
@@ -123,7 +125,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     whisk = whisk.during([f for f in whisk.frames if f not in touched])
     rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
     curves = {f: one_curve(rest, np.zeros(2), wire.length_mm, angle, wire) for f, angle in whisk.motor.items()}
-    seen = [one for view in whisk.views for one in trace_wire(whisk, view, axis, curves)]
+    seen = [one for view in whisk.views for one in trace_wire(whisk, view, axis, curves, _blurs_px(whisk))]
     nothing = np.zeros(len(curves), dtype=bool)
     alone = replace(problem, motor_rad=whisk.angles_rad, touching=nothing, bent=nothing, seen=seen,
                     motion=whisk.motion)
@@ -137,6 +139,11 @@ def _fitted_curves(problem: Problem, state: State, frames: Sequence[int]) -> dic
     return {f: curves.one(k) for k, f in enumerate(frames)}
 
 
+def _blurs_px(whisk: WhiskPictures) -> dict[str, float]:
+    """The lens blur of each camera in which the wire was traced."""
+    return {name: light.blur_px for name, light in whisk.light.items()}
+
+
 def _begin(problem: Problem, look: _Look) -> State:
     vector = np.zeros(problem.size)
     vector[BAR:BAR + REST] = np.ravel(look.rest_mm)
@@ -148,10 +155,10 @@ def _trace_all(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, look: _Look,
     """Line points of wire and bar in all cameras. Raises Refused where one of them is seen in none."""
     wires_px = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
                 for view in whisk.views}
-    bars = bar.observed(look.axis, look.came_mm, list(look.curves), wires_px)
+    bars = bar.observed(look.axis, look.came_mm, list(look.curves), wires_px, last=last)
     seen = []
     for number, view in enumerate(whisk.views):
-        seen += trace_wire(whisk, view, look.axis, look.curves, last=last)
+        seen += trace_wire(whisk, view, look.axis, look.curves, look.blur_px, last=last)
         seen += [Observed(-1, number, points, side, frame) for frame, side, points in bars.get(view.camera.name, [])]
     require_both_rods(seen)
     return seen
@@ -165,11 +172,12 @@ def require_both_rods(seen: Sequence[Observed]) -> None:
             raise Refused(f"no camera shows enough of the {rod}")
 
 
-def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[int, Curves], *,
-               last: bool = True) -> list[Observed]:
+def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[int, Curves],
+               seen_blur_px: Mapping[str, float] | None = None, *, last: bool = True) -> list[Observed]:
     """Line points of the wire in one of a whisk's cameras, by frame, beside curves in each of them.
 
-    Fills whisk.light with how that camera sees the wire.
+    seen_blur_px: by camera, of an earlier look that told the curves. Fills whisk.light with how the camera sees the
+    wire.
     """
     wire, settings = whisk.rods.wire, whisk.settings
     pieces = wire_pieces(view, curves, wire, settings.wire_piece_px, settings.wire_margin_px)
@@ -179,7 +187,7 @@ def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[
     if len(pieces) == 0:
         return []
     knots = Knots.of_turning(np.arange(NEAR_CLAMP_MM, wire.length_mm, _WIRE_KNOT_MM), whisk.motor)
-    traced = trace(pieces, knots, last=last)
+    traced = trace(pieces, knots, seen_blur_px=(seen_blur_px or {}).get(view.camera.name), last=last)
     whisk.light[view.camera.name] = WireAppearance(traced.blur_px, seen_width(traced.pieces, traced.blur_px),
                                                    float(np.sqrt(traced.misfit)))
     points, source = to_points(traced)

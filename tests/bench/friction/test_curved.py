@@ -8,7 +8,8 @@ import pytest
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction.curved import TOO_FEW, curved
-from bench.records.trial import FeltAt
+from bench.friction.turning import turn, with_turn
+from bench.records.trial import EstimateRow, FeltAt
 from bench.rig.simulate import simulate
 from bench.session.whisker import Whisker
 from estimator import curvature
@@ -85,3 +86,16 @@ def test_the_radius_of_a_thick_bar_is_felt(tmp_path):
     assert held["lateral_per_mm"] == "" and "does not slip" in held["status"]
     for row in slipping:
         assert abs(float(row["lateral_per_mm"])) < 2 * float(row["lateral_sigma_per_mm"])
+
+
+@pytest.mark.parametrize("r_n, told", [(1.0, True), (1e6, False)])
+def test_an_estimate_against_what_turns_the_slip_angle_says_so(r_n, told):
+    """At κ_n = 1 φ turns by about sin β_0 a radian, 2° at θ = 3°, of which (10) knows nothing: 2 % of d_x."""
+    felt = felt_on_circle(r_n, np.radians(40.0), 0.005)
+    (at,) = (one for one in felt if one.theta_rad == THETAS[2])
+    row = EstimateRow("with_friction", Value(D_X, 0.5), alpha_est_rad=ALPHA)
+    phi = float(np.arctan2(at.m_y_Nmm.value, at.m_z_Nmm.value))
+    said = with_turn(row, phi, turn(felt), at.theta_rad)
+    assert ("phi turns by" in said.status) == told
+    unsure = EstimateRow("with_friction", Value(D_X, 10.0), alpha_est_rad=ALPHA)
+    assert with_turn(unsure, phi, turn(felt), at.theta_rad).status == ""

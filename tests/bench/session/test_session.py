@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
+from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.session.session import load_session
 from bench.session.trial import Trial
@@ -47,6 +48,17 @@ def test_natural_order_of_trials(small_copy):
         (small_copy / "trials" / name).rename(small_copy / "trials" / f"w{10 if name == 'b30_3' else 9}")
     names = [trial.name for trial in load_session(small_copy).trials]
     assert names == ["gauge_roll0", "gauge_roll90", "w9", "w10"]
+
+
+def test_trials_come_in_the_order_of_the_sessions_surfaces(small_copy):
+    for name, surface in (("b30_3", "sandpaper"), ("b60_4", "steel")):
+        manifest = small_copy / "trials" / name / "trial.toml"
+        replace(manifest, 'surface = "steel"', f'surface = "{surface}"')
+    replace(small_copy / "session.toml", "format = 1", 'format = 1\nsurfaces = ["steel", "sandpaper", "glas"]')
+    doubts = Doubts(stop_at_first=False)
+    names = [t.name for t in load_session(small_copy, doubts).trials if t.purpose == "measure"]
+    assert names == ["b60_4", "b30_3"]
+    assert [note for note in doubts.notes if "'glas'" in note and "sandpaper, steel" in note]
 
 
 def test_defaults_of_the_session_yield_to_the_trial(small_copy):

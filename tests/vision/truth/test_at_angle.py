@@ -3,40 +3,58 @@
 import numpy as np
 import pytest
 
-from vision.truth.at_angle import Smooth, _scatter, _unfitted, at_angle, expected_scatter
+from vision.truth.at_angle import Smooth, _scatter, at_angle, scatter
 from vision.truth.value import FIELDS
 
 THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
 
 
-def frames(covariance: np.ndarray, slip: np.ndarray) -> Smooth:
-    """Each frame's slip is one of the parameters."""
+def frames(covariance: np.ndarray, values: np.ndarray, name: str) -> Smooth:
+    """Each frame's value is one of the parameters."""
     size = len(THETA_RAD)
-    return Smooth(THETA_RAD, np.zeros(size), {"slip": slip}, {"slip": np.eye(size)}, covariance)
+    return Smooth(THETA_RAD, np.zeros(size), {name: values}, {name: np.eye(size)}, covariance)
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.8])
 def test_scatter_expected_is_that_of_draws(shared):
-    """RMS over 4000 draws of a mean square with 4 degrees of freedom: known to 1 %, four times that. What all frames
-    share is no scatter."""
-    size, rng = len(THETA_RAD), np.random.default_rng(2)
+    """RMS over 1000 draws of a mean square with 8 degrees of freedom: known to 0.8 %, four times that. What all frames
+    share is no scatter of an angle."""
+    size, rng, wanted = len(THETA_RAD), np.random.default_rng(2), np.radians(3.0)
     covariance = 0.01**2 * ((1.0 - shared) * np.eye(size) + shared * np.ones((size, size)))
-    draws = rng.multivariate_normal(np.zeros(size), covariance, size=4000)
-    seen = [_unfitted(frames(covariance, 0.3 * THETA_RAD**2 + one), "slip", np.radians(3.0)) for one in draws]
-    expected = expected_scatter(frames(covariance, draws[0]), "slip", np.radians(3.0))
-    assert np.sqrt(np.mean(np.square(seen))) == pytest.approx(expected, rel=0.04)
-    assert expected == pytest.approx(0.01 * np.sqrt(1.0 - shared))
+    draws = rng.multivariate_normal(np.zeros(size), covariance, size=1000)
+    seen = [scatter(frames(covariance, 0.3 * THETA_RAD**2 + one, "phi"), "phi", wanted) for one in draws]
+    assert np.sqrt(np.mean([one.left**2 for one in seen])) == pytest.approx(seen[0].expected, rel=0.03)
+    assert seen[0].expected == pytest.approx(0.01 * np.sqrt(1.0 - shared))
+    assert seen[0].freedom == pytest.approx(size - 3)
 
 
-def test_small_jumps_that_few_frames_show_are_known_by_students_t():
-    """Frames to and fro by far more than their sigmas, too little to be jumps: left over four degrees of freedom, the
-    line's t of 2.78 over 1.96. As far as chance lets them, their scatter stands as it is."""
-    size = len(THETA_RAD)
-    zigzag = 0.01 * (-1.0) ** np.arange(size)
-    for sigma, widened in ((1e-6, 2.776 / 1.960), (0.01, 1.0)):
-        smooth = frames(sigma**2 * np.eye(size), zigzag)
-        left = _unfitted(smooth, "slip", np.radians(3.0))
-        assert _scatter(smooth, "slip", np.radians(3.0)) == pytest.approx(widened * left, rel=1e-3)
+@pytest.mark.parametrize("name", ["phi", "slip"])
+def test_small_jumps_that_few_frames_show_are_known_by_students_t(name):
+    """Frames to and fro by far more than their sigmas, too little to be jumps, lengths as their pushing angles: left
+    over 8 degrees of freedom, the parabola's t of 2.306 over 1.960, and each of the seven frames nearby moves the local
+    fit at its middle by what a parabola's weights are, Σ w² = 1/3. As far as chance lets them, their scatter stands."""
+    wanted = np.radians(3.0)
+    zigzag = 0.01 * (-1.0) ** np.arange(len(THETA_RAD)) * (THETA_RAD / wanted if name == "slip" else 1.0)
+    for sigma, widened in ((1e-6, 2.306 / 1.960), (0.01, 1.0)):
+        own = sigma * (THETA_RAD / wanted if name == "slip" else np.ones(len(THETA_RAD)))
+        smooth = frames(np.diag(own**2), zigzag, name)
+        left = scatter(smooth, name, wanted).left
+        assert left == pytest.approx(0.01, rel=0.2)
+        with_fit = np.sqrt(4 / 3) if widened > 1.0 else 1.0
+        assert _scatter(smooth, name, wanted) == pytest.approx(widened * with_fit * left, rel=0.02)
+
+
+@pytest.mark.parametrize("first", range(8))
+def test_frames_in_step_with_teeth_are_told_by_those_further_away(first):
+    """Teeth of 3° in the force's angle, each a seventh longer than the one before, and frames of 1 mrad 0.7° apart:
+    about the wanted angle they may lie on a smooth line, over the stroke they do not."""
+    rng, ends = np.random.default_rng(first), 0.8 * 1.15 ** np.arange(40)
+    theta = np.radians(np.arange(0.1 + 0.08 * first, 4.9, 0.7))
+    tooth = np.searchsorted(np.radians(ends), theta)
+    phase = (np.degrees(theta) - np.append(0.0, ends)[tooth]) / np.diff(ends, prepend=0.0)[tooth]
+    smooth = Smooth(theta, np.zeros(len(theta)), {"phi": 0.5 - 0.05 * phase + 0.001 * rng.standard_normal(len(theta))},
+                    {"phi": np.eye(len(theta))}, 1e-6 * np.eye(len(theta)))  # fmt: skip
+    assert _scatter(smooth, "phi", np.radians(3.0)) > 0.01
 
 
 TOOTH_RAD, JUMP_MM, SIGMA_MM, TOUCH_RAD = np.radians(0.8), 0.3, 0.004, np.radians(0.02)
