@@ -22,7 +22,7 @@ from estimator.whisk import EstimatorSettings, Whisk
 ALIKE = "friction is not felt to turn round: there and back the moments are alike"
 NO_PUSH = "no push on one of both ways"
 NOWHERE = "the distance comes out nowhere on the whisker"
-_SURE_SIGMAS = 5.0  # of the moments' difference: its direction, and so β, to 0.2 rad
+_SURE_SIGMAS = 3.0  # of the moments' difference: a direction within its noise tells no slope
 _ROUGHEST_RAD = np.radians(30.0)  # friction angle: beyond those of the paper's surfaces
 _STEP = 1e-6  # of differences, in parts
 
