@@ -127,7 +127,9 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     """Figures where they are wanted, report and summary, which is returned. Results of a synthetic session are
     scored."""
     from bench.report.against_theta import write_against_theta
+    from bench.report.both_ways import both_ways_lines, ways_back, write_both_ways
     from bench.report.ledger import write_ledger
+    from bench.report.moving import moved_whisks, moving_lines, write_moving
     from bench.report.page.write import write_report
     from bench.report.record import record_of, write_record
     from bench.report.score import score
@@ -139,14 +141,18 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     by_theta, of_theta = write_against_theta(out, results, drawn=drawn)
     needed = write_ledger(out, results, evaluation.session.whisker)
     write_sensors(out, worth := sensors_worth(results, evaluation.friction))
+    write_both_ways(out, back := ways_back(results))
+    moved = moved_whisks(evaluation.session, results)
     figures = [
         *(_figures(evaluation, pool) if drawn else []),
         *of_theta,
+        *write_moving(out, moved, drawn=drawn),
         *write_explained(out, results, evaluation.session.whisker, drawn=drawn),
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
     scores = score(evaluation.session, out, evaluation.gauges)
-    summary = summary_of(evaluation, scores, figures, by_theta, needed, worth)
+    others = tuple(moving_lines(moved)), tuple(both_ways_lines(back))
+    summary = summary_of(evaluation, scores, figures, by_theta, needed, worth, *others)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)
     if figure_formats:

@@ -27,6 +27,15 @@ class OtherSensors:
     rate_covariance: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class ObjectMotion:
+    """How an object moves while it is touched: (3,) mm per radian of the motor, with covariance (3, 3); x along the
+    whisker at touch, y the way it pushes, z up."""
+
+    per_rad_mm: np.ndarray
+    covariance_mm2: np.ndarray
+
+
 @dataclass(frozen=True)
 class Whisk:
     """One forward stroke against an object, as a robot feels it.
@@ -36,8 +45,9 @@ class Whisk:
     the pushing angle wanted; m_y_at_Nmm, m_z_at_Nmm: moments there; covariance_at (2, 2): theirs, in the
     order y, z, in (N·mm)²; theta_sigma_rad: of the pushing angle, felt touch included;
     theta_moment_covariance_at (2,): of the pushing angle with m_y and m_z, in rad·N·mm. others: what other sensors
-    tell, None where nobody asked. Raises ValueError where shapes disagree or a sigma is negative. The arrays are
-    copies that cannot be written to: what one estimator does with them is no other's concern.
+    tell, None where nobody asked. object_motion: None where the object stands. Raises ValueError where shapes disagree
+    or a sigma is negative. The arrays are copies that cannot be written to: what one estimator does with them is no
+    other's concern.
     """
 
     time_s: np.ndarray
@@ -52,6 +62,7 @@ class Whisk:
     beam: Beam
     theta_moment_covariance_at: np.ndarray = field(default_factory=lambda: np.zeros(2))
     others: OtherSensors | None = None
+    object_motion: ObjectMotion | None = None
 
     def __post_init__(self):
         shapes = {np.shape(a) for a in (self.time_s, self.theta_rad, self.m_y_Nmm, self.m_z_Nmm)}

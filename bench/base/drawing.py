@@ -21,6 +21,7 @@ COLOURS = {
     "with_friction_fitted": "#67a9cf",
     "with_friction_seen": "#35978f",
     "with_friction_kinetic": "#999999",
+    "known_motion": "#1b7837",
 }
 OTHER_COLOURS = ("#1b7837", "#762a83", "#8c510a", "#01665e")
 LABELS = {
@@ -34,6 +35,8 @@ LABELS = {
     "touch_alone": "touch alone",
     "moment_rate": "rate of the moment",
     "force_and_moment": "force and moment",
+    "known_motion": "(10), motion known",
+    "both_ways": "there and back",
     "estimator.builtin:printed_17": "(17) as printed",
 }
 _STYLE = {

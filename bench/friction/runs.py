@@ -19,11 +19,11 @@ from bench.friction.surfaces import Surface, surfaces
 from bench.friction.turning import turn, with_turn
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, answer
+from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, answer, whisk_of
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.uncertainty import Z_95
-from estimator.whisk import EstimatorSettings, Whisk
+from estimator.whisk import EstimatorSettings
 from vision.truth.value import Value
 
 GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
@@ -159,11 +159,3 @@ def told_of(result: TrialResult) -> EstimatorSettings:
     radii_mm = _radii_mm(result)
     reach_mm = OBJECT_REACH_MM if np.isnan(radii_mm[0]) else sum(radii_mm)
     return EstimatorSettings(0.0, 0.0, reach_mm, TILT_SIGMA_RAD, *radii_mm)
-
-
-def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
-    """The whisk at the wanted angle: all that (10) looks at."""
-    no_samples = (np.zeros(0),) * 4
-    moments = felt.m_y_Nmm.value, felt.m_z_Nmm.value
-    covariances = felt.covariance_at, felt.theta_sigma_rad, beam, felt.theta_moment_covariance_at
-    return Whisk(*no_samples, theta_rad, *moments, *covariances)

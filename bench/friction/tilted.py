@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.tables import write_table
-from bench.friction.runs import told_of, whisk_of
+from bench.friction.runs import told_of
 from bench.gauges.readings import NOMINAL_SHARE
 from bench.records.trial import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.session import Session
 from bench.trials.compare import is_sound
+from bench.trials.estimates import whisk_of
 from estimator.two_tilts import SharedContact, shared_contact
 from vision.geometry.counted import counted
 

@@ -10,7 +10,7 @@ import numpy as np
 from bench.base.settings import Settings
 from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.rails import off_the_rails
-from bench.session.signals import Signals, back_stroke, forward_strokes
+from bench.session.signals import Signals, back_stroke, forward_strokes, ways_back
 from bench.session.trial import Trial
 from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
 from vision.truth.records import FrameTruth
@@ -120,6 +120,23 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: boo
         way_back = signals.time_s[back], signals.motor_rad[back], channels[back]
         strokes.append(_levelled(stroke, *way_back) if level else stroke)
     return strokes
+
+
+def ways_back_of(signals: Signals, trial: Trial, settings: Settings) -> list[Stroke | None]:
+    """The way back after each forward stroke, run backwards, so that the whisker comes to the object; None where none
+    was recorded. Its zero is that of the free stroke after it lets go."""
+    channels, found = np.stack([signals.y, signals.z], axis=1), []
+    for where in ways_back(signals):
+        if where is None:
+            found.append(None)
+            continue
+        mine = off_the_rails(channels[where]) if signals.kind == "V" else channels[where]
+        time, motor = signals.time_s[where], signals.motor_rad[where]
+        cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
+        smooth = _lowpass(mine, signals.rate_Hz, cutoff_Hz)
+        forces = None if signals.forces_N is None else signals.forces_N[where][::-1]
+        found.append(Stroke(time[-1] - time[::-1], motor[::-1], mine[::-1], smooth[::-1], forces_N=forces))
+    return found
 
 
 def _levelled(stroke: Stroke, time_s, motor_rad, channels) -> Stroke:

@@ -62,7 +62,7 @@ def _field(kind: type, field: Field, hint: Any, table: Mapping) -> list:
         return []
     if field.name not in table:
         raise ValueError(f"{kind.__name__}: {field.name} is missing")
-    if hint is Value:
+    if hint in (Value, Value | None):
         return [Value(_number(table[field.name]), _number(table.get(sigma_name(field.name))))]
     return [_read(hint, table[field.name])]
 

@@ -101,6 +101,7 @@ class SeenWhisk:
     lines: dict[str, LineNoise] = field(default_factory=dict)
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
+    velocity_mm_s: Value | None = None
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
@@ -145,7 +146,7 @@ class SeenTrial:
     """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
 
     bar_looks: how thick the bar looks over how thick it is said to be, by camera. back: the first back stroke, where it
-    was recorded and has a truth.
+    was recorded and has a truth. ways_back: the way back of each whisk, run backwards, where they are asked for.
     """
 
     whisks: tuple[SeenWhisk, ...]
@@ -156,6 +157,7 @@ class SeenTrial:
     clock: Clock | None = None
     bar_looks: dict[str, Value] = field(default_factory=dict)
     back: BackStroke | None = None
+    ways_back: tuple[SeenWhisk, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -247,10 +249,11 @@ class FeltWhisk:
 
 @dataclass(frozen=True, eq=False)
 class FeltTrial:
-    """The felt half of a trial. back_touch_rad: felt touch of the first back stroke."""
+    """The felt half of a trial. back_touch_rad: felt touch of the first back stroke. ways_back: see `SeenTrial`."""
 
     whisks: tuple[FeltWhisk, ...]
     back_touch_rad: Value = UNKNOWN
+    ways_back: tuple[FeltWhisk, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,12 +26,18 @@ _STRAIGHT = np.zeros((3, 3))  # how the axis of a straight bar turns
 @dataclass(frozen=True)
 class Bar:
     """A round bar in the rig frame: a point of its axis, the axis' unit direction (its z positive), its radius, and how
-    stiff its surface is: it gives way by force over stiffness, along its normal, where the whisker presses."""
+    stiff its surface is: it gives way by force over stiffness, along its normal, where the whisker presses.
+
+    velocity_mm_rad (3,): of a bar that moves, per radian of the motor's steady way; it is at its point at first touch,
+    motor angle touch_rad. None: it stands.
+    """
 
     point_mm: np.ndarray
     axis: np.ndarray
     radius_mm: float
     stiffness_N_mm: float = math.inf
+    velocity_mm_rad: np.ndarray | None = None
+    touch_rad: float = 0.0
 
     @classmethod
     def placed(
@@ -57,6 +63,21 @@ class Bar:
         axis = pose[:, :3].T @ self.axis
         point = pose[:, :3].T @ (self.point_mm - pose[:, 3])
         return replace(self, point_mm=point, axis=axis if axis[2] >= 0 else -axis)
+
+    def moving(self, velocity_mm_rad: np.ndarray, touch_rad: float) -> "Bar":
+        """The bar as one that moves."""
+        return replace(self, velocity_mm_rad=np.asarray(velocity_mm_rad, float), touch_rad=touch_rad)
+
+    def moved_mm(self, motor_rad: float | np.ndarray) -> np.ndarray:
+        """How far (..., 3) a bar that moves has come since first touch, at motor angles."""
+        since = np.asarray(motor_rad, float)[..., None] - self.touch_rad
+        return since * (np.zeros(3) if self.velocity_mm_rad is None else self.velocity_mm_rad)
+
+    def at(self, motor_rad: float) -> "Bar":
+        """The bar where it is at a motor angle, standing."""
+        if self.velocity_mm_rad is None:
+            return self
+        return replace(self, point_mm=self.point_mm + self.moved_mm(motor_rad), velocity_mm_rad=None)
 
     def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
         """The axis' points nearest to points (..., 3)."""

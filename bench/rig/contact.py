@@ -96,11 +96,14 @@ class Contact:
 
     def foot_side(self, state: ContactState) -> float:
         """Positive where the bar's nearest point lies behind the contact along the whisker, negative ahead of it."""
-        return float((state.point_mm - self.bar.foot_mm(state.point_mm)) @ state.tangent)
+        foot = self.bar.at(state.motor_rad).foot_mm(state.point_mm)
+        return float((state.point_mm - foot) @ state.tangent)
 
     def _solve(self, motor_rad, old, unknowns, law, tip):
         """Newton's method with Deuflhard's monotonicity test: a step is halved until the next one would be smaller."""
-        problem = _Problem(self, _turn(motor_rad), old, law, tip)
+        bar = self.bar
+        went = bar.moved_mm(motor_rad) - bar.moved_mm(old.motor_rad)
+        problem = _Problem(self, bar.at(motor_rad), went, _turn(motor_rad), old, law, tip)
         here = problem.at(unknowns, old.angle)
         for _ in range(40):
             step = solved(here.jacobian, here.residual)
@@ -175,9 +178,11 @@ class _Here:
 
 @dataclass(frozen=True)
 class _Problem:
-    """What stays the same while Newton's method runs."""
+    """What stays the same while Newton's method runs. bar: where it is now; went: how far it has come since `old`."""
 
     contact: Contact
+    bar: Bar
+    went: np.ndarray
     turn: np.ndarray
     old: ContactState
     law: Sliding | Oiled | Held
@@ -186,7 +191,7 @@ class _Problem:
     def at(self, unknowns, angle) -> _Here:
         """The equations at unknowns, the elastica starting from `angle`."""
         pose = _Pose.of(self.contact, self.turn, unknowns, angle)
-        bar = self.contact.bar
+        bar = self.bar
         apart, flat, axis, turning = bar.around(pose.point)
         axis_by = turning @ pose.point_by
         distance = math.sqrt(apart @ apart)
@@ -221,9 +226,10 @@ class _Problem:
         return press, press_by, shear, np.stack([way @ force_by + force @ by for way, by in (along, around)])
 
     def _motion(self, arc, pose, along, around):
-        """How far the material that is now at the contact has moved since `old`. The old rod was straight there."""
+        """How far the material that is now at the contact has moved over the bar since `old`. The old rod was straight
+        there."""
         old = self.old
-        moved = pose.point - old.point_mm - old.tangent * (arc - old.arc_mm)
+        moved = pose.point - old.point_mm - old.tangent * (arc - old.arc_mm) - self.went
         moved_by = pose.point_by.copy()
         moved_by[:, 3] -= old.tangent
         motion = np.array([moved @ way for way, _ in (along, around)])

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 # As far as the march finds its way (docs/extremes.md): at a slope of 89.5° it does, at a tilt of 85° no more.
 _STEEPEST_DEG, _MOST_TILT_DEG, _NEAREST = 89.0, 80.0, 0.02
+# Of the whisker's own speed at the contact: a bar that runs away as fast is never touched.
+_FASTEST_SHARE = 0.5
 
 def check_protocol(protocol: "Protocol", path: Path) -> None:
     """Raises BadInput, naming the file, for what no rig can do, or what its mechanics here do not cover."""
@@ -53,7 +55,26 @@ def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
     if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:
         found = f"found {run.before_deg:g} and {run.after_deg:g}"
         raise BadInput(f"the motor's before_deg is 0.1 to 90 and its after_deg 0.1 to 25; {found}", file=path)
+    _check_moving(protocol, run, path)
     if pictures.before_deg > run.before_deg or pictures.after_deg > run.after_deg:
         raise BadInput("pictures: before_deg and after_deg are at most the motor's", file=path)
     if math.isclose(sum(abs(x) for x in protocol.light.towards), 0):
         raise BadInput("light: towards is a direction, not zero", file=path)
+
+
+def _check_moving(protocol: "Protocol", run: "Run", path: Path) -> None:
+    """The march goes by the motor's angle: a bar moves by it as long as the motor goes steadily one way."""
+    velocity = run.table.object_velocity_mm_s
+    if not velocity:
+        return
+    if protocol.goes_back(run) or protocol.motor.ramp_s or protocol.motor.pause_s:
+        found = "is simulated for single forward strokes without ramps and pauses"
+        raise BadInput(f"object_velocity_mm_s: an object that moves {found}", file=path)
+    if protocol.columns:
+        raise BadInput("object_velocity_mm_s: an object that moves is simulated for one whisker", file=path)
+    if run.table.stiffness_N_mm:
+        raise BadInput("object_velocity_mm_s: an object that moves is rigid; leave out stiffness_N_mm", file=path)
+    fastest = _FASTEST_SHARE * math.radians(run.speed_deg_s) * run.d_x_mm
+    if math.hypot(*velocity) > fastest:
+        found = f"{math.hypot(*velocity):.3g} mm/s, {fastest:.3g} is allowed: half the whisker's own where it touches"
+        raise BadInput(f"object_velocity_mm_s: {found}", file=path)

@@ -201,7 +201,7 @@ class March:
 
     def _hub_axes(self, state):
         """Normal of the contact and axis of the bar in the hub frame."""
-        bar = self.contact.bar
+        bar = self.contact.bar.at(state.motor_rad)
         apart = state.point_mm - bar.foot_mm(state.point_mm)
         axis = bar.axis_at(state.point_mm)
         return turned(apart / np.linalg.norm(apart), -state.motor_rad), turned(axis, -state.motor_rad)

@@ -111,9 +111,10 @@ class MarchedWhisk:
         down, returned = march.along(np.append(up[-2::-1], touch.motor_rad))
         return cls(rod, bar, touch, friction, forward, Instants.of(np.append(path[-1], down), [states[-1], *returned]))
 
-    def slip_mm(self, point_mm: np.ndarray) -> np.ndarray:
-        """Along the bar since first touch, in the direction that its axis has there."""
-        return (np.asarray(point_mm) - self.touch.point_mm) @ self.bar.axis_at(self.touch.point_mm)
+    def slip_mm(self, point_mm: np.ndarray, motor_rad: float | np.ndarray) -> np.ndarray:
+        """Along the bar since first touch, in the direction that its axis has there; over it where it moves itself."""
+        moved = np.asarray(point_mm) - self.touch.point_mm - self.bar.moved_mm(motor_rad)
+        return moved @ self.bar.axis_at(self.touch.point_mm)
 
     def way(self, back: bool) -> Instants:
         """The forward or the back stroke. Raises ValueError where there was no back stroke."""
@@ -124,7 +125,8 @@ class MarchedWhisk:
     def slip_at(self, theta_rad: float | np.ndarray) -> np.ndarray:
         """Slip (mm) on the forward stroke at pushing angles, NaN where it does not reach them."""
         motor = self.touch.motor_rad + np.asarray(theta_rad)
-        return np.interp(motor, self.forward.motor_rad, self.slip_mm(self.forward.point_mm), right=np.nan)
+        way = self.forward
+        return np.interp(motor, way.motor_rad, self.slip_mm(way.point_mm, way.motor_rad), right=np.nan)
 
     def centreline_mm(self, motor_rad: float, state: ContactState | None, arc_mm: np.ndarray) -> np.ndarray:
         """Points (n, 3) of the whisker at arc lengths (n,) in the rig frame, bent by the force of `state` or free."""

@@ -87,6 +87,11 @@ def trial_toml(recording: Recording) -> str:
              "d_x_mm": float(run.d_x_mm), "purpose": table.purpose}
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
+    if table.both_ways:
+        trial["both_ways"] = True
+    if recording.stated_velocity_mm_s is not None:
+        trial["object_velocity_mm_s"] = [round(float(v), 6) for v in recording.stated_velocity_mm_s]
+        trial["object_velocity_sigma_mm_s"] = table.object_velocity_sigma_mm_s or 0.0
     if table.purpose == "gauge":
         trial["follicle_roll_deg"] = table.follicle_roll_deg
     return tomli_w.dumps(trial)
@@ -150,7 +155,7 @@ def _truth_row(frame, whisk, time_s, motor_rad, back):
         values = [*[math.nan] * 5, 0.0, 0.0]
     else:
         moment = way.moment_Nmm[way.row_at(motor_rad)]
-        values = [*state.point_mm, float(whisk.slip_mm(state.point_mm)), state.arc_mm, *moment]
+        values = [*state.point_mm, float(whisk.slip_mm(state.point_mm, motor_rad)), state.arc_mm, *moment]
     first, rest = (",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values))
     status = "free" if state is None else state.status
     return f"{frame},{first},{int(state is not None)},{rest},{status}"

@@ -124,10 +124,12 @@ def _array_trial(job, number, folder):
 
 def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterator[np.ndarray]:
     """Frames of one camera, over all whisks of a trial, as the sensor gives them."""
-    studio, frames = job.studios[camera], recording.frames
-    setting = studio.setting(recording.bar, recording.bar.foot_mm(recording.touch.point_mm))
+    studio, frames, bar = job.studios[camera], recording.frames, recording.bar
+    middle = bar.foot_mm(recording.touch.point_mm)
+    still = studio.setting(bar, middle) if bar.velocity_mm_rad is None else None
     for number, (_, motor, whisk, back) in enumerate(frames):
         moments = moments_of(job.protocol, studio, recording, recording.whisks[whisk], motor, back)
+        setting = still or studio.setting(bar.at(motor), middle + bar.moved_mm(motor))
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
 
 

@@ -218,8 +218,12 @@ class TrialTable(Table):
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
+    # Absent where not given, so that protocols without them stay what they were:
     object: Literal["ring", "sphere"] | msgspec.UnsetType = msgspec.UNSET  # by default a straight bar
     ring_diameter_mm: Positive | msgspec.UnsetType = msgspec.UNSET  # of the circle that a ring's axis is
+    both_ways: bool | msgspec.UnsetType = msgspec.UNSET  # the way back is recorded, and to be evaluated
+    object_velocity_mm_s: Three | msgspec.UnsetType = msgspec.UNSET  # of the bar, rig frame; by default it stands
+    object_velocity_sigma_mm_s: Zero | msgspec.UnsetType = msgspec.UNSET  # of what trial.toml states of it, each way
     purpose: Literal["measure", "gauge"] = "measure"
     follicle_roll_deg: float = 0.0
     name: str = ""
@@ -255,7 +259,7 @@ class Protocol(Table, kw_only=True):
 
     def goes_back(self, run: "Run") -> bool:
         """Whether a trial's recording holds back strokes."""
-        return run.table.whisks > 1 or self.motor.back_stroke or self.pictures.back_stroke
+        return run.table.whisks > 1 or bool(run.table.both_ways) or self.motor.back_stroke or self.pictures.back_stroke
 
     def fingerprint(self) -> str:
         """Changes with any value."""

@@ -40,7 +40,8 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too."""
+    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too.
+    `stated_velocity_mm_s` (3,): of the bar, as trial.toml has it; None where it stands."""
 
     run: Run
     rod: Rod
@@ -50,6 +51,7 @@ class Recording:
     whisks: tuple[MarchedWhisk, ...]
     frames: Frames
     signals: np.ndarray
+    stated_velocity_mm_s: np.ndarray | None = None
 
     @classmethod
     def make(cls, protocol: Protocol, run: Run, rng: np.random.Generator) -> "Recording":
@@ -57,6 +59,8 @@ class Recording:
         rod = build.rod(protocol)
         bar, *near = placed_bar(protocol, run, rod, rng)
         touch = first_touch(rod, bar, *near)
+        if run.table.object_velocity_mm_s:
+            bar = bar.moving(np.array(run.table.object_velocity_mm_s) / math.radians(run.speed_deg_s), touch.motor_rad)
         stroke = _stroke(protocol, run, touch)
         frames = _frames(protocol, run, touch, stroke)
         return cls.pushed(protocol, run, rod, bar, touch, stroke, frames, build.gauges(protocol), rng)
@@ -74,7 +78,7 @@ class Recording:
         made = {friction: march(friction) for friction in dict.fromkeys(frictions)}  # whisks of one friction are alike
         whisks = tuple(made[friction] for friction in frictions)
         recorded = signals(protocol, run, stroke, whisks, gauges, rng)
-        return cls(run, rod, bar, touch, stroke, whisks, frames, recorded)
+        return cls(run, rod, bar, touch, stroke, whisks, frames, recorded, _stated_velocity(run.table, rng))
 
 
 def placed_bar(protocol: Protocol, run: Run, rod: Rod, rng: np.random.Generator) -> tuple[Bar, float, float]:
@@ -98,6 +102,13 @@ def _rounded(table, bar: Bar, touch_deg: float, d_x_mm: float) -> Bar:
         touched = turned(np.array([d_x_mm, 0.0, 0.0]), math.radians(touch_deg))
         return Ring.bent(bar, touched, 0.5 * table.ring_diameter_mm)
     return bar
+
+
+def _stated_velocity(table, rng) -> np.ndarray | None:
+    """What people say of a bar that moves."""
+    if not table.object_velocity_mm_s:
+        return None
+    return np.array(table.object_velocity_mm_s) + (table.object_velocity_sigma_mm_s or 0.0) * rng.standard_normal(3)
 
 
 def _stroke(protocol, run, touch):

@@ -145,8 +145,9 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
 def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels) -> Session:
     """The session as that whisker alone would have recorded it, in its base frame, without pictures."""
     own = tuple(
-        replace(trial, daq=channels[trial.name][base.name], whisker=base.name, camera_sources={}) for trial in trials
-    )
+        replace(trial, daq=channels[trial.name][base.name], whisker=base.name, camera_sources={},
+                object_velocity_mm_s=_turned(trial.object_velocity_mm_s, base)) for trial in trials
+    )  # fmt: skip
     return replace(
         session,
         name=f"{session.name}, whisker {base.name}",
@@ -156,3 +157,8 @@ def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels)
         base=base,
         **_NO_PICTURES,
     )
+
+
+def _turned(in_rig: Sequence[float] | None, base: Base) -> list[float] | None:
+    """A vector of the rig frame in a base's, where there is one."""
+    return None if in_rig is None else (base.T_rig_base[:, :3].T @ in_rig).tolist()

@@ -8,6 +8,7 @@ from bench.session import plausible
 from bench.session.strict_toml import Keys
 
 Row4 = Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]
+Triple = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 Pair = Annotated[list[float], msgspec.Meta(min_length=2, max_length=2)]
 Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 
@@ -151,6 +152,9 @@ class TrialKeys(Keys, kw_only=True):
     first_frame_s: float | None = None
     first_frame_sigma_s: float = 0.0
     gauge_filter_Hz: float | None = None
+    both_ways: bool = False
+    object_velocity_mm_s: Triple | None = None
+    object_velocity_sigma_mm_s: float = 0.0
     follicle_roll_deg: float = 0.0
     follicle_roll_sigma_deg: float = 0.0
     object: ObjectKeys | None = None
@@ -166,6 +170,7 @@ class TrialKeys(Keys, kw_only=True):
         "frame_rate_Hz": plausible.RATE,
         "first_frame_s": plausible.CLOCK,
         "gauge_filter_Hz": plausible.FILTER,
+        "object_velocity_mm_s": plausible.VELOCITY,
         "follicle_roll_deg": plausible.ANGLE,
     }
 

@@ -58,6 +58,7 @@ RATE = Window(1e-2, 1e6)
 FILTER = Window(0.0, 1e6)
 CLOCK = Window(-1e7, 1e7)
 EXPOSURE = Window(1e-7, 1.0, (MILLISECONDS, MICROSECONDS))
+VELOCITY = Window(-1e4, 1e4, (("metres per second", 1e3),))
 FORCE = Window(0.0, 1e3)
 SIGMA = Window(0.0, math.inf)
 

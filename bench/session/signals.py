@@ -62,9 +62,18 @@ def forward_strokes(signals: Signals) -> tuple[slice, ...]:
 
 def back_stroke(signals: Signals) -> slice | None:
     """Samples of the first back stroke that follows a forward one; None where none was recorded."""
+    return next(iter(ways_back(signals)[:1]), None)
+
+
+def ways_back(signals: Signals) -> tuple[slice | None, ...]:
+    """Samples of the back stroke that follows each forward one; None where none was recorded before the next."""
     forward = forward_strokes(signals)
     back = strokes.forward_strokes(-signals.motor_rad)
-    return next((where for where in back if forward and where.start >= forward[0].stop - 1), None)
+    ends = [*(where.start for where in forward[1:]), len(signals.motor_rad)]
+    return tuple(
+        next((where for where in back if there.stop - 1 <= where.start < end), None)
+        for there, end in zip(forward, ends)
+    )
 
 
 def read_signals(trial: Trial) -> Signals:

@@ -31,8 +31,10 @@ class Trial:
     """Settings of one recording; nominal values are None where not given, sigmas 0 where taken as exact.
 
     purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
-    the follicle was turned about the whisker. camera_sources: camera to folder of pictures or video, empty
-    where the trial has none. whisker: of an array, whose channels `daq` names; '' where there is one whisker.
+    the follicle was turned about the whisker. both_ways: each way back is evaluated, too. object_velocity_mm_s: (3,) in
+    the rig frame, of an object that moves at constant speed, with one sigma each way. camera_sources: camera to folder
+    of pictures or video, empty where the trial has none. whisker: of an array, whose channels `daq` names; '' where it
+    is the only one.
     """
 
     name: str
@@ -61,6 +63,9 @@ class Trial:
     first_frame_sigma_s: float
     gauge_filter_Hz: float | None
     object: StatedObject | None = None
+    both_ways: bool = False
+    object_velocity_mm_s: list[float] | None = None
+    object_velocity_sigma_mm_s: float = 0.0
     daq: DaqFile | None = None
     whisker: str = ""
 

@@ -172,6 +172,14 @@ def felt_at(whisk: Whisk, estimates: tuple[EstimateRow, ...] = ()) -> FeltAt:
     return FeltAt(whisk.theta_at_rad, *_moments(whisk), *covariances, estimates)
 
 
+def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
+    """The whisk at the wanted angle: all that (10) looks at."""
+    no_samples = (np.zeros(0),) * 4
+    moments = felt.m_y_Nmm.value, felt.m_z_Nmm.value
+    covariances = felt.covariance_at, felt.theta_sigma_rad, beam, felt.theta_moment_covariance_at
+    return Whisk(*no_samples, theta_rad, *moments, *covariances)
+
+
 def _slip_angle(whisk: Whisk) -> Value:
     """φ, equation (8), and its sigma."""
     m_y, m_z = whisk.m_y_at_Nmm, whisk.m_z_at_Nmm

@@ -12,7 +12,7 @@ from bench.gauges.felt import motor_speed
 from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.session import Session
-from bench.session.signals import Signals, back_stroke, forward_strokes
+from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.trial import Trial
 from bench.trials.consistency import cone_doubt, length_doubt, slope_doubt, turns_doubt, width_doubt, wire_doubt
 from bench.trials.scene import still_scene
@@ -60,17 +60,20 @@ def _see(
     wire = session.whisker.wire
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
     places = [times.frames_in(signals, stroke) for stroke in strokes]
-    back = _backwards(signals, times)
+    wanted = ways_back(signals) if trial.both_ways else ways_back(signals)[:1]
+    back = {k: where for k, one in enumerate(wanted) if (where := _backwards(signals, times, one)) is not None}
     pictures = TrialPictures(
         {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
         times.time_s,
         np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
         calibration.background,
+        trial.object_velocity_mm_s and np.array(trial.object_velocity_mm_s),
+        trial.object_velocity_sigma_mm_s,
     )
     rods = Rods(wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))
     observe = partial(observe_trial, pictures, cameras=calibration.cameras, rods=rods)
     first, *harder = [(one.name, replace(one.vision, clock_sigma_s=clock_sigma_s)) for one in rungs(settings)]
-    truth = observe(whisks=[*places, *back], settings=first[1])
+    truth = observe(whisks=[*places, *back.values()], settings=first[1])
     looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]
     for rung in harder:
         looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
@@ -87,7 +90,8 @@ def _see(
         0.5 * wire.diameter_mm,
         Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
         truth.bar_looks,
-        _touch_alone(truth.whisks[-1]) if back else None,
+        _touch_alone(truth.whisks[len(places)]) if 0 in back else None,
+        _seen_back(dict(zip(back, truth.whisks[len(places) :])), len(places), settings) if trial.both_ways else (),
     )
 
 
@@ -105,16 +109,21 @@ def _looked_harder(observe: Callable[..., TrialTruth], places, looked, rung, acc
     return [better.get(k, one) for k, one in enumerate(looked)]
 
 
-def _backwards(signals: Signals, times: FrameTimes) -> list[slice]:
-    """Frames of the first back stroke, last to first, so that the whisker comes to the bar; none where few were taken.
+def _seen_back(truths: dict[int, WhiskTruth], count: int, settings: Settings) -> tuple[SeenWhisk, ...]:
+    """The way back of each whisk, by the number of that."""
+    seen = {k: whisk_record(replace(truth, whisk=k), settings) for k, truth in truths.items()}
+    return tuple(seen.get(k, SeenWhisk(k, NO_PICTURES)) for k in range(count))
+
+
+def _backwards(signals: Signals, times: FrameTimes, where: slice | None) -> slice | None:
+    """Frames of a back stroke, last to first, so that the whisker comes to the bar; None where few were taken.
 
     A clock that is late has the whisker touch late on the way there and early on the way back.
     """
-    where = back_stroke(signals)
     frames = None if where is None else times.frames_in(signals, where)
     if frames is None or frames.stop - frames.start < _FEWEST_BACK:
-        return []
-    return [slice(frames.stop - 1, frames.start - 1 if frames.start else None, -1)]
+        return None
+    return slice(frames.stop - 1, frames.start - 1 if frames.start else None, -1)
 
 
 def _touch_alone(truth: WhiskTruth) -> BackStroke | None:

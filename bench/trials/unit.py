@@ -35,9 +35,11 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import Agreement, agreement
+from bench.trials.both_ways import feel_back
 from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_of
+from bench.trials.moving import ASKED, MOVING, with_motion
 from bench.trials.phases import phases_of
 from bench.trials.seen import see_trial
 from bench.trials.sensors import with_others
@@ -153,7 +155,8 @@ def described(unit: Unit) -> tuple[TrialFacts, WhiskerFacts, float]:
 def _described(trial: Trial) -> TrialFacts:
     given = trial.d_x_mm, trial.beta_deg, trial.bar_diameter_mm
     nominal = (NAN if value is None else float(value) for value in given)
-    return TrialFacts(trial.name, trial.purpose, trial.surface, trial.speed_deg_s, *nominal)
+    purpose = trial.purpose if trial.object_velocity_mm_s is None else MOVING
+    return TrialFacts(trial.name, purpose, trial.surface, trial.speed_deg_s, *nominal)
 
 
 def _whisker(whisker: Whisker) -> WhiskerFacts:
@@ -167,7 +170,9 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     strokes = strokes_of(signals, unit.trial, unit.settings)
     whisks = tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes))
     delay = gauge_delay(unit.trial.gauge_filter_Hz)
-    return FeltTrial(whisks, touch_on_the_way_back(signals, delay.value) if seen.back else UNKNOWN)
+    there = touch_on_the_way_back(signals, delay.value) if seen.back else UNKNOWN
+    back = feel_back(partial(_feel, unit, signals.kind), unit, signals, seen, whisks) if unit.trial.both_ways else ()
+    return FeltTrial(whisks, there, back)
 
 
 def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
@@ -189,6 +194,9 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     told = {"settings": unit.settings, "radii_mm": _radii_mm(unit)}
     known = {"force_drift_rate": unit.force_drift_rate, "scale_sigma": _C_share(unit, readout, of_wire=True)}
     sensing = partial(with_others, stroke=stroke, readout=readout, touch=touch, **known)
+    sensors = () if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told)
+    if unit.trial.object_velocity_mm_s is not None:
+        sensors += answers(with_motion(usable, unit.trial, stroke, felt.touch_felt_rad.value), ASKED, **told)
     answered = partial(_answered, sensing if unit.settings.estimators else None,
                        asked=estimators(unit.settings.estimators), **told)  # fmt: skip
     estimates = answered(usable)
@@ -198,7 +206,7 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
         estimates=estimates,
         kinetic=kinetic_of(stroke, touch, readout, usable, next(row for row in estimates if row.estimator == _TEN)),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
-        sensors=() if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told),
+        sensors=sensors,
         one_factor=_one_factor(unit, kind, stroke),
         with_drift=_with_drift(unit, stroke, readout),
     )

@@ -74,11 +74,13 @@ def draw(shape: str, rng: np.random.Generator) -> Drawn | None:
 
 
 def push(rod: Rod, beta: float, psi: float, d_x: float, radius: float, alpha: float, theta: float,
-         stiffness: float = np.inf):
-    """First touch, and the exact moments at θ; stiffness: of the bar, N/mm. Raises ArithmeticError without contact."""
+         stiffness: float = np.inf, per_rad_mm: np.ndarray | None = None):
+    """First touch, and the exact moments at θ; stiffness: of the bar, N/mm; per_rad_mm (3,): how it moves. Raises
+    ArithmeticError without contact."""
     bar = Bar.placed(d_x_mm=d_x, beta_rad=beta, psi_rad=psi, touch_rad=0.0, radius_mm=radius,
                      whisker_radius_mm=float(rod.radius_mm(d_x)), stiffness_N_mm=stiffness)  # fmt: skip
     touch = first_touch(rod, bar, 0.0, d_x)
+    bar = bar if per_rad_mm is None else bar.moving(per_rad_mm, touch.motor_rad)
     march = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, STEPS + 1) / STEPS)[1]
     if state is None:

@@ -106,7 +106,7 @@ class Scene:
         touch, (whisk, *_) = self.recording.touch, self.recording.whisks
         beta, _ = self.recording.bar.slope(touch.motor_rad)
         points = [np.full(3, np.nan) if s is None else s.point_mm for s in self.states]
-        return Truth(touch.motor_rad, touch.d_x_mm, beta, whisk.slip_mm(points))
+        return Truth(touch.motor_rad, touch.d_x_mm, beta, whisk.slip_mm(points, self.motor_rad))
 
     @property
     def plane_angle_deg(self) -> float:

@@ -38,7 +38,7 @@ def whisk(beta_deg: float, kinetic: float, static: float) -> dict[str, np.ndarra
                                step_rad=np.radians(0.05))  # fmt: skip
     way = marched.forward
     m_y, m_z = way.moment_Nmm[1:].T
-    return {"theta": (way.motor_rad - touch.motor_rad)[1:], "slip": marched.slip_mm(way.point_mm)[1:],
+    return {"theta": (way.motor_rad - touch.motor_rad)[1:], "slip": marched.slip_mm(way.point_mm, way.motor_rad)[1:],
             "phi": np.arctan2(m_y, m_z)}  # fmt: skip
 
 

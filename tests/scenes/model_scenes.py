@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.fit.problem import Problem, State, bar_axis, curves_of
+from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, shifts_mm
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
@@ -31,17 +31,19 @@ def camera(name, centre, target=(55.0, 5.0, 0.0), focal=2000.0):
 CAMERAS = Cameras((camera("one", (38, -175, 335)), camera("two", (130, -325, 120))))
 
 
-def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7):
-    """A problem without line points and the state that is its truth: a whisk whose contact keeps the reach."""
+def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7, motion=None):
+    """A problem without line points and the state that is its truth: a whisk whose contact keeps the reach. motion: of
+    the bar; its parameters are off by 0.1 each."""
     motor = np.radians(0.7 + 0.9 * np.arange(frames))
     touch, beta = np.radians(touch_deg), np.radians(beta_deg)
     turn = rotation_z(touch)
     axis = BarAxis(turn @ (np.array([d_x, 0, 0]) + REACH * np.array([0, np.cos(beta), -np.sin(beta)])),
                    turn @ np.array([0.0, np.sin(beta), np.cos(beta)]))
     touching = motor > touch
-    problem = Problem(CAMERAS, RODS, axis, motor, touching, touching, [])
+    problem = Problem(CAMERAS, RODS, axis, motor, touching, touching, [], motion=motion)
     vector = np.zeros(problem.size)
     vector[4:12] = [0.05, 0.1, -0.2, 0.0, -0.05, 0.1, -0.3, 0.0]
+    vector[problem.bar_moves] = 0.1
     state = State(vector, np.full(frames, d_x))
     return problem, _bent_until_touching(problem, state)
 
@@ -55,8 +57,7 @@ def _bent_until_touching(problem, state, slope=0.35):
         vector = state.vector.copy()
         vector[problem.first_bend:] = np.stack([middle, -slope * middle], axis=1).ravel()
         curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=6)
-        axis = bar_axis(problem, vector)
-        gap = clearance(curves, BarAxis(axis.point_mm[None], axis.direction[None]))[0][problem.bent] - REACH
+        gap = clearance(curves, bar_axes(problem, vector))[0][problem.bent] - REACH
         low, high = np.where(gap < 0, middle, low), np.where(gap < 0, high, middle)
     return State(vector, arcs)
 
@@ -71,14 +72,16 @@ def with_points(problem, state, rng=None, sigma=0.05):
             one = Curves(curves.arc_mm, curves.points_mm[frame], curves.tangents[frame])
             seen.append(Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng)))
         place = np.linspace(-25.0, 25.0, 20)
-        seen.append(Observed(-1, number, _points(bar_middle(problem, view, state.vector, place), place, sigma, rng)))
+        for frame in range(1 if problem.motion is None else len(problem.motor_rad)):
+            px = bar_middle(problem, view, state.vector, place, frame)
+            seen.append(Observed(-1, number, _points(px, place, sigma, rng), bar_in=frame))
     return replace(problem, seen=seen)
 
 
-def bar_middle(problem, camera, vector, place_mm):
-    """Middle (n, 2) of the bar's outline in a camera, at places (n,) along its axis."""
+def bar_middle(problem, camera, vector, place_mm, frame=0):
+    """Middle (n, 2) of the bar's outline in a camera, at places (n,) along its axis; frame: of a bar that moves."""
     axis = bar_axis(problem, vector)
-    points = axis.point_mm + place_mm[:, None] * axis.direction
+    points = axis.point_mm + shifts_mm(problem, vector)[frame] + place_mm[:, None] * axis.direction
     return outline(camera, points, np.broadcast_to(axis.direction, points.shape), problem.rods.bar.radius_mm)[0]
 
 

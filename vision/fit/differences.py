@@ -13,6 +13,7 @@ def steps(problem: Problem) -> np.ndarray:
     """Step (size,) of each parameter."""
     step = np.full(problem.size, _BEND_RAD)
     step[0:2], step[2:4], step[BAR:BAR + REST], step[REACH] = _SHIFT_MM, _TILT_RAD, _SHIFT_MM, _SHIFT_MM
+    step[problem.bar_moves] = _SHIFT_MM
     return step
 
 
@@ -21,7 +22,7 @@ def perturbed(problem: Problem, vector: np.ndarray, *, reach: bool = False) -> t
     (f,), -1 where none did. reach: move the reach's error, too."""
     step, frames = steps(problem), len(problem.motor_rad)
     rows, columns = [vector], []
-    for k in range(REACH + reach):
+    for k in [*range(REACH + reach), *range(problem.size)[problem.bar_moves]]:
         rows.append(vector + step[k] * (np.arange(problem.size) == k))
         columns.append((step[k], np.full(frames, k)))
     order = np.cumsum(problem.bent) - 1

@@ -46,11 +46,12 @@ class Sight:
     bar_px: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, view: View, rods: Rods, axis: BarAxis, frames: Sequence[int]) -> "Sight":
-        """frames: those of the whisk, in which the wire moves."""
+    def of(cls, view: View, rods: Rods, axis: BarAxis, frames: Sequence[int],
+           bar_mm: float) -> "Sight":
+        """frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is."""
         frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))]
         still = replace(view, background=median_of([view.frames[frame] for frame in frames]))
-        return cls(view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, rods.bar.radius_mm))
+        return cls(view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, bar_mm))
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Where the wire may be beside predicted curves by frame, clear of hub and bar."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.motion import Motion, between
 from vision.fit.onset import Onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
@@ -43,7 +44,8 @@ class Problem:
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
     axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
     cameras do not know whisker and bar well enough in space to tell when they touch. alike: by camera, how much of its
-    error a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`).
+    error a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`). motion: of a bar
+    that does not stand still.
     """
 
     cameras: Cameras
@@ -55,6 +57,7 @@ class Problem:
     seen: Sequence[Observed]
     onset: Onset | None = None
     alike: Sequence[float] = ()
+    motion: Motion | None = None
 
     @property
     def wire(self) -> Wire:
@@ -63,13 +66,20 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """Number of parameters: bar, rest shape, reach, how each camera's lines are off as a whole, bends."""
+        """Number of parameters: bar, rest shape, reach, how each camera's lines are off as a whole, the bar's motion,
+        bends."""
         return self.first_bend + 2 * int(np.sum(self.bent))
 
     @property
     def first_bend(self) -> int:
         """Index of the first bend."""
-        return BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
+        return self.bar_moves.stop
+
+    @property
+    def bar_moves(self) -> slice:
+        """Parameters of the bar's motion: none where it stands still."""
+        first = BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
+        return slice(first, first + (0 if self.motion is None else len(self.motion)))
 
     def bend_of(self, frame: int) -> slice:
         """Parameters of a frame's bend; the frame may bend."""
@@ -100,6 +110,30 @@ def bar_axis(problem: Problem, vector: np.ndarray) -> BarAxis:
     return shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
 
 
+def shifts_mm(problem: Problem, vector: np.ndarray) -> np.ndarray:
+    """How far (…, f, 3) the bar is in each frame from where `bar_axis` has it; (…, 1, 3) of 0 where it stands."""
+    if problem.motion is None:
+        return np.zeros((*vector.shape[:-1], 1, 3))
+    return problem.motion.shift_mm(vector[..., problem.bar_moves])
+
+
+def bar_axes(problem: Problem, vector: np.ndarray) -> BarAxis:
+    """The bar's axis (…, f, 3) in each frame; (…, 1, 3) where it stands."""
+    axis = bar_axis(problem, vector)
+    point, direction = axis.point_mm[..., None, :], axis.direction[..., None, :]
+    if problem.motion is None:
+        return BarAxis(point, direction)
+    point = point + shifts_mm(problem, vector)
+    return BarAxis(point, np.broadcast_to(direction, point.shape))
+
+
+def shift_at_mm(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
+    """How far (…, 3) the bar is from where `bar_axis` has it as the motor passes angles (…)."""
+    if problem.motion is None:
+        return np.zeros(3)
+    return between(problem.motor_rad, shifts_mm(problem, vector), motor_rad)
+
+
 def rest_shape(vector: np.ndarray) -> np.ndarray:
     """Rest polynomials (…, 2, 4) in mm."""
     return vector[..., BAR:BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
@@ -115,8 +149,7 @@ def bends(problem: Problem, vector: np.ndarray) -> np.ndarray:
 def curves_of(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds: int = 1) -> tuple[Curves, np.ndarray]:
     """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
     rest = rest_shape(vector)[..., None, :, :]
-    axis = bar_axis(problem, vector)
-    axis = BarAxis(axis.point_mm[..., None, :], axis.direction[..., None, :])
+    axis = bar_axes(problem, vector)
     angles = bends(problem, vector)
     shape = angles.shape[:-1]
     arcs = np.broadcast_to(arcs_mm, shape)

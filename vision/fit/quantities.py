@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.differences import perturbed
-from vision.fit.problem import REACH, Problem, State, bar_axis, curves_of, rest_shape
+from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, rest_shape, shift_at_mm, shifts_mm
 from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
@@ -27,13 +27,14 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     """All quantities for one parameter vector or a batch (b, size)."""
     touch = first_touch(problem, vector)
     axis = bar_axis(problem, vector)
-    each = BarAxis(axis.point_mm[..., None, :], axis.direction[..., None, :])
+    each = bar_axes(problem, vector)
     curves, _ = curves_of(problem, vector, arcs_mm)
     _, arc, point = clearance(curves, each)
     beta, psi = contact_frame_angles(axis.direction, touch.motor_rad)
     whisk = {"touch": touch.motor_rad, "d_x": np.linalg.norm(touch.point_mm, axis=-1), "beta": beta, "psi": psi,
              **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")}}
-    slip = np.sum((point - touch.point_mm[..., None, :]) * each.direction, axis=-1)
+    came = shifts_mm(problem, vector) - shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
+    slip = np.sum((point - touch.point_mm[..., None, :] - came) * each.direction, axis=-1)
     d_y, d_z = _deflection(problem, vector, touch, point)
     alpha = _angle_to_normal(_force(curves, touch, arc, d_y, d_z), each, point, beta)
     frame = {"slip": slip, "longitudinal_slip": arc - touch.arc_mm[..., None], "d_y": d_y, "d_z": d_z, "arc": arc,
@@ -97,7 +98,7 @@ def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
     whisk = {name: np.zeros(problem.size) for name in all_rows.whisk}
     frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in all_rows.frame}
     for number, (step, columns) in enumerate(moves, start=1):
-        shared = number <= REACH + 1
+        shared = 0 <= columns[0] < problem.first_bend
         for name, values in all_rows.whisk.items():
             if shared:
                 whisk[name][columns[0]] = (values[number] - values[0]) / step

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import BAR, REACH, Problem, State, bar_axis, bends, curves_of
+from vision.fit.problem import BAR, REACH, Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import Jacobians, Measured, measure
 from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
@@ -128,7 +128,7 @@ def _contacts_of_small_angles(problem: Problem, state: State, curves: Curves, ar
     """Where (f,) along itself such a beam touches: distances along it are shorter than arcs."""
     moves = _in_rig(problem, curves, [_small_angles(problem, state, curves, arcs_mm)])
     moved = Curves(curves.arc_mm, curves.points_mm + moves.points_mm[0], curves.tangents + moves.tangents[0])
-    axis = bar_axis(problem, state.vector)
+    axis = bar_axes(problem, state.vector)
     each = BarAxis(*(np.broadcast_to(part, (len(arcs_mm), 3)) for part in (axis.point_mm, axis.direction)))
     return closest_arc(moved, each, arcs_mm)
 

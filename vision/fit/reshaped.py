@@ -5,7 +5,7 @@ moves: `Curves` whose points and tangents (k, f, m, 3) are what each of k change
 
 import numpy as np
 
-from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axis
+from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axes
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis, clearance
 from vision.lines.points import Observed
@@ -35,7 +35,7 @@ def by_contacts(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Change of the touching frames' residuals (t, k), and of the slip in one frame (k,), the parameters standing
     still; by differences over `step` of each change."""
-    axis = bar_axis(problem, state.vector)
+    axis = bar_axes(problem, state.vector)
     points, tangents = (
         np.concatenate([still[None], still + step * moved])
         for still, moved in ((curves.points_mm, moves.points_mm), (curves.tangents, moves.tangents))
@@ -43,5 +43,5 @@ def by_contacts(
     wide = BarAxis(*(np.broadcast_to(part, (*points.shape[:2], 3)) for part in (axis.point_mm, axis.direction)))
     distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), wide)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
-    slip = (contact[1:, frame] - contact[0, frame]) @ axis.direction / step
+    slip = (contact[1:, frame] - contact[0, frame]) @ axis.direction[0] / step
     return by_change[:, problem.touching].T, slip

@@ -27,13 +27,15 @@ from vision.fit.problem import (
     REST_PRIOR_MM,
     Problem,
     State,
+    bar_axes,
     bar_axis,
     curves_of,
     rest_shape,
+    shifts_mm,
     wire_modes,
 )
 from vision.geometry.centreline import Curves, centrelines
-from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.contact import clearance
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.silhouette import edges
 from vision.lines.points import LinePoints, Observed
@@ -111,10 +113,13 @@ def _over_sigma(points: LinePoints, px, jacobian, off: slice, modes, vector):
     return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
 
 
-def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np.ndarray, np.ndarray]:
-    """Both edges (…, n, 2) of the bar's outline; wider_mm (…, n) or a number: added to the bar's radius."""
+def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm, frame) -> tuple[np.ndarray, np.ndarray]:
+    """Both edges (…, n, 2) of the bar's outline; wider_mm (…, n) or a number: added to the bar's radius; frame (n,): in
+    which it is seen, of a bar that moves."""
     axis = bar_axis(problem, vector)
     points = axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
+    if problem.motion is not None:
+        points = points + shifts_mm(problem, vector)[..., frame, :]
     directions = np.broadcast_to(axis.direction[..., None, :], points.shape)
     radius_mm = np.broadcast_to(problem.rods.bar.radius_mm + wider_mm, points.shape[:-1])
     one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radius_mm.ravel())
@@ -123,29 +128,29 @@ def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm) -> tuple[np
 
 def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns, vector):
     """Residuals and Jacobian rows of one camera's points of the bar: of its middle, or of an edge."""
-    points, side = _together(group), np.repeat([s.side for s in group], [len(s.points) for s in group])
-    moving = [*range(BAR), *([REACH] if np.any(side) else [])] if columns else []
+    points = _together(group)
+    side, frame = (np.repeat(of, [len(s.points) for s in group]) for of in zip(*((s.side, s.bar_in) for s in group)))
+    moves = range(problem.size)[problem.bar_moves]
+    moving = [*range(BAR), *([REACH] if np.any(side) else []), *moves] if columns else []
     step = steps(problem)[moving]
     moved = vector + step[:, None] * np.eye(problem.size)[moving]
-    px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side)
+    px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side, frame)
     jacobian = np.zeros((len(points), problem.size))
     jacobian[:, moving] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
     modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
     return _over_sigma(points, px[0], jacobian, problem.bar_off(number), modes, vector)
 
 
-def _bar_px(problem: Problem, camera, vector, points: LinePoints, side) -> np.ndarray:
+def _bar_px(problem: Problem, camera, vector, points: LinePoints, side, frame) -> np.ndarray:
     """Where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's error is taken for the bar's."""
-    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., REACH, None] * (side != 0))
+    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., REACH, None] * (side != 0), frame)
     half = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
     return 0.5 * (one + other) + side[:, None] * half * points.normal
 
 
 def _contact_block(problem: Problem, moved, curves: Curves, arcs_mm, columns, vector):
     """Touching frames: signed distance from axis to centreline is reach + its error."""
-    axis = bar_axis(problem, moved)
-    axis = BarAxis(axis.point_mm[:, None], axis.direction[:, None])
-    distance, arc, _ = clearance(curves, axis, arcs_mm)
+    distance, arc, _ = clearance(curves, bar_axes(problem, moved), arcs_mm)
     distance = distance - problem.rods.reach_mm(arc)
     frames = np.flatnonzero(problem.touching)
     jacobian = np.zeros((len(frames), problem.size))
@@ -176,6 +181,7 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
 def _prior_block(problem: Problem, vector):
     sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
                             [max(problem.rods.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
+                            [] if problem.motion is None else problem.motion.sigma,
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 
@@ -191,7 +197,7 @@ def solve(problem: Problem, state: State, *,
 
     Returns the state and its covariance (size, size) from noise and priors alone.
     """
-    near_jacobian, geometry = None, np.r_[:BAR + REST, problem.first_bend:problem.size]
+    near_jacobian, geometry = None, np.r_[:BAR + REST, problem.bar_moves.start:problem.size]
     for scale in scales:
         linear, state = linearise(problem, state, near_jacobian)
         root = np.sqrt(robust_weights(linear, scale))

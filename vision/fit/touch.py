@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import REACH, Problem, bar_axis, rest_shape
+from vision.fit.problem import REACH, Problem, bar_axis, rest_shape, shift_at_mm
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Rods
@@ -29,17 +29,21 @@ class FirstTouch:
 def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
     """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
     axis = bar_axis(problem, vector)
-    wider = vector[..., REACH]
+
+    def gap(motor_rad):
+        there = BarAxis(axis.point_mm + shift_at_mm(problem, vector, motor_rad), axis.direction)
+        return _gap(rest, motor_rad, there, vector[..., REACH], problem.rods)
+
     rest = rest_shape(vector)
     low = np.full(vector.shape[:-1], np.min(problem.motor_rad))
     high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
-    gap_low, gap_high = (_gap(rest, m, axis, wider, problem.rods)[0] for m in (low, high))
+    gap_low, gap_high = (gap(m)[0] for m in (low, high))
     for _ in range(rounds):
         moving = np.abs(gap_high) > _TOUCH_GAP_MM
         slope = (gap_high - gap_low) / np.where(moving, high - low, 1.0)
         new = np.where(moving, high - gap_high / np.where(moving, slope, 1.0), high)
         low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
-        high, (gap_high, arc, point) = new, _gap(rest, new, axis, wider, problem.rods)
+        high, (gap_high, arc, point) = new, gap(new)
     return FirstTouch(high, point, arc)
 
 
@@ -48,7 +52,7 @@ def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) ->
 
     answer (size, size): covariance that the fit gives.
     """
-    geometry = np.arange(REACH + 1)
+    geometry = np.r_[: REACH + 1, problem.bar_moves]
     here = float(first_touch(problem, vector).motor_rad)
     moved = first_touch(problem, vector + _STEP * np.eye(len(vector))[geometry]).motor_rad
     slope = (moved - here) / _STEP

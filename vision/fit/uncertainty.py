@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import correlate1d
 
-from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, point_rows
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, point_rows, shifts_mm
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
 from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
@@ -82,10 +82,10 @@ def variance_by_cause(problem: Problem, state: State, fitted: Uncertainty, gradi
     on_wire = np.concatenate([np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen])
     touch = len(on_wire) + int(np.sum(problem.touching))
     reach = touch + BAR + REST
-    light = slice(reach + 1, touch + problem.first_bend)
+    light = slice(reach + 1, touch + problem.bar_moves.start)
     causes = {"wire": parts[:len(on_wire)][on_wire], "bar": parts[:len(on_wire)][~on_wire],
               "touch": parts[len(on_wire):touch], "diameters": parts[reach], "light": parts[light],
-              "priors": [parts[touch:reach].sum(), parts[touch + problem.first_bend:].sum()]}
+              "priors": [parts[touch:reach].sum(), parts[touch + problem.bar_moves.start:].sum()]}
     whole = float(gradient @ fitted.lens @ gradient)
     placement = _by_placement(problem, state, fitted.answer, gradient)
     own = whole if np.isnan(placement) else max(whole - placement, 0.0)  # rounding may leave less than nothing
@@ -130,6 +130,7 @@ def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> l
         return [one.at(seen.points.place)[0]]
     axis, camera = bar_axis(problem, state.vector), problem.cameras.cameras[seen.camera]
     points = axis.point_mm + seen.points.place[:, None] * axis.direction
+    points = points + shifts_mm(problem, state.vector)[seen.bar_in]
     edges = grazed(camera, points, np.broadcast_to(axis.direction, points.shape),
                    problem.rods.bar.radius_mm)
     beside = [np.sum((camera.project(edge) - camera.project(points)) * seen.points.normal) for edge in edges]

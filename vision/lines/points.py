@@ -43,10 +43,12 @@ class LinePoints:
 class Observed:
     """Line points of one camera in one frame (frame is -1 for the bar, which stands still).
 
-    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals.
+    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals. bar_in: the
+    frame in which a bar that moves is seen.
     """
 
     frame: int
     camera: int
     points: LinePoints
     side: int = 0
+    bar_in: int = 0

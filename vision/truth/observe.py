@@ -16,6 +16,7 @@ from vision.bar.search import see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.motion import Told
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
@@ -27,6 +28,8 @@ from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import one_sided_lines
 from vision.pictures.scale import shrunk_cameras
+from vision.pictures.view import View
+from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.trial_pictures import TrialPictures
@@ -54,17 +57,33 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
         cameras, behind = _that_face_it(cameras, rods.wire, motor_rad)
         views = pictures.views(cameras)
         used = cameras.subset([view.camera.name for view in views])
-        bar_seen = see_bar(views, used, rods, motor_rad, settings)
+        strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
+        told, stands = _told(pictures, strokes, views)
+        bar_seen = see_bar(stands, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
-    strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
     seen = [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
-                          left_out=tuple(behind)) for number, stroke in enumerate(strokes)]
+                          left_out=tuple(behind), told=told) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
-    looks = seen_over_given(views, bar_seen, rods, motor_rad, settings)
+    looks = seen_over_given(stands, bar_seen, rods, motor_rad, settings)
     bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
+
+
+def _told(pictures: TrialPictures, strokes, views: Sequence[View]) -> tuple[Told | None, Sequence[View]]:
+    """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
+    stands: of that frame alone. Raises Refused for what is not told of it."""
+    if pictures.object_velocity_mm_s is None:
+        return None, views
+    if len(strokes) != 1:
+        raise Refused("an object that moves is seen in recordings of one whisk; record each by itself")
+    both = [frame for frame in strokes[0] if all(frame in view.frames for view in views)]
+    if not both:
+        raise Refused("no frame is seen by every camera")
+    middle = both[len(both) // 2]
+    velocity, sigma = np.asarray(pictures.object_velocity_mm_s), pictures.object_velocity_sigma_mm_s
+    return Told(velocity, sigma, float(pictures.time_s[middle])), in_one_frame(views, middle)
 
 
 def _nothing(whisks, reason: str) -> TrialTruth:

@@ -52,7 +52,8 @@ class WhiskTruth:
     fit beyond the motor's. refinements: what the truth would be without each part of the model, by name. lines: what
     each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end; looks: how
     thick it looks over how thick it is said to be, of a trial's first whisk.
-    point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit.
+    point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of
+    an object that moves, as seen; None where it stands.
     """
 
     whisk: int
@@ -77,6 +78,7 @@ class WhiskTruth:
     looks: dict[str, Value] = field(default_factory=dict)
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
+    velocity_mm_s: Value | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""

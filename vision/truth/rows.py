@@ -3,7 +3,7 @@
 import numpy as np
 
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import bar_axis, bends, curves_of, rest_shape
+from vision.fit.problem import bar_axes, bends, curves_of, rest_shape
 from vision.fit.uncertainty import variance_by_cause
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
@@ -38,7 +38,16 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     return WhiskTruth(whisk.number, frames, cameras=len(whisk.views), frames_used=len(fitted.frames),
                       status="; ".join(filter(None, reasons)), overlay=_overlay(whisk, fitted),
                       budget=_budget(fitted), lines=line_noise(fitted.problem),
-                      shape=_shape(fitted), **truth)
+                      shape=_shape(fitted), velocity_mm_s=_velocity(whisk, fitted), **truth)
+
+
+def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
+    """Of a bar that moves, as told and seen, mm/s (3,)."""
+    if whisk.told is None:
+        return None
+    own = fitted.problem.bar_moves
+    sigma = np.sqrt(np.diag(fitted.covariance)[own])
+    return Value(whisk.told.velocity_mm_s + fitted.state.vector[own], sigma)
 
 
 def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:
@@ -151,12 +160,13 @@ def _budget(fitted: FittedWhisk) -> dict[str, float]:
 def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, dict[str, np.ndarray]]]:
     """Per frame and camera: wire, the bar's two edges (m, 2) and the contact (2,) in pixels."""
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    axis = bar_axis(fitted.problem, fitted.state.vector)
+    axes = bar_axes(fitted.problem, fitted.state.vector)
     place = np.linspace(-_DRAWN_MM, _DRAWN_MM, 81)
-    along = axis.point_mm + place[:, None] * axis.direction
     drawn: dict = {}
     for k, f in enumerate(fitted.frames):
-        one = curves.one(k)
+        one, number = curves.one(k), min(k, len(axes.point_mm) - 1)
+        axis = BarAxis(axes.point_mm[number], axes.direction[number])
+        along = axis.point_mm + place[:, None] * axis.direction
         contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
         drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm,
                                                   whisk.settings.picture_scale) for view in whisk.views}

@@ -54,6 +54,13 @@ class BarMiddles:
             self.lines = measure_bars(self.views, axis, self.radius_mm, wires_px, self.settings, self.lines)
         return {name: {0: line.points} for name, line in self.lines.items() if line.is_bar}
 
+    def observed(self, axis: BarAxis, came_mm: np.ndarray, frames: Sequence[int],
+                 wires_px: Mapping[str, Sequence[np.ndarray]], *,
+                 last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
+        """By camera (frame of the fit, side, points) of the bar's lines; one that stands is seen in no frame alone."""
+        seen = self.points(axis, wires_px, last=last)
+        return {name: [(0, side, points) for side, points in sides.items()] for name, sides in seen.items()}
+
 
 class BarEdges(BarMiddles):
     """The bar by its two edges (sides -1 and 1), which tell how far away it is; by its middle where these are not

@@ -17,12 +17,15 @@ _FEWEST_PICTURES = 3  # two tell the noise, a third what moves
 @dataclass(frozen=True, eq=False)
 class TrialPictures:
     """frames: per camera the grey pictures (h, w) by frame index, a missing index is a lost frame; time_s, motor_rad
-    (n,) at each frame; background: per camera the scene (h, w) without whisker and bar, or None."""
+    (n,) at each frame; background: per camera the scene (h, w) without whisker and bar, or None. object_velocity_mm_s
+    (3,), with one sigma each way: of a bar that moves, rig frame; None where it stands."""
 
     frames: Mapping[str, Mapping[int, np.ndarray]]
     time_s: np.ndarray
     motor_rad: np.ndarray
     background: Mapping[str, np.ndarray | None]
+    object_velocity_mm_s: np.ndarray | None = None
+    object_velocity_sigma_mm_s: float = 0.0
 
     def shrunk(self, scale: int) -> "TrialPictures":
         """The same with pixels `scale` times as wide."""

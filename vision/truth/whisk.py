@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from vision.bar.one_view import seen_from_one_side
 from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
-from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape
+from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, one_curve
@@ -18,7 +19,8 @@ from vision.lines.points import Observed
 from vision.lines.shading import Knots
 from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
 from vision.pictures.view import SATURATED, View
-from vision.truth.strategies import BarMiddles, Touch, early, ways_to_see
+from vision.truth.moving_bar import BarInFrames
+from vision.truth.strategies import BarMiddles, Touch, TouchByClearance, early, ways_to_see
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _WIRE_KNOT_MM = 12.0
@@ -30,10 +32,12 @@ _MOST_SCATTER_PX = 0.7  # where a wire is seen at all its points lie on one line
 
 @dataclass(frozen=True)
 class _Look:
-    """What is taken for known before a round: bar, rest shape (2, 4), bend (f, 2) and contact arc (f,) in each frame,
-    the curves by frame, which frames touch or are free (f,), and by a round before each camera's lens blur, px."""
+    """What is taken for known before a round: bar, and where it is in each frame from there (f, 3) if it moves, rest
+    shape (2, 4), bend (f, 2) and contact arc (f,) in each frame, the curves by frame, which frames touch or are free
+    (f,), and by a round before each camera's lens blur, px."""
 
     axis: BarAxis
+    came_mm: np.ndarray
     rest_mm: np.ndarray
     bend_rad: np.ndarray
     arcs_mm: np.ndarray
@@ -48,7 +52,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 
     Fills whisk.light with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    *others, last = ways_to_see(whisk)
+    *others, last = ways_to_see(whisk) if whisk.told is None else [_moving(whisk)]
     for way in others:
         try:
             return _fitted_by(whisk, *way)
@@ -59,7 +63,14 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
     return _fitted_by(whisk, *last)
 
 
-def _fitted_by(whisk: WhiskPictures, bar: BarMiddles, touch: Touch) -> FittedWhisk:
+def _moving(whisk: WhiskPictures) -> tuple[BarInFrames, Touch]:
+    """How a bar that moves is seen. Raises Refused where the cameras do not know it in space."""
+    if seen_from_one_side(whisk.cameras, whisk.bar.axis) or len(whisk.views) < 2:
+        raise Refused("an object that moves is seen by two cameras or more, from different sides")
+    return BarInFrames(whisk.views, whisk.rods.bar.radius_mm, whisk.settings), TouchByClearance()
+
+
+def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, touch: Touch) -> FittedWhisk:
     whisk, look = _first_look(whisk, touch)
     for _ in range(whisk.settings.rounds):
         seen = _trace_all(whisk, bar, look, last=False)
@@ -67,8 +78,9 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles, touch: Touch) -> FittedWhi
             raise Refused("a single camera sees wire and bar")
         problem, state, answer = _fit(whisk, look, seen, touch)
         _check_scatter(problem, state)
-        look = _Look(upward(bar_axis(problem, state.vector)), rest_shape(state.vector), bends(problem, state.vector),
-                     state.arcs_mm, _fitted_curves(problem, state, whisk.frames), *touch.parted(problem, state, answer),
+        look = _Look(upward(bar_axis(problem, state.vector)), shifts_mm(problem, state.vector),
+                     rest_shape(state.vector), bends(problem, state.vector), state.arcs_mm,
+                     _fitted_curves(problem, state, whisk.frames), *touch.parted(problem, state, answer),
                      _blurs_px(whisk))
     return FittedWhisk.of(*_fit(whisk, look, _trace_all(whisk, bar, look, last=True), touch), whisk.frames)
 
@@ -76,7 +88,7 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles, touch: Touch) -> FittedWhi
 def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Look]:
     """The whisk in the frames to fit, and what coarse points tell of them."""
     axis, wire = whisk.bar.axis, whisk.rods.wire
-    sights = [Sight.of(view, whisk.rods, axis, whisk.frames) for view in whisk.views]
+    sights = [Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views]
     free = np.array(whisk.frames)[early(whisk.angles_rad)]
     rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
     coarse = follow_bends(sights, axis, rest, whisk.motor)
@@ -85,12 +97,14 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
     touching, free = touch.first(whisk.angles_rad, bend)
     arcs = np.array([contact_arc(rest, b, m, axis, wire) for b, m in zip(bend, whisk.angles_rad)])
     curves = {f: one_curve(rest, b, a, m, wire) for (f, m), b, a in zip(whisk.motor.items(), bend, arcs)}
-    return whisk, _Look(axis, rest, bend, arcs, curves, touching, free)
+    came = np.zeros((1, 3)) if whisk.told is None else whisk.motion.told_mm
+    return whisk, _Look(axis, came, rest, bend, arcs, curves, touching, free)
 
 
 def _fit(whisk: WhiskPictures, look: _Look, seen: list[Observed], touch: Touch) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
-    problem = Problem(whisk.cameras, whisk.rods, look.axis, whisk.angles_rad, look.touching, ~look.free, seen)
+    problem = Problem(whisk.cameras, whisk.rods, look.axis, whisk.angles_rad, look.touching, ~look.free, seen,
+                      motion=whisk.motion)
     problem, state = touch.settled(problem, *solve(problem, _begin(problem, look)))
     problem = inflated_by_residuals(problem, state)
     return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
@@ -114,7 +128,8 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     curves = {f: one_curve(rest, np.zeros(2), wire.length_mm, angle, wire) for f, angle in whisk.motor.items()}
     seen = [one for view in whisk.views for one in trace_wire(whisk, view, axis, curves, _blurs_px(whisk))]
     nothing = np.zeros(len(curves), dtype=bool)
-    alone = replace(problem, motor_rad=whisk.angles_rad, touching=nothing, bent=nothing, seen=seen)
+    alone = replace(problem, motor_rad=whisk.angles_rad, touching=nothing, bent=nothing, seen=seen,
+                    motion=whisk.motion)
     there = State(state.vector[:problem.first_bend], np.full(len(curves), 0.5 * wire.length_mm))
     there, _ = solve(alone, there, scales=[LAST_SCALE] * 3)
     return inflated_by_residuals(alone, there, _FREE_SHARED), there
@@ -137,15 +152,15 @@ def _begin(problem: Problem, look: _Look) -> State:
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
 
-def _trace_all(whisk: WhiskPictures, bar: BarMiddles, look: _Look, *, last: bool) -> list[Observed]:
+def _trace_all(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, look: _Look, *, last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. Raises Refused where one of them is seen in none."""
     wires_px = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
                 for view in whisk.views}
-    bars = bar.points(look.axis, wires_px, last=last)
+    bars = bar.observed(look.axis, look.came_mm, list(look.curves), wires_px, last=last)
     seen = []
     for number, view in enumerate(whisk.views):
         seen += trace_wire(whisk, view, look.axis, look.curves, look.blur_px, last=last)
-        seen += [Observed(-1, number, points, side) for side, points in bars.get(view.camera.name, {}).items()]
+        seen += [Observed(-1, number, points, side, frame) for frame, side, points in bars.get(view.camera.name, [])]
     require_both_rods(seen)
     return seen
 
@@ -180,7 +195,7 @@ def clear_pieces(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mappin
     settings = whisk.settings
     pieces = wire_pieces(view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px)
     pieces = pieces.below(SATURATED * view.full_scale)
-    outline = outline_of_bar(view.camera, axis, whisk.rods.bar.radius_mm)
+    outline = outline_of_bar(view.camera, axis, whisk.bar_swept_mm)
     return pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from vision.bar.search import SeenBar
 from vision.fit.exposure import Exposure, slip_in_exposure
+from vision.fit.motion import Motion, Told
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import Jacobians, Measured, jacobians
@@ -27,7 +28,7 @@ class WhiskPictures:
     """One whisk in the pictures of a trial.
 
     indices: the frames of the stroke; time_s, motor_rad (n,) at every frame of the trial; light: filled with how each
-    camera sees the wire; left_out: a line on each camera that is not asked.
+    camera sees the wire; left_out: a line on each camera that is not asked; told: of a bar that moves.
     """
 
     number: int
@@ -41,6 +42,18 @@ class WhiskPictures:
     settings: VisionSettings
     light: dict[str, WireAppearance] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    told: Told | None = None
+
+    @property
+    def motion(self) -> Motion | None:
+        """How a bar that moves goes through the frames."""
+        return None if self.told is None else Motion.steady(self.told, self.time_s[self.frames])
+
+    @property
+    def bar_swept_mm(self) -> float:
+        """Radius about its axis within which the bar stays through the whisk."""
+        moved = 0.0 if self.told is None else float(np.linalg.norm(self.motion.told_mm, axis=1).max(initial=0.0))
+        return self.rods.bar.radius_mm + moved
 
     @cached_property
     def frames(self) -> list[int]:

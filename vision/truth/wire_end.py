@@ -71,7 +71,7 @@ def _seen_along(view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]) 
     wire = replace(whisk.rods.wire, length_mm=max(length_mm, _in_picture_mm(view.camera, curves, length_mm)))
     still = replace(view, background=median_of([view.frames[frame] for frame in curves]))
     pieces, standing = (wire_pieces(one, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX) for one in (view, still))
-    outline = outline_of_bar(view.camera, whisk.bar.axis, whisk.rods.bar.radius_mm)
+    outline = outline_of_bar(view.camera, whisk.bar.axis, whisk.bar_swept_mm)
     clear = clear_of_bar(pieces, *outline, _BESIDE_BAR_PX)
     return _binned(pieces.place[clear], _evidence(pieces.select(clear), standing.select(clear)))
 
