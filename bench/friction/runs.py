@@ -103,8 +103,8 @@ def _answers(
         kinetic = whisk_of(felt.kinetic, theta_rad, beam)
         runs.append(answer(KINETIC, with_friction, kinetic, alpha, doubt.sigma_rad, radii_mm))
     rate, ten = turn(felt.by_theta), {*ASSUMING, *RUNS}
-    return tuple(with_turn(row, felt.phi_felt_rad.value, rate, theta_rad) if row.estimator in ten else row
-                 for row in (*given, *runs))  # fmt: skip
+    turned = felt.phi_felt_rad.value, rate, theta_rad, beam.length_mm
+    return tuple(with_turn(row, *turned) if row.estimator in ten else row for row in (*given, *runs))
 
 
 def _given(

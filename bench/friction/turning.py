@@ -16,6 +16,7 @@ from bench.friction.curved import apart, phi_sigma
 from bench.records.trial import EstimateRow, FeltAt
 from bench.trials.estimates import TILT_SIGMA_RAD
 from estimator.domain import RIGHT_ANGLE
+from estimator.uncertainty import Z_95
 from vision.truth.value import UNKNOWN, Value
 
 _FEWEST = 4  # angles, for three numbers and what is left
@@ -48,15 +49,38 @@ def _quantile(freedom: float) -> float:
     return float(stdtrit(freedom, 1.0 - _CHANCE / 2))
 
 
-def with_turn(row: EstimateRow, phi: float, rate: Value, theta_rad: float) -> EstimateRow:
-    """A row of (10), whatever α it assumed, with a status where φ turns by more than against an object that leans as
-    one set up by hand, and it matters. phi, rate: the slip angle felt, and its `turn`."""
+def with_turn(row: EstimateRow, phi: float, rate: Value, theta_rad: float, length_mm: float) -> EstimateRow:
+    """A row of (10), whatever α it assumed, with what φ's turn may do to it in its sigma; with a status where φ turns
+    by more than against an object that leans as one set up by hand, and it matters. phi, rate: the slip angle felt, and
+    its `turn`; length_mm: the whisker's, at which intervals end.
+
+    Into the sigma goes what the turn's square is beyond its variance (the positive part of the moment estimate, as
+    DerSimonian & Laird, Controlled Clinical Trials 7, 1986): of an object across the whisker nothing, in the mean.
+    """
     beta = min(abs(phi) + row.alpha_est_rad, 0.999 * RIGHT_ANGLE)
     by_hand = 0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD)
-    off = abs(rate.value) * theta_rad * np.sin(abs(phi)) / (np.cos(row.alpha_est_rad) * np.cos(beta))
-    turns = abs(rate.value) > _quantile(np.inf) * np.hypot(rate.sigma, by_hand)
-    if not (turns and off * row.d_x_est_mm.value > _MATTERS * row.d_x_est_mm.sigma):
+    share = theta_rad * np.sin(abs(phi)) / (np.cos(row.alpha_est_rad) * np.cos(beta))  # of d_x, by a rate
+    spread = float(np.hypot(rate.sigma, by_hand))
+    if not (abs(rate.value) > spread and np.isfinite(row.d_x_est_mm.value)):
         return row
+    off = abs(rate.value) * share
+    widened = _widened(row, share * float(np.sqrt(rate.value**2 - spread**2)), length_mm)
+    sure = abs(rate.value) > _quantile(np.inf) * spread
+    if not (sure and off * row.d_x_est_mm.value > _MATTERS * row.d_x_est_mm.sigma):
+        return widened
     said = (f"phi turns by {np.degrees(rate.value * theta_rad):+.1f} deg over the push: the object leans along the "
             f"whisker or is curved to the side, and (10) may be {100 * off:.0f} % off")  # fmt: skip
-    return replace(row, status="; ".join(filter(None, [row.status, said])))
+    return replace(widened, status="; ".join(filter(None, [row.status, said])))
+
+
+def _widened(row: EstimateRow, share: float, length_mm: float) -> EstimateRow:
+    """The row with a share of its distance more in both sigmas and either side of its interval, in squares."""
+    value, more = row.d_x_est_mm, share * row.d_x_est_mm.value
+    low, high = (np.hypot(end - value.value, Z_95 * more) for end in (row.d_x_est_low_mm, row.d_x_est_high_mm))
+    return replace(
+        row,
+        d_x_est_mm=Value(value.value, float(np.hypot(value.sigma, more))),
+        d_x_est_sigma_alpha_exact_mm=float(np.hypot(row.d_x_est_sigma_alpha_exact_mm, more)),
+        d_x_est_low_mm=max(value.value - float(low), 0.0),
+        d_x_est_high_mm=min(value.value + float(high), length_mm),
+    )

@@ -104,7 +104,7 @@ def answers(push: Push, draws: int, rng: np.random.Generator) -> list[EstimateRo
         stroke = true.stroke_Nmm + sigma * rng.standard_normal(true.stroke_Nmm.shape)
         rate = turn([FeltAt(a, *(Value(m, sigma) for m in pair), TOUCH_SIGMA_RAD, covariance, np.zeros(2))
                      for a, pair in zip(true.stroke_rad, stroke)])  # fmt: skip
-        found.append(with_turn(row, felt_slip_angle(*felt), rate, theta))
+        found.append(with_turn(row, felt_slip_angle(*felt), rate, theta, true.beam.length_mm))
     return found
 
 

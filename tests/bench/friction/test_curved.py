@@ -93,9 +93,16 @@ def test_an_estimate_against_what_turns_the_slip_angle_says_so(r_n, told):
     """At κ_n = 1 φ turns by about sin β_0 a radian, 2° at θ = 3°, of which (10) knows nothing: 2 % of d_x."""
     felt = felt_on_circle(r_n, np.radians(40.0), 0.005)
     (at,) = (one for one in felt if one.theta_rad == THETAS[2])
-    row = EstimateRow("with_friction", Value(D_X, 0.5), alpha_est_rad=ALPHA)
-    phi = float(np.arctan2(at.m_y_Nmm.value, at.m_z_Nmm.value))
-    said = with_turn(row, phi, turn(felt), at.theta_rad)
+    ends = {"d_x_est_low_mm": D_X - 1.0, "d_x_est_high_mm": D_X + 1.0}
+    row = EstimateRow("with_friction", Value(D_X, 0.5), alpha_est_rad=ALPHA, **ends)
+    turns = float(np.arctan2(at.m_y_Nmm.value, at.m_z_Nmm.value)), turn(felt), at.theta_rad, D_X + 1.5
+    said = with_turn(row, *turns)
     assert ("phi turns by" in said.status) == told
+    two_percent = np.hypot(0.5, 0.02 * D_X)
+    assert said.d_x_est_mm.sigma == pytest.approx(two_percent if told else 0.5, rel=0.25 if told else 0.01)
+    assert said.d_x_est_low_mm < D_X - 2.0 if told else said.d_x_est_low_mm == pytest.approx(D_X - 1.0, rel=0.001)
+    assert said.d_x_est_high_mm == pytest.approx(D_X + (1.5 if told else 1.0), rel=0.001)
     unsure = EstimateRow("with_friction", Value(D_X, 10.0), alpha_est_rad=ALPHA)
-    assert with_turn(unsure, phi, turn(felt), at.theta_rad).status == ""
+    assert with_turn(unsure, *turns).status == ""
+    nearer = EstimateRow("with_friction", Value(np.nan, np.nan), ALPHA, d_x_est_low_mm=0.0, d_x_est_high_mm=20.0)
+    assert with_turn(nearer, *turns) is nearer
