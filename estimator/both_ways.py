@@ -84,11 +84,12 @@ def _felt(whisk: Whisk) -> tuple[float, float, float]:
 
 
 def _solved(felt: np.ndarray, beam) -> np.ndarray:
-    """(d_x, β, α) of (θ, m_y, m_z) there and (θ, m_y, m_z) back: the mean of what both ways say of the distance."""
-    there, back = felt[1:3], felt[4:6]
+    """(d_x, β, α) of (θ, m_y, m_z) there and (θ, m_y, m_z) back: the mean of what both ways say of the distance. The
+    moments' difference is that of both at one angle, so what θ is off by on one way turns β as well."""
+    there, back = felt[1:3] / felt[0], felt[4:6] / felt[3]
     beta = slope(there, back)
     normal = np.array([sin(beta), cos(beta)])
-    d = 0.5 * beam.C_Nmm2 * cos(beta) * (felt[0] / (there @ normal) + felt[3] / (back @ normal))
+    d = 0.5 * beam.C_Nmm2 * cos(beta) * (1 / (there @ normal) + 1 / (back @ normal))
     return np.array([float(beam.distance_mm(d)), beta, beta - atan2(*there)])
 
 
@@ -112,12 +113,12 @@ def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:
 
 
 def _dragged(felt: np.ndarray, alpha: float, left: float) -> np.ndarray:
-    """What friction along the whisker adds to the moments there and takes from those back (6, 6): it turns round by
-    itself, and is not in the difference of which the slope is made. left: share of the base's diameter there."""
+    """What friction along the whisker takes from the moments back (6, 6): it is not in the difference of which the
+    slope is made. There the contact slips sideways, and friction along with it; back it is held until it has turned
+    round, and what share of it acts along the whisker then no moment tells. left: share of the base's diameter there.
+    """
     moved = np.zeros(6)
-    for first, way in ((0, 1.0), (3, -1.0)):
-        share = way * first_order.dragging(felt[first], min(alpha, _ROUGHEST_RAD)) / left
-        moved[first + 1:first + 3] = share * felt[first + 1:first + 3]
+    moved[4:6] = first_order.dragging(felt[3], min(alpha, _ROUGHEST_RAD)) / left * felt[4:6]
     return np.outer(moved, moved)
 
 

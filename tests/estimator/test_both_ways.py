@@ -1,5 +1,7 @@
 """A push and its way back: slope, friction and distance by exact mechanics, without α_est."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,16 @@ def test_what_both_ways_share_does_not_turn_the_slope():
     assert told.beta_sigma_rad == pytest.approx(plain.beta_sigma_rad, rel=1e-3)
     assert untold.beta_sigma_rad > 1.2 * plain.beta_sigma_rad
     assert told.sigma_mm > plain.sigma_mm
+
+
+def test_what_the_angle_back_is_off_by_turns_the_slope():
+    """As far as its sigma says: at angles that differ the moments' difference is not friction alone."""
+    there, back = ways(50.0)
+    off = 1e-3
+    surer, unsure, moved = (
+        there_and_back(there, replace(back, theta_at_rad=THETA + shift, theta_sigma_rad=sigma), TOLD)
+        for shift, sigma in ((0.0, 0.0), (0.0, off), (off, 0.0))
+    )
+    more = np.sqrt(unsure.beta_sigma_rad**2 - surer.beta_sigma_rad**2)
+    assert abs(moved.beta_rad - surer.beta_rad) > np.radians(1.0)
+    assert abs(moved.beta_rad - surer.beta_rad) == pytest.approx(more, rel=0.1)
