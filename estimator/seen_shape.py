@@ -21,6 +21,7 @@ from estimator.uncertainty import Z_95
 
 FEW = "one camera shows too few points or frames of the whisker"
 NOT_PUSHED = "one camera does not see the whisker pushed as far as the pushing angle"
+ASIDE = "force and give are not told: the camera looks aside, and how the bend leaves the whisking plane is not known"
 UNTOLD = "the seen shape does not tell where the bend ends"
 # One sigma of what is believed before. Of the rest shape by powers of s/L, mm: clamped off centre, clamp angle, set and
 # sag, change of curvature; tan φ of the bend; how fast the contact moves along the whisker, mm/rad: a bar's radius in
@@ -31,6 +32,7 @@ _FEWEST_FRAMES, _FEWEST_POINTS = 4, 30
 # One sigma of the force, a share per rad pushed: what friction along the whisker, which is not modelled, adds to the
 # moment is tan α times w/d, that is θ at most, over that of the force across; α is taken as 0 ± 14°.
 _DRAG = 0.25
+_MOST_BY_PLANE = 0.1  # share of the force by what tan φ may be: its square, a hundredth, is left out
 _LEAST_LEFT = 1e-3  # of the base's diameter: a cone's point bends without end
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _TOUCH, _BEND, _BEND_2, _TAN, _ARC, _ALONG, _OWN = 8, 9, 10, 11, 12, 13, 14
@@ -123,7 +125,15 @@ def contact_of_shape(
     told = fit.told(vector)
     by = _slopes(fit.told, vector)
     of_told = by @ covariance @ by.T
-    return _answer(told, of_told, vector, theta_rad, beam, (reach_mm, tilt_sigma_rad, rigidity_share))
+    by_plane = abs(by[2] @ covariance[:, _TAN]) / covariance[_TAN, _TAN] ** 0.5 / max(told[2], 1e-9)
+    answer = _answer(told, of_told, vector, theta_rad, beam, (reach_mm, tilt_sigma_rad, rigidity_share))
+    return answer if answer.status or by_plane < _MOST_BY_PLANE else _without_force(answer)
+
+
+def _without_force(answer: ShapeContact) -> ShapeContact:
+    """Touch and distance alone."""
+    known = {name: getattr(answer, name) for name in ("touch_rad", "touch_sigma_rad", "d_x_mm", "d_x_sigma_mm")}
+    return ShapeContact(**known, status=ASIDE)
 
 
 def _answer(told, covariance, vector, theta, beam, doubts) -> ShapeContact:
@@ -131,7 +141,7 @@ def _answer(told, covariance, vector, theta, beam, doubts) -> ShapeContact:
     reach, tilt, rigidity_share = doubts
     sigmas = np.sqrt(np.diag(covariance))
     if not (0 < d_x <= beam.length_mm and sigmas[1] < 0.25 * beam.length_mm and force > 0):
-        return ShapeContact(touch, float(sigmas[0]), status=UNTOLD)
+        return ShapeContact(status=UNTOLD)
     phi, left = atan(abs(vector[_TAN])), beam.left(d_x)
     share = hypot(load_cell.rolling(theta, reach, 0.0, d_x, left), load_cell.leaning(theta, tilt, phi, 0.0))
     of_force = hypot(rigidity_share, _DRAG * theta) * force

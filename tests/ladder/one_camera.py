@@ -65,14 +65,14 @@ def sample(wanted: list[dict], rng: np.random.Generator) -> list[tuple[dict, Sho
 
 def print_coverage(found: list) -> None:
     """A line a quantity."""
-    kept = [(told, judged(one, said)) for told, one, said in found if not said.status]
-    print(f"{len(found)} whisks, {len(found) - len(kept)} without an answer")
-    z = np.array([one[:, 0] / one[:, 1] for _, one in kept])
-    for k, name in enumerate(NAMES):
-        print(f"{name:<10} 95 % intervals hold in {100 * np.mean(np.abs(z[:, k]) < Z_95):.1f} %, RMS z "
-              f"{np.sqrt(np.mean(z[:, k] ** 2)):.2f}, largest |z| {np.abs(z[:, k]).max():.1f}")  # fmt: skip
-    for row in np.argsort(-np.abs(z).max(axis=1))[:4]:
-        print("  z", np.round(z[row], 1), kept[row][0])
+    z = np.array([errors[:, 0] / errors[:, 1] for errors in (judged(one, said) for _, one, said in found)])
+    for name, column in zip(NAMES, z.T):
+        known = column[np.isfinite(column)]
+        print(f"{name:<10} {len(known)} of {len(z)} told, 95 % intervals hold in "
+              f"{100 * np.mean(np.abs(known) < Z_95):.1f} %, RMS z {np.sqrt(np.mean(known**2)):.2f}, largest |z| "
+              f"{np.abs(known).max():.1f}")  # fmt: skip
+    for row in np.argsort(-np.nanmax(np.abs(z), axis=1, initial=0.0))[:3]:
+        print("  z", np.round(z[row], 1), found[row][0])
 
 
 def print_table(rng: np.random.Generator) -> None:
@@ -84,11 +84,13 @@ def print_table(rng: np.random.Generator) -> None:
             found = [(one, said) for _, one, said in sample(wanted, rng) if not said.status]
             rms = np.sqrt(np.mean([judged(one, said) ** 2 for one, said in found], axis=0))
             force = np.sqrt(np.mean([(judged(one, said)[2] / one.force_N) ** 2 for one, said in found], axis=0))
-            told = [said.stiffness_N_mm for _, said in found]
+            told = np.array([said.stiffness_N_mm for _, said in found])
+            told = told[np.isfinite(told)]
+            middle = f"{np.median(told):.3f}" if len(told) else "none"
             print(f"| {stiffness:g} | {beta:g}° | {np.degrees(rms[0, 0]):.3f} (± {np.degrees(rms[0, 1]):.3f}) | "
                   f"{rms[1, 0]:.2f} (± {rms[1, 1]:.2f}) | {100 * force[0]:.1f} (± {100 * force[1]:.1f}) | "
-                  f"{rms[3, 0]:.3f} (± {rms[3, 1]:.3f}) | {np.nanmedian([*told, np.nan]):.3f} of "
-                  f"{np.isfinite(told).sum()} in {len(found)} |", flush=True)  # fmt: skip
+                  f"{rms[3, 0]:.3f} (± {rms[3, 1]:.3f}) | {middle} ({len(told)} of "
+                  f"{len(found)}) |", flush=True)  # fmt: skip
 
 
 def main() -> None:
