@@ -143,6 +143,7 @@ def evaluate(
     preset: str = STANDARD,
     accuracy_mm: float | None = None,
     follow_links: bool = False,
+    one_camera: str | None = None,
     workers: int = 0,
     dask: str | None = None,
     figure_formats: Sequence[str] = (),
@@ -165,6 +166,7 @@ def evaluate(
         seeing=by_preset(preset),
         accuracy_mm=accuracy_mm,
         follow_links=follow_links,
+        one_camera=one_camera,
     )
     return evaluate_with(Path(session), Path(out), settings, workers, figure_formats, dask=dask)
 

@@ -36,6 +36,12 @@ def add_evaluate(verbs: Verbs) -> None:
         metavar="MODULE:FUNCTION",
         help="one of your own, importable from here; may be given several times",
     )
+    verb.add_argument(
+        "--one-camera",
+        metavar="NAME",
+        help="distance, force and stiffness by the shape that this camera alone sees, too, without gauges: "
+        "one_camera.csv (it sees its own trial, and has a line of its own)",
+    )
     verb.add_argument("--trials", metavar="PATTERN", help="only trials of such names, e.g. 'b3*' (default: all)")
     verb.add_argument("--no-figures", action="store_false", dest="figures", help="tables, report and summary alone")
     add_figure_format(verb)
@@ -89,7 +95,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         check_nwb(options.nwb, options.session)
     sys.path.append(os.getcwd())  # where --estimator is looked for; last, so that it hides nothing of ours
     numbers = ("theta_deg", "alpha_est_deg", "alpha_est_sigma_deg", "cutoff_Hz", "clock_sigma_s", "accuracy_mm")
-    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures", "follow_links")
+    names = (*numbers, "estimators", "gauges_from_all", "trials", "figures", "follow_links", "one_camera")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     given["seeing"] = seeing_of(options)
     if "estimators" in given:

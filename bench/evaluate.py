@@ -25,6 +25,7 @@ from bench.trials.estimates import estimators
 from bench.trials.exchanged import exchanged_signals
 from bench.trials.lost import evaluated
 from bench.trials.of_session import judged, placed_units, require_some, with_gauges
+from bench.trials.one_camera import require_camera
 
 DONE, DOUBTFUL = 0, 1
 
@@ -53,6 +54,7 @@ def evaluate(
     check_outside(out, session_path)
     doubts = Doubts()
     views = checked_views(session_path, doubts, trials, follow_links=settings.follow_links)
+    require_camera(views[0], settings)
     recorded = [judged(view) for view in views]
     require_some(recorded[0], settings)
     with lock_output(out), _workers(dask, workers, out, progress) as pool:
@@ -130,6 +132,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     from bench.report.both_ways import both_ways_lines, ways_back, write_both_ways
     from bench.report.ledger import write_ledger
     from bench.report.moving import moved_whisks, moving_lines, write_moving
+    from bench.report.one_camera import one_camera_lines, shapes_seen, write_one_camera
     from bench.report.page.write import write_report
     from bench.report.record import record_of, write_record
     from bench.report.score import score
@@ -142,6 +145,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     needed = write_ledger(out, results, evaluation.session.whisker)
     write_sensors(out, worth := sensors_worth(results, evaluation.friction))
     write_both_ways(out, back := ways_back(results))
+    write_one_camera(out, shapes := shapes_seen(results))
     moved = moved_whisks(evaluation.session, results)
     figures = [
         *(_figures(evaluation, pool) if drawn else []),
@@ -151,7 +155,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
         *write_error_map(out, results, evaluation.friction, alpha_est_rad, drawn=drawn),
     ]
     scores = score(evaluation.session, out, evaluation.gauges)
-    others = tuple(moving_lines(moved)), tuple(both_ways_lines(back))
+    others = tuple(moving_lines(moved)), tuple(both_ways_lines(back)), tuple(one_camera_lines(shapes))
     summary = summary_of(evaluation, scores, figures, by_theta, needed, worth, *others)
     record = write_record(out, record_of(evaluation, summary, figures), evaluation.session.path)
     write_report(out, record, results, evaluation.friction)

@@ -39,7 +39,8 @@ class Settings:
     (`FrameTimes.clock_sigma_s`). gauges_from_all: every trial that can, calibrates the gauges. trials: pattern of the
     names of those that are evaluated. figures: whether any is drawn. seeing: how hard pictures are looked at; with
     accuracy_mm each whisk by the first preset by which d_x's stated sigma is no more. follow_links: pictures may lie
-    outside of the session. Raises BadInput out of range.
+    outside of the session. one_camera: name of the camera by which alone shapes are judged, too. Raises BadInput out of
+    range.
     """
 
     theta_deg: float = 3.0
@@ -54,6 +55,7 @@ class Settings:
     seeing: Seeing = field(default_factory=Seeing)
     accuracy_mm: float | None = None
     follow_links: bool = False
+    one_camera: str | None = None
 
     def __post_init__(self):
         _require("--theta-deg", self.theta_deg, 0.0, 20.0, above=True)
@@ -88,7 +90,8 @@ class Settings:
 
     def seen(self) -> list:
         """The settings that what is seen depends on."""
-        return [self.theta_deg, self.clock_sigma_s, self.seeing.vision, self.seeing.cameras, self.accuracy_mm]
+        one = [] if self.one_camera is None else [self.one_camera]
+        return [self.theta_deg, self.clock_sigma_s, self.seeing.vision, self.seeing.cameras, self.accuracy_mm, *one]
 
     def estimated(self) -> list:
         """The settings that a trial's whole result depends on."""

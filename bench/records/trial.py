@@ -74,6 +74,22 @@ class Drawing:
     cameras: dict[str, dict[str, np.ndarray]]
 
 
+@dataclass(frozen=True)
+class ByOneCamera:
+    """What the shape seen by one camera tells without gauges (`estimator.seen_shape`). It sees its own trial: no
+    estimate to be judged beside the gauges'. stiffness_low_N_mm: no less than that, by 97.5 %."""
+
+    camera: str
+    touch_rad: Value = UNKNOWN
+    d_x_mm: Value = UNKNOWN
+    force_N: Value = UNKNOWN
+    moved_mm: Value = UNKNOWN
+    stiffness_N_mm: float = NAN
+    stiffness_sigma_N_mm: float = NAN
+    stiffness_low_N_mm: float = NAN
+    status: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class SeenWhisk:
     """One whisk as the cameras show it; d_x_mm is NaN exactly where there is no truth, and `status` says why.
@@ -81,7 +97,7 @@ class SeenWhisk:
     The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
     moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
     (`bench.trials.clocks`). looked: preset or settings file by which the pictures were looked at. contradicted: what
-    the recording says twice does not agree (`bench.trials.consistency`).
+    the recording says twice does not agree (`bench.trials.consistency`). by_one_camera: where that was asked for.
     """
 
     whisk: int
@@ -109,6 +125,7 @@ class SeenWhisk:
     touch_shared_rad: float = 0.0
     looked: str = ""
     contradicted: bool = False
+    by_one_camera: ByOneCamera | None = None
 
     @property
     def has_truth(self) -> bool:

@@ -15,6 +15,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.trial import Trial
 from bench.trials.consistency import cone_doubt, length_doubt, slope_doubt, turns_doubt, width_doubt, wire_doubt
+from bench.trials.one_camera import by_one_camera
 from bench.trials.scene import still_scene
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
@@ -83,7 +84,10 @@ def _see(
             _leaning(one, settings)] for _, one in looked]  # fmt: skip
     whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
     return SeenTrial(
-        tuple(replace(whisk, looked=name) for whisk, (name, _) in zip(whisks, looked)),
+        tuple(
+            replace(whisk, looked=name, by_one_camera=by_one_camera(one, session.whisker, settings))
+            for whisk, (name, one) in zip(whisks, looked)
+        ),
         (*truth.notes, *_lost(frames, times), *dropped(times, places), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,

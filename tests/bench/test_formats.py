@@ -15,7 +15,7 @@ from bench.evaluate import evaluate
 from bench.friction import curved, error_map, explained, soft, tables, tilted
 from bench.gauges.gauges_file import FileKeys
 from bench.plan import written
-from bench.report import against_theta, assembly, both_ways, compare, figure_8, ledger, moving, sensors
+from bench.report import against_theta, assembly, both_ways, compare, figure_8, ledger, moving, one_camera, sensors
 from bench.report.run import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
@@ -61,6 +61,7 @@ CSV = {
     "sensors.csv": sensors.COLUMNS,
     "moving.csv": moving.COLUMNS,
     "both_ways.csv": both_ways.COLUMNS,
+    "one_camera.csv": one_camera.COLUMNS,
     "comparison": compare.COLUMNS,
     "figure_8.csv": figure_8.COLUMNS,
     "tradeoff.csv": tradeoff.COLUMNS,

@@ -6,6 +6,7 @@ import numpy as np
 
 from vision.fit.beam_check import BeamCheck
 from vision.fit.line_noise import LineNoise
+from vision.fit.problem import Problem
 from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
@@ -53,7 +54,8 @@ class WhiskTruth:
     each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end; looks: how
     thick it looks over how thick it is said to be, of a trial's first whisk.
     point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of
-    an object that moves, as seen; None where it stands.
+    an object that moves, as seen; None where it stands. problem: what was fitted, from which `sights_of` takes what one
+    camera shows.
     """
 
     whisk: int
@@ -79,6 +81,7 @@ class WhiskTruth:
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
+    problem: Problem | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Truth at a pushing angle, by a fit over the frames around it."""

@@ -38,7 +38,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     return WhiskTruth(whisk.number, frames, cameras=len(whisk.views), frames_used=len(fitted.frames),
                       status="; ".join(filter(None, reasons)), overlay=_overlay(whisk, fitted),
                       budget=_budget(fitted), lines=line_noise(fitted.problem),
-                      shape=_shape(fitted), velocity_mm_s=_velocity(whisk, fitted), **truth)
+                      shape=_shape(fitted), velocity_mm_s=_velocity(whisk, fitted), problem=fitted.problem, **truth)
 
 
 def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:

@@ -62,16 +62,18 @@ def summary_of(
     sensors: Sequence[SensorWorth] = (),
     moving: Sequence[str] = (),
     both_ways: Sequence[str] = (),
+    one_camera: Sequence[str] = (),
 ) -> Summary:
     """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta:
     errors against θ; needed: which refinements are; sensors: what each is worth, where a load cell was recorded;
-    moving, both_ways: lines on objects that moved, and on ways back."""
+    moving, both_ways, one_camera: lines on objects that moved, on ways back, and on shapes seen by one camera."""
     doubtful = [*evaluation.doubts, *shared_doubts(evaluation.results), *whisk_doubts(evaluation.results)]
     judged = judge(evaluation.results)
     name, pictures = evaluation.session.name, any(trial.camera_sources for trial in evaluation.session.trials)
     said = verdict(name, pictures, evaluation.results, judged, evaluation.settings, len(doubtful))
     said = (*said, *gauges_of_all(evaluation.gauges), *looked_at(evaluation.results, evaluation.settings))
-    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta, needed, sensors, moving, both_ways)
+    others = moving, both_ways, one_camera
+    sections = _sections(evaluation, judged, doubtful, scores, figures, by_theta, needed, sensors, *others)
     return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))
 
 
@@ -86,6 +88,7 @@ def _sections(
     sensors: Sequence[SensorWorth],
     moving: Sequence[str],
     both_ways: Sequence[str],
+    one_camera: Sequence[str],
 ) -> Iterator[Section]:
     results, settings = evaluation.results, evaluation.settings
     errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
@@ -95,6 +98,7 @@ def _sections(
     yield _titled(errors, [*error_lines(judged), *contact_lines(results)])
     yield _titled("Sensors of Table I: error of d_x, RMS (sensors.csv)", sensor_lines(sensors))
     yield _titled("Ways back (both_ways.csv)", both_ways)
+    yield _titled("By one camera's pictures of its own trial, no gauge (one_camera.csv)", one_camera)
     yield _titled("Objects that moved (moving.csv)", moving)
     yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
     friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings), *tilted_lines(evaluation.tilted)]
