@@ -10,6 +10,7 @@ from bench.base.workers import Workers
 from bench.friction.curved import curved_whisks, write_curvature
 from bench.friction.error_map import write_error_map
 from bench.friction.explained import write_explained
+from bench.friction.gave import write_gives_way
 from bench.friction.runs import alpha_est_sigma
 from bench.friction.soft import soft_objects, write_compliance
 from bench.friction.tables import write_friction
@@ -107,6 +108,7 @@ def _evaluated(
     alpha = settings.alpha_est_rad, alpha_est_sigma([f.surface for f in whole.friction], settings)
     soft = tuple(soft_objects(session, whole.results, *alpha))
     write_compliance(out, soft)
+    write_gives_way(out, whole.results)
     shapes = tuple(curved_whisks(whole.results, session.whisker, *alpha))
     write_curvature(out, shapes)
     tilted = tuple(tilted_whisks(session, whole.results))

@@ -2,17 +2,18 @@
 
 The whisker is moved along itself by a known shift, between trials of one surface and speed whose nominal distances
 (d_x_mm in trial.toml) differ. Only whisks that do not slip sideways serve, for the equation has no slip. No picture is
-looked at.
+looked at; where they show the object giving way, what they tell stands beside it (`bench.friction.gave`).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from bench.base.tables import write_table
+from bench.friction.gave import mean_give
 from bench.gauges.readings import NOMINAL_SHARE
 from bench.records.trial import FeltWhisk, TrialFacts, TrialResult, whisks
 from bench.session.session import Session
@@ -21,13 +22,14 @@ from bench.trials.compare import is_sound
 from estimator import compliance, first_order
 from estimator.beam import Beam
 from estimator.uncertainty import Z_95, model_share
-from vision.truth.value import Value
+from vision.truth.value import UNKNOWN, Value
 
 COLUMNS = (
     *("surface", "speed_deg_s", "near_nominal_mm", "far_nominal_mm", "whisks_near", "whisks_far", "shift_mm"),
     *("shift_sigma_mm", "d_x_mm", "d_x_sigma_mm", "give_mm_N", "give_sigma_mm_N", "stiffness_N_mm"),
     *("stiffness_low_N_mm", "stiffness_high_N_mm", "status"),
 )
+SEEN_COLUMNS = ("whisks_seen", "give_seen_mm_N", "give_seen_sigma_mm_N")  # only where an object gave way in pictures
 _LEAST_SHIFT_MM = 2.0  # nominal distances that differ by less are one distance set up again
 _HELD_SIGMAS = 3.0  # of φ felt: beyond, the contact slips sideways
 NOT_SOFT = "no softer than a rigid object within the noise"
@@ -49,7 +51,8 @@ class Place:
 
 @dataclass(frozen=True)
 class Soft:
-    """What two places tell of one surface: the nearer distance, how far the object gives way, mm/N; NaN and why."""
+    """What two places tell of one surface: the nearer distance, how far the object gives way, mm/N; NaN and why. seen:
+    the same by pictures and force, of whisks_seen."""
 
     surface: str
     speed_deg_s: float | None
@@ -60,6 +63,8 @@ class Soft:
     give_mm_N: float
     give_sigma_mm_N: float
     status: str = ""
+    seen: Value = UNKNOWN
+    whisks_seen: int = 0
 
     @property
     def stiffness_N_mm(self) -> tuple[float, float, float]:
@@ -79,8 +84,10 @@ def soft_objects(
         mine = [r for r in results if r.trial.purpose == "measure" and r.trial.panel == panel]
         places = [place for place in _places(session, mine) if place is not None]
         facts, theta = mine[0].trial, float(np.radians(mine[0].theta_deg))
-        found += [softness(session.whisker, facts, *pair, theta, alpha_est) for pair in pairwise(places)
-                  if pair[1].nominal_mm - pair[0].nominal_mm >= _LEAST_SHIFT_MM]  # fmt: skip
+        seen, count = mean_give(mine)
+        told = (softness(session.whisker, facts, *pair, theta, alpha_est) for pair in pairwise(places)
+                if pair[1].nominal_mm - pair[0].nominal_mm >= _LEAST_SHIFT_MM)  # fmt: skip
+        found += [replace(soft, seen=seen, whisks_seen=count) for soft in told]
     return found
 
 
@@ -164,7 +171,12 @@ def _compliance_of_distance(beam: Beam, place: Place) -> float:
 
 def write_compliance(out: Path, found: Sequence[Soft]) -> None:
     """compliance.csv."""
-    write_table(out / "compliance.csv", COLUMNS, map(_row, found))
+    beside = SEEN_COLUMNS if any(soft.whisks_seen for soft in found) else ()
+    write_table(out / "compliance.csv", (*COLUMNS, *beside), ({**_row(soft), **_seen(soft, beside)} for soft in found))
+
+
+def _seen(soft: Soft, names: Sequence[str]) -> dict:
+    return dict(zip(names, (soft.whisks_seen, soft.seen.value, soft.seen.sigma)))
 
 
 def _row(soft: Soft) -> dict:

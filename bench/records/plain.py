@@ -13,21 +13,22 @@ from bench.base.tables import sigma_name
 from vision.truth.value import NAN, Value
 
 Record = TypeVar("Record")
+WHERE_THERE = {"where_there": True}  # of a field that has no key where it is None
 
 
 def to_plain(value: object) -> Any:
     """A record, or a list or mapping of records, as plain values."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {key: part for f in fields(value) for key, part in _keys(f.name, getattr(value, f.name))}
+        return {key: part for f in fields(value) for key, part in _keys(f, getattr(value, f.name))}
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
     return [to_plain(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
 
 
-def _keys(name: str, value: object) -> list[tuple[str, Any]]:
+def _keys(field: Field, value: object) -> list[tuple[str, Any]]:
     if isinstance(value, Value):
-        return [(name, plain(value.value)), (sigma_name(name), plain(value.sigma))]
-    return [(name, to_plain(value))]
+        return [(field.name, plain(value.value)), (sigma_name(field.name), plain(value.sigma))]
+    return [] if value is None and field.metadata == WHERE_THERE else [(field.name, to_plain(value))]
 
 
 def from_plain(kind: type[Record], value: Any) -> Record:

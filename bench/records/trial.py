@@ -6,13 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
+from bench.records.plain import WHERE_THERE
 from vision.fit.beam_check import BeamCheck
 from vision.fit.line_noise import LineNoise
 from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
-from vision.truth.records import FrameTruth, WireShape
+from vision.truth.records import FrameTruth, GaveWay, WireShape
 from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
 
 
@@ -118,6 +119,7 @@ class SeenWhisk:
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
+    gave: GaveWay | None = field(default=None, metadata=WHERE_THERE)
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None

@@ -79,6 +79,10 @@ class Bar:
             return self
         return replace(self, point_mm=self.point_mm + self.moved_mm(motor_rad), velocity_mm_rad=None)
 
+    def given(self, gave_mm: np.ndarray) -> "Bar":
+        """The bar that has given way by so much (3,)."""
+        return replace(self, point_mm=self.point_mm + gave_mm)
+
     def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
         """The axis' points nearest to points (..., 3)."""
         return self.point_mm + np.multiply.outer((point_mm - self.point_mm) @ self.axis, self.axis)

@@ -1,5 +1,6 @@
 """One whisk: what the exact mechanics says at every motor angle of its forward and back stroke."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -115,6 +116,17 @@ class MarchedWhisk:
         """Along the bar since first touch, in the direction that its axis has there; over it where it moves itself."""
         moved = np.asarray(point_mm) - self.touch.point_mm - self.bar.moved_mm(motor_rad)
         return moved @ self.bar.axis_at(self.touch.point_mm)
+
+    def gave_mm(self, motor_rad: float, back: bool) -> np.ndarray:
+        """How far (3,) a soft bar is from where it stands: away from the contact, by the force along its normal."""
+        state = self.way(back).state_between(motor_rad)
+        if state is None or not state.force_hub_N.any() or math.isinf(self.bar.stiffness_N_mm):
+            return np.zeros(3)
+        point = self.centreline_mm(state.motor_rad, state, np.array([state.arc_mm]))[0]
+        away = self.bar.foot_mm(point) - point
+        normal = away / np.linalg.norm(away)
+        press = -turned(state.force_hub_N, state.motor_rad) @ normal
+        return press / self.bar.stiffness_N_mm * normal
 
     def way(self, back: bool) -> Instants:
         """The forward or the back stroke. Raises ValueError where there was no back stroke."""

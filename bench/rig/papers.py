@@ -92,6 +92,8 @@ def trial_toml(recording: Recording) -> str:
     if recording.stated_velocity_mm_s is not None:
         trial["object_velocity_mm_s"] = [round(float(v), 6) for v in recording.stated_velocity_mm_s]
         trial["object_velocity_sigma_mm_s"] = table.object_velocity_sigma_mm_s or 0.0
+    if table.stiffness_N_mm:
+        trial["object_gives_way"] = True
     if table.purpose == "gauge":
         trial["follicle_roll_deg"] = table.follicle_roll_deg
     return tomli_w.dumps(trial)
@@ -145,7 +147,7 @@ def array_frames_csv(recording: ArrayRecording) -> str:
 def truth_csv(recording: Recording) -> str:
     """A row a frame. A frame at the angle of a jump shows what came after it. `status`: free, held, sliding or tip."""
     rows = (_truth_row(i, recording.whisks[w], t, m, back) for i, (t, m, w, back) in enumerate(recording.frames))
-    return "\n".join([_TRUTH, *rows]) + "\n"
+    return "\n".join([_TRUTH + (",gave_mm" if math.isfinite(recording.bar.stiffness_N_mm) else ""), *rows]) + "\n"
 
 
 def _truth_row(frame, whisk, time_s, motor_rad, back):
@@ -158,7 +160,9 @@ def _truth_row(frame, whisk, time_s, motor_rad, back):
         values = [*state.point_mm, float(whisk.slip_mm(state.point_mm, motor_rad)), state.arc_mm, *moment]
     first, rest = (",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values))
     status = "free" if state is None else state.status
-    return f"{frame},{first},{int(state is not None)},{rest},{status}"
+    gave = np.linalg.norm(whisk.gave_mm(motor_rad, back))
+    soft = f",{gave:.6f}" if math.isfinite(whisk.bar.stiffness_N_mm) else ""
+    return f"{frame},{first},{int(state is not None)},{rest},{status}{soft}"
 
 
 def truth_toml(recording: Recording) -> str:

@@ -127,9 +127,13 @@ def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterat
     studio, frames, bar = job.studios[camera], recording.frames, recording.bar
     middle = bar.foot_mm(recording.touch.point_mm)
     still = studio.setting(bar, middle) if bar.velocity_mm_rad is None else None
-    for number, (_, motor, whisk, back) in enumerate(frames):
-        moments = moments_of(job.protocol, studio, recording, recording.whisks[whisk], motor, back)
-        setting = still or studio.setting(bar.at(motor), middle + bar.moved_mm(motor))
+    for number, (_, motor, which, back) in enumerate(frames):
+        whisk = recording.whisks[which]
+        moments, gave = moments_of(job.protocol, studio, recording, whisk, motor, back), whisk.gave_mm(motor, back)
+        setting = still
+        if still is None or gave.any():
+            moved = bar.moved_mm(motor) + gave
+            setting = studio.setting(bar.at(motor).given(gave), middle + moved)
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
 
 

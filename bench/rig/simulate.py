@@ -79,7 +79,6 @@ def _check_can_be_rendered(job, name):
     if job.signals_only or not job.protocol.cameras:
         return
     felt_alone = {
-        "a soft bar (stiffness_N_mm)": any(t.stiffness_N_mm for t in job.protocol.trials),
         "a ring or sphere (object)": any(t.object for t in job.protocol.trials),
         "an array ([[columns]])": bool(job.whiskers),
     }

@@ -155,6 +155,7 @@ class TrialKeys(Keys, kw_only=True):
     both_ways: bool = False
     object_velocity_mm_s: Triple | None = None
     object_velocity_sigma_mm_s: float = 0.0
+    object_gives_way: bool = False
     follicle_roll_deg: float = 0.0
     follicle_roll_sigma_deg: float = 0.0
     object: ObjectKeys | None = None

@@ -32,9 +32,9 @@ class Trial:
 
     purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
     the follicle was turned about the whisker. both_ways: each way back is evaluated, too. object_velocity_mm_s: (3,) in
-    the rig frame, of an object that moves at constant speed, with one sigma each way. camera_sources: camera to folder
-    of pictures or video, empty where the trial has none. whisker: of an array, whose channels `daq` names; '' where it
-    is the only one.
+    the rig frame, of an object that moves at constant speed, with one sigma each way. object_gives_way: it moves as
+    it is pushed. camera_sources: camera to folder of pictures or video, empty where the trial has none. whisker: of an
+    array, whose channels `daq` names; '' where it is the only one.
     """
 
     name: str
@@ -66,6 +66,7 @@ class Trial:
     both_ways: bool = False
     object_velocity_mm_s: list[float] | None = None
     object_velocity_sigma_mm_s: float = 0.0
+    object_gives_way: bool = False
     daq: DaqFile | None = None
     whisker: str = ""
 
@@ -93,6 +94,7 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq:
     shown = f"trials/{folder.name}"
     keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}", doubts)
     _check_weight(keys, f"{shown}/{MANIFEST}")
+    _check_motion(keys, f"{shown}/{MANIFEST}")
     signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
         raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{signals_path.name}")
@@ -123,6 +125,12 @@ def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: 
 def _check_weight(keys: manifest.TrialKeys, shown: str) -> None:
     if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
         raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
+
+
+def _check_motion(keys: manifest.TrialKeys, shown: str) -> None:
+    if keys.object_gives_way and keys.object_velocity_mm_s is not None:
+        found = "an object that moves does not give way, too; leave out object_velocity_mm_s"
+        raise BadInput(f"object_gives_way: {found}", file=shown)
 
 
 def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None:

@@ -70,6 +70,7 @@ def _see(
         calibration.background,
         trial.object_velocity_mm_s and np.array(trial.object_velocity_mm_s),
         trial.object_velocity_sigma_mm_s,
+        trial.object_gives_way,
     )
     rods = Rods(wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))
     observe = partial(observe_trial, pictures, cameras=calibration.cameras, rods=rods)

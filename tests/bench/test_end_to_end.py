@@ -43,7 +43,7 @@ def check_keys(out) -> None:
         found = {key for file in out.glob(files) for key in keys(json.loads(file.read_text()))}
         plain = {re.sub(r"\.(cameras|bar_looks|lines)\.(high|low)\b", r".\1.<camera>", key) for key in found}
         plain = {re.sub(r"\.refinements\.[^.]+", ".refinements.<refinement>", key) for key in plain}
-        assert plain == set(documented(heading))
+        assert plain == {key for key in documented(heading) if ".gave." not in key}  # no key where the object stands
     with np.load(out / "calibration" / "cameras.npz") as arrays:
         assert sorted(arrays) == sorted(documented("cameras.npz"))
 

@@ -12,7 +12,7 @@ from bench import robot_trade, tradeoff
 from bench.array import verdict as contacts
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction import curved, error_map, explained, soft, tables, tilted
+from bench.friction import curved, error_map, explained, gave, soft, tables, tilted
 from bench.gauges.gauges_file import FileKeys
 from bench.plan import written
 from bench.report import against_theta, assembly, both_ways, compare, figure_8, ledger, moving, one_camera, sensors
@@ -53,7 +53,8 @@ CSV = {
     "surfaces.csv": tables.SURFACE_COLUMNS,
     "explained.csv": explained.COLUMNS,
     "error_map.csv": error_map.COLUMNS,
-    "compliance.csv": soft.COLUMNS,
+    "compliance.csv": (*soft.COLUMNS, *soft.SEEN_COLUMNS),
+    "gives_way.csv": gave.COLUMNS,
     "curvature.csv": curved.COLUMNS,
     "tilts.csv": tilted.COLUMNS,
     "against_theta.csv": against_theta.COLUMNS,
@@ -106,7 +107,7 @@ def _by_name(match: re.Match) -> str:
 
 
 def test_truth_of_a_simulated_session(tmp_path):
-    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\n")
+    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\n")
     session = simulate(tmp_path / "session", protocol=protocol, seed=1, signals_only=True)
     (folder,) = (session / "trials").iterdir()
     written = {

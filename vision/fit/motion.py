@@ -1,8 +1,11 @@
 """A bar that does not stand still: where it is in each frame, by a few parameters of the fit (moving objects)."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
+
+from vision.geometry.contact import axis_frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,6 +18,16 @@ class Told:
     time_s: float
 
 
+@dataclass(frozen=True)
+class Gives:
+    """A bar that stands until it is touched and then gives way: motor angle of touch, how far the motor goes on from
+    there, rad, and how far the bar comes, mm. Before anything is known, touch is never."""
+
+    touch_rad: float = np.inf
+    span_rad: float = 1.0
+    most_mm: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Where the bar is in each of f frames, mm from where its axis is counted: told_mm (f, 3), and per_unit (k, f, 3)
@@ -23,6 +36,8 @@ class Motion:
     told_mm: np.ndarray
     per_unit: np.ndarray
     sigma: np.ndarray
+
+    from_touch: ClassVar = False
 
     @classmethod
     def steady(cls, told: Told, time_s: np.ndarray) -> "Motion":
@@ -39,6 +54,56 @@ class Motion:
         return self.told_mm + np.einsum("...k,kfi->...fi", values, self.per_unit)
 
 
+@dataclass(frozen=True, eq=False)
+class Yielding:
+    """Where a bar that gives way is in each of f frames, at motor_rad (f,): in its place up to touch, then across its
+    direction (3,) by powers of the pushing angle. Parameters are by how much touch is later than said, degrees, and mm
+    at the end of the push, of each way and power."""
+
+    gives: Gives
+    motor_rad: np.ndarray
+    direction: np.ndarray
+
+    from_touch: ClassVar = True
+
+    def __len__(self) -> int:
+        return 1 + 2 * _POWERS
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Of the parameters (k,), beforehand: nothing is believed of them."""
+        return np.array([_ANY_TOUCH_DEG, *[_ANYWHERE_MM] * (2 * _POWERS)])
+
+    @property
+    def told_mm(self) -> np.ndarray:
+        """Where it is in each frame (f, 3) before anything is seen: in its place."""
+        return np.zeros((len(self.motor_rad), 3))
+
+    def shift_mm(self, values: np.ndarray) -> np.ndarray:
+        """How far (…, f, 3) the bar is from its place, by parameters (…, k)."""
+        ways = values[..., 1:].reshape(*values.shape[:-1], 2, _POWERS)
+        return np.einsum("...fp,...wp,wi->...fi", self._powers(values[..., :1]), ways, axis_frame(self.direction))
+
+    def values(self, shift_mm: np.ndarray) -> np.ndarray:
+        """Parameters (k,) that meet shifts (f, 3) best, with touch as said."""
+        ways = np.linalg.lstsq(self._powers(np.zeros(1)), shift_mm @ axis_frame(self.direction).T, rcond=None)[0]
+        return np.append(0.0, ways.T)
+
+    def by_values(self, values: np.ndarray) -> np.ndarray:
+        """What shifts change by with each parameter, (k, f, 3)."""
+        moved = self.shift_mm(values + _STEP * np.eye(len(self)))
+        return (moved - self.shift_mm(values)) / _STEP
+
+    def _powers(self, later_deg: np.ndarray) -> np.ndarray:
+        pushed = np.maximum(self.motor_rad - self.gives.touch_rad - np.radians(later_deg), 0.0)
+        return (pushed / self.gives.span_rad)[..., None] ** np.arange(1, _POWERS + 1)
+
+
+# Force, and so the way that a spring gives, over the pushing angle: in proportion, and what large bending and friction
+# add to that.
+_POWERS = 3
+_ANYWHERE_MM, _ANY_TOUCH_DEG = 50.0, 50.0  # nothing is believed of how far a bar gives way, as of where it is
+_STEP = 1e-5  # mm and degrees, of differences
 _EXACT_MM_S = 1e-6  # a prior that is none would leave the fit no parameter to move
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.motion import Motion, between
+from vision.fit.motion import Motion, Yielding, between
 from vision.fit.onset import Onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
@@ -43,7 +43,8 @@ class Problem:
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
     axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
-    cameras do not know whisker and bar well enough in space to tell when they touch. alike: by camera, how much of its
+    cameras do not know whisker and bar well enough in space to tell when they touch, or when a bar begins to give way:
+    then as late beside it as the motion's first parameter has it. alike: by camera, how much of its
     error a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`). motion: of a bar
     that does not stand still.
     """
@@ -57,7 +58,7 @@ class Problem:
     seen: Sequence[Observed]
     onset: Onset | None = None
     alike: Sequence[float] = ()
-    motion: Motion | None = None
+    motion: Motion | Yielding | None = None
 
     @property
     def wire(self) -> Wire:
@@ -128,8 +129,8 @@ def bar_axes(problem: Problem, vector: np.ndarray) -> BarAxis:
 
 
 def shift_at_mm(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
-    """How far (…, 3) the bar is from where `bar_axis` has it as the motor passes angles (…)."""
-    if problem.motion is None:
+    """How far (…, 3) the bar is from where `bar_axis` has it as the motor passes angles (…) up to touch."""
+    if problem.motion is None or problem.motion.from_touch:
         return np.zeros(3)
     return between(problem.motor_rad, shifts_mm(problem, vector), motor_rad)
 

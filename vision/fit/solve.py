@@ -167,15 +167,23 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
     rest, axis = rest_shape(moved), bar_axis(problem, moved)
     count = len(moved)
     curves = centrelines(rest, np.zeros((count, 2)), np.full(count, problem.wire.length_mm / 2),
-                         np.full(count, onset.motor_rad), problem.wire)
+                         np.full(count, onset.motor_rad) + _later_rad(problem, moved), problem.wire)
     distance, arc, _ = clearance(curves, axis)
     distance, sigma_mm = distance - problem.rods.reach_mm(arc), onset.sigma_rad * arc[0]
     jacobian = np.zeros((1, problem.size))
-    for k, (step, _) in enumerate(columns[:BAR + REST]):
-        jacobian[0, k] = (distance[k + 1] - distance[0]) / step
+    alone = [*range(BAR + REST), *range(problem.size)[problem.bar_moves]] if columns else []
+    for number, (k, (step, _)) in enumerate(zip(alone, columns)):
+        jacobian[0, k] = (distance[number + 1] - distance[0]) / step
     jacobian[0, REACH] = -1.0
     residual = distance[:1] - vector[REACH]
     return residual / sigma_mm, jacobian / sigma_mm
+
+
+def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
+    """By how much (…) a bar that gives way is touched later than said."""
+    if problem.motion is None or not problem.motion.from_touch:
+        return 0.0
+    return np.radians(vector[..., problem.bar_moves.start])
 
 
 def _prior_block(problem: Problem, vector):

@@ -16,7 +16,7 @@ from vision.bar.search import see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
-from vision.fit.motion import Told
+from vision.fit.motion import Gives, Told
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
@@ -62,8 +62,9 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
         bar_seen = see_bar(stands, used, rods, motor_rad, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
+    gives = Gives() if pictures.object_gives_way else None
     seen = [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
-                          left_out=tuple(behind), told=told) for number, stroke in enumerate(strokes)]
+                          left_out=tuple(behind), told=told, gives=gives) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
     looks = seen_over_given(stands, bar_seen, rods, motor_rad, settings)
@@ -74,6 +75,8 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
 def _told(pictures: TrialPictures, strokes, views: Sequence[View]) -> tuple[Told | None, Sequence[View]]:
     """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
     stands: of that frame alone. Raises Refused for what is not told of it."""
+    if pictures.object_gives_way:
+        return None, _at_first(views, strokes)
     if pictures.object_velocity_mm_s is None:
         return None, views
     if len(strokes) != 1:
@@ -84,6 +87,14 @@ def _told(pictures: TrialPictures, strokes, views: Sequence[View]) -> tuple[Told
     middle = both[len(both) // 2]
     velocity, sigma = np.asarray(pictures.object_velocity_mm_s), pictures.object_velocity_sigma_mm_s
     return Told(velocity, sigma, float(pictures.time_s[middle])), in_one_frame(views, middle)
+
+
+def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[View]:
+    """The views in the frame that a stroke begins with, before it touches. Raises Refused where there is none."""
+    for frame in (frame for stroke in strokes for frame in stroke[:1]):
+        if all(frame in view.frames for view in views):
+            return in_one_frame(views, frame)
+    raise Refused("no stroke's first frame is seen by every camera")
 
 
 def _nothing(whisks, reason: str) -> TrialTruth:
@@ -130,6 +141,7 @@ def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
 
 def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
+    whisk = whisk.yielding_as(fitted.problem, fitted.state)
     truth, unexplained = to_whisk(whisk, fitted), [looks.doubt(name) for name, looks in whisk.light.items()]
     beam = _beam(fitted) if whisk.settings.check_beam else None
     without = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}

@@ -44,6 +44,17 @@ class WireShape:
 
 
 @dataclass(frozen=True, eq=False)
+class GaveWay:
+    """How far a bar that gives way has come in each touching frame (n,): index of the frame, pushing angle, and mm away
+    from the contact (normal_mm) and across that and the bar (aside_mm), which its springs need not have."""
+
+    index: np.ndarray
+    theta_rad: np.ndarray
+    normal_mm: Value
+    aside_mm: Value
+
+
+@dataclass(frozen=True, eq=False)
 class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
@@ -54,8 +65,8 @@ class WhiskTruth:
     each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end; looks: how
     thick it looks over how thick it is said to be, of a trial's first whisk.
     point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of
-    an object that moves, as seen; None where it stands. problem: what was fitted, from which `sights_of` takes what one
-    camera shows.
+    an object that moves, as seen; None where it stands. gave: of one that gives way. problem: what was fitted, from
+    which `sights_of` takes what one camera shows.
     """
 
     whisk: int
@@ -81,6 +92,7 @@ class WhiskTruth:
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
+    gave: GaveWay | None = None
     problem: Problem | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:

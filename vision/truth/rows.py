@@ -3,7 +3,7 @@
 import numpy as np
 
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import bar_axes, bends, curves_of, rest_shape
+from vision.fit.problem import bar_axes, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.uncertainty import variance_by_cause
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
@@ -11,7 +11,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import normals, outline
 from vision.pictures.scale import full_px
 from vision.truth.at_angle import Smooth
-from vision.truth.records import FrameTruth, WhiskTruth, WireShape
+from vision.truth.records import FrameTruth, GaveWay, WhiskTruth, WireShape
 from vision.truth.value import FIELDS, Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -38,7 +38,9 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     return WhiskTruth(whisk.number, frames, cameras=len(whisk.views), frames_used=len(fitted.frames),
                       status="; ".join(filter(None, reasons)), overlay=_overlay(whisk, fitted),
                       budget=_budget(fitted), lines=line_noise(fitted.problem),
-                      shape=_shape(fitted), velocity_mm_s=_velocity(whisk, fitted), problem=fitted.problem, **truth)
+                      shape=_shape(fitted), velocity_mm_s=_velocity(whisk, fitted),
+                      gave=_gave(fitted) if whisk.gives is not None and is_known else None,
+                      problem=fitted.problem, **truth)
 
 
 def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
@@ -48,6 +50,25 @@ def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
     own = fitted.problem.bar_moves
     sigma = np.sqrt(np.diag(fitted.covariance)[own])
     return Value(whisk.told.velocity_mm_s + fitted.state.vector[own], sigma)
+
+
+def _gave(fitted: FittedWhisk) -> GaveWay:
+    """How far a bar that gives way has come in each touching frame, away from the contact and across that."""
+    problem = fitted.problem
+    by = problem.motion.by_values(fitted.state.vector[problem.bar_moves])
+    keep, axis = problem.touching, bar_axes(problem, fitted.state.vector)
+    point = np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
+    direction = axis.direction[0]
+    normal = (axis.point_mm - point) @ (np.eye(3) - np.outer(direction, direction))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    own, came = fitted.covariance[problem.bar_moves, problem.bar_moves], shifts_mm(problem, fitted.state.vector)
+    found = []
+    for way in (normal, np.cross(direction, normal)):
+        rows = np.einsum("kfi,fi->fk", by, way)[keep]
+        sigma = np.sqrt(np.einsum("fk,kl,fl->f", rows, own, rows))
+        found.append(Value(np.sum(came * way, axis=1)[keep], sigma))
+    index = np.array(fitted.frames)[keep]
+    return GaveWay(index, problem.motor_rad[keep] - float(fitted.measured.whisk["touch"]), *found)
 
 
 def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:

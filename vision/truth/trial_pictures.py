@@ -18,7 +18,8 @@ _FEWEST_PICTURES = 3  # two tell the noise, a third what moves
 class TrialPictures:
     """frames: per camera the grey pictures (h, w) by frame index, a missing index is a lost frame; time_s, motor_rad
     (n,) at each frame; background: per camera the scene (h, w) without whisker and bar, or None. object_velocity_mm_s
-    (3,), with one sigma each way: of a bar that moves, rig frame; None where it stands."""
+    (3,), with one sigma each way: of a bar that moves, rig frame; None where it stands.
+    object_gives_way: it stands until it is touched, and comes back."""
 
     frames: Mapping[str, Mapping[int, np.ndarray]]
     time_s: np.ndarray
@@ -26,6 +27,7 @@ class TrialPictures:
     background: Mapping[str, np.ndarray | None]
     object_velocity_mm_s: np.ndarray | None = None
     object_velocity_sigma_mm_s: float = 0.0
+    object_gives_way: bool = False
 
     def shrunk(self, scale: int) -> "TrialPictures":
         """The same with pixels `scale` times as wide."""

@@ -11,7 +11,7 @@ from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curve
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, one_curve
-from vision.geometry.contact import BarAxis, outline_of_bar, upward
+from vision.geometry.contact import BarAxis, clearance, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused
 from vision.lines.bands import Pieces
 from vision.lines.one_sided import WireAppearance, seen_width
@@ -52,7 +52,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 
     Fills whisk.light with how each camera sees the wire. Raises Refused where there is no touch to fit.
     """
-    *others, last = ways_to_see(whisk) if whisk.told is None else [_moving(whisk)]
+    *others, last = ways_to_see(whisk) if whisk.motion is None else [_moving(whisk)]
     for way in others:
         try:
             return _fitted_by(whisk, *way)
@@ -66,7 +66,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 def _moving(whisk: WhiskPictures) -> tuple[BarInFrames, Touch]:
     """How a bar that moves is seen. Raises Refused where the cameras do not know it in space."""
     if seen_from_one_side(whisk.cameras, whisk.bar.axis) or len(whisk.views) < 2:
-        raise Refused("an object that moves is seen by two cameras or more, from different sides")
+        raise Refused("an object that moves or gives way is seen by two cameras or more, from different sides")
     return BarInFrames(whisk.views, whisk.rods.bar.radius_mm, whisk.settings), TouchByClearance()
 
 
@@ -77,6 +77,7 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, touch: Touch
         if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
             raise Refused("a single camera sees wire and bar")
         problem, state, answer = _fit(whisk, look, seen, touch)
+        whisk = whisk.yielding_as(problem, state)
         _check_scatter(problem, state)
         look = _Look(upward(bar_axis(problem, state.vector)), shifts_mm(problem, state.vector),
                      rest_shape(state.vector), bends(problem, state.vector), state.arcs_mm,
@@ -97,14 +98,29 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
     touching, free = touch.first(whisk.angles_rad, bend)
     arcs = np.array([contact_arc(rest, b, m, axis, wire) for b, m in zip(bend, whisk.angles_rad)])
     curves = {f: one_curve(rest, b, a, m, wire) for (f, m), b, a in zip(whisk.motor.items(), bend, arcs)}
-    came = np.zeros((1, 3)) if whisk.told is None else whisk.motion.told_mm
+    came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.told_mm
+    if whisk.gives is not None:
+        came = _given_way(whisk, list(curves.values()), touching)
+        first = int(np.argmax(touching))
+        whisk = whisk.yielding(came, float(np.mean(whisk.angles_rad[[np.flatnonzero(free[:first])[-1], first]])))
     return whisk, _Look(axis, came, rest, bend, arcs, curves, touching, free)
+
+
+def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
+    """How far (f, 3) the bar has come, where it touches curves that have passed where it stood."""
+    came = np.zeros((len(curves), 3))
+    for k in np.flatnonzero(touching).tolist():
+        distance, arc, _ = clearance(curves[k], whisk.bar.axis)
+        away = np.cross(whisk.bar.axis.direction, curves[k].at(np.atleast_1d(arc))[1][0])
+        away *= np.sign(away[1]) / np.linalg.norm(away)
+        came[k] = max(whisk.rods.reach_mm(arc) - distance, 0.0) * away
+    return came
 
 
 def _fit(whisk: WhiskPictures, look: _Look, seen: list[Observed], touch: Touch) -> tuple[Problem, State, np.ndarray]:
     """The fit to all lines, with sigmas as large as residuals show: problem, state, and how the parameters answer."""
     problem = Problem(whisk.cameras, whisk.rods, look.axis, whisk.angles_rad, look.touching, ~look.free, seen,
-                      motion=whisk.motion)
+                      motion=whisk.motion, onset=whisk.onset)
     problem, state = touch.settled(problem, *solve(problem, _begin(problem, look)))
     problem = inflated_by_residuals(problem, state)
     return problem, *solve(problem, state, scales=[LAST_SCALE] * 3)
@@ -148,6 +164,8 @@ def _blurs_px(whisk: WhiskPictures) -> dict[str, float]:
 def _begin(problem: Problem, look: _Look) -> State:
     vector = np.zeros(problem.size)
     vector[BAR:BAR + REST] = np.ravel(look.rest_mm)
+    if problem.motion is not None and problem.motion.from_touch:
+        vector[problem.bar_moves] = problem.motion.values(look.came_mm)
     vector[problem.first_bend:] = look.bend_rad[problem.bent].ravel()
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 

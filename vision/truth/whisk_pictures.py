@@ -8,10 +8,12 @@ import numpy as np
 
 from vision.bar.search import SeenBar
 from vision.fit.exposure import Exposure, slip_in_exposure
-from vision.fit.motion import Motion, Told
+from vision.fit.motion import Gives, Motion, Told, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State
+from vision.fit.onset import Onset
+from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.quantities import Jacobians, Measured, jacobians
+from vision.fit.touch import first_touch
 from vision.fit.uncertainty import Uncertainty, uncertainty
 from vision.geometry.camera import Cameras
 from vision.geometry.rods import Rods
@@ -20,6 +22,8 @@ from vision.lines.one_sided import WireAppearance
 from vision.pictures.view import View
 from vision.truth.value import Value
 
+_EXACT_RAD = 1e-6  # a tenth of a micrometre where it touches: less than the contact's own sigma
+_LEAST_SPAN_RAD = 1e-4  # of a whisk that ends at touch: there is nothing to divide by
 _FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
 
 
@@ -28,7 +32,8 @@ class WhiskPictures:
     """One whisk in the pictures of a trial.
 
     indices: the frames of the stroke; time_s, motor_rad (n,) at every frame of the trial; light: filled with how each
-    camera sees the wire; left_out: a line on each camera that is not asked; told: of a bar that moves.
+    camera sees the wire; left_out: a line on each camera that is not asked; told: of a bar that moves; gives: of
+    one that gives way.
     """
 
     number: int
@@ -43,15 +48,39 @@ class WhiskPictures:
     light: dict[str, WireAppearance] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     told: Told | None = None
+    gives: Gives | None = None
 
     @property
-    def motion(self) -> Motion | None:
+    def motion(self) -> Motion | Yielding | None:
         """How a bar that moves goes through the frames."""
+        if self.gives is not None:
+            return Yielding(self.gives, self.angles_rad, self.bar.axis.direction)
         return None if self.told is None else Motion.steady(self.told, self.time_s[self.frames])
+
+    @property
+    def onset(self) -> Onset | None:
+        """When a bar begins to give way: then the unbent whisker touches it."""
+        return None if self.gives is None else Onset(self.gives.touch_rad, _EXACT_RAD)
+
+    def yielding(self, came_mm: np.ndarray, touch_rad: float) -> "WhiskPictures":
+        """The whisk once it is known where a bar that gives way is in its frames (f, 3), and when it is touched."""
+        if self.gives is None:
+            return self
+        span_rad = max(float(self.angles_rad.max()) - touch_rad, _LEAST_SPAN_RAD)
+        return replace(self, gives=Gives(touch_rad, span_rad, float(np.linalg.norm(came_mm, axis=1).max())))
+
+    def yielding_as(self, problem: Problem, state: State) -> "WhiskPictures":
+        """`yielding` by a fit."""
+        if self.gives is None:
+            return self
+        touch = float(first_touch(problem, state.vector).motor_rad)
+        return self.yielding(shifts_mm(problem, state.vector), touch)
 
     @property
     def bar_swept_mm(self) -> float:
         """Radius about its axis within which the bar stays through the whisk."""
+        if self.gives is not None:
+            return self.rods.bar.radius_mm + self.gives.most_mm
         moved = 0.0 if self.told is None else float(np.linalg.norm(self.motion.told_mm, axis=1).max(initial=0.0))
         return self.rods.bar.radius_mm + moved
 

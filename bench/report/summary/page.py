@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bench.base.tables import TABLES
 from bench.friction.curved import curved_lines
+from bench.friction.gave import gave_lines
 from bench.friction.soft import soft_lines
 from bench.friction.tables import alpha_lines
 from bench.friction.tilted import tilted_lines
@@ -103,7 +104,8 @@ def _sections(
     yield _titled("Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg))
     friction = [*alpha_lines(evaluation.friction), *run_lines(judged, settings), *tilted_lines(evaluation.tilted)]
     yield _titled("Friction angle α (± one sigma)", friction)
-    yield _titled("The object", [*soft_lines(evaluation.soft), *curved_lines(evaluation.shapes)])
+    soft = [*soft_lines(evaluation.soft), *gave_lines(results)]
+    yield _titled("The object", [*soft, *curved_lines(evaluation.shapes)])
     yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
     yield _titled("Only what the scene requires: the effect of leaving it out (ledger.csv)", ledger_lines(needed))
     yield _titled("Cameras", evaluation.calibration.notes)

@@ -5,7 +5,6 @@ import csv
 import numpy as np
 import pytest
 
-from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
 from bench.friction.soft import NO_PUSH, NOT_SOFT, Place, soft_lines, softness
@@ -80,9 +79,3 @@ def test_a_simulated_sponge_is_soft_and_steel_is_not(tmp_path):
     assert abs(float(sponge["d_x_mm"]) - 45.0) < 2 * float(sponge["d_x_sigma_mm"])
     assert steel["status"] == NOT_SOFT and float(steel["stiffness_low_N_mm"]) > 1.0
     assert "gives way by" in (tmp_path / "out" / "summary.txt").read_text()
-
-
-def test_a_soft_bar_is_not_drawn(tmp_path):
-    camera = '[[cameras]]\nname = "a"\nposition_mm = [20.0, -220.0, 300.0]\n'
-    with pytest.raises(BadInput, match="--signals-only"):
-        simulate(tmp_path / "session", protocol=protocol_file(tmp_path, PROTOCOL + camera))

@@ -1,13 +1,19 @@
-"""A bar that moves through the whisk: the fit finds its way, touch and slip are those of the bar where it is."""
+"""A bar that moves through the whisk or gives way: the fit finds its way, touch and slip are those of the bar where it
+is."""
+
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import begun, scene, with_points
-from vision.fit.motion import Motion, Told, between
+from vision.fit.motion import Gives, Motion, Told, Yielding, between
+from vision.fit.onset import Onset
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import measure
 from vision.fit.solve import linearise, solve
+from vision.fit.touch import first_touch
 
 VELOCITY = np.array([1.0, 2.0, -1.5])
 
@@ -15,6 +21,38 @@ VELOCITY = np.array([1.0, 2.0, -1.5])
 def moving(frames=6):
     """A bar at constant velocity, frames 0.09 s apart, counted from the fourth."""
     return Motion.steady(Told(VELOCITY, 0.5, 0.27), 0.09 * np.arange(frames))
+
+
+@cache
+def giving():
+    """Problem and truth of a bar that gives way, a tenth of a millimetre at the end by each power each way; its touch
+    is said 0.1° too early."""
+    standing, state = scene(frames=6)
+    said = Gives(float(first_touch(standing, state.vector).motor_rad) - np.radians(0.1), 0.1)
+    problem, truth = scene(frames=6, motion=Yielding(said, standing.motor_rad, standing.axis.direction))
+    return replace(problem, onset=Onset(said.touch_rad, 1e-6)), truth
+
+
+def test_how_a_bar_gives_way_is_found_with_the_rest():
+    """From nothing known of it and without noise: touch, distance, and where the bar is in each frame."""
+    problem, truth = giving()
+    begin = begun(problem, truth)
+    found, _ = solve(with_points(problem, truth, sigma=1e-6), begin, scales=(1e9,) * 10 + (2e9,))
+    here, true = (measure(problem, s.vector, s.arcs_mm) for s in (found, truth))
+    assert here.whisk["touch"] == pytest.approx(true.whisk["touch"], abs=1e-6)
+    assert here.whisk["d_x"] == pytest.approx(true.whisk["d_x"], abs=1e-4)
+    shifts = [problem.motion.shift_mm(s.vector[problem.bar_moves]) for s in (found, truth)]
+    assert np.abs(shifts[1]).max() > 0.05
+    assert shifts[0] == pytest.approx(shifts[1], abs=1e-4)
+
+
+def test_a_bar_that_gives_way_stands_until_touch():
+    problem, truth = giving()
+    shift = problem.motion.shift_mm(truth.vector[problem.bar_moves])
+    touch = first_touch(problem, truth.vector).motor_rad
+    assert not shift[problem.motor_rad < touch].any()
+    assert shift[problem.motor_rad > touch].any(axis=1).all()
+    assert problem.motion.shift_mm(problem.motion.values(shift))[-1] == pytest.approx(shift[-1], abs=0.02)
 
 
 def test_a_motion_is_found_with_the_rest():
@@ -44,8 +82,9 @@ def test_slip_is_over_the_bar():
     assert here.frame["slip"][problem.touching] == pytest.approx(slip[problem.touching], abs=1e-9)
 
 
-def test_jacobian_is_the_derivative_of_the_residual(rng):
-    problem, truth = scene(frames=6, motion=moving())
+@pytest.mark.parametrize("made", [lambda: scene(frames=6, motion=moving()), giving])
+def test_jacobian_is_the_derivative_of_the_residual(rng, made):
+    problem, truth = made()
     problem = with_points(problem, truth, rng)
     state = State(truth.vector + 1e-3 * rng.standard_normal(problem.size), truth.arcs_mm)
     linear, _ = linearise(problem, state)
