@@ -1,16 +1,19 @@
-"""Time against error of the truth: one setting of the looking changed at a time, and the presets.
+"""Time against error of the truth: one setting of the looking changed at a time, the presets, and figures or none.
 
 Each setting sees the same trials. It is timed as often as asked, and the least time stands: what a clock adds is never
 negative. Errors are against the known truth where the session is simulated, else against the preset `fine`.
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter
 from tqdm import tqdm
 
 from bench.base.atomic import lock_output, write_whole
@@ -20,22 +23,28 @@ from bench.base.errors import BadInput
 from bench.base.settings import Seeing, Settings
 from bench.base.tables import write_table
 from bench.base.workers import Workers
-from bench.records.trial import SeenTrial
+from bench.records.trial import SeenTrial, TrialResult
+from bench.report.figures import draw_trial
 from bench.report.score import truth_of
 from bench.session.check import checked_session
 from bench.session.inside import check_outside
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
-from bench.trials.of_session import judged, placed_units
+from bench.trials.of_session import judged, placed_units, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.seen import see_trial
-from bench.trials.unit import Unit
+from bench.trials.unit import Unit, trial_result
 
 COLUMNS = ("setting", "on_front", "whisks", "whisks_with_truth", "cpu_s_per_whisk", "wall_s_per_whisk",
            "cpu_share_of_standard", "d_x_error_rms_mm", "d_x_sigma_median_mm", "inside_95_percent")
 _CHANGES = {"rounds": (0, 2), "every_frame": (2, 3), "picture_scale": (2,), "wire_piece_px": (8, 24),
             "bar_piece_px": (8, 24), "check_beam": (False,)}
 _WITHIN_95 = 1.959964
+FIGURES = "with-figures"  # the standard; no key of a settings file
+
+_PLAIN = FormatStrFormatter("%.3g")  # a log axis of less than a decade
+
+_Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +94,12 @@ def tradeoff(
         raise BadInput(f"--trials {trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:
         _, units = placed_units(session, judged(session), out, settings, pool, doubts)
+        *_, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name) and unit.trial.camera_sources]
         asked = list(ladder(tuple(chosen[0].trial.camera_sources)))
         each = tqdm(asked, desc="settings", disable=not progress, leave=False)
-        trades = _against_truth(session, chosen, [_timed(chosen, seeing, repeats) for seeing in each])
+        trades = [_timed(chosen, seeing, repeats) for seeing in each]
+        trades = _against_truth(session, chosen, [*trades, _drawn(chosen, _standard(trades), repeats)])
     _write(out, trades)
     return 0
 
@@ -112,20 +123,41 @@ def front(trades: Sequence[Trade]) -> list[bool]:
 
 
 def _timed(units: Sequence[Unit], seeing: Seeing, repeats: int) -> Trade:
-    """The trials seen so often with one setting; no errors yet."""
-    asked = Settings(seeing=seeing)
-    runs = [_clocked(units, asked) for _ in range(repeats)]
-    whisks = [whisk for trial in runs[0][0] for whisk in trial.whisks]
+    """The trials seen so often with one setting, decoding included; no errors yet."""
+    seen, cpu_s, wall_s = _clocked(lambda: _seen(units, Settings(seeing=seeing)), repeats)
+    whisks = [whisk for trial in seen for whisk in trial.whisks]
     d_x, sigma = np.array([(whisk.d_x_mm.value, whisk.d_x_mm.sigma) for whisk in whisks], dtype=float).T
-    cpu_s, wall_s = (min(run[k] for run in runs) / len(whisks) for k in (1, 2))
-    return Trade(seeing, cpu_s, wall_s, d_x, sigma, np.full(len(d_x), np.nan))
+    return Trade(seeing, cpu_s / len(whisks), wall_s / len(whisks), d_x, sigma, np.full(len(d_x), np.nan))
 
 
-def _clocked(units: Sequence[Unit], settings: Settings) -> tuple[list[SeenTrial], float, float]:
-    """What is seen, and the seconds of processor and of wall that it took, decoding included."""
-    cpu_s, wall_s = time.process_time(), time.perf_counter()
-    seen = [see_trial(u.session, u.trial, read_signals(u.trial), u.calibration, settings) for u in units]
-    return seen, time.process_time() - cpu_s, time.perf_counter() - wall_s
+def _seen(units: Sequence[Unit], settings: Settings) -> list[SeenTrial]:
+    return [see_trial(u.session, u.trial, read_signals(u.trial), u.calibration, settings) for u in units]
+
+
+def _drawn(units: Sequence[Unit], standard: Trade, repeats: int) -> Trade:
+    """The standard, and beside its seconds those of drawing all figures of the trials."""
+    results = [(unit, trial_result(unit)) for unit in units]
+    _, cpu_s, wall_s = _clocked(lambda: _draw_all(results), repeats)
+    count, about = len(standard.d_x_mm), Seeing(FIGURES, standard.seeing.vision)
+    seconds = {"cpu_s": standard.cpu_s + cpu_s / count, "wall_s": standard.wall_s + wall_s / count}
+    return replace(standard, seeing=about, **seconds)
+
+
+def _draw_all(results: Sequence[tuple[Unit, TrialResult]]) -> list[str]:
+    """Sensing planes and overlays, into a folder that does not stay; their names."""
+    with TemporaryDirectory() as folder:
+        return [name for unit, result in results
+                for name in draw_trial((unit.trial, result, (unit.settings.alpha_est_rad, "assumed"), Path(folder)))]
+
+
+def _clocked(make: Callable[[], _Made], repeats: int) -> tuple[_Made, float, float]:
+    """What is made, and the least seconds of processor and of wall of so many times."""
+    runs = []
+    for _ in range(repeats):
+        cpu_s, wall_s = time.process_time(), time.perf_counter()
+        made = make()
+        runs.append((time.process_time() - cpu_s, time.perf_counter() - wall_s))
+    return made, *(min(column) for column in zip(*runs))
 
 
 def _against_truth(session: Session, units: Sequence[Unit], trades: Sequence[Trade]) -> list[Trade]:
@@ -137,10 +169,14 @@ def _against_truth(session: Session, units: Sequence[Unit], trades: Sequence[Tra
     return [replace(trade, errors_mm=trade.d_x_mm - np.where(np.isnan(true), finest, true)) for trade in trades]
 
 
+def _standard(trades: Sequence[Trade]) -> Trade:
+    return next(trade for trade in trades if trade.seeing.name == STANDARD)
+
+
 def _write(out: Path, trades: Sequence[Trade]) -> None:
     on_front = front(trades)
-    standard = next(trade for trade in trades if trade.seeing.name == STANDARD)
-    rows = [trade.row(standard.cpu_s, there) for trade, there in zip(trades, on_front)]
+    standard_cpu_s = _standard(trades).cpu_s
+    rows = [trade.row(standard_cpu_s, there) for trade, there in zip(trades, on_front)]
     write_table(out / "tradeoff.csv", COLUMNS, rows)
     for trade, there in zip(trades, on_front):
         if there:
@@ -161,15 +197,19 @@ def _lines(rows: Sequence[dict]) -> Iterator[str]:
 
 
 def draw(trades: Sequence[Trade], on_front: Sequence[bool]) -> Figure:
-    """Error against processor time, the front joined."""
+    """Error against processor time, the front joined; presets and what lies on the front are named."""
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.add_subplot()
     joined = sorted((trade.cpu_s, trade.rms_mm) for trade, there in zip(trades, on_front) if there)
     axes.plot(*np.array(joined).T, color="0.6", lw=1, zorder=1, label="Pareto front")
     for trade, there in zip(trades, on_front):
         axes.plot(trade.cpu_s, trade.rms_mm, "o", color="#2166ac" if there else "0.6", ms=5)
-        axes.annotate(trade.seeing.name, (trade.cpu_s, trade.rms_mm), xytext=(4, 3), textcoords="offset points",
-                      fontsize=7, color="0.2" if there else "0.5")
-    axes.set(xlabel="processor time a whisk, s", ylabel="error of d_x, RMS, mm", yscale="log")
+        if there or trade.seeing.name in (*PRESETS, FIGURES):  # the rest lie upon each other: tradeoff.csv has them
+            axes.annotate(trade.seeing.name, (trade.cpu_s, trade.rms_mm), xytext=(4, 3), textcoords="offset points",
+                          fontsize=7, color="0.2" if there else "0.5")
+    axes.set(xlabel="processor time a whisk, s", ylabel="error of d$_x$, RMS, mm", yscale="log")
+    axes.yaxis.set_major_formatter(_PLAIN)
+    axes.yaxis.set_minor_formatter(_PLAIN)
+    axes.margins(x=0.12)
     axes.legend()
     return figure

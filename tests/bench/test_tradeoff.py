@@ -39,9 +39,10 @@ def test_a_table_and_files_to_give_back(tmp_path, monkeypatch, capsys):
     assert tradeoff.tradeoff(RING, tmp_path, trials="w*", repeats=1) == 0
     with (tmp_path / "tradeoff.csv").open(newline="") as file:
         rows = {row["setting"]: row for row in csv.DictReader(file)}
-    assert set(rows) == {"draft", "standard"}
+    assert set(rows) == {"draft", "standard", "with-figures"}
     assert all(float(row["d_x_error_rms_mm"]) < 0.1 for row in rows.values())
-    assert float(rows["draft"]["cpu_share_of_standard"]) < 1.0
+    assert float(rows["draft"]["cpu_share_of_standard"]) < 1.0 < float(rows["with-figures"]["cpu_share_of_standard"])
+    assert rows["with-figures"]["d_x_error_rms_mm"] == rows["standard"]["d_x_error_rms_mm"]
     files = sorted((tmp_path / "settings").iterdir())
     assert files
     assert {from_file(path).vision for path in files} <= {seeing.vision for seeing in ladder(())}

@@ -105,10 +105,17 @@ def centrelines(
 
 @lru_cache
 def simpson() -> np.ndarray:
-    """The matrix (m, m) that integrates values at the nodes of a curve, one apart, from the first node to each."""
-    from scipy.integrate import cumulative_simpson  # with all of scipy.optimize: a look at a session does without
+    """The matrix (m, m) that integrates values at the nodes of a curve, one apart, from the first node to each: by the
+    parabola through three nodes, over its first and its second half by turns; over the last step its second half.
 
-    return cumulative_simpson(np.eye(_NODES), dx=1.0, axis=0, initial=0.0)
+    As `scipy.integrate.cumulative_simpson`, which takes an eighth of a second to load.
+    """
+    first, second = np.array([5.0, 8.0, -1.0]) / 12.0, np.array([-1.0, 8.0, 5.0]) / 12.0
+    steps = np.zeros((_NODES, _NODES))
+    for k in range(_NODES - 1):
+        begins = k % 2 == 0 and k + 2 < _NODES
+        steps[k + 1, k - (not begins):k + 2 + begins] = first if begins else second
+    return np.cumsum(steps, axis=0)
 
 
 def _rest_slope(rest_mm, u) -> np.ndarray:
