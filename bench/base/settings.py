@@ -13,6 +13,10 @@ from vision.geometry.settings import VisionSettings
 CUTOFF_HZ_PER_DEG_S = 0.5
 # How far α_est may be off where nothing tells: steel's 10.5° to sandpaper's 23.3° (Fig. 8) about an assumed 10° or 15°.
 ALPHA_EST_SIGMA_DEG = 5.0
+# What a robot allows for in an object that it is told nothing of: as thick as the paper's bar of 6 mm, with the whisker
+# of 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
+OBJECT_REACH_MM = 3.5
+TILT_SIGMA_RAD = math.radians(5.0)  # rad, one sigma: how upright a bar is set by eye
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.settings import TILT_SIGMA_RAD
 from bench.base.tables import write_table
 from bench.records.trial import FeltAt, FeltWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.compare import is_sound
-from bench.trials.estimates import TILT_SIGMA_RAD
 from estimator import curvature, first_order
 from estimator.beam import Beam
 from estimator.uncertainty import Z_95, gradient_with_friction

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.base.settings import Settings
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.friction.alphas import seen_friction
 from bench.friction.surfaces import Surface, surfaces
 from bench.friction.turning import turn, with_turn
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, answer, whisk_of
+from bench.trials.estimates import answer, whisk_of
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.uncertainty import Z_95

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
+from bench.base.settings import TILT_SIGMA_RAD
 from bench.friction.curved import apart, phi_sigma
 from bench.records.trial import EstimateRow, FeltAt
-from bench.trials.estimates import TILT_SIGMA_RAD
 from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95
 from vision.truth.value import UNKNOWN, Value

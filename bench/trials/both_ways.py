@@ -4,10 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.gauges.felt import Stroke, gauge_delay, ways_back_of
 from bench.records.trial import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk
 from bench.session.signals import Signals
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, whisk_of
+from bench.trials.estimates import whisk_of
 from bench.trials.seen import NO_PICTURES
 from estimator.both_ways import there_and_back
 from estimator.whisk import EstimatorSettings

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.base.settings import Settings
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke
 from bench.gauges.matrix import GaugeMatrix, to_follicle
@@ -23,10 +23,6 @@ from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 from vision.truth.value import Value
 
-# What a robot allows for in an object that it is told nothing of: as thick as the paper's bar of 6 mm, with the whisker
-# of 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
-OBJECT_REACH_MM = 3.5
-TILT_SIGMA_RAD = np.radians(5.0)  # rad, one sigma: how upright a bar is set by eye
 UNTOLD = (math.nan, 0.0)  # radii of bar and whisker where nobody says
 # Pushing angles at which a run says how error and sigma go with θ: steps of a half and less, where errors bend.
 THETAS_DEG = (0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0)

@@ -4,11 +4,10 @@ It sees its own trial, as no other estimate does: its rows have a table and a li
 """
 
 from bench.base.errors import BadInput
-from bench.base.settings import Settings
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.records.trial import ByOneCamera
 from bench.session.session import Session
 from bench.session.whisker import Whisker
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from estimator.seen_shape import SeenShape, contact_of_shape
 from vision.truth.records import WhiskTruth
 from vision.truth.sights import sights_of

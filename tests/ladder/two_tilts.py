@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from estimator.builtin import with_friction
 from estimator.two_tilts import SharedContact, shared_contact
 from estimator.uncertainty import Z_95
