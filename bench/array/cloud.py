@@ -13,6 +13,7 @@ from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
 from estimator.distance import cartesian, contact_point
 from vision.geometry.rods import Wire
+from vision.geometry.rotation import skew
 from vision.truth.value import NAN, UNKNOWN, Value
 
 SEEN = "seen"  # in the place of an estimator's name
@@ -100,7 +101,7 @@ def _normal(touch_rad: float, beta_rad: float) -> np.ndarray:
 def _placed(base: Base, point, covariance, normal) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """From the base frame to the rig's; the covariance with that of the base's place."""
     turn, arm = base.T_rig_base[:, :3], base.T_rig_base[:, :3] @ point
-    lever = np.array([[0.0, arm[2], -arm[1]], [-arm[2], 0.0, arm[0]], [arm[1], -arm[0], 0.0]])
+    lever = skew(arm)
     of_base = base.sigma_mm**2 * np.eye(3) + base.sigma_rad**2 * lever @ lever.T
     return arm + base.T_rig_base[:, 3], turn @ covariance @ turn.T + of_base, turn @ normal
 

@@ -201,6 +201,11 @@ class EstimateRow:
     slip_est_mm: Value = UNKNOWN
     touch_covariance_mm_rad: float = NAN
 
+    def holds(self, d_x_mm: float) -> bool | None:
+        """Whether the 95 % interval holds a distance; None where either is not known."""
+        known = np.isfinite([self.d_x_est_low_mm, self.d_x_est_high_mm, d_x_mm]).all()
+        return bool(self.d_x_est_low_mm <= d_x_mm <= self.d_x_est_high_mm) if known else None
+
 
 @dataclass(frozen=True, eq=False)
 class FeltAt:

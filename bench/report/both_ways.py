@@ -44,9 +44,7 @@ class WayBack:
     @property
     def inside(self) -> bool | None:
         """Whether the 95 % interval holds the truth; None where either is not known."""
-        ends = self.answer.d_x_est_low_mm, self.answer.d_x_est_high_mm
-        known = np.isfinite([*ends, self.d_x_mm.value]).all()
-        return bool(ends[0] <= self.d_x_mm.value <= ends[1]) if known else None
+        return self.answer.holds(self.d_x_mm.value)
 
 
 def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:

@@ -55,9 +55,7 @@ class Moved:
     @property
     def inside(self) -> bool | None:
         """Whether the 95 % interval holds the truth; None where there is no interval."""
-        low, high = self.answer.d_x_est_low_mm, self.answer.d_x_est_high_mm
-        known = np.isfinite([low, high, self.error_percent]).all()
-        return bool(low <= self.seen.d_x_mm.value <= high) if known else None
+        return self.answer.holds(self.seen.d_x_mm.value) if np.isfinite(self.error_percent) else None
 
 
 def moved_whisks(session: Session, results: Sequence[TrialResult]) -> list[Moved]:

@@ -69,8 +69,7 @@ def _in_order(item: tuple) -> tuple:
 def _judged(row: EstimateRow, truth: Value) -> np.ndarray:
     """Error and its stated sigma, % of the truth, and whether the interval holds it (3,)."""
     error, sigma = row.d_x_est_mm.value - truth.value, np.hypot(row.d_x_est_mm.sigma, truth.sigma)
-    holds = row.d_x_est_low_mm <= truth.value <= row.d_x_est_high_mm
-    return 100.0 * np.array([error / truth.value, sigma / truth.value, holds])
+    return 100.0 * np.array([error / truth.value, sigma / truth.value, bool(row.holds(truth.value))])
 
 
 def _alphas_deg(friction: Iterable[SurfaceFriction]) -> dict[str, float]:

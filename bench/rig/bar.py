@@ -20,6 +20,11 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def cross_matrix(a: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) that makes of a vector its cross product with this one from the left."""
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
 _STRAIGHT = np.zeros((3, 3))  # how the axis of a straight bar turns
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Bar, Touch, cross
+from bench.rig.bar import Bar, Touch, cross, cross_matrix
 from bench.rig.elastica import Elastica
 from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
 from bench.rig.linear import solved
@@ -197,7 +197,7 @@ class _Problem:
         distance = math.sqrt(apart @ apart)
         normal = apart / distance
         normal_by = (flat - np.outer(normal, normal)) @ pose.point_by / distance
-        side, side_by = cross(axis, normal), _cross_matrix(axis) @ normal_by - _cross_matrix(normal) @ axis_by
+        side, side_by = cross(axis, normal), cross_matrix(axis) @ normal_by - cross_matrix(normal) @ axis_by
         ways = (axis, axis_by), (side, side_by)
         press, press_by, shear, shear_by = self._forces(unknowns, normal, normal_by, *ways)
         motion, motion_by = self._motion(unknowns[3], pose, *ways)
@@ -261,10 +261,6 @@ def moments_Nmm(state: ContactState) -> tuple[float, float]:
 def _turn(angle_rad):
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])
-
-
-def _cross_matrix(a):
-    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
 
 
 def _settled(step, unknowns):

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from bench.rig.bar import Bar
+from bench.rig.bar import Bar, cross_matrix
 
 _UP = np.array([0.0, 0.0, 1.0])  # (3,): axes have a positive z
 
@@ -48,7 +48,7 @@ class Ring(Bar):
         outward_by = (plane - np.outer(outward, outward)) / length
         along = np.cross(self.axis, outward)
         side = 1.0 if along[2] >= 0 else -1.0
-        turning = side * _cross_matrix(self.axis) @ outward_by
+        turning = side * cross_matrix(self.axis) @ outward_by
         way = apart - self.ring_radius_mm * outward
         return way, np.eye(3) - self.ring_radius_mm * outward_by, side * along, turning
 
@@ -76,7 +76,3 @@ class Sphere(Bar):
         axis = upright / length
         upright_by = -np.outer(normal, normal_by[2]) - normal[2] * normal_by
         return way, np.eye(3), axis, (np.eye(3) - np.outer(axis, axis)) @ upright_by / length
-
-
-def _cross_matrix(a: np.ndarray) -> np.ndarray:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])

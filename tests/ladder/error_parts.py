@@ -27,7 +27,7 @@ from vision.truth.whisk import fit_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 
-def fitted(folder: Path) -> tuple[FittedWhisk, BarAxis]:
+def fit_scene(folder: Path) -> tuple[FittedWhisk, BarAxis]:
     """The fit of a scene's whisk, and the true axis of its bar. Raises Refused where there is no fit."""
     views, cameras, rods, motor_rad, axis = read_scene(folder)
     settings, time_s = VisionSettings(), np.arange(len(motor_rad), dtype=float)
@@ -55,7 +55,7 @@ def main() -> None:
     for folder in sorted(one for one in Path(sys.argv[1]).glob(pattern) if (one / "trials/w/truth.toml").exists()):
         true_mm = tomllib.loads((folder / "trials/w/truth.toml").read_text())["d_x_mm"]
         try:
-            found, axis = fitted(folder)
+            found, axis = fit_scene(folder)
         except Refused as reason:
             print(f"{folder.name}: {reason}", flush=True)
             continue

@@ -16,30 +16,22 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.ladder.bar_scenes import read_scene
-from vision.bar.search import see_bar
+from tests.ladder.error_parts import fit_scene
+from vision.calibration.cameras_file import read_cameras
 from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
 from vision.fit.uncertainty import uncertainty
-from vision.geometry.settings import VisionSettings
-from vision.truth.whisk import fit_whisk
-from vision.truth.whisk_pictures import WhiskPictures
 
 SHIFT_PX = 2.0
 
 
 def fitted(folder: Path) -> tuple[Problem, State] | None:
     """The fit of a scene's whisk; None where fewer than three cameras see it."""
-    views, cameras, rods, motor_rad, _ = read_scene(folder)
-    if len(views) < 3:
+    if len(read_cameras(folder / "cameras.toml")) < 3:
         return None
-    settings, time_s = VisionSettings(), np.arange(len(motor_rad), dtype=float)
-    bar = see_bar(views, cameras, rods, motor_rad, settings)
-    frames = range(len(motor_rad))
-    whisk = WhiskPictures(0, frames, time_s, motor_rad, tuple(views), cameras, rods, bar, settings)
-    found = fit_whisk(whisk.without_gaps())
+    found, _ = fit_scene(folder)
     return found.problem, found.state
 
 

@@ -76,7 +76,6 @@ class Task:
     blur_sigma: float = BLUR_SIGMA
     seen_blur_px: float | None = None
 
-
     def of(self, some: slice) -> "Task":
         """The same of some of the pieces."""
         return replace(self, pieces=self.pieces.select(some))

@@ -145,7 +145,7 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
     much for their pushing angle. Each frame weighs as it is known. With weights W and the projection M off the curve,
     what scatters by τ in all of them leaves τ² tr(M W²), with tr(M W²)² / tr((M W²)²) degrees of freedom.
     """
-    near = _nearest(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
+    near = _near(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
     degree = _degree(int(np.sum(near)))
     if np.sum(near) <= degree + 1:
         return Scatter()
@@ -174,12 +174,7 @@ def _sigmas(smooth: Smooth, name: str, frames: np.ndarray, slope: float = 0.0) -
     return np.sqrt(np.maximum(np.einsum("fi,ij,fj->f", rows, smooth.covariance, rows), 0.0))
 
 
-def _near(x) -> np.ndarray:
-    """Frames (f,) within the window of the angle, the two nearest where there are fewer."""
-    return _nearest(x, 2)
-
-
-def _nearest(x, fewest: int) -> np.ndarray:
+def _near(x, fewest: int = 2) -> np.ndarray:
     """Frames (f,) within the window of the angle, so many of the nearest where there are fewer."""
     near = np.abs(x) <= _WINDOW_RAD
     if np.sum(near) < fewest:
