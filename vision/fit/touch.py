@@ -99,3 +99,10 @@ def frames_by_touch(motor_rad: np.ndarray, touch_rad: float, sigma_rad: float) -
     free = motor_rad < touch_rad - margin
     free[:FEWEST_FREE] |= motor_rad[:FEWEST_FREE] < touch_rad
     return motor_rad > touch_rad + margin, free
+
+
+def bends_tell_more(motor_rad: np.ndarray, sigma_rad: float) -> bool:
+    """Whether bends part the frames better than a touch known to sigma, as where sights hardly cross: they do to a
+    frame, or to what the motor turns by until a bend is sure."""
+    to_a_frame = np.median(np.abs(np.diff(motor_rad)))
+    return bool(_SURE_SIGMAS * sigma_rad > max(to_a_frame, _SURE_BEND_RAD))
