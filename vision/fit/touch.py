@@ -82,6 +82,13 @@ def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.n
     return (motor_rad > touch + step) & sure & ~first, (motor_rad < touch - step) | first
 
 
+def begins_free(motor_rad: np.ndarray, bend_rad: np.ndarray) -> bool:
+    """Whether coarse bends (f, 2) show that the first frames come before touch: by more than the motor turns until a
+    bend is sure. Where none is, there is no touch."""
+    touching, _ = frames_that_touch(motor_rad, bend_rad)
+    return not np.any(touching) or motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
+
+
 def _hinge(motor_rad, bend_rad) -> float:
     """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
     towards = np.median(bend_rad[-max(2, len(bend_rad) // 3):], axis=0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.fit.touch import bends_tell_more, frames_that_touch
+from vision.fit.touch import begins_free, bends_tell_more, frames_that_touch
 
 MOTOR = np.radians(np.arange(0.8, 6.5, 0.7))
 
@@ -33,3 +33,13 @@ def test_bends_tell_more_than_a_touch_known_to_no_frame():
     sure but a quarter of a degree after touch."""
     assert bends_tell_more(MOTOR, np.radians(0.24)) and not bends_tell_more(MOTOR, np.radians(0.23))
     assert not bends_tell_more(MOTOR / 100.0, np.radians(0.08)) and bends_tell_more(MOTOR / 100.0, np.radians(0.09))
+
+
+def test_a_stroke_begins_free_where_its_second_frame_comes_before_touch():
+    """The second frame is at 1.5 degrees, and a bend is sure a quarter of a degree after touch. Without noise the hinge
+    is where its starts are: a tenth of a frame."""
+    none = np.random.default_rng(0)
+    assert begins_free(MOTOR, bends(1.5 + 0.25 + 0.1, 0.0, none))
+    assert not begins_free(MOTOR, bends(1.5 + 0.25 - 0.1, 0.0, none))
+    assert not begins_free(MOTOR, bends(1.0, 0.0, none))
+    assert begins_free(MOTOR, bends(9.0, 0.0, none))  # never touches
