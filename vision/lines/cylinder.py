@@ -39,7 +39,7 @@ def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, 
     between = csr_array((shares.ravel(), places.ravel(), ends), shape=(before.size, len(table)))
     wide = np.zeros((len(table), table.shape[1] + room))
     wide[:, :table.shape[1]] = table
-    return (between @ wide).reshape(*before.shape, -1)
+    return (between @ wide).reshape(*before.shape, wide.shape[1])
 
 
 def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,

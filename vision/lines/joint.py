@@ -36,7 +36,7 @@ _STIFFER, _EASIER, _UNDAMPED = 10.0, 5.0, 1e-2  # what a step makes of it; of _D
 # What a step may still gain in chi² by what all share, which it moves by a seventh of a sigma at most, and in the mean
 # by a piece's own position, which it moves by 0.03 sigma: pieces that tell nothing wander on for ever.
 _SETTLED, _SETTLED_EACH = 0.02, 1e-3
-_ROUGHLY = 25.0  # times as much, of what another descent begins from: a sigma's half by what all share
+_ROUGHLY = 25.0  # times as much: of what another descent begins from
 
 
 @dataclass(frozen=True)
