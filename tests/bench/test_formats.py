@@ -107,7 +107,7 @@ def _by_name(match: re.Match) -> str:
 
 
 def test_truth_of_a_simulated_session(tmp_path):
-    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\n")
+    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\nobject = 'sphere'\n")
     session = simulate(tmp_path / "session", protocol=protocol, seed=1, signals_only=True)
     (folder,) = (session / "trials").iterdir()
     written = {
