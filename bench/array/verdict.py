@@ -45,7 +45,7 @@ def _row(contact: Contact) -> dict:
     )
 
 
-def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
+def judged_by(cloud: Iterable[Contact], estimator: str = _FELT) -> list[Contact]:
     """Contacts beside a known surface, by one estimator; nothing doubtful is said of them."""
     mine = (c for c in cloud if c.estimator == estimator and not c.status)
     return [c for c in mine if math.isfinite(c.distance_mm.value)]
@@ -53,7 +53,7 @@ def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
 
 def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
     """The array's verdict in a sentence; nothing where no object is known."""
-    known = _judged(cloud, _FELT)
+    known = judged_by(cloud)
     if not known:
         return
     across, along = _rms([c.distance_mm.value for c in known]), _rms([c.along_mm.value for c in known])
@@ -81,7 +81,7 @@ def _normals(known: Sequence[Contact]) -> str:
 def surface_lines(cloud: Sequence[Contact]) -> Iterator[str]:
     """A line an estimator, and one on what is seen."""
     names = dict.fromkeys(contact.estimator for contact in cloud)
-    rows = [(name, _judged(cloud, name)) for name in names]
+    rows = [(name, judged_by(cloud, name)) for name in names]
     if any(known for _, known in rows):
         yield f"{'':<24}{'n':>4}   off it: mean     RMS  in 95 %   along: mean     RMS  in 95 %   normals RMS"
     for name, known in rows:

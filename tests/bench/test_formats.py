@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench import robot_trade, tradeoff
+from bench.array import size
 from bench.array import verdict as contacts
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
@@ -45,6 +46,7 @@ CSV = {
     "whisks.csv": assembly.WHISK_COLUMNS,
     "estimates.csv": assembly.ESTIMATE_COLUMNS,
     "surface.csv": contacts.COLUMNS,
+    "size.csv": size.COLUMNS,
     "track/<trial>.csv": assembly.TRACK_COLUMNS,
     "budget.csv": assembly.BUDGET_COLUMNS,
     "beam.csv": assembly.BEAM_COLUMNS,

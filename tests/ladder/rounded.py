@@ -3,11 +3,12 @@
     python tests/ladder/rounded.py [BETA_DEG ...]
 
 A perfect robot: exact moments and pushing angles, the true friction angle (10.5 degrees); d_x 60 mm, theta 3 degrees.
-RMS by object and radius over the slopes, 0 to 60 degrees without any: errors of (10), of what its first order leaves and
-of (10) corrected, % of d_x; how far the normal felt (phi + alpha_est) lies from that at touch, degrees; slip by (5) less
-the contact's true path along the object, and the true path round it with the slide in it, mm. Over slopes that slip, the
-mean of the curvatures that successive contacts tell (curvature.csv) over the true ones, in the whisking plane and along
-the slip, where that is curved. A ring is a bar of 6 mm bent to a circle of that radius; a cone's is its radius across.
+RMS by object and radius over the slopes, 0 to 60 degrees without any: errors of (10), of what its first order leaves
+and of (10) corrected, % of d_x; how far the normal felt (phi + alpha_est) lies from that at touch, degrees; slip by (5)
+less the contact's true path along the object, and the true path round it with the slide in it, mm. Over slopes that
+slip, the mean of the curvatures that successive contacts tell (curvature.csv) over the true ones, in the whisking plane
+and along the slip, where that is curved. A ring is a bar of 6 mm bent to a circle of that radius; a cone's is its
+radius across.
 """
 
 import math
@@ -43,7 +44,7 @@ OBJECTS = ("bar", "cone of 15 deg", "cone of 45 deg", "sphere", "ring")
 
 
 def placed(name: str, radius_mm: float, beta: float) -> tuple[Bar, float, float]:
-    """The object where the whisker first touches it at d_x, its radius in the whisking plane and that along the slip."""
+    """The object where the whisker first touches it at d_x; its radii in the whisking plane and along the slip."""
     ring = name == "ring"
     bar = Bar.placed(d_x_mm=D_X_MM, beta_rad=beta, psi_rad=0.0, touch_rad=0.0,
                      radius_mm=TUBE_MM if ring else radius_mm, whisker_radius_mm=0.5)  # fmt: skip
