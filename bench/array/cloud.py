@@ -25,7 +25,8 @@ class Contact:
 
     normal (3,): of the surface, towards the whisker, as felt; NaN where the estimator gives no slope. normal_sigma_rad:
     of it, in the plane across the whisker. base_mm (3,), wire: of the whisker; by_alpha_mm: how far one sigma of the
-    friction angle that is assumed, which is one for all, moves the point along the whisker. distance_mm: from the
+    friction angle that is assumed, which is one for all, moves the point along the whisker; has_touch: nothing is
+    doubtful of the angle of touch, whatever the status says of the distance. distance_mm: from the
     object's surface to the whisker's, positive outside; along_mm: how far beyond the place where this whisker comes
     nearest to the object, along the whisker; normal_off_rad: between the normal and the object's own there. All three
     NaN where the object is not known. source: of it.
@@ -43,6 +44,7 @@ class Contact:
     base_mm: np.ndarray
     wire: Wire
     by_alpha_mm: float = 0.0
+    has_touch: bool = True
     distance_mm: Value = UNKNOWN
     along_mm: Value = UNKNOWN
     normal_off_rad: float = NAN
@@ -88,7 +90,7 @@ def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Ite
     for answer in (*felt.estimates, *felt.sensors):
         if math.isfinite(answer.d_x_est_mm.value) and math.isfinite(felt.touch_felt_rad.value):
             status = "; ".join(dict.fromkeys(filter(None, [felt.status, answer.status])))
-            found = *_felt(mount, felt, answer), status, *whisker, _by_alpha_mm(answer)
+            found = *_felt(mount, felt, answer), status, *whisker, _by_alpha_mm(answer), not felt.status
             yield Contact(*of_whisk, answer.estimator, *found)
 
 

@@ -3,7 +3,8 @@
 At first touch each whisker is a straight line that just touches the surface: how far the line passes off it is known by
 the angle of touch, to hundredths of a millimetre, and where along it by the distance felt. Shape, direction of the axis
 and a ring's thickness are taken from the manifest; place and size are fitted to both, weighted by their covariance, in
-which the error of the friction angle that is assumed is one for all.
+which the error of the friction angle that is assumed is one for all. Where a distance is doubtful the touch counts
+alone.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,12 +16,13 @@ from scipy.special import chdtrc
 
 from bench.array.cloud import Contact
 from bench.array.surface import STATED, Surface
+from bench.array.verdict import FELT
 from bench.base.tables import sigma_name, write_table
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
 COLUMNS = (
-    *("trial", "shape", "contacts", "radius_mm", "radius_sigma_mm", "stated_radius_mm"),
+    *("trial", "shape", "contacts", "distances", "radius_mm", "radius_sigma_mm", "stated_radius_mm"),
     *("half_angle_deg", "half_angle_sigma_deg", "stated_half_angle_deg", "chance", "status"),
 )
 _SIZES = {"bar": "radius_mm", "sphere": "radius_mm", "ring": "ring_radius_mm", "cone": "half_angle_rad"}
@@ -31,12 +33,14 @@ _TOLD = 1.959964  # sigmas: a size whose 95 % interval holds 0 is not told
 
 @dataclass(frozen=True)
 class Felt:
-    """The size felt of one trial's object. key: the field of `Surface` that it is; size, stated: in that field's unit;
-    chance: that contacts lie as far off such a surface, NaN where none is left to tell."""
+    """The size felt of one trial's object, in the unit of the field of `Surface` that it is, `key`. contacts,
+    distances: how many touches served, and distances; chance: that contacts lie as far off such a surface.
+    """
 
     trial: str
     surface: Surface
     contacts: int
+    distances: int
     size: Value = UNKNOWN
     chance: float = np.nan
     status: str = ""
@@ -53,12 +57,12 @@ class Felt:
 
 
 def felt_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[Felt]:
-    """A size a trial whose object the manifest names. cloud: contacts by one estimator, beside their surfaces."""
-    cloud = list(cloud)
+    """A size a trial whose object the manifest names, by the contacts of (10)."""
+    mine = [contact for contact in cloud if contact.estimator == FELT and contact.has_touch]
     return [
-        felt_size(trial, [c for c in cloud if c.trial == trial], surface)
+        felt_size(trial, [contact for contact in mine if contact.trial == trial], surface)
         for trial, surface in surfaces.items()
-        if surface.source == STATED and any(c.trial == trial for c in cloud)
+        if surface.source == STATED and any(contact.trial == trial for contact in mine)
     ]
 
 
@@ -66,9 +70,11 @@ def felt_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> Felt
     """Gauss and Newton's method from where and how large the object is said to be."""
     from scipy.optimize import least_squares  # not before it is needed: it takes longer than an evaluation's tables
 
-    free = _free(surface)
-    if 2 * len(contacts) <= len(free) + 1:
-        return Felt(trial, surface, len(contacts), status=f"{counted(len(contacts), 'contact')}: too few")
+    free, distances = _free(surface), sum(not contact.status for contact in contacts)
+    served = trial, surface, len(contacts), distances
+    freedom = len(contacts) + distances - len(free) - 1
+    if freedom < 1:
+        return Felt(*served, status=f"too few, of {counted(distances, 'sound distance')}")
     root = np.linalg.cholesky(_covariance(contacts, surface))
 
     def off(numbers: np.ndarray) -> np.ndarray:
@@ -81,11 +87,11 @@ def felt_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> Felt
     found = least_squares(off, start, method="lm", jac=slopes)
     information = found.jac.T @ found.jac
     if not np.isfinite(information).all() or np.linalg.cond(information) > 1e12:
-        return Felt(trial, surface, len(contacts), status="contacts leave the size open")
+        return Felt(*served, status="contacts leave the size open")
     size = Value(getattr(surface, _SIZES[surface.shape]) + float(found.x[-1]),
                  float(np.sqrt(np.linalg.inv(information)[-1, -1])))  # fmt: skip
-    chance = float(chdtrc(2 * len(contacts) - len(start), 2 * found.cost))
-    return Felt(trial, surface, len(contacts), size, chance, _status(size, chance))
+    chance = float(chdtrc(freedom, 2 * found.cost))
+    return Felt(*served, size, chance, _status(size, chance))
 
 
 def _status(size: Value, chance: float) -> str:
@@ -155,6 +161,8 @@ def _covariance(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
     for number, (contact, normal) in enumerate(zip(contacts, surface.distance_mm(places)[1])):
         axes, by_alpha = np.stack([normal, contact.towards]), contact.by_alpha_mm * contact.towards
         own = contact.covariance_mm2 - np.outer(by_alpha, by_alpha)
+        if contact.status:  # its distance is any that the whisker has
+            own = own + contact.wire.length_mm**2 * np.outer(contact.towards, contact.towards)
         both = slice(2 * number, 2 * number + 2)
         whole[both, both] = axes @ own @ axes.T
         shared += [*axes @ by_alpha]
@@ -167,7 +175,8 @@ def write_sizes(path: Path, found: Iterable[Felt]) -> None:
 
 
 def _row(felt: Felt) -> dict:
-    row = {"trial": felt.trial, "shape": felt.surface.shape, "contacts": felt.contacts, "chance": felt.chance}
+    row = {"trial": felt.trial, "shape": felt.surface.shape, "chance": felt.chance}
+    row |= {"contacts": felt.contacts, "distances": felt.distances}
     name, to_shown = _shown(felt)
     sizes = {name: felt.size.value, sigma_name(name): felt.size.sigma, f"stated_{name}": felt.stated}
     return row | {"status": felt.status} | {key: to_shown * value for key, value in sizes.items()}

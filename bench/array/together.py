@@ -9,7 +9,7 @@ from bench.array.cloud import Contact, Mount, contacts
 from bench.array.page import write_page
 from bench.array.size import felt_sizes, size_lines, write_sizes
 from bench.array.surface import Surface, seen_surface, stated_surface
-from bench.array.verdict import judged_by, surface_lines, surface_verdict, write_surface
+from bench.array.verdict import surface_lines, surface_verdict, write_surface
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.tables import write_table
@@ -100,7 +100,7 @@ def write_array(out: Path) -> Summary:
     surfaces = _seen(runs) | record.surfaces
     cloud = [contact for run in runs for contact in contacts(run.mount, run.whole.results, surfaces)]
     write_surface(out / "surface.csv", cloud)
-    sizes = felt_sizes(judged_by(cloud), record.surfaces)
+    sizes = felt_sizes(cloud, record.surfaces)
     write_sizes(out / "size.csv", sizes)
     summary = _summary(record, runs, cloud, sizes)
     figures = []

@@ -4,11 +4,10 @@
 
 A perfect robot: exact moments and pushing angles, the true friction angle (10.5 degrees); d_x 60 mm, theta 3 degrees.
 RMS by object and radius over the slopes, 20, 40 and 60 degrees without any: errors of (10), of what its first order
-leaves and of (10) corrected, % of d_x; how far the normal felt (phi + alpha_est) lies from that at touch, degrees; slip by (5)
-less the contact's true path along the object, and the true path round it with the slide in it, mm; the mean of the
-curvatures that successive contacts tell (curvature.csv) over the true ones, in the whisking plane and along the slip,
-where that is curved. A ring is a bar of 6 mm bent to a circle of that radius; a cone's is its
-radius across.
+leaves and of (10) corrected, % of d_x; how far the normal felt (phi + alpha_est) lies from that at touch, degrees; slip
+by (5) less the contact's true path along the object, and the true path round it with the slide in it, mm; the mean of
+the curvatures that successive contacts tell (curvature.csv) over the true ones, in the whisking plane and along the
+slip, where that is curved. A ring is a bar of 6 mm bent to a circle of that radius; a cone's is its radius across.
 """
 
 import math

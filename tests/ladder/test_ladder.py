@@ -136,7 +136,7 @@ def test_the_last_rung_is_a_path_traced_scene(name, most_mm):
 
 def test_what_a_ball_does_to_10_is_its_first_order():
     """At 40 degrees on balls of 40 and 80 mm radius: what is left is of the second order in theta d_x / R, so a
-    quarter for twice the radius, where other terms of that order leave 0.05 % at most."""
+    quarter for twice the radius; what a bar leaves is 0.04 % (docs/arrays.md), on either side."""
     (small, left, *_), (large, less, *_) = (rounded.row("sphere", radius, np.radians(40.0)) for radius in (40.0, 80.0))
     assert small < -2.0 and large < -2.0
-    assert abs(left) < 0.2 and less == pytest.approx(left / 4, abs=0.05)
+    assert abs(left) < 0.2 and less == pytest.approx(left / 4, abs=0.08)

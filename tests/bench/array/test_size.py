@@ -1,5 +1,6 @@
 """Sizes of objects from touches and distances that are drawn with the errors which are stated of them."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -72,7 +73,10 @@ def test_sigmas_are_the_scatter(rng):
 def test_what_is_not_told_is_not_said(rng):
     contacts = drawn(BALL, rng, 0.0)
     (line,) = size_lines([felt_size("t", contacts[:2], BALL)])
-    assert line == "t: sphere, 2 contacts: no size; 2 contacts: too few"
+    assert line == "t: sphere, 2 contacts: no size; too few, of 2 sound distances"
+    by_touch = felt_size("t", [replace(contact, status="odd") for contact in contacts], BALL)
+    assert by_touch.distances == 0 and by_touch.size.value == pytest.approx(30.0, rel=1e-4)
+    assert by_touch.size.sigma > felt_size("t", contacts, BALL).size.sigma
     contacts[0].point_mm[1] += 1.0
     assert "farther off such a surface" in felt_size("t", contacts, BALL).status
     seen = Surface("bar", np.zeros(3), UP, 3.0, source=SEEN)
