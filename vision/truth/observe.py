@@ -23,7 +23,7 @@ from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import is_before
 from vision.geometry.counted import counted
-from vision.geometry.errors import Misled, Refused
+from vision.geometry.errors import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import one_sided_lines
@@ -123,6 +123,8 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
         try:
             fitted = fit_whisk(whisk)
             break
+        except TooFewFrames:
+            whisk = whisk.with_all_frames()
         except Misled as reason:
             if len(whisk.views) == 1:
                 return _refused(whisk, str(reason))
