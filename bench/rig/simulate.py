@@ -79,7 +79,7 @@ def _check_can_be_rendered(job, name):
     if job.signals_only or not job.protocol.cameras:
         return
     felt_alone = {
-        "a ring or sphere (object)": any(t.object for t in job.protocol.trials),
+        "a ring, sphere or cone (object)": any(t.object for t in job.protocol.trials),
         "an array ([[columns]])": bool(job.whiskers),
     }
     for what, there in felt_alone.items():
