@@ -96,6 +96,11 @@ def _without_mean(covariance: np.ndarray) -> np.ndarray:
     return whole - np.outer(common, common) / common.sum()
 
 
+def _agree(values: np.ndarray, variances: np.ndarray) -> bool:
+    """Whether values (n,) are one but for chance; a single one is."""
+    return len(values) == 1 or Difference(values, _without_mean(np.diag(variances)), len(values) - 1).is_chance
+
+
 def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
     motor, index, n = turns.motor_rad, turns.index, len(turns.index)
     none, ahead = np.zeros(n), np.diff(motor, append=2.0 * motor[-1] - motor[-2])
@@ -157,15 +162,16 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
 
 def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> str:
     """The whisker's diameter as seen against its own: a sentence where cameras that agree with each other see a thinner
-    one, '' where they do not, or where fewer than two tell. Shadows beside a wire, bloom and movement make it look
-    thicker, in all cameras alike, and nothing thinner. looks: how thick over how thick it is said to be, by camera."""
-    if len(looks) < 2:
+    one, or the only one that tells; '' where they do not, or none tells. Shadows beside a wire, bloom and movement make
+    it look thicker, in all cameras alike, and nothing thinner. looks: how thick over how thick it is said to be, by
+    camera."""
+    if not looks:
         return ""
     logs = np.log([one.value for one in looks.values()])
     variances = np.array([(one.sigma / one.value) ** 2 for one in looks.values()])
     stated = (whisker.diameter_sigma_mm / whisker.diameter_mm) ** 2
     of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
-    if of_all.is_chance or not Difference(logs, _without_mean(np.diag(variances)), len(looks) - 1).is_chance:
+    if of_all.is_chance or not _agree(logs, variances):
         return ""
     factor, sigma = float(np.exp(np.average(logs, weights=1.0 / variances))), float(np.sum(1.0 / variances) ** -0.5)
     if factor > 1.0:
@@ -182,7 +188,7 @@ def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> str:
     if len(ends) < 2:
         return ""
     places, sigmas = (np.array([getattr(end, name) for end in ends.values()]) for name in ("value", "sigma"))
-    if not Difference(places, _without_mean(np.diag(sigmas**2)), len(ends) - 1).is_chance:
+    if not _agree(places, sigmas**2):
         return ""
     sigma = float(np.hypot(np.max(sigmas), whisker.length_sigma_mm))
     seen_mm = float(np.average(places, weights=sigmas**-2.0))

@@ -146,10 +146,13 @@ def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, 
         ((Value(1.4, 0.05), Value(1.0, 0.05)), 0.0, ""),  # a shadow beside the wire in one of them
         ((Value(1.4, 0.08), Value(1.4, 0.08)), 0.0, ""),  # bloom in both
         ((Value(1.0, 0.14), Value(0.87, 0.1)), 0.0, ""),
-        ((Value(0.5, 0.05),), 0.0, ""),
+        # the only one that tells on b60_4; of 50 views of 27 path-traced scenes none is more than 2.5 sigma too thin
+        ((Value(0.69, 0.063),), 0.0, "0.69 ± 0.06 times as thick as said"),
+        ((Value(0.64, 0.14),), 0.0, ""),
+        ((), 0.0, ""),
     ],
 )
-def test_a_whisker_of_another_diameter_is_told_by_cameras_that_agree(looks, sigma_mm, said):
+def test_a_whisker_of_another_diameter_is_told_by_cameras_that_do_not_contradict_each_other(looks, sigma_mm, said):
     whisker = Whisker("cylinder", 100.0, 1.5, 60.0, diameter_sigma_mm=sigma_mm)
     found = wire_doubt({str(k): one for k, one in enumerate(looks)}, whisker)
     assert said in found and bool(found) == bool(said)
