@@ -138,7 +138,8 @@ def test_the_print_is_opencvs(legacy, inverted):
 
 def moment(motor_rad, material=None):
     rod, arc = Rod("cylinder", 100.0, 1.0, 60.0), np.linspace(HUB_FRONT_MM, 100, 257)
-    return Moment(motor_rad, Tube(unloaded(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25)))
+    tube = Tube(unloaded(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25))
+    return Moment.alone(motor_rad, tube)
 
 
 @pytest.fixture(scope="module", params=[0, 1])
