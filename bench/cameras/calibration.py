@@ -22,7 +22,7 @@ from bench.session.session import Session
 from vision.boards.corners import refine_corners
 from vision.boards.static_board import camera_moved
 from vision.calibration.cameras_file import read_cameras
-from vision.calibration.place import Placement, placed
+from vision.calibration.place import Placement, by_board, placed
 from vision.geometry.camera import Cameras
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
@@ -63,6 +63,33 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     background = _backgrounds(session, cameras)
     content = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras], list(background.values())
     return SessionCalibration(cameras, background, hash_of(*content), notes, T_rig_board)
+
+
+def at_base(calibration: SessionCalibration, view: Session) -> SessionCalibration:
+    """An array's calibration in the base frame of the whisker whose view this is.
+
+    As well as the rig frame is known the base's is, and besides as well as the base: both by the sigmas of the view's
+    board (see `by_board`), or, of cameras that were brought along, by the sigmas of the base.
+    """
+    cameras = calibration.cameras
+    if cameras is None:
+        return calibration
+    T_rig_base, exact = view.base.T_rig_base, np.zeros((6, 6))
+    step = np.append(log_rotation(T_rig_base[:, :3]), T_rig_base[:, 3])
+    turned, whole = np.kron(np.eye(2), T_rig_base[:, :3]), view.whole
+    if whole.cameras_toml is not None:
+        before = cameras.placement if cameras.placement is not None else exact
+        own = before + np.diag(np.repeat([view.base.sigma_rad**2, view.base.sigma_mm**2], 3))
+    else:
+        before = by_board(whole.T_rig_board, whole.T_rig_board_sigma_mm, whole.T_rig_board_sigma_rad).covariance
+        board = by_board(view.T_rig_board, view.T_rig_board_sigma_mm, view.T_rig_board_sigma_rad)
+        own = turned @ board.covariance @ turned.T
+    there = placed(cameras, Placement(np.zeros(6), before), Placement(step, own))
+    T_base_board = calibration.T_rig_board
+    if T_base_board is not None:
+        T_base_board = compose(view.base.T_base_rig, T_base_board)
+    made = hash_of(calibration.hash, view.base)
+    return replace(calibration, cameras=there, T_rig_board=T_base_board, hash=made)
 
 
 def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:

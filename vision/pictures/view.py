@@ -1,12 +1,13 @@
 """One camera's pictures of a whisk, beside the picture without rods."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.pictures.others import Others
 from vision.pictures.pixel_noise import Noise
 
 _SCALE_OF = 3  # frames: what is saturated is so in all of them
@@ -16,12 +17,14 @@ MEAN_OF = 40  # frames: more would not make a still thing clearer
 
 @dataclass(frozen=True)
 class View:
-    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise."""
+    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise. others: rods in
+    them that are not looked for."""
 
     camera: Camera
     frames: Mapping[int, np.ndarray]
     background: np.ndarray
     noise: Noise
+    others: Others = field(default_factory=dict)
 
     def some(self, most: int) -> list[np.ndarray]:
         """At most so many of the pictures, spread over all of them."""

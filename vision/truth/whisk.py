@@ -89,10 +89,7 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, touch: Touch
 def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Look]:
     """The whisk in the frames to fit, and what coarse points tell of them."""
     axis, wire = whisk.bar.axis, whisk.rods.wire
-    sights = [Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views]
-    free = np.array(whisk.frames)[early(whisk.angles_rad)]
-    rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
-    coarse = follow_bends(sights, axis, rest, whisk.motor)
+    rest, coarse = coarse_shapes(whisk)
     whisk = whisk.during(touch.near(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.first(whisk.angles_rad, bend)
@@ -104,6 +101,16 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
         first = int(np.argmax(touching))
         whisk = whisk.yielding(came, float(np.mean(whisk.angles_rad[[np.flatnonzero(free[:first])[-1], first]])))
     return whisk, _Look(axis, came, rest, bend, arcs, curves, touching, free)
+
+
+def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """Rest shape (2, 4), mm, and the bend (2,), rad, of every frame, to a pixel or two. Raises Refused where no whisker
+    is seen to swing."""
+    axis = whisk.bar.axis
+    sights = [Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views]
+    free = np.array(whisk.frames)[early(whisk.angles_rad)]
+    rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
+    return rest, follow_bends(sights, axis, rest, whisk.motor)
 
 
 def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
