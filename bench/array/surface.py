@@ -1,6 +1,6 @@
 """The object that an array feels: where its surface is, from the manifest or from pictures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,8 +18,8 @@ class Surface:
     ("ring") or a point ("sphere").
 
     point_mm (3,): of the straight line, or the centre; axis (3,), unit: the line's direction, or the normal of the
-    circle's plane; ring_radius_mm: of the circle, 0 of others. sigma_mm: of each of the point's coordinates; source:
-    STATED or SEEN.
+    circle's plane; ring_radius_mm: of the circle, 0 of others. covariance_mm2 (3, 3): of where it is; source: STATED or
+    SEEN.
     """
 
     shape: str
@@ -27,7 +27,7 @@ class Surface:
     axis: np.ndarray
     radius_mm: float
     ring_radius_mm: float = 0.0
-    sigma_mm: float = 0.0
+    covariance_mm2: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
     source: str = STATED
 
     def foot_mm(self, points_mm: np.ndarray) -> np.ndarray:
@@ -66,14 +66,17 @@ def stated_surface(trial: Trial) -> Surface | None:
         return None
     point, axis = np.array(given.point_mm, dtype=float), np.array(given.axis, dtype=float)
     radii = 0.5 * trial.bar_diameter_mm, 0.5 * (given.ring_diameter_mm or 0.0)
-    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, given.point_sigma_mm)
+    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, given.point_sigma_mm**2 * np.eye(3))
 
 
 def seen_surface(seen: SeenTrial, base: Base) -> Surface | None:
-    """The bar as one whisker's cameras show it, in the rig frame; None where they do not."""
-    if seen.bar is None or not np.isfinite(seen.bar.point_mm).all():
+    """The bar as one whisker's cameras show it, in the rig frame, as well known as where it touches it; None where they
+    show no touch."""
+    known = [whisk.point_covariance_mm2 for whisk in seen.whisks if whisk.point_covariance_mm2 is not None]
+    if not known or seen.bar is None or not np.isfinite(seen.bar.point_mm).all():
         return None
     turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
     point, axis = turn @ seen.bar.point_mm + shift, turn @ seen.bar.direction
-    return Surface("bar", point, axis, seen.bar_radius_mm, source=SEEN)
+    covariance = turn @ known[0] @ turn.T
+    return Surface("bar", point, axis, seen.bar_radius_mm, covariance_mm2=covariance, source=SEEN)
 

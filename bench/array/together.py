@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bench.array.cloud import Contact, Mount, contacts
+from bench.array.exchanged import exchanged
 from bench.array.page import write_page
 from bench.array.surface import Surface, seen_surface, stated_surface
 from bench.array.verdict import surface_lines, surface_verdict, write_surface
@@ -96,15 +97,14 @@ def write_array(out: Path) -> Summary:
     record = read_array_record(out)
     runs = [_read(base, folder_of(out, base.name)) for base in record.bases]
     _write_tables(out, runs)
-    surfaces = _seen(runs) | record.surfaces
-    cloud = [contact for run in runs for contact in contacts(run.mount, run.whole.results, surfaces)]
+    cloud = [contact for run in runs for contact in contacts(run.mount, run.whole.results, record.surfaces)]
     write_surface(out / "surface.csv", cloud)
     summary = _summary(record, runs, cloud)
     figures = []
     if runs[0].record.settings.figures:
         from bench.array.figure import write_figures  # with all of matplotlib
 
-        figures = write_figures(out, cloud, surfaces)
+        figures = write_figures(out, cloud, _seen(runs) | record.surfaces)
     write_page(out, record.session, summary, [(run.base.name, run.record) for run in runs], figures)
     write_whole(out / "summary.txt", summary.text)
     write_array_record(out, replace(record, verdict=summary.verdict, doubtful=summary.doubtful))
@@ -138,7 +138,8 @@ def _write_tables(out: Path, runs: Sequence[WhiskerRun]) -> None:
 
 
 def _summary(record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Contact]) -> Summary:
-    doubtful = [*record.doubts, *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts)]
+    swapped = exchanged({run.base.name: run.whole.results for run in runs})
+    doubtful = [*record.doubts, *swapped, *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts)]
     judged = [replace(j, trial=f"{j.trial}, {run.base.name}") for run in runs for j in judge(run.whole.results)]
     results = [result for run in runs for result in run.whole.results]
     pictures = any(run.record.has_pictures for run in runs)

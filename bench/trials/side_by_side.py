@@ -55,14 +55,15 @@ def _is_seen(unit: Unit) -> bool:
 
 def _told(unit: Unit, whiskers: Sequence[Sequence[Unit]], look: int) -> Unit:
     """The unit with the files of that look at the others."""
-    others = tuple(
+    files = tuple(
         (one.session.base.name, replace(one, stage=f"wires{look}").seen_path)
         for units in whiskers
         for one in units
-        if one.trial.name == unit.trial.name and one.session.base.name != unit.session.base.name
+        if one.trial.name == unit.trial.name
     )
-    hashes = [hash_of_files([path]) for _, path in others]
-    return replace(unit, others=others, others_hash=hash_of([name for name, _ in others], hashes))
+    others = tuple((name, path) for name, path in files if name != unit.session.base.name)
+    made_from = hash_of([name for name, _ in others], [hash_of_files([path]) for _, path in others])
+    return replace(unit, others=others, others_hash=made_from, straight=unit.straight if look else files)
 
 
 def _key(unit: Unit) -> str:

@@ -44,6 +44,7 @@ from bench.trials.other_wires import lines_in
 from bench.trials.phases import phases_of
 from bench.trials.seen import see_trial
 from bench.trials.sensors import with_others
+from bench.trials.whose_wire import with_whose
 from estimator.builtin import ESTIMATORS
 from estimator.sensors import SENSORS
 from estimator.signal import NOT_REACHED
@@ -61,7 +62,8 @@ class Unit:
     """What one trial's result is made from. files: hash of the trial's files. drift_rate: (2,), of the channels per
     second, and force_drift_rate (3,) of a load cell; gauges: None where volts cannot become moments. stage: folder of
     what is seen before all is known. others: of an array, by the names of the other whiskers, files that say where
-    their wires are in the pictures, with the hash of all of them."""
+    their wires are in the pictures, with the hash of all of them; straight: files of all its whiskers, where these were
+    straight."""
 
     session: Session
     trial: Trial
@@ -75,6 +77,7 @@ class Unit:
     force_drift_rate: np.ndarray | None = None
     others: tuple[tuple[str, Path], ...] = ()
     others_hash: str = ""
+    straight: tuple[tuple[str, Path], ...] = ()
 
     @property
     def path(self) -> Path:
@@ -125,8 +128,11 @@ def see_unit(unit: Unit) -> SeenTrial:
 
 
 def _see(unit: Unit, signals: Signals) -> SeenTrial:
-    told = (lines_in(unit.others),) if unit.others else ()
-    return see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings, *told)
+    made_from = unit.session, unit.trial, signals, unit.calibration, unit.settings
+    if not unit.others:
+        return see_trial(*made_from)
+    looked = lines_in(unit.others)
+    return with_whose(see_trial(*made_from, looked), lines_in(unit.straight), looked, unit.session.base.name)
 
 
 def kept_seen(unit: Unit) -> SeenTrial | None:

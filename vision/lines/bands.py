@@ -112,6 +112,11 @@ class Pieces:
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
+    def show_rod(self, margin_px: float) -> np.ndarray:
+        """Which pieces (s,) lack no pixel of the rod, where it is expected, nor within a margin beside it."""
+        needed = np.abs(self.offset_px) <= self.radius_px[:, None] + margin_px
+        return ~np.any(needed & (self.weight == 0), axis=1)
+
     def below(self, grey: float) -> "Pieces":
         """The same pieces; pixels of this grey level or above weigh nothing."""
         return replace(self, weight=np.where(self.grey < grey, self.weight, 0.0))

@@ -24,6 +24,7 @@ from vision.truth.strategies import BarMiddles, Touch, TouchByClearance, early, 
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _WIRE_KNOT_MM = 12.0
+_EDGE_PX = 3.0  # beside the wire: as far as a lens blur of a pixel spreads its edge
 BESIDE_BAR_PX = 4.0
 # What changes slowly over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 _FREE_SHARED = 4.0
@@ -219,6 +220,8 @@ def clear_pieces(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mappin
     """Pieces of the wire beside curves, clear of clamp and bar, in one of a whisk's cameras."""
     settings = whisk.settings
     pieces = wire_pieces(view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    if view.others:
+        pieces = pieces.select(pieces.show_rod(_EDGE_PX))
     pieces = pieces.below(SATURATED * view.full_scale)
     outline = outline_of_bar(view.camera, axis, whisk.bar_swept_mm)
     return pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))
