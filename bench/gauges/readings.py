@@ -176,8 +176,8 @@ def _paired(
     rigid_Nmm: float,
     theta_rad: float,
 ) -> Pairs | None:
-    """Volts at the same motor angles, each from a short line through the samples around it. None where the pushing angle
-    that is seen is reached before a touch is felt."""
+    """Volts at the same motor angles, each from a short line through the samples around it. None where the wanted
+    pushing angle, as seen, is reached before a touch is felt."""
     theta = reference.motor_rad - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(reference.motor_rad), initial=np.inf))
     after = theta > 0.5 * _LEAST_THETA_RAD

@@ -10,8 +10,7 @@ from vision.pictures.scale import shrunk_px
 
 # Beside another rod's outline, px: two by which a first look is off, and three of a lens blur of a pixel.
 BESIDE_ROD_PX = 5.0
-_PARTS = 16  # of a pixel, in which a line's nodes are drawn
-_PARTS_AS_SHIFT = 4
+_PARTS, _PARTS_AS_SHIFT = 16, 4  # of a pixel, in which a line's nodes are drawn
 
 
 @dataclass(frozen=True, eq=False)
