@@ -64,7 +64,7 @@ def contacts(mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, S
         if result.trial.purpose != "measure":
             continue
         stated = surfaces.get(result.trial.name)
-        surface = stated or seen_surface(result.seen, mount.base)
+        surface = stated or seen_surface(seen, result.seen.bar_radius_mm, mount.wire, mount.base)
         for contact in _of_whisk(mount, result.trial.name, seen, felt):
             alone = surface is None or (stated is None and contact.estimator == SEEN)
             yield contact if alone else _beside(contact, surface, mount.wire, mount.base)

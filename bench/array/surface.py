@@ -4,9 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bench.records.trial import SeenTrial
+from bench.records.trial import SeenWhisk
 from bench.session.session import Base
 from bench.session.trial import Trial
+from vision.geometry.centreline import rotation_z
+from vision.geometry.rods import Wire
 
 STATED, SEEN = "manifest", "pictures"
 _ARC_MM = 1e-6  # mm: as near as an arc is looked for
@@ -69,14 +71,19 @@ def stated_surface(trial: Trial) -> Surface | None:
     return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, given.point_sigma_mm**2 * np.eye(3))
 
 
-def seen_surface(seen: SeenTrial, base: Base) -> Surface | None:
-    """The bar as one whisker's cameras show it, in the rig frame, as well known as where it touches it; None where they
-    show no touch."""
-    known = [whisk.point_covariance_mm2 for whisk in seen.whisks if whisk.point_covariance_mm2 is not None]
-    if not known or seen.bar is None or not np.isfinite(seen.bar.point_mm).all():
-        return None
-    turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
-    point, axis = turn @ seen.bar.point_mm + shift, turn @ seen.bar.direction
-    covariance = turn @ known[0] @ turn.T
-    return Surface("bar", point, axis, seen.bar_radius_mm, covariance_mm2=covariance, source=SEEN)
+def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:
+    """The bar as a whisk shows it, in the rig frame, as well known as where it is touched; None where no touch is seen.
 
+    Its axis is away from the contact by both radii, at right angles to whisker and axis.
+    """
+    if not seen.has_truth or seen.point_covariance_mm2 is None or not np.isfinite(bar_radius_mm):
+        return None
+    beta, psi, touch = seen.beta_rad.value, seen.psi_rad.value, seen.touch_rad.value
+    turn = base.T_rig_base[:, :3] @ rotation_z(touch)
+    axis = turn @ [np.sin(psi), np.cos(psi) * np.sin(beta), np.cos(psi) * np.cos(beta)]
+    across = np.cross(axis, turn[:, 0])
+    reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
+    contact = base.T_rig_base[:, :3] @ seen.point_mm.value + base.T_rig_base[:, 3]
+    covariance = base.T_rig_base[:, :3] @ seen.point_covariance_mm2 @ base.T_rig_base[:, :3].T
+    point = contact + reach_mm * across / np.linalg.norm(across)
+    return Surface("bar", point, axis, bar_radius_mm, covariance_mm2=covariance, source=SEEN)

@@ -15,6 +15,7 @@ from bench.base.errors import BadInput
 from bench.base.tables import write_table
 from bench.friction.runs import alpha_est_sigma
 from bench.records.plain import from_plain, to_plain
+from bench.records.trial import whisks
 from bench.report.assembly import ESTIMATE_COLUMNS, WHISK_COLUMNS, estimate_rows, whisk_rows
 from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
@@ -117,11 +118,11 @@ def _read(base: Base, folder: Path) -> WhiskerRun:
 
 
 def _seen(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
-    """The bar of each trial, as the first whisker whose cameras show it has it."""
+    """The bar of each trial, as the first whisk that shows it has it."""
     found = {}
     for run in runs:
-        for result in run.whole.results:
-            surface = seen_surface(result.seen, run.base)
+        for result, seen, _ in whisks(run.whole.results):
+            surface = seen_surface(seen, result.seen.bar_radius_mm, run.mount.wire, run.base)
             if surface is not None:
                 found.setdefault(result.trial.name, surface)
     return found

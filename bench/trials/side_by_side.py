@@ -28,7 +28,7 @@ from vision.lines.trace import lines_of
 from vision.pictures.others import RodLines
 from vision.truth.observe import wire_lines
 
-_LOOKS = 2
+_LOOKS = 2  # after the first, wires are up to 20 px off where others cross them, after the second 2.2 (docs/arrays.md)
 
 
 def array_units(

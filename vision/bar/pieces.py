@@ -12,7 +12,6 @@ from vision.geometry.silhouette import outline
 from vision.lines.bands import Band, Pieces, cut_pieces, read_band
 from vision.lines.cylinder import WAVES
 from vision.lines.shading import Knots, fit_shading, locate
-from vision.pictures.others import all_lines
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 
@@ -40,7 +39,6 @@ def bar_pieces(view: View, noise: Noise, axis: BarAxis, radius_mm: float, wires_
     band = _from_whole(read_band(view.mean, view.background, middle, place, radius, half), settings.bar_piece_px)
     pieces = cut_pieces([band], settings.bar_piece_px, noise)
     in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
-    wires_px = [*wires_px, *all_lines(view.others)]
     return pieces.select(in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
 
 

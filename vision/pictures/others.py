@@ -1,6 +1,6 @@
 """Rods in the pictures that are not the one looked for: where one of them may be, nothing is learnt of this one."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import cv2
@@ -48,9 +48,3 @@ def covered(others: Others, frame: int, shape: tuple[int, int]) -> np.ndarray | 
                 wide = int(np.ceil(2.0 * (half + BESIDE_ROD_PX)))
                 cv2.polylines(mask, [nodes], False, 1, thickness=wide, shift=_PARTS_AS_SHIFT)
     return mask.astype(bool)
-
-
-def all_lines(others: Others) -> Iterator[np.ndarray]:
-    """Lines (m, 2), px, of other rods in all frames."""
-    for lines in others.values():
-        yield from lines.middle_px

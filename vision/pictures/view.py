@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vision.geometry.camera import Camera
-from vision.pictures.others import Others
+from vision.pictures.others import Others, covered
 from vision.pictures.pixel_noise import Noise
 
 _SCALE_OF = 3  # frames: what is saturated is so in all of them
@@ -44,12 +44,26 @@ class View:
 
     @cached_property
     def mean(self) -> np.ndarray:
-        """Mean (h, w) of the pictures, of MEAN_OF at most."""
+        """Mean (h, w) of the pictures, of MEAN_OF at most; of those in which no other rod covers a pixel, NaN where one
+        does in most."""
+        if self.others:
+            return self._mean_of_clear()
         pictures = self.some(MEAN_OF)
         total = np.zeros(pictures[0].shape, dtype=np.float32)
         for picture in pictures:
             total += picture
         return total / len(pictures)
+
+    def _mean_of_clear(self) -> np.ndarray:
+        frames = list(self.frames)
+        chosen = np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))
+        shape = self.frames[frames[0]].shape
+        total, count = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+        for frame in (frames[k] for k in chosen):
+            clear = ~covered(self.others, frame, shape)
+            total += np.where(clear, self.frames[frame], 0)
+            count += clear
+        return np.where(count >= 0.5 * len(chosen), total / np.maximum(count, 1.0), np.nan)
 
 
 def median_of(pictures: Sequence[np.ndarray]) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vision.lines.bands import cut_pieces, read_band
-from vision.pictures.others import BESIDE_ROD_PX, RodLines, all_lines, covered
+from vision.pictures.others import BESIDE_ROD_PX, RodLines, covered
 from vision.pictures.pixel_noise import Noise
 
 LINE = np.stack([np.linspace(10.0, 90.0, 9), np.linspace(20.0, 40.0, 9)], axis=1)
@@ -25,7 +25,6 @@ def test_what_lies_near_a_line_is_covered_and_no_more():
 def test_frames_without_another_rod_are_covered_nowhere():
     assert covered({}, 0, (10, 10)) is None
     assert not covered(RODS, 1, (100, 110)).any()
-    assert len(list(all_lines(RODS))) == 2
 
 
 def test_a_line_of_unknown_place_covers_nothing():
