@@ -13,7 +13,7 @@ from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.trial import Trial
 from bench.trials.scene import StillScene, still_scene
 from vision.geometry.rods import Bar, Rods
-from vision.pictures.others import Others
+from vision.pictures.others import RodLines
 from vision.truth.trial_pictures import TrialPictures
 
 _FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
@@ -35,15 +35,16 @@ class Shown:
     @classmethod
     def of(
         cls, session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration, settings: Settings,
-        others: Mapping[str, Others]
+        wires: Mapping[str, Mapping[str, RodLines]]
     ) -> "Shown":
-        """others: by camera, where rods are that are not the whisker. Raises BadInput where pictures and times do not
-        go together."""
+        """wires: by camera, where those of an array's whiskers are, its own among them. Raises BadInput where pictures
+        and times do not go together."""
         times = frame_times(trial)
         frames = read_trial(trial, times)
         scene = still_scene(session, calibration, frames)
         wanted = ways_back(signals) if trial.both_ways else ways_back(signals)[:1]
         back = {k: where for k, one in enumerate(wanted) if (where := _backwards(signals, times, one)) is not None}
+        own = session.base.name if session.base else ""
         pictures = TrialPictures(
             {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
             times.time_s,
@@ -52,7 +53,8 @@ class Shown:
             trial.object_velocity_mm_s and np.array(trial.object_velocity_mm_s),
             trial.object_velocity_sigma_mm_s,
             trial.object_gives_way,
-            others,
+            {camera: {name: one for name, one in some.items() if name != own} for camera, some in wires.items()},
+            {camera: some[own] for camera, some in wires.items() if own in some},
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
         rods = Rods(session.whisker.wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))

@@ -19,7 +19,7 @@ from bench.trials.one_camera import by_one_camera
 from bench.trials.pictures import Shown
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
-from vision.pictures.others import Others
+from vision.pictures.others import RodLines
 from vision.truth.observe import observe_trial
 from vision.truth.records import TrialTruth, WhiskTruth
 
@@ -35,9 +35,9 @@ def see_trial(
     signals: Signals,
     calibration: SessionCalibration,
     settings: Settings,
-    others: Mapping[str, Others] | None = None,
+    wires: Mapping[str, Mapping[str, RodLines]] | None = None,
 ) -> SeenTrial:
-    """Whisks of a trial as the cameras show them. others: by camera, wires of the other whiskers of an array.
+    """Whisks of a trial as the cameras show them. wires: by camera, those of an array's whiskers by name.
 
     What keeps a trial from being seen is the status of its whisks; the others go on.
     """
@@ -45,7 +45,7 @@ def see_trial(
     if not trial.camera_sources or calibration.cameras is None:
         return unseen(count, NO_PICTURES)
     try:
-        shown = Shown.of(session, trial, signals, calibration, settings, others or {})
+        shown = Shown.of(session, trial, signals, calibration, settings, wires or {})
         return _see(session, trial, shown, calibration, settings)
     except Refused as reason:
         return unseen(count, str(reason))

@@ -54,16 +54,15 @@ def _is_seen(unit: Unit) -> bool:
 
 
 def _told(unit: Unit, whiskers: Sequence[Sequence[Unit]], look: int) -> Unit:
-    """The unit with the files of that look at the others."""
+    """The unit with the files of that look at it and the others."""
     files = tuple(
         (one.session.base.name, replace(one, stage=f"wires{look}").seen_path)
         for units in whiskers
         for one in units
         if one.trial.name == unit.trial.name
     )
-    others = tuple((name, path) for name, path in files if name != unit.session.base.name)
-    made_from = hash_of([name for name, _ in others], [hash_of_files([path]) for _, path in others])
-    return replace(unit, others=others, others_hash=made_from, straight=unit.straight if look else files)
+    made_from = hash_of([name for name, _ in files], [hash_of_files([path]) for _, path in files])
+    return replace(unit, wires=files, wires_hash=made_from, straight=unit.straight if look else files)
 
 
 def _key(unit: Unit) -> str:
@@ -92,7 +91,7 @@ def _found(unit: Unit) -> dict[str, RodLines]:
     usual = replace(unit.settings.seeing.vision, every_frame=1, picture_scale=1)
     signals = read_signals(unit.trial)
     try:
-        told = unit.trial, signals, unit.calibration, unit.settings, lines_in(unit.others)
+        told = unit.trial, signals, unit.calibration, unit.settings, lines_in(unit.wires)
         shown = Shown.of(unit.session, *told)
         whisks = [*shown.places, *shown.back.values()]
         return wire_lines(shown.pictures, whisks, unit.calibration.cameras, shown.rods, usual)

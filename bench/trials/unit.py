@@ -61,9 +61,8 @@ OWN_GAUGES = "not judged: without this trial the gauges are not known"
 class Unit:
     """What one trial's result is made from. files: hash of the trial's files. drift_rate: (2,), of the channels per
     second, and force_drift_rate (3,) of a load cell; gauges: None where volts cannot become moments. stage: folder of
-    what is seen before all is known. others: of an array, by the names of the other whiskers, files that say where
-    their wires are in the pictures, with the hash of all of them; straight: files of all its whiskers, where these were
-    straight."""
+    what is seen before all is known. wires: of an array, by the names of its whiskers, files that say where
+    their wires are in the pictures, with the hash of all of them; straight: the same were all wires straight."""
 
     session: Session
     trial: Trial
@@ -75,8 +74,8 @@ class Unit:
     gauges: Gauges | None = None
     stage: str = "seen"
     force_drift_rate: np.ndarray | None = None
-    others: tuple[tuple[str, Path], ...] = ()
-    others_hash: str = ""
+    wires: tuple[tuple[str, Path], ...] = ()
+    wires_hash: str = ""
     straight: tuple[tuple[str, Path], ...] = ()
 
     @property
@@ -102,7 +101,7 @@ class Unit:
             session.T_rig_board,
             self.calibration.hash,
             self.settings.seen(),
-            *filter(None, [self.others_hash]),
+            *filter(None, [self.wires_hash]),
         )
 
     @property
@@ -129,9 +128,9 @@ def see_unit(unit: Unit) -> SeenTrial:
 
 def _see(unit: Unit, signals: Signals) -> SeenTrial:
     made_from = unit.session, unit.trial, signals, unit.calibration, unit.settings
-    if not unit.others:
+    if not unit.wires:
         return see_trial(*made_from)
-    looked = lines_in(unit.others)
+    looked = lines_in(unit.wires)
     return with_whose(see_trial(*made_from, looked), lines_in(unit.straight), looked, unit.session.base.name)
 
 

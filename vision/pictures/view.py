@@ -7,24 +7,26 @@ from functools import cached_property
 import numpy as np
 
 from vision.geometry.camera import Camera
-from vision.pictures.others import Others, covered
+from vision.pictures.others import Others, RodLines, covered
 from vision.pictures.pixel_noise import Noise
 
 _SCALE_OF = 3  # frames: what is saturated is so in all of them
 SATURATED = 250.0 / 255.0  # of full scale: what the sensor cut off is not known
 MEAN_OF = 40  # frames: more would not make a still thing clearer
+_LEAST_CLEAR = 2  # frames that show a pixel without a rod: one is as noisy as a frame
 
 
 @dataclass(frozen=True)
 class View:
     """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise. others: rods in
-    them that are not looked for."""
+    them that are not looked for; itself: the wire that is, where its place is known to a pixel or two."""
 
     camera: Camera
     frames: Mapping[int, np.ndarray]
     background: np.ndarray
     noise: Noise
     others: Others = field(default_factory=dict)
+    itself: RodLines | None = None
 
     def some(self, most: int) -> list[np.ndarray]:
         """At most so many of the pictures, spread over all of them."""
@@ -39,31 +41,33 @@ class View:
 
     @property
     def mean_share(self) -> float:
-        """What part of one picture's variance the mean has."""
+        """What part of one picture's variance the mean has; where rods are known, the pixel with most has."""
+        if self.itself is not None:
+            return 1.0 / _LEAST_CLEAR
         return 1.0 / min(len(self.frames), MEAN_OF)
 
     @cached_property
     def mean(self) -> np.ndarray:
-        """Mean (h, w) of the pictures, of MEAN_OF at most; of those in which no other rod covers a pixel, NaN where one
-        does in most."""
-        if self.others:
-            return self._mean_of_clear()
+        """Mean (h, w) of the pictures, of MEAN_OF at most; where rods are known, of those in which none covers a pixel,
+        NaN where one does in nearly all."""
+        if self.itself is not None:
+            return self._mean_of_clear({"": self.itself, **self.others})
         pictures = self.some(MEAN_OF)
         total = np.zeros(pictures[0].shape, dtype=np.float32)
         for picture in pictures:
             total += picture
         return total / len(pictures)
 
-    def _mean_of_clear(self) -> np.ndarray:
+    def _mean_of_clear(self, rods: Others) -> np.ndarray:
         frames = list(self.frames)
         chosen = np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))
         shape = self.frames[frames[0]].shape
         total, count = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
         for frame in (frames[k] for k in chosen):
-            clear = ~covered(self.others, frame, shape)
+            clear = ~covered(rods, frame, shape)
             total += np.where(clear, self.frames[frame], 0)
             count += clear
-        return np.where(count >= 0.5 * len(chosen), total / np.maximum(count, 1.0), np.nan)
+        return np.where(count >= _LEAST_CLEAR, total / np.maximum(count, 1.0), np.nan)
 
 
 def median_of(pictures: Sequence[np.ndarray]) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
-from vision.pictures.others import Others
+from vision.pictures.others import Others, RodLines
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.scale import shrunk_frames, shrunk_picture
 from vision.pictures.view import View
@@ -21,7 +21,7 @@ class TrialPictures:
     (n,) at each frame; background: per camera the scene (h, w) without whisker and bar, or None. object_velocity_mm_s
     (3,), with one sigma each way: of a bar that moves, rig frame; None where it stands.
     object_gives_way: it stands until it is touched, and comes back. others: by camera, rods in its pictures that are
-    not the wire."""
+    not the wire; itself: where that is, to a pixel or two, where it is known beforehand."""
 
     frames: Mapping[str, Mapping[int, np.ndarray]]
     time_s: np.ndarray
@@ -31,13 +31,16 @@ class TrialPictures:
     object_velocity_sigma_mm_s: float = 0.0
     object_gives_way: bool = False
     others: Mapping[str, Others] = field(default_factory=dict)
+    itself: Mapping[str, RodLines] = field(default_factory=dict)
 
     def shrunk(self, scale: int) -> "TrialPictures":
         """The same with pixels `scale` times as wide."""
         behind = self.background.items()
         background = {name: None if empty is None else shrunk_picture(empty, scale) for name, empty in behind}
         others = {name: {rod: lines.shrunk(scale) for rod, lines in some.items()} for name, some in self.others.items()}
-        return replace(self, frames=shrunk_frames(self.frames, scale), background=background, others=others)
+        itself = {name: lines.shrunk(scale) for name, lines in self.itself.items()}
+        frames = shrunk_frames(self.frames, scale)
+        return replace(self, frames=frames, background=background, others=others, itself=itself)
 
     def views(self, cameras: Cameras) -> tuple[View, ...]:
         """What each camera that has three pictures or more shows. Raises Refused where none has."""
@@ -51,4 +54,5 @@ class TrialPictures:
         pictures, empty = self.frames[camera.name], self.background.get(camera.name)
         first, second = list(pictures.values())[:2]
         empty = np.zeros(first.shape) if empty is None else np.asarray(empty, dtype=float)
-        return View(camera, pictures, empty, measure_noise(first, second), self.others.get(camera.name, {}))
+        others, itself = self.others.get(camera.name, {}), self.itself.get(camera.name)
+        return View(camera, pictures, empty, measure_noise(first, second), others, itself)
