@@ -20,6 +20,10 @@ from bench.session.inside import check_outside
 from bench.trials.estimates import estimators
 from vision.geometry.errors import Refused
 
+_ANEW = (
+    "cameras.toml is not brought along, so that each new trial calibrates the cameras anew and all are seen again: "
+    "`calibrate cameras` and `calibrate gauges` write what a session keeps"
+)
 Look = dict[str, tuple[int, int]]  # size and time of change of each file, by its path
 
 
@@ -27,7 +31,7 @@ Look = dict[str, tuple[int, int]]  # size and time of change of each file, by it
 class _Watched:
     """A session that is being recorded. follow_links: see `Settings`; around: what all trials share; last: the trials
     at the last look; asked: what complete or refused trials were asked with; refused: why one is not complete, '' where
-    it is."""
+    it is; hints: what is still to be said."""
 
     path: Path
     announce: Callable[[str], object]
@@ -36,6 +40,13 @@ class _Watched:
     last: dict[str, Look] = field(default_factory=dict)
     asked: dict[str, tuple[Look, Look]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
+    hints: list[str] = field(default_factory=lambda: [_ANEW])
+
+    def hint(self) -> None:
+        """Says, once, what makes every evaluation but the first longer than it need be."""
+        calibrates = (self.path / "boards").is_dir() and not (self.path / "cameras.toml").is_file()
+        while calibrates and self.hints:
+            self.announce(self.hints.pop())
 
     def look(self) -> dict[str, Look]:
         """The trials that are complete, by name; a line on each that stands still and is not."""
@@ -111,6 +122,8 @@ def watch(
             except KeyboardInterrupt:
                 return code
             continue
+        if done[1]:
+            watched.hint()
         done = watched.around, ready
         announce(f"{len(ready)} complete: {', '.join(ready)}")
         try:

@@ -24,9 +24,12 @@ class Contact:
     """A contact at first touch: the point (3,) of the whisker's centreline, rig frame, mm, and its covariance (3, 3).
 
     normal (3,): of the surface, towards the whisker, as felt; NaN where the estimator gives no slope. normal_sigma_rad:
-    of it, in the plane across the whisker. distance_mm: from the object's surface to the whisker's, positive outside;
-    along_mm: how far beyond the place where this whisker comes nearest to the object, along the whisker;
-    normal_off_rad: between the normal and the object's own there. All NaN where the object is not known. source: of it.
+    of it, in the plane across the whisker. base_mm (3,), wire: of the whisker; by_alpha_mm: how far one sigma of the
+    friction angle that is assumed, which is one for all, moves the point along the whisker; has_touch: nothing is
+    doubtful of the angle of touch, whatever the status says of the distance. distance_mm: from the
+    object's surface to the whisker's, positive outside; along_mm: how far beyond the place where this whisker comes
+    nearest to the object, along the whisker; normal_off_rad: between the normal and the object's own there. All three
+    NaN where the object is not known. source: of it.
     """
 
     whisker: str
@@ -38,10 +41,24 @@ class Contact:
     normal: np.ndarray
     normal_sigma_rad: float
     status: str
+    base_mm: np.ndarray
+    wire: Wire
+    by_alpha_mm: float = 0.0
+    has_touch: bool = True
     distance_mm: Value = UNKNOWN
     along_mm: Value = UNKNOWN
     normal_off_rad: float = NAN
     source: str = ""
+
+    @property
+    def arc_mm(self) -> float:
+        """From the base."""
+        return float(np.linalg.norm(self.point_mm - self.base_mm))
+
+    @property
+    def towards(self) -> np.ndarray:
+        """Along the whisker, straight at first touch: (3,), unit."""
+        return (self.point_mm - self.base_mm) / self.arc_mm
 
 
 @dataclass(frozen=True)
@@ -67,19 +84,26 @@ def contacts(mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, S
         surface = stated or seen_surface(seen, result.seen.bar_radius_mm, mount.wire, mount.base)
         for contact in _of_whisk(mount, result.trial.name, seen, felt):
             alone = surface is None or (stated is None and contact.estimator == SEEN)
-            yield contact if alone else _beside(contact, surface, mount.wire, mount.base)
+            yield contact if alone else _beside(contact, surface)
 
 
 def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Iterator[Contact]:
-    of_whisk = mount.base.name, trial, seen.whisk
+    of_whisk, whisker = (mount.base.name, trial, seen.whisk), (mount.base.T_rig_base[:, 3], mount.wire)
     if seen.has_truth and seen.point_covariance_mm2 is not None:
         normal = _normal(seen.touch_rad.value, seen.beta_rad.value)
         placed = _placed(mount.base, seen.point_mm.value, seen.point_covariance_mm2, normal)
-        yield Contact(*of_whisk, SEEN, *placed, seen.beta_rad.sigma, seen.status)
+        yield Contact(*of_whisk, SEEN, *placed, seen.beta_rad.sigma, seen.status, *whisker)
     for answer in (*felt.estimates, *felt.sensors):
         if math.isfinite(answer.d_x_est_mm.value) and math.isfinite(felt.touch_felt_rad.value):
             status = "; ".join(dict.fromkeys(filter(None, [felt.status, answer.status])))
-            yield Contact(*of_whisk, answer.estimator, *_felt(mount, felt, answer), status)
+            found = *_felt(mount, felt, answer), status, *whisker, _by_alpha_mm(answer), not felt.status
+            yield Contact(*of_whisk, answer.estimator, *found)
+
+
+def _by_alpha_mm(answer: EstimateRow) -> float:
+    """Of the distance, by one sigma of the friction angle that is assumed: a larger one brings it nearer."""
+    own = answer.d_x_est_sigma_alpha_exact_mm
+    return -math.sqrt(max(answer.d_x_est_mm.sigma**2 - own**2, 0.0)) if math.isfinite(own) else 0.0
 
 
 def _felt(mount: Mount, felt: FeltWhisk, answer: EstimateRow) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -112,14 +136,12 @@ def _placed(base: Base, point, covariance, normal) -> tuple[np.ndarray, np.ndarr
     return arm + base.T_rig_base[:, 3], turn @ covariance @ turn.T + of_base, turn @ normal
 
 
-def _beside(contact: Contact, surface: Surface, wire: Wire, base: Base) -> Contact:
+def _beside(contact: Contact, surface: Surface) -> Contact:
     """The contact with its distance from the object, across and along the whisker, and the angle of the normals.
 
     Across, an error of d_x hardly counts: at first touch the whisker lies along the surface.
     """
-    start = base.T_rig_base[:, 3]
-    arc = float(np.linalg.norm(contact.point_mm - start))
-    towards = (contact.point_mm - start) / arc
+    start, arc, towards, wire = contact.base_mm, contact.arc_mm, contact.towards, contact.wire
     nearest = surface.nearest_arc_mm(start, towards, wire.length_mm)
     (outside, _), (normal, own) = surface.distance_mm(np.array([contact.point_mm, start + nearest * towards]))
     across, along = (

@@ -72,8 +72,10 @@ def _draw_contact(axes, contact: Contact, x: int, y: int, colour) -> None:
 
 def _draw_object(axes, surface: Surface, points: np.ndarray, x: int, y: int) -> None:
     """As the discs of its radius about its centreline: together they are what is seen of it."""
-    radius = surface.radius_mm
-    for centre in _centreline(surface, points)[:, [x, y]]:
+    centreline = _centreline(surface, points)
+    down = (surface.point_mm - centreline) @ surface.axis
+    radii = surface.radius_mm + np.sin(surface.half_angle_rad) * down  # of balls that just fit in, of a cone
+    for centre, radius in zip(centreline[:, [x, y]], radii):
         axes.add_patch(Ellipse(centre, 2 * radius, 2 * radius, facecolor="0.85", edgecolor="none"))
 
 
@@ -85,6 +87,10 @@ def _centreline(surface: Surface, points: np.ndarray) -> np.ndarray:
         along = (points - surface.point_mm) @ surface.axis
         span = np.linspace(along.min() - 2 * _MARGIN_MM, along.max() + 2 * _MARGIN_MM, _POINTS)
         return surface.point_mm + np.outer(span, surface.axis)
+    if surface.shape == "cone":
+        down = (surface.point_mm - points) @ surface.axis
+        span = np.linspace(0.0, max(down.max(), 0.0) + 2 * _MARGIN_MM, _POINTS)
+        return surface.point_mm - np.outer(span, surface.axis)
     first = np.cross(surface.axis, np.eye(3)[np.argmin(np.abs(surface.axis))])
     first /= np.linalg.norm(first)
     second, turn = np.cross(surface.axis, first), np.linspace(0.0, 2 * np.pi, _POINTS)

@@ -17,11 +17,11 @@ _ARC_MM = 1e-6  # mm: as near as an arc is looked for
 @dataclass(frozen=True, eq=False)
 class Surface:
     """All points at one distance (radius_mm) from a centreline, in the rig frame: a straight one ("bar"), a circle
-    ("ring") or a point ("sphere").
+    ("ring") or a point ("sphere"); or a cone, whose radius_mm is 0.
 
-    point_mm (3,): of the straight line, or the centre; axis (3,), unit: the line's direction, or the normal of the
-    circle's plane; ring_radius_mm: of the circle, 0 of others. covariance_mm2 (3, 3): of where it is; source: STATED or
-    SEEN.
+    point_mm (3,): of the straight line, the centre, or the cone's tip; axis (3,), unit: the line's direction, the
+    normal of the circle's plane, or where the cone points; ring_radius_mm: of the circle, 0 of others; half_angle_rad:
+    of the cone. covariance_mm2 (3, 3): of where it is; source: STATED or SEEN.
     """
 
     shape: str
@@ -31,6 +31,7 @@ class Surface:
     ring_radius_mm: float = 0.0
     covariance_mm2: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
     source: str = STATED
+    half_angle_rad: float = 0.0
 
     def foot_mm(self, points_mm: np.ndarray) -> np.ndarray:
         """The centreline's points (n, 3) that are nearest to points (n, 3), mm."""
@@ -45,9 +46,23 @@ class Surface:
 
     def distance_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far points (n, 3) are outside of the surface, (n,), negative within; its normals there, (n, 3)."""
+        if self.shape == "cone":
+            return self._from_cone(points_mm)
         apart = points_mm - self.foot_mm(points_mm)
         length = np.linalg.norm(apart, axis=1)
         return length - self.radius_mm, apart / length[:, None]
+
+    def _from_cone(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same of a cone: from its straight lines, or from its tip where none is nearer."""
+        sin, cos = np.sin(self.half_angle_rad), np.cos(self.half_angle_rad)
+        apart = points_mm - self.point_mm
+        high, from_tip = apart @ self.axis, np.linalg.norm(apart, axis=1)
+        flat = apart - np.outer(high, self.axis)
+        far = np.linalg.norm(flat, axis=1)
+        normals = cos * flat / far[:, None] + sin * self.axis
+        above = sin * far < cos * high
+        normals[above] = apart[above] / from_tip[above, None]
+        return np.where(above, from_tip, cos * far + sin * high), normals
 
     def nearest_arc_mm(self, base_mm: np.ndarray, towards: np.ndarray, length_mm: float) -> float:
         """Where a straight whisker of this length comes nearest to the object: arc from its base (3,), mm.
@@ -64,11 +79,14 @@ class Surface:
 def stated_surface(trial: Trial) -> Surface | None:
     """The object as the manifest states it; None where it does not, or does not say how thick it is."""
     given = trial.object
-    if given is None or trial.bar_diameter_mm is None:
+    if given is None or (trial.bar_diameter_mm is None and given.shape != "cone"):
         return None
     point, axis = np.array(given.point_mm, dtype=float), np.array(given.axis, dtype=float)
-    radii = 0.5 * trial.bar_diameter_mm, 0.5 * (given.ring_diameter_mm or 0.0)
-    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, given.point_sigma_mm**2 * np.eye(3))
+    thick = 0.0 if given.shape == "cone" else trial.bar_diameter_mm
+    radii = 0.5 * thick, 0.5 * (given.ring_diameter_mm or 0.0)
+    angle = float(np.radians(given.half_angle_deg or 0.0))
+    told = {"covariance_mm2": given.point_sigma_mm**2 * np.eye(3), "half_angle_rad": angle}
+    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, **told)
 
 
 def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from bench.array.cloud import Contact, Mount, contacts
 from bench.array.exchanged import exchanged
 from bench.array.page import write_page
+from bench.array.size import felt_sizes, size_lines, write_sizes
 from bench.array.surface import Surface, seen_surface, stated_surface
 from bench.array.verdict import surface_lines, surface_verdict, write_surface
 from bench.base.atomic import write_whole
@@ -27,7 +28,7 @@ from bench.session.session import Base, Session
 from bench.trials.compare import judge
 from vision.geometry.counted import counted
 
-TABLES = ("whisks", "estimates", "surface")
+TABLES = ("whisks", "estimates", "surface", "size")
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,9 @@ def write_array(out: Path) -> Summary:
     _write_tables(out, runs)
     cloud = [contact for run in runs for contact in contacts(run.mount, run.whole.results, record.surfaces)]
     write_surface(out / "surface.csv", cloud)
-    summary = _summary(record, runs, cloud)
+    sizes = felt_sizes(cloud, record.surfaces)
+    write_sizes(out / "size.csv", sizes)
+    summary = _summary(record, runs, cloud, sizes)
     figures = []
     if runs[0].record.settings.figures:
         from bench.array.figure import write_figures  # with all of matplotlib
@@ -138,7 +141,7 @@ def _write_tables(out: Path, runs: Sequence[WhiskerRun]) -> None:
         write_table(out / f"{name}.csv", ("whisker", *columns), named)
 
 
-def _summary(record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Contact]) -> Summary:
+def _summary(record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Contact], sizes) -> Summary:
     swapped = exchanged({run.base.name: run.whole.results for run in runs})
     doubtful = [*record.doubts, *swapped, *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts)]
     judged = [replace(j, trial=f"{j.trial}, {run.base.name}") for run in runs for j in judge(run.whole.results)]
@@ -149,9 +152,10 @@ def _summary(record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Co
     sections = (
         Section("Whiskers", tuple(f"{run.base.name}: {run.record.verdict[-1]}" for run in runs)),
         Section("Surface: contacts from the object, mm (surface.csv)", tuple(surface_lines(cloud))),
+        Section("Size of the object by (10), its place free (size.csv)", tuple(size_lines(sizes))),
         Section(DOUBTFUL, tuple(doubtful)),
         Section("Score against the truth files of this synthetic session (no result knows them)", record.scores),
-        Section("Files", (f"report.html, whisks.csv, estimates.csv, surface.csv, {RUNS}/<name>/",)),
+        Section("Files", (f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/",)),
     )
     spoken = (*surface_verdict(cloud), *said)
     return Summary(spoken, tuple(doubtful), tuple(section for section in sections if section.lines))

@@ -22,7 +22,7 @@ COLUMNS = (
     *("normal_off_deg", "normal_sigma_deg", "surface_from", "status"),
 )
 _WITHIN_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
-_FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
+FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
 
 
 def write_surface(path: Path, cloud: Iterable[Contact]) -> None:
@@ -53,7 +53,7 @@ def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
 
 def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
     """The array's verdict in a sentence; nothing where no object is known."""
-    known = _judged(cloud, _FELT)
+    known = _judged(cloud, FELT)
     if not known:
         return
     across, along = _rms([c.distance_mm.value for c in known]), _rms([c.along_mm.value for c in known])
@@ -61,7 +61,7 @@ def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
     whiskers, source = len({c.whisker for c in known}), " and ".join(sorted({c.source for c in known}))
     most = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm ({worst.whisker}, {worst.trial})"
     yield (
-        f"Surface by {label_of(_FELT)}: {counted(len(known), 'contact')} felt by {counted(whiskers, 'whisker')} lie "
+        f"Surface by {label_of(FELT)}: {counted(len(known), 'contact')} felt by {counted(whiskers, 'whisker')} lie "
         f"{across:.2f} mm RMS off the object ({source}) and {along:.2f} mm along the whisker, most {most}"
         f"{_normals(known)}."
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image
+from PIL import Image, PngImagePlugin
 
 from bench.base.atomic import whole_file
 
@@ -103,6 +103,14 @@ def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
     with whole_file(path) as temporary:
         about = {"Software": None, _STAMP: stamp}
         figure.savefig(temporary, dpi=dpi, metadata=about, pil_kwargs={"compress_level": _COMPRESSION})
+
+
+def save_picture(picture: Image.Image, path: Path, stamp: str) -> None:
+    """The same of a picture that is painted."""
+    about = PngImagePlugin.PngInfo()
+    about.add_text(_STAMP, stamp)
+    with whole_file(path) as temporary:
+        picture.save(temporary, "PNG", pnginfo=about, compress_level=_COMPRESSION)
 
 
 def _lay_out(figure: "Figure") -> None:

@@ -37,7 +37,7 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> Non
 
 
 # Columns that hold text, and whole numbers that are never missing; all others are numbers.
-TEXT = ("whisker", "trial", "surface", "looked", "estimator", "beta_from", "record", "kind", "notes", "status")
+TEXT = ("whisker", "trial", "surface", "looked", "estimator", "beta_from", "record", "kind", "shape", "notes", "status")
 TEXT += ("refinement", "verdict", "surface_from", "camera")
 SAID = ("status", "notes")  # sentences of ours
 _ASCII = {

@@ -19,6 +19,7 @@ from bench.session.whisker import Whisker
 from bench.trials.compare import is_sound
 from estimator import curvature, first_order
 from estimator.beam import Beam
+from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95, gradient_with_friction
 from vision.truth.value import UNKNOWN, Value
 
@@ -60,7 +61,8 @@ def curved(felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sig
     if not np.isfinite(distances).all():
         return Curved(len(chosen), phi_0_rad=phi, status="(10) has no distance at all of the angles")
     d_x, creep = _rate(theta, *np.array(distances).T)
-    radius = _radius(d_x.value, creep, 0.0 if held else phi.value, (alpha_rad, alpha_sigma_rad), whisker)
+    turned = 0.0 if held else _turned(d_x.value, phi.value, phi_rate, alpha_rad)
+    radius = _radius(d_x.value, creep, 0.0 if held else phi.value, (alpha_rad, alpha_sigma_rad), turned, whisker)
     if held:
         return Curved(len(chosen), radius, phi, status="does not slip sideways: no lateral curvature")
     return Curved(len(chosen), radius, phi, *_lateral(phi.value, phi_rate, d_x.value, alpha_rad))
@@ -101,7 +103,19 @@ def _distance(at: FeltAt, alpha_rad: float, beam: Beam) -> tuple[float, float]:
     return d_x, float(np.sqrt(by_moments @ at.covariance_at @ by_moments))
 
 
-def _radius(d_x: float, creep: Value, phi: float, alpha: tuple[float, float], whisker: Whisker) -> Value:
+def _turned(d_x: float, phi: float, rate: Value, alpha_rad: float) -> float:
+    """What (10) may change by with θ, mm/rad, because φ turns by more than an object's lean by hand and noise let it:
+    by all of it where the object leans, by half of it the other way where it is curved to the side
+    (`bench.friction.turning`, docs/maps.md)."""
+    beta = min(abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
+    by_hand = 0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD)
+    beyond = float(np.sqrt(max(rate.value**2 - rate.sigma**2 - by_hand**2, 0.0)))
+    return float(d_x * beyond * np.sin(abs(phi)) / (np.cos(alpha_rad) * np.cos(beta)))
+
+
+def _radius(
+    d_x: float, creep: Value, phi: float, alpha: tuple[float, float], turned: float, whisker: Whisker
+) -> Value:
     """Of the object, from the change of (10) with θ, mm/rad; phi 0 where the contact is held."""
     left = whisker.beam.left(d_x)
     per_mm = float(first_order.rolling(1.0, 1.0, phi, alpha[0], 1.0, left))
@@ -109,7 +123,7 @@ def _radius(d_x: float, creep: Value, phi: float, alpha: tuple[float, float], wh
     by_alpha = 0.2 * d_x * alpha[1] * first_order.HELD_SHARE if phi == 0 else 0.0
     leaning = d_x * float(first_order.leaning(1.0, TILT_SIGMA_RAD, phi, alpha[0]))
     reach = (creep.value - first_order.HELD_SHARE * held) / per_mm
-    others = np.array([creep.sigma, first_order.HELD_SPREAD * held, by_alpha, leaning])
+    others = np.array([creep.sigma, first_order.HELD_SPREAD * held, by_alpha, leaning, turned])
     return Value(reach - 0.5 * whisker.diameter_mm * left, float(np.linalg.norm(others / per_mm)))
 
 

@@ -1,21 +1,27 @@
 """What was found, drawn on its pictures: wire, bar's edges and contact, at touch and at θ, in every camera."""
 
+from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
+import cv2
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from PIL import Image, ImageDraw, ImageFont
 
-from bench.base.drawing import is_drawn, save
+from bench.base.drawing import is_drawn, save_picture
 from bench.records.trial import SeenWhisk, TrialResult
+from bench.report.painting import as_8_bit, polyline
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.trial import Trial
 
-_WIRE, _BAR, _CONTACT = "#ffd92f", "#4daf4a", "#e41a1c"
+_WIRE, _BAR, _CONTACT, _WHITE = (255, 217, 47), (77, 175, 74), (228, 26, 28), (255, 255, 255)
 _MOMENTS = {"touch": "at touch", "theta": "at θ"}
 _AROUND_PX = 34  # half width of the view that is enlarged
-_MARGIN_PX = 70
+_MARGIN_PX = 70  # of a picture, around the whisker
+_PANEL_PX = (800, 450)
+_INSET_PX, _EDGE_PX, _CROSS_PX = 186, 12, 6  # enlarged view, distance from the panel's edges; half of a contact's cross
+_GAP_PX, _TITLE_PX, _FONT_PX = 10, 26, 16
 
 
 def draw_overlays(trial: Trial, result: TrialResult, out: Path, stamp: str) -> list[str]:
@@ -25,22 +31,36 @@ def draw_overlays(trial: Trial, result: TrialResult, out: Path, stamp: str) -> l
         if whisk.overlay:
             names.append(f"overlays/{trial.name}_{whisk.whisk}.png")
             if not is_drawn(out / names[-1], stamp):
-                save(_figure(trial, whisk), out / names[-1], stamp, dpi=130)
+                save_picture(overlay(trial, whisk), out / names[-1], stamp)
     return names
 
 
-def _figure(trial: Trial, whisk: SeenWhisk) -> Figure:
+def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
+    """A row of panels a camera: at touch and at θ."""
     chosen = whisk.overlay
     cameras = list(chosen["touch"].cameras)
     pictures = _pictures(trial, cameras, {chosen[m].frame for m in _MOMENTS})
-    figure = Figure(figsize=(13.0, 3.9 * len(cameras)), layout="constrained")
-    grid = figure.subplots(len(cameras), 2, squeeze=False)
-    for row, camera in zip(grid, cameras):
-        for axes, moment in zip(row, _MOMENTS):
+    (width, height), rows, titles = _PANEL_PX, [], []
+    for row, camera in enumerate(cameras):
+        panels = [_panel(pictures[camera].get(chosen[m].frame), chosen[m].cameras[camera]) for m in _MOMENTS]
+        rows.append(np.hstack([np.pad(p, ((_TITLE_PX, _GAP_PX), (0, _GAP_PX), (0, 0)), constant_values=255)
+                               for p in panels]))  # fmt: skip
+        for column, (moment, said) in enumerate(_MOMENTS.items()):
             frame = chosen[moment].frame
-            _draw(axes, pictures[camera].get(frame), chosen[moment].cameras[camera])
-            axes.set_title(f"{camera}, frame {frame}, {_MOMENTS[moment]}: {_theta(whisk, frame)}", loc="left")
-    return figure
+            place = column * (width + _GAP_PX), row * (height + _TITLE_PX + _GAP_PX) + 3
+            titles.append((place, f"{camera}, frame {frame}, {said}: {_theta(whisk, frame)}"))
+    picture = Image.fromarray(np.vstack(rows))
+    for place, title in titles:
+        ImageDraw.Draw(picture).text(place, title, fill=(0, 0, 0), font=_font())
+    return picture
+
+
+@lru_cache
+def _font() -> ImageFont.FreeTypeFont:
+    """Matplotlib's own, which is there wherever figures are drawn."""
+    from matplotlib import get_data_path
+
+    return ImageFont.truetype(str(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), _FONT_PX)
 
 
 def _theta(whisk: SeenWhisk, frame: int) -> str:
@@ -58,34 +78,43 @@ def _pictures(trial: Trial, cameras, frames: set[int]) -> dict[str, dict[int, np
     return pictures
 
 
-def _draw(axes: Axes, picture, lines: dict[str, np.ndarray]) -> None:
-    """The picture around the whisker with its lines, and the contact enlarged beside it."""
+def _panel(picture: np.ndarray | None, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The picture around the whisker (h, w, 3) with its lines, and the contact enlarged in a corner."""
+    width, height = _PANEL_PX
     if picture is None:
-        axes.text(0.5, 0.5, "no picture", transform=axes.transAxes, ha="center")
-        axes.set_axis_off()
-        return
-    contact = lines["contact"]
-    inset, white = axes.inset_axes((0.76, 0.02, 0.23, 0.41)), np.percentile(picture, 99.8)
-    for target in (axes, inset):
-        target.imshow(picture, cmap="gray", vmax=white, interpolation="nearest")
-        for name, colour in (("bar_left", _BAR), ("bar_right", _BAR), ("wire", _WIRE)):
-            target.plot(*lines[name].T, color=colour, lw=0.7)
-        target.plot(*contact, "+", color=_CONTACT, ms=9, mew=1.2)
-        target.set(xticks=[], yticks=[])
-    _look_at(axes, picture, lines["wire"])
-    (x, y), around = contact, np.array([-_AROUND_PX, _AROUND_PX])
-    inset.set(xlim=x + around, ylim=y - around)
-    for edge in inset.spines.values():
-        edge.set(visible=True, color="white", lw=1.2)
-    axes.indicate_inset_zoom(inset, edgecolor="white", lw=0.8)
+        return np.full((height, width, 3), 200, np.uint8)
+    grey = as_8_bit(picture)
+    corner, scale = _around(grey.shape, lines["wire"])
+    panel = _drawn(grey, corner, scale, _PANEL_PX, lines)
+    contact = np.asarray(lines["contact"], dtype=float)
+    if np.isfinite(contact).all():
+        seen = contact - _AROUND_PX
+        inset = _drawn(grey, seen, _INSET_PX / (2.0 * _AROUND_PX), (_INSET_PX, _INSET_PX), lines)
+        low, high = (np.round(scale * (at - corner)).astype(int) for at in (seen, contact + _AROUND_PX))
+        cv2.rectangle(panel, low.tolist(), high.tolist(), _WHITE, 1)
+        cv2.rectangle(inset, (0, 0), (_INSET_PX - 1, _INSET_PX - 1), _WHITE, 2)
+        panel[-_EDGE_PX - _INSET_PX : -_EDGE_PX, -_EDGE_PX - _INSET_PX : -_EDGE_PX] = inset
+    return panel
 
 
-def _look_at(axes: Axes, picture, wire) -> None:
-    """The part of the picture that holds the whisker, in the shape of 16:9."""
-    height, width = picture.shape
-    finite = wire[np.isfinite(wire).all(axis=1)]
+def _drawn(grey: np.ndarray, corner_px, scale: float, size_px, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The part of a picture from its pixel corner_px (2,) on, enlarged by scale to size_px, with the lines in it."""
+    shift = -scale * np.asarray(corner_px)
+    moved = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
+    how = cv2.INTER_NEAREST if scale > 1.0 else cv2.INTER_LINEAR
+    view = cv2.cvtColor(cv2.warpAffine(grey, moved, size_px, flags=how), cv2.COLOR_GRAY2RGB)
+    for name, colour in (("bar_left", _BAR), ("bar_right", _BAR), ("wire", _WIRE)):
+        polyline(view, scale * lines[name] + shift, colour)
+    at = scale * np.asarray(lines["contact"], dtype=float) + shift
+    for way in np.eye(2) * _CROSS_PX:
+        polyline(view, np.stack([at - way, at + way]), _CONTACT)
+    return view
+
+
+def _around(shape: tuple[int, ...], wire: np.ndarray) -> tuple[np.ndarray, float]:
+    """Corner (2,) of the part that holds the whisker (n, 2), in the panel's shape, and its scale there."""
+    finite, panel = wire[np.isfinite(wire).all(axis=1)], np.array(_PANEL_PX, dtype=float)
     middle, size = 0.5 * (finite.min(axis=0) + finite.max(axis=0)), np.ptp(finite, axis=0) + 2 * _MARGIN_PX
-    size = max(size[0], size[1] * 16 / 9) * np.array([1.0, 9 / 16])
-    low = np.clip(middle - 0.5 * size, 0, np.maximum(np.array([width, height]) - size, 0))
-    high = np.minimum(low + size, [width, height])
-    axes.set(xlim=(low[0] - 0.5, high[0] - 0.5), ylim=(high[1] - 0.5, low[1] - 0.5))
+    scale = float(np.min(panel / size))
+    room = np.maximum(np.array(shape[1::-1]) - panel / scale, 0.0)
+    return np.clip(middle - 0.5 * panel / scale, 0.0, room), scale

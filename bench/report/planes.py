@@ -13,6 +13,7 @@ from bench.report.page.plane import contact_path
 
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
 _MARGIN_MM = 2.2
+_PANEL_IN, _AROUND_IN = (6.4, 5.6), (0.55, 0.1, 0.95, 0.3)  # left, right, below and above the axes
 _LEAST_DEG, _ROOM_DEG = 3.0, 25.0  # of an angle that is drawn, and of one that its name fits into
 _LABEL_MM = 0.4  # of room that a name takes
 _LEG = {"fontsize": 9, "color": "0.25"}
@@ -27,14 +28,24 @@ def draw_planes(result: TrialResult, friction: tuple[float, str], out: Path, sta
     if not is_drawn(out / name, stamp):
         columns = min(len(whisks), 3)
         rows = -(-len(whisks) // columns)
-        figure = Figure(figsize=(6.4 * columns, 5.6 * rows), layout="constrained")
-        grid = figure.subplots(rows, columns, squeeze=False)
+        figure = Figure(figsize=(_PANEL_IN[0] * columns, _PANEL_IN[1] * rows))
+        grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw=_room(columns, rows))
         for axes in grid.flat[len(whisks) :]:
             axes.set_visible(False)
         for axes, whisk in zip(grid.flat, whisks):
             sensing_plane(axes, result, whisk, friction)
         save(figure, out / name, stamp, dpi=130)
     return [name]
+
+
+def _room(columns: int, rows: int) -> dict[str, float]:
+    """Where the axes stand: found by `constrained_layout`, each panel would cost as much again as its drawing."""
+    (wide, high), (left, right, bottom, top) = _PANEL_IN, _AROUND_IN
+    inner = wide - left - right, high - bottom - top
+    return {
+        **{"left": left / wide / columns, "right": 1.0 - right / wide / columns, "wspace": (left + right) / inner[0]},
+        **{"bottom": bottom / high / rows, "top": 1.0 - top / high / rows, "hspace": (bottom + top) / inner[1]},
+    }
 
 
 def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: tuple[float, str]) -> None:

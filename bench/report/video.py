@@ -14,6 +14,7 @@ from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
 from bench.records.trial import SeenWhisk, TrialResult
 from bench.report.page.svg import limits, ticks
+from bench.report.painting import as_8_bit, polyline
 from bench.report.pooled import read_run
 from bench.report.record import SESSION, read_record
 from bench.report.run import CameraFacts
@@ -141,11 +142,10 @@ def _picture(grey, facts: CameraFacts, result: TrialResult, whisk: SeenWhisk, k:
         picture = np.full((size[1], size[0], 3), 60, np.uint8)
         _text(picture, f"{facts.name}: no picture", (12, 24), _PAPER)
         return picture
-    bright = np.clip(grey * (255.0 / max(float(np.percentile(grey, 99.8)), 1.0)), 0, 255).astype(np.uint8)
-    picture = cv2.cvtColor(cv2.resize(bright, size, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR)
+    picture = cv2.cvtColor(cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR)
     camera = Camera(facts.name, tuple(facts.size_px), facts.matrix, facts.distortion, facts.T_camera_rig)
     for points, colour in _lines(camera, result, whisk, k):
-        _polyline(picture, scale * (camera.project(points) + 0.5) - 0.5, colour)
+        polyline(picture, scale * (camera.project(points) + 0.5) - 0.5, colour)
     if whisk.frames.touching[k]:
         ((x, y),) = scale * (camera.project(whisk.frames.point_mm.value[k : k + 1]) + 0.5) - 0.5
         cv2.circle(picture, (round(x), round(y)), 5, _CONTACT, 1, cv2.LINE_AA)
@@ -237,19 +237,11 @@ def _plot(panel: np.ndarray, theta: np.ndarray, curve: Curve, k: int) -> None:
         column = round(left + (right - left) * (value - x_limits[0]) / (x_limits[1] - x_limits[0]))
         _text(panel, f"{value:g}", (column - 6, height - 8), _INK)
     points = np.stack([x, y], axis=1)
-    _polyline(panel, points, _GREY)
-    _polyline(panel, points[: k + 1], _INK)
+    polyline(panel, points, _GREY)
+    polyline(panel, points[: k + 1], _INK)
     cv2.line(panel, (round(x[k]), top), (round(x[k]), bottom), _CONTACT, 1)
     now = f" = {curve.values[k]:.3f}" if np.isfinite(curve.values[k]) else ""
     _text(panel, f"{curve.name}{now}  at theta = {theta[k]:.2f} deg", (left, 18), _INK)
-
-
-def _polyline(picture: np.ndarray, px: np.ndarray, colour) -> None:
-    """Lines between points (n, 2), px, to a sixteenth of a pixel, broken where one is missing."""
-    good = np.isfinite(px).all(axis=1)
-    for run in np.split(np.arange(len(px)), np.flatnonzero(np.diff(good.astype(int))) + 1):
-        if len(run) > 1 and good[run[0]]:
-            cv2.polylines(picture, [np.round(px[run] * 16).astype(np.int32)], False, colour, 1, cv2.LINE_AA, 4)
 
 
 def _text(picture: np.ndarray, text: str, place: tuple[int, int], colour) -> None:

@@ -117,7 +117,7 @@ def touch_from_afar(rod: Rod, bar: Bar, towards_rad: float) -> Touch | None:
     arcs = np.linspace(0.0, rod.length_mm, _ARCS)
     for angle in towards_rad + _SWEPT_RAD:
         points = unloaded(rod, angle, arcs)[0]
-        gaps = np.linalg.norm(points - bar.foot_mm(points), axis=-1) - bar.radius_mm - rod.radius_mm(arcs)
+        gaps = bar.outside_mm(points) - rod.radius_mm(arcs)
         if gaps.min() <= 0.0:
             if angle == towards_rad + _SWEPT_RAD[0]:
                 raise ValueError("stands in the bar before it moves")

@@ -92,6 +92,11 @@ class Bar:
         """The axis' points nearest to points (..., 3)."""
         return self.point_mm + np.multiply.outer((point_mm - self.point_mm) @ self.axis, self.axis)
 
+    def outside_mm(self, point_mm: np.ndarray) -> np.ndarray:
+        """How far points (..., 3) are outside of the surface, negative within."""
+        apart = point_mm - self.foot_mm(point_mm)
+        return np.linalg.norm(apart, axis=-1 if apart.ndim > 1 else None) - self.radius_mm
+
     def around(self, point_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What a contact at a point (3,) sees: the way there (3,) from the axis' nearest point, and its derivative by
         the point, (3, 3); the axis' direction there (3,), and its derivative (3, 3)."""
@@ -156,7 +161,7 @@ def first_touch(rod: Rod, bar: Bar, motor_rad: float, arc_mm: float) -> Touch:
 def _gap(rod, bar, at):
     point, tangent = unloaded(rod, at[0], at[1])
     apart = point - bar.foot_mm(point)
-    return np.array([np.linalg.norm(apart) - bar.radius_mm - rod.radius_mm(at[1]), apart @ tangent])
+    return np.array([bar.outside_mm(point) - rod.radius_mm(at[1]), apart @ tangent])
 
 
 def _tip_touch(rod, bar, motor_rad):

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 _STEEPEST_DEG, _MOST_TILT_DEG, _NEAREST = 89.0, 80.0, 0.02
 # Of the whisker's own speed at the contact: a bar that runs away as fast is never touched.
 _FASTEST_SHARE = 0.5
+# Of a cone: with less its tip is out of any rig, with more it is hardly any cone.
+_SLIMMEST_DEG, _BLUNTEST_DEG = 1.0, 75.0
 
 def check_protocol(protocol: "Protocol", path: Path) -> None:
     """Raises BadInput, naming the file, for what no rig can do, or what its mechanics here do not cover."""
@@ -48,8 +50,12 @@ def _check_run(protocol: "Protocol", run: "Run", path: Path) -> None:
         raise BadInput(f"d_x_mm {run.d_x_mm:g} is outside {_NEAREST:g} to 1.05 of the whisker's length", file=path)
     if not 0.01 <= run.speed_deg_s <= 2000:
         raise BadInput(f"speed_deg_s {run.speed_deg_s:g}; 0.01 to 2000 is allowed", file=path)
-    if (table.object == "ring") != bool(table.ring_diameter_mm):
-        raise BadInput('ring_diameter_mm belongs to object = "ring", and to no other', file=path)
+    for key, shape in (("ring_diameter_mm", "ring"), ("cone_half_angle_deg", "cone")):
+        if (table.object == shape) != bool(getattr(table, key)):
+            raise BadInput(f'{key} belongs to object = "{shape}", and to no other', file=path)
+    if table.object == "cone" and not _SLIMMEST_DEG <= table.cone_half_angle_deg <= _BLUNTEST_DEG:
+        found = f"cone_half_angle_deg {table.cone_half_angle_deg:g}; {_SLIMMEST_DEG:g} to {_BLUNTEST_DEG:g}"
+        raise BadInput(f"{found} is allowed", file=path)
     if table.static_friction is not None and table.static_friction < table.friction:
         raise BadInput(f"static_friction {table.static_friction:g} is below friction {table.friction:g}", file=path)
     if not 0.1 <= run.before_deg <= 90 or not 0.1 <= run.after_deg <= 25:

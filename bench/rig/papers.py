@@ -13,7 +13,8 @@ from bench.rig.array import ArrayRecording, Mounted, base_keys
 from bench.rig.bar import Bar
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
-from bench.rig.rounded import Ring, Sphere
+from bench.rig.rounded import Cone, Ring, Sphere
+from bench.rig.slip import COLUMNS, slips_mm
 
 _GAUGED, _FORCES = ("time_s", "motor_deg", "y_V", "z_V"), ("f_x_N", "f_y_N", "f_z_N")
 _TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"
@@ -130,6 +131,9 @@ def _object(bar: Bar) -> dict:
     stated = {"shape": "bar", "point_mm": bar.point_mm.tolist(), "axis": bar.axis.tolist()}
     if isinstance(bar, Sphere):
         return {"shape": "sphere", "point_mm": stated["point_mm"]}
+    if isinstance(bar, Cone):
+        angle = math.degrees(bar.half_angle_rad)
+        return stated | {"shape": "cone", "point_mm": bar.tip_mm.tolist(), "half_angle_deg": angle}
     return stated | {"shape": "ring", "ring_diameter_mm": 2 * bar.ring_radius_mm} if isinstance(bar, Ring) else stated
 
 
@@ -149,11 +153,20 @@ def array_frames_csv(recording: ArrayRecording, clock_offset_s: float) -> str:
 
 def truth_csv(recording: Recording) -> str:
     """A row a frame. A frame at the angle of a jump shows what came after it. `status`: free, held, sliding or tip."""
-    rows = (_truth_row(i, recording.whisks[w], t, m, back) for i, (t, m, w, back) in enumerate(recording.frames))
-    return "\n".join([_TRUTH + (",gave_mm" if math.isfinite(recording.bar.stiffness_N_mm) else ""), *rows]) + "\n"
+    slips = {}
+    if type(recording.bar) is not Bar:
+        ways = (False, True)[: 1 + (recording.whisks[0].back is not None)]
+        slips = {(id(whisk), back): slips_mm(whisk, back) for whisk in recording.whisks for back in ways}
+    rows = (
+        _truth_row(i, recording.whisks[w], t, m, back, slips.get((id(recording.whisks[w]), back)))
+        for i, (t, m, w, back) in enumerate(recording.frames)
+    )
+    names = [*("gave_mm",) * math.isfinite(recording.bar.stiffness_N_mm), *COLUMNS * bool(slips)]
+    return "\n".join([",".join([_TRUTH, *names]), *rows]) + "\n"
 
 
-def _truth_row(frame, whisk, time_s, motor_rad, back):
+def _truth_row(frame, whisk, time_s, motor_rad, back, slips=None):
+    """slips (n, 4): of the whisk's way, where the object is rounded."""
     way = whisk.way(back)
     state = way.state_at(motor_rad)
     if state is None:
@@ -164,8 +177,10 @@ def _truth_row(frame, whisk, time_s, motor_rad, back):
     first, rest = (",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values))
     status = "free" if state is None else state.status
     gave = np.linalg.norm(whisk.gave_mm(motor_rad, back))
-    soft = f",{gave:.6f}" if math.isfinite(whisk.bar.stiffness_N_mm) else ""
-    return f"{frame},{first},{int(state is not None)},{rest},{status}{soft}"
+    more = [gave] if math.isfinite(whisk.bar.stiffness_N_mm) else []
+    if slips is not None:
+        more += [math.nan] * 4 if state is None else [*slips[way.row_at(motor_rad)]]
+    return ",".join([f"{frame},{first},{int(state is not None)},{rest},{status}", *(f"{v:.6f}" for v in more)])
 
 
 def truth_toml(recording: Recording) -> str:

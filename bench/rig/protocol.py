@@ -219,8 +219,9 @@ class TrialTable(Table):
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
     # Absent where not given, so that protocols without them stay what they were:
-    object: Literal["ring", "sphere"] | msgspec.UnsetType = msgspec.UNSET  # by default a straight bar
+    object: Literal["ring", "sphere", "cone"] | msgspec.UnsetType = msgspec.UNSET  # by default a straight bar
     ring_diameter_mm: Positive | msgspec.UnsetType = msgspec.UNSET  # of the circle that a ring's axis is
+    cone_half_angle_deg: Positive | msgspec.UnsetType = msgspec.UNSET  # between a cone's axis and its surface
     both_ways: bool | msgspec.UnsetType = msgspec.UNSET  # the way back is recorded, and to be evaluated
     object_velocity_mm_s: Three | msgspec.UnsetType = msgspec.UNSET  # of the bar, rig frame; by default it stands
     object_velocity_sigma_mm_s: Zero | msgspec.UnsetType = msgspec.UNSET  # of what trial.toml states of it, each way

@@ -15,7 +15,7 @@ from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.rod import Rod
-from bench.rig.rounded import Ring, Sphere
+from bench.rig.rounded import Cone, Ring, Sphere
 from bench.rig.stroke import Stroke
 
 _STEP_RAD = math.radians(0.1)  # rad: half of it changes nothing that is seen (tests/bench/rig/test_contact_march.py)
@@ -98,8 +98,10 @@ def _rounded(table, bar: Bar, touch_deg: float, d_x_mm: float) -> Bar:
     """What is touched in the bar's place, at the same point with the same slope."""
     if table.object == "sphere":
         return Sphere(bar.point_mm, bar.axis, bar.radius_mm, bar.stiffness_N_mm)
+    touched = turned(np.array([d_x_mm, 0.0, 0.0]), math.radians(touch_deg))
+    if table.object == "cone":
+        return Cone.narrowing(bar, touched, math.radians(table.cone_half_angle_deg))
     if table.object == "ring":
-        touched = turned(np.array([d_x_mm, 0.0, 0.0]), math.radians(touch_deg))
         return Ring.bent(bar, touched, 0.5 * table.ring_diameter_mm)
     return bar
 

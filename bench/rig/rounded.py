@@ -1,7 +1,8 @@
-"""Objects that are no straight bar: a bar bent to a circle, and a sphere. To a contact each is a bar whose axis turns
-as the contact moves on it.
+"""Objects that are no straight bar: a bar bent to a circle, a sphere, and a cone. To a contact each is a bar whose axis
+turns as the contact moves on it.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -76,3 +77,69 @@ class Sphere(Bar):
         axis = upright / length
         upright_by = -np.outer(normal, normal_by[2]) - normal[2] * normal_by
         return way, np.eye(3), axis, (np.eye(3) - np.outer(axis, axis)) @ upright_by / length
+
+
+@dataclass(frozen=True)
+class Cone(Bar):
+    """A round cone: all points at `radius_mm` from the thinner one whose tip is `point_mm`, up to its own tip. `axis`
+    points there; the axis that a contact sees is the straight line of the surface through it.
+    """
+
+    half_angle_rad: float = 0.0
+
+    @classmethod
+    def narrowing(cls, bar: Bar, touched_mm: np.ndarray, half_angle_rad: float) -> Self:
+        """A cone that a whisker touches at the point (3,) and slope at which it touches the bar, its tip above; there
+        it is as curved across as the bar is."""
+        foot = bar.foot_mm(touched_mm)
+        normal = (touched_mm - foot) / np.linalg.norm(touched_mm - foot)
+        axis = math.cos(half_angle_rad) * bar.axis + math.sin(half_angle_rad) * normal
+        return cls(foot, axis, bar.radius_mm, bar.stiffness_N_mm, half_angle_rad=half_angle_rad)
+
+    @property
+    def tip_mm(self) -> np.ndarray:
+        """Where the cone ends, (3,)."""
+        return self.point_mm + self.radius_mm / math.sin(self.half_angle_rad) * self.axis
+
+    def seen_from(self, pose: np.ndarray) -> Self:
+        """The same cone in the frame of a pose (3, 4), T_rig_base."""
+        turn, shift = pose[:, :3], pose[:, 3]
+        return replace(self, point_mm=turn.T @ (self.point_mm - shift), axis=turn.T @ self.axis)
+
+    def _across(self, point_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of points (..., 3): the way out from the centreline (..., 3), how far that is, and the distance from the thin
+        cone, negative within, (...)."""
+        apart = point_mm - self.point_mm
+        high = apart @ self.axis
+        flat = apart - np.multiply.outer(high, self.axis)
+        far = np.linalg.norm(flat, axis=-1)
+        return flat, far, math.cos(self.half_angle_rad) * far + math.sin(self.half_angle_rad) * high
+
+    def _normal(self, outward: np.ndarray) -> np.ndarray:
+        return math.cos(self.half_angle_rad) * outward + math.sin(self.half_angle_rad) * self.axis
+
+    def outside_mm(self, point_mm: np.ndarray) -> np.ndarray:
+        """As `Bar.outside_mm`; above the tip, how far from the tip."""
+        _, far, distance = self._across(point_mm)
+        outside = distance - self.radius_mm
+        above = far < math.cos(self.half_angle_rad) * outside
+        return np.where(above, np.linalg.norm(point_mm - self.tip_mm, axis=-1), outside)
+
+    def foot_mm(self, point_mm: np.ndarray) -> np.ndarray:
+        """The thin cone's points nearest to points (..., 3)."""
+        flat, far, distance = self._across(point_mm)
+        return point_mm - distance[..., None] * self._normal(flat / far[..., None])
+
+    def around(self, point_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """As `Bar.around`. Raises ArithmeticError above the tip."""
+        flat, far, distance = self._across(point_mm)
+        sin, cos = math.sin(self.half_angle_rad), math.cos(self.half_angle_rad)
+        if far <= cos * (distance - self.radius_mm):
+            raise ArithmeticError("the contact is past the cone's tip")
+        outward = flat / far
+        normal = self._normal(outward)
+        outward_by = (np.eye(3) - np.outer(self.axis, self.axis) - np.outer(outward, outward)) / far
+        upwards = cos * self.axis - sin * outward
+        side = 1.0 if upwards[2] >= 0 else -1.0
+        way_by = np.outer(normal, normal) + distance * cos * outward_by
+        return distance * normal, way_by, side * upwards, -side * sin * outward_by

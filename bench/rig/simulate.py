@@ -80,7 +80,7 @@ def _check_can_be_rendered(job, name):
         return
     trials = job.protocol.trials
     felt_alone = {
-        "a ring or sphere (object)": any(t.object for t in trials),
+        "a ring, sphere or cone (object)": any(t.object for t in trials),
         "an array ([[columns]]) before a soft bar": bool(job.whiskers) and any(t.stiffness_N_mm for t in trials),
     }
     for what, there in felt_alone.items():

@@ -55,6 +55,7 @@ def load_views(
         with doubts.guard():
             channels[trial.name] = _channels_of_all(trial, named)
             _check_motors(bases, channels[trial.name])
+            _check_cone(bases, trial)
     if any(trial.camera_sources for trial in session.trials):
         _check_placed(session)
     readable = tuple(trial for trial in session.trials if trial.name in channels)
@@ -148,6 +149,21 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
             angle = np.degrees(np.arccos(cosine))
             found = f"{one.name} and {other.name} are on one motor ({motors[0].channel}), their axes {angle:.3g}° apart"
             raise BadInput(f"[[whiskers]] {found}; name each one's own motor_deg in [whiskers.channels]", file=MANIFEST)
+
+
+def _check_cone(bases: Sequence[Base], trial: Trial) -> None:
+    """Raises BadInput for a cone that ends before it comes to any whisker's plane of whisking."""
+    if trial.object is None or trial.object.shape != "cone":
+        return
+    tip, axis = (np.array(given, dtype=float) for given in (trial.object.point_mm, trial.object.axis))
+    opening = np.radians(trial.object.half_angle_deg)
+    for base in bases:
+        normal = base.T_rig_base[:, 2]
+        towards = np.copysign(1.0, (base.T_rig_base[:, 3] - tip) @ normal) * normal
+        if np.arccos(np.clip(-axis @ towards / np.linalg.norm(axis), -1.0, 1.0)) - opening < np.pi / 2:
+            return
+    found = "the cone's tip, point_mm, lies before every whisker's plane: none can touch it; axis points to the tip"
+    raise BadInput(f"[object] {found}", file=f"trials/{trial.name}/trial.toml")
 
 
 def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels) -> Session:

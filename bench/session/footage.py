@@ -86,5 +86,4 @@ def read_frames(source: Path, indices: Iterable[int]) -> dict[int, np.ndarray | 
         frames = Frames.open(source)
     except Refused:
         return dict.fromkeys(wanted)
-    span = frames.read(min(wanted), max(wanted) + 1) if wanted else ()
-    return dict.fromkeys(wanted) | {index: grey for index, grey in span if index in wanted}
+    return dict.fromkeys(wanted) | dict(frames.pick(wanted))

@@ -121,13 +121,18 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
 class ObjectKeys(Keys, kw_only=True):
     """[object] of trial.toml: where the object stands, in the rig frame."""
 
-    shape: Literal["bar", "ring", "sphere"] = "bar"
+    shape: Literal["bar", "ring", "sphere", "cone"] = "bar"
     point_mm: Three
     point_sigma_mm: float = 0.0
     axis: Three = msgspec.field(default_factory=lambda: [0.0, 0.0, 1.0])
     ring_diameter_mm: float | None = None
+    half_angle_deg: float | None = None
 
-    windows: ClassVar = {"point_mm": plausible.PLACE, "ring_diameter_mm": plausible.LENGTH}
+    windows: ClassVar = {
+        "point_mm": plausible.PLACE,
+        "ring_diameter_mm": plausible.LENGTH,
+        "half_angle_deg": plausible.HALF_ANGLE,
+    }
 
 
 class TrialKeys(Keys, kw_only=True):

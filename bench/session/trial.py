@@ -16,14 +16,16 @@ SIGNALS = "signals.csv"
 
 @dataclass(frozen=True)
 class StatedObject:
-    """Where the object stands, in the rig frame, with one sigma of each coordinate. point_mm (3,): of a bar's axis, or
-    the centre of a ring or sphere; axis (3,): the bar's direction, or the normal of the ring's plane."""
+    """Where the object stands, in the rig frame, with one sigma of each coordinate. point_mm (3,): of a bar's axis, the
+    centre of a ring or sphere, or a cone's tip; axis (3,): the bar's direction, the normal of the ring's plane, or
+    where the cone points."""
 
     shape: str
     point_mm: tuple[float, ...]
     point_sigma_mm: float
     axis: tuple[float, ...]
     ring_diameter_mm: float | None
+    half_angle_deg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -137,12 +139,13 @@ def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None
     """Raises BadInput for one that cannot be."""
     if keys is None:
         return None
-    if (keys.shape == "ring") != (keys.ring_diameter_mm is not None):
-        raise BadInput('[object] ring_diameter_mm belongs to shape = "ring", and to no other shape', file=shown)
+    for key, shape in (("ring_diameter_mm", "ring"), ("half_angle_deg", "cone")):
+        if (keys.shape == shape) != (getattr(keys, key) is not None):
+            raise BadInput(f'[object] {key} belongs to shape = "{shape}", and to no other shape', file=shown)
     if not any(keys.axis):
         raise BadInput("[object] axis is a direction, not zero", file=shown)
     point, axis = tuple(keys.point_mm), tuple(keys.axis)
-    return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, keys.ring_diameter_mm)
+    return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, keys.ring_diameter_mm, keys.half_angle_deg)
 
 
 def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:

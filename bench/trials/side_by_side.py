@@ -82,12 +82,13 @@ def _predict(unit: Unit) -> None:
 
 
 def _look(unit: Unit) -> None:
-    """The wire where a first look finds it; nothing of a trial that cannot be seen."""
+    """The wire where a first look finds it."""
     if not has_lines(unit.seen_path, _key(unit)):
         write_lines(unit.seen_path, _key(unit), _found(unit))
 
 
 def _found(unit: Unit) -> dict[str, RodLines]:
+    """By camera; straight in a trial that cannot be seen."""
     usual = replace(unit.settings.seeing.vision, every_frame=1, picture_scale=1)
     signals = read_signals(unit.trial)
     try:
@@ -96,4 +97,5 @@ def _found(unit: Unit) -> dict[str, RodLines]:
         whisks = [*shown.places, *shown.back.values()]
         return wire_lines(shown.pictures, whisks, unit.calibration.cameras, shown.rods, usual)
     except Refused:
-        return {}
+        name = unit.session.base.name
+        return {camera: some[name] for camera, some in lines_in(unit.straight).items() if name in some}

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench import robot_trade, tradeoff
+from bench.array import size
 from bench.array import verdict as contacts
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
@@ -45,6 +46,7 @@ CSV = {
     "whisks.csv": assembly.WHISK_COLUMNS,
     "estimates.csv": assembly.ESTIMATE_COLUMNS,
     "surface.csv": contacts.COLUMNS,
+    "size.csv": size.COLUMNS,
     "track/<trial>.csv": assembly.TRACK_COLUMNS,
     "budget.csv": assembly.BUDGET_COLUMNS,
     "beam.csv": assembly.BEAM_COLUMNS,
@@ -107,7 +109,7 @@ def _by_name(match: re.Match) -> str:
 
 
 def test_truth_of_a_simulated_session(tmp_path):
-    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\n")
+    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\nobject = 'sphere'\n")
     session = simulate(tmp_path / "session", protocol=protocol, seed=1, signals_only=True)
     (folder,) = (session / "trials").iterdir()
     written = {

@@ -87,6 +87,8 @@ def test_a_trial_without_all_its_frames_waits(small_copy, exact_vision, tmp_path
     (waiting,) = (line for line in said if line.startswith("waiting for b30_3"))
     assert "there must be a row a frame" in waiting
     assert names_in(said) == [["gauge_roll0"], ["b30_3", "gauge_roll0"]]
+    (hint,) = (place for place, line in enumerate(said) if line.startswith("cameras.toml is not brought along"))
+    assert said[hint + 1].startswith("2 complete")  # where the first new trial makes it felt, once
 
 
 @pytest.mark.parametrize("follow", [False, True])

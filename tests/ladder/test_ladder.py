@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from bench.rig.protocol import PicturesTable, WhiskerTable
-from tests.ladder import estimates_montecarlo, path_traced
+from tests.ladder import estimates_montecarlo, path_traced, rounded
 from tests.ladder.coverage import COLUMNS, QUANTITIES, Seen, row_of, scene_row, see_points, summary
 from tests.ladder.exactness import model_errors, own_errors, scenes
 from tests.ladder.gradients import of_cameras, of_quantities, of_residuals, off_solution
@@ -132,3 +132,11 @@ def test_the_last_rung_is_a_path_traced_scene(name, most_mm):
     row = row_of(*path_traced.see_scene(0, path_traced.ROOT / "fixtures" / "scenes" / name))
     assert not path_traced.odd(row)
     assert abs(row["d_x_mm_error"]) < most_mm
+
+
+def test_what_a_ball_does_to_10_is_its_first_order():
+    """At 40 degrees on balls of 40 and 80 mm radius: what is left is of the second order in theta d_x / R, so a
+    quarter for twice the radius; what a bar leaves is 0.04 % (docs/arrays.md), on either side."""
+    (small, left, *_), (large, less, *_) = (rounded.row("sphere", radius, np.radians(40.0)) for radius in (40.0, 80.0))
+    assert small < -2.0 and large < -2.0
+    assert abs(left) < 0.2 and less == pytest.approx(left / 4, abs=0.08)

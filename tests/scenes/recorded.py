@@ -8,6 +8,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.rods import Bar, Rods, Wire
+from vision.geometry.settings import VisionSettings
 from vision.pictures.files import read_picture
 from vision.pictures.frames import Frames
 from vision.truth.observe import observe_trial
@@ -40,15 +41,16 @@ class Recorded:
         self.background = {c.name: read_picture(session / "boards" / "rig" / f"{c.name}.png").astype(float)
                            for c in self.cameras}
 
-    def see(self, keep=slice(None)):
+    def see(self, keep=slice(None), **settings):
         """The truth of the frames in `keep`, renumbered from 0."""
         chosen = range(len(self.rows["time_s"]))[keep]
         frames = {name: {k: pictures[f] for k, f in enumerate(chosen) if f in pictures}
                   for name, pictures in self.frames.items()}
         motor, time = np.radians(self.rows["motor_deg"][keep]), self.rows["time_s"][keep]
-        return self.see_frames(TrialPictures(frames, time, motor, self.background))
+        return self.see_frames(TrialPictures(frames, time, motor, self.background), VisionSettings(**settings))
 
-    def see_frames(self, pictures):
+    def see_frames(self, pictures, settings=VisionSettings()):  # noqa: B008
         """The truth of these pictures, taken as one whisk."""
-        (whisk,) = observe_trial(pictures, [slice(0, len(pictures.motor_rad))], self.cameras, RODS).whisks
+        whole = [slice(0, len(pictures.motor_rad))]
+        (whisk,) = observe_trial(pictures, whole, self.cameras, RODS, settings).whisks
         return whisk

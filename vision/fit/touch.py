@@ -82,6 +82,13 @@ def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.n
     return (motor_rad > touch + step) & sure & ~first, (motor_rad < touch - step) | first
 
 
+def begins_free(motor_rad: np.ndarray, bend_rad: np.ndarray) -> bool:
+    """Whether coarse bends (f, 2) show that the first frames come before touch: by more than the motor turns until a
+    bend is sure. Where none is, there is no touch."""
+    touching, _ = frames_that_touch(motor_rad, bend_rad)
+    return not np.any(touching) or motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
+
+
 def _hinge(motor_rad, bend_rad) -> float:
     """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
     towards = np.median(bend_rad[-max(2, len(bend_rad) // 3):], axis=0)
@@ -99,3 +106,10 @@ def frames_by_touch(motor_rad: np.ndarray, touch_rad: float, sigma_rad: float) -
     free = motor_rad < touch_rad - margin
     free[:FEWEST_FREE] |= motor_rad[:FEWEST_FREE] < touch_rad
     return motor_rad > touch_rad + margin, free
+
+
+def bends_tell_more(motor_rad: np.ndarray, sigma_rad: float) -> bool:
+    """Whether bends part the frames better than a touch known to sigma, as where sights hardly cross: they do to a
+    frame, or to what the motor turns by until a bend is sure."""
+    to_a_frame = np.median(np.abs(np.diff(motor_rad)))
+    return bool(_SURE_SIGMAS * sigma_rad > max(to_a_frame, _SURE_BEND_RAD))

@@ -11,8 +11,9 @@ class VisionSettings:
     bar_margin_px: background read on either side of the rod. rounds: how often the lines are traced anew from the
     fit. clock_sigma_s: how well the cameras' clock is known against the motor's; 0 takes frame times as exact.
     bar_reach_mm: length of bar used on either side of the contact. picture_scale: pictures are shrunk by so much, a
-    whole number. every_frame: of a stroke's frames one in so many is looked at. check_beam: whether the wire is fitted
-    once more as a curve that is no beam, and looked at for another width, to see whether it is the one that is stated.
+    whole number. every_frame: of a stroke's frames one in so many is looked at, all where these leave too few before
+    touch. check_beam: whether the wire is fitted once more as a curve that is no beam, and looked at for another width,
+    to see whether it is the one that is stated.
     """
 
     wire_piece_px: int = 12

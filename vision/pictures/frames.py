@@ -8,7 +8,7 @@ never shift. Grey is what the file holds at full depth; of a colour video it is 
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -78,6 +78,12 @@ class Frames(ABC):
                 self._check_size(index, grey)
             yield index, grey
 
+    def pick(self, wanted: Iterable[int]) -> Iterator[tuple[int, np.ndarray | None]]:
+        """The same of these frames alone, in order. Of a video all up to the last are decoded."""
+        chosen = set(wanted)
+        span = self.read(min(chosen), max(chosen) + 1) if chosen else ()
+        yield from ((index, grey) for index, grey in span if index in chosen)
+
     def _check_size(self, index: int, grey: np.ndarray) -> None:
         size = (grey.shape[1], grey.shape[0])
         if size != self.size_px:
@@ -87,7 +93,16 @@ class Frames(ABC):
             )
 
 
-class PictureFolder(Frames):
+class _OneByOne(Frames):
+    """Frames each of which is decoded by itself."""
+
+    def pick(self, wanted: Iterable[int]) -> Iterator[tuple[int, np.ndarray | None]]:
+        """These frames alone, and no other is decoded."""
+        for index in sorted(set(wanted)):
+            yield from self.read(index, index + 1)
+
+
+class PictureFolder(_OneByOne):
     """Pictures in the natural order of their names (2 before 10)."""
 
     def __init__(self, path: Path):
@@ -108,7 +123,7 @@ class PictureFolder(Frames):
             yield index, read_picture(self.files[index])
 
 
-class TiffStack(Frames):
+class TiffStack(_OneByOne):
     """The pages of one TIFF file, in their order."""
 
     def __init__(self, path: Path):

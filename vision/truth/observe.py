@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.bar.search import see_bar
+from vision.bar.search import SeenBar, see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
@@ -24,7 +24,7 @@ from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
 from vision.geometry.counted import counted
-from vision.geometry.errors import Misled, Refused
+from vision.geometry.errors import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import one_sided_lines
@@ -55,11 +55,11 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
     Refused only for input that no trial could be seen with.
     """
     try:
-        seen, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
+        seen, bar_seen, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
     rows = tuple(_see_whisk(whisk) for whisk in seen)
-    bar_seen, motor_rad = seen[0].bar, seen[0].motor_rad
+    motor_rad = np.asarray(pictures.motor_rad, dtype=float)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
     looks = seen_over_given(stands, bar_seen, rods, motor_rad, settings)
     bars = {name: Value(*share) for name, share in looks.items()}
@@ -70,9 +70,9 @@ def wire_lines(pictures: TrialPictures, whisks: Sequence[slice], cameras: Camera
                settings: VisionSettings = _USUAL) -> dict[str, RodLines]:
     """Where the wire is in the pictures of each camera, by a first look, to a pixel or two; straight, as the motor has
     it, in whisks in which it is not seen. Arguments and errors as of `observe_trial`."""
-    seen, _ = _whisks_of(pictures, whisks, cameras, rods, settings)
+    seen, _, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
     curves = {frame: curve for whisk in seen for frame, curve in _first_curves(whisk.without_gaps()).items()}
-    return {camera.name: lines_of(camera, rods.wire, curves) for camera in seen[0].cameras}
+    return {view.camera.name: lines_of(view.camera, rods.wire, curves) for view in stands if curves}
 
 
 def _first_curves(whisk: WhiskPictures) -> dict[int, Curves]:
@@ -87,8 +87,8 @@ def _first_curves(whisk: WhiskPictures) -> dict[int, Curves]:
 
 
 def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
-               settings: VisionSettings) -> tuple[list[WhiskPictures], Sequence[View]]:
-    """The whisks with all that is known before a wire is looked for, and views in which the bar stands. Raises
+               settings: VisionSettings) -> tuple[list[WhiskPictures], SeenBar, Sequence[View]]:
+    """The whisks with all that is known before a wire is looked for, the bar, and views in which it stands. Raises
     Refused."""
     pictures, cameras = pictures.shrunk(settings.picture_scale), shrunk_cameras(cameras, settings.picture_scale)
     time_s, motor_rad = (np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad))
@@ -101,7 +101,7 @@ def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Camera
     gives = Gives() if pictures.object_gives_way else None
     return [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
                           left_out=tuple(behind), told=told, gives=gives)
-            for number, stroke in enumerate(strokes)], stands
+            for number, stroke in enumerate(strokes)], bar_seen, stands
 
 
 def _told(pictures: TrialPictures, strokes, views: Sequence[View]) -> tuple[Told | None, Sequence[View]]:
@@ -155,6 +155,8 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
         try:
             fitted = fit_whisk(whisk)
             break
+        except TooFewFrames:
+            whisk = whisk.with_all_frames()
         except Misled as reason:
             if len(whisk.views) == 1:
                 return _refused(whisk, str(reason))

@@ -14,7 +14,7 @@ from vision.bar.line import BarLine, measure_bars
 from vision.bar.one_view import seen_from_one_side
 from vision.fit.problem import Problem, State
 from vision.fit.solve import solve
-from vision.fit.touch import FEWEST_FREE, frames_by_touch, frames_that_touch, touch_and_sigma
+from vision.fit.touch import FEWEST_FREE, bends_tell_more, frames_by_touch, frames_that_touch, touch_and_sigma
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
@@ -106,7 +106,10 @@ class TouchByClearance:
 
     def parted(self, problem: Problem, state: State, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """`first` once more, by a fit. answer (size, size): how its parameters answer. Raises Refused."""
-        touching, free = frames_by_touch(problem.motor_rad, *touch_and_sigma(problem, state.vector, answer))
+        touch_rad, sigma_rad = touch_and_sigma(problem, state.vector, answer)
+        touching, free = frames_by_touch(problem.motor_rad, touch_rad, sigma_rad)
+        if bends_tell_more(problem.motor_rad, sigma_rad):
+            touching, free = touching | problem.touching & ~free, free | ~problem.bent & ~touching
         if np.sum(free) < FEWEST_FREE:
             raise Refused(STARTS_TOUCHING)
         if not np.any(touching):

@@ -10,9 +10,10 @@ from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
 from vision.fit.problem import BAR, REST, Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
+from vision.fit.touch import begins_free
 from vision.geometry.centreline import Curves, one_curve
 from vision.geometry.contact import BarAxis, clearance, outline_of_bar, upward
-from vision.geometry.errors import Misled, Refused
+from vision.geometry.errors import Misled, Refused, TooFewFrames
 from vision.lines.bands import Pieces
 from vision.lines.one_sided import WireAppearance, seen_width
 from vision.lines.points import Observed
@@ -57,7 +58,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
     for way in others:
         try:
             return _fitted_by(whisk, *way)
-        except Misled:
+        except (Misled, TooFewFrames):
             raise
         except Refused:
             continue
@@ -91,6 +92,8 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
     """The whisk in the frames to fit, and what coarse points tell of them."""
     axis, wire = whisk.bar.axis, whisk.rods.wire
     rest, coarse = coarse_shapes(whisk)
+    if whisk.is_thinned and not begins_free(whisk.angles_rad, np.array(list(coarse.values()))):
+        raise TooFewFrames("too few of the frames before touch were looked at")
     whisk = whisk.during(touch.near(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.first(whisk.angles_rad, bend)

@@ -103,6 +103,16 @@ class WhiskPictures:
         """The whisk in some of its frames."""
         return replace(self, indices=frames)
 
+    @property
+    def is_thinned(self) -> bool:
+        """Whether not all frames of the stroke are looked at."""
+        return isinstance(self.indices, range) and abs(self.indices.step) > 1
+
+    def with_all_frames(self) -> "WhiskPictures":
+        """The whisk in every frame of a stroke that was thinned."""
+        thinned = self.indices
+        return self.during(range(thinned.start, thinned.stop, int(np.sign(thinned.step))))
+
     def without_gaps(self) -> "WhiskPictures":
         """The whisk by the cameras that have most of its frames: one camera's gaps are not all cameras'."""
         counts = {view.camera.name: sum(f in view.frames for f in self.indices) for view in self.views}

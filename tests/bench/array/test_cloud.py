@@ -96,6 +96,15 @@ def test_distances_from_rings_and_spheres():
     np.testing.assert_allclose(sphere.distance_mm(points)[0], [13.0, np.hypot(20, 4) - 10.0, 5.0])
 
 
+def test_distances_from_a_cone():
+    """Its tip at the origin, pointing up, opening by 30°: beside it, inside, and above the tip."""
+    cone = Surface("cone", np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, half_angle_rad=np.pi / 6)
+    beside = np.array([0.5, 0.0, -np.sqrt(0.75)]) * 10.0 + 2.0 * np.array([np.sqrt(0.75), 0.0, 0.5])
+    outside, normals = cone.distance_mm(np.array([beside, [0.0, 1e-9, -4.0], [3.0, 0.0, 4.0]]))
+    np.testing.assert_allclose(outside, [2.0, -2.0, 5.0], atol=1e-8)
+    np.testing.assert_allclose(normals[::2], [[np.sqrt(0.75), 0.0, 0.5], [0.6, 0.0, 0.8]], atol=1e-12)
+
+
 def test_doubtful_contacts_are_in_the_table_and_not_in_the_verdict():
     surface, base = bar(0.0)
     sound, doubtful = cloud(felt(), surface, base), cloud(felt(80.0, status="odd"), surface, base)

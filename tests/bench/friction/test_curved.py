@@ -88,6 +88,19 @@ def test_the_radius_of_a_thick_bar_is_felt(tmp_path):
         assert abs(float(row["lateral_per_mm"])) < 2 * float(row["lateral_sigma_per_mm"])
 
 
+def test_the_radius_of_a_ball_is_within_what_is_said_of_it(tmp_path):
+    """There φ turns as the contact slips, and (10) falls short for that, too: at 40° on one of 80 mm by twice as much
+    as for the rolling."""
+    ball = 'd_x_mm = 60.0\nobject = "sphere"\n'
+    text = PROTOCOL.replace("d_x_mm = 40.0\n", ball).replace("30.0", "80.0").replace("[0, 20, 30]", "[30, 40, 50]")
+    session = simulate(tmp_path / "session", protocol=protocol_file(tmp_path, text), signals_only=True, seed=2)
+    evaluate(session, tmp_path / "out", Settings(), workers=0)
+    with (tmp_path / "out" / "curvature.csv").open(newline="") as file:
+        for row in csv.DictReader(file):
+            assert abs(float(row["radius_mm"]) - 40.0) < 2 * float(row["radius_sigma_mm"])
+            assert float(row["lateral_per_mm"]) > 2 * float(row["lateral_sigma_per_mm"])
+
+
 @pytest.mark.parametrize("r_n, told", [(1.0, True), (1e6, False)])
 def test_an_estimate_against_what_turns_the_slip_angle_says_so(r_n, told):
     """At κ_n = 1 φ turns by about sin β_0 a radian, 2° at θ = 3°, of which (10) knows nothing: 2 % of d_x."""

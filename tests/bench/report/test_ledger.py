@@ -8,7 +8,17 @@ import pytest
 from bench.base.tables import read_table
 from bench.gauges.felt import gauge_delay
 from bench.records.trial import EstimateRow, WithDrift
-from bench.report.ledger import COLUMNS, MAY_GO, NEEDED, NOT_KNOWN, Entry, ledger, ledger_lines, write_ledger
+from bench.report.ledger import (
+    COLUMNS,
+    MAY_GO,
+    NEEDED,
+    NOT_KNOWN,
+    QUANTITIES,
+    Entry,
+    ledger,
+    ledger_lines,
+    write_ledger,
+)
 from bench.report.left_out import NAMES
 from bench.session.whisker import Whisker
 from estimator import first_order
@@ -40,6 +50,15 @@ def test_a_tenth_of_a_sigma_decides():
     assert entry(0.0011, 0.01).verdict == NEEDED
     assert entry(-0.0009, 0.01).verdict == MAY_GO
     assert entry(0.0, np.nan).verdict == MAY_GO
+
+
+def test_what_may_be_left_out_is_kept_and_for_how_much():
+    effects, sigmas = dict.fromkeys(QUANTITIES, 1e-4), dict.fromkeys(QUANTITIES, 0.01)
+    entries = [Entry("a", 0, name, effects, sigmas) for name in NAMES]
+    assert [one.row["cost_percent"] for one in entries if one.refinement in ("psi", "drift")] == [0.6, 0.0]
+    said = {line[:28].strip(): line[28:] for line in ledger_lines(entries)}
+    assert said["psi"].startswith("may be left out, kept at 0.6 % of the time at most: at most +0.0001 mm of d_x")
+    assert said["drift"].startswith("may be left out, kept at no cost: at most +0.0001")
 
 
 def test_what_is_not_known_is_not_left_out():

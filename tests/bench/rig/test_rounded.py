@@ -1,15 +1,17 @@
-"""Rings and spheres: their derivatives, and that a large one is a straight bar."""
+"""Rings, spheres and cones: their derivatives, and that a large one is a straight bar."""
 
 import math
 
 import numpy as np
 import pytest
 
+from bench.base.errors import BadInput
 from bench.rig.bar import Bar, first_touch, turned
 from bench.rig.friction import Friction
 from bench.rig.marched import MarchedWhisk
+from bench.rig.protocol import load
 from bench.rig.rod import Rod
-from bench.rig.rounded import Ring, Sphere
+from bench.rig.rounded import Cone, Ring, Sphere
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
 
@@ -32,7 +34,14 @@ def marched(bar: Bar, friction: Friction) -> MarchedWhisk:
     return MarchedWhisk.run(ROD, bar, friction, touch, touch.motor_rad + math.radians(3.0), step_rad=step)
 
 
-@pytest.mark.parametrize("thing", [placed(), Ring.bent(placed(), TOUCHED, 20.0), sphere(20.0)], ids=type)
+def cone(radius_mm: float = 20.0, half_angle_rad: float = 0.35) -> Cone:
+    return Cone.narrowing(placed(radius_mm), TOUCHED, half_angle_rad)
+
+
+THINGS = [placed(), Ring.bent(placed(), TOUCHED, 20.0), sphere(20.0), cone()]
+
+
+@pytest.mark.parametrize("thing", THINGS, ids=type)
 def test_what_a_contact_sees_has_these_derivatives(thing):
     """By central differences of 1e-6 mm, whose rounding is 1e-9; the way is that from the foot."""
     point = TOUCHED + np.array([0.3, 0.2, -0.4])
@@ -69,6 +78,38 @@ def test_force_on_a_sphere_lies_on_the_cone_about_its_normal():
         press = force @ normal
         assert np.linalg.norm(state.point_mm - whisk.bar.point_mm) == pytest.approx(20.5, abs=1e-9)
         assert np.linalg.norm(force - press * normal) == pytest.approx(0.2 * press, rel=1e-6)
+
+
+def test_a_cone_is_touched_where_the_bar_is_and_ends_at_its_tip():
+    bar, thing = placed(20.0), cone()
+    touch, same = (first_touch(ROD, one, 0.04, 60.0) for one in (bar, thing))
+    assert same.motor_rad == pytest.approx(touch.motor_rad, abs=1e-9)
+    assert thing.slope(0.04, same.point_mm) == pytest.approx(bar.slope(0.04), abs=1e-9)
+    down = -thing.axis
+    surface = thing.tip_mm + 30.0 * (np.cos(0.35) * down + np.sin(0.35) * np.cross(thing.axis, [1.0, 0.0, 0.0]))
+    assert thing.outside_mm(np.array([surface, thing.tip_mm + 3.0 * thing.axis]))[1] == pytest.approx(3.0)
+    with pytest.raises(ArithmeticError, match="past the cone's tip"):
+        thing.around(thing.tip_mm + thing.axis + [0.0, 1e-3, 0.0])
+
+
+@pytest.mark.parametrize("friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"])
+def test_a_slim_cone_is_a_bar(friction):
+    """Of a half-angle of 1e-5 the radius changes by 2e-5 mm over 2 mm of slip."""
+    bar, slim = (marched(thing, friction) for thing in (placed(), cone(3.0, 1e-5)))
+    at = bar.touch.motor_rad + np.radians([0.5, 1.5, 2.5])
+    np.testing.assert_allclose(slim.forward.moments_at(at), bar.forward.moments_at(at), rtol=2e-4)
+
+
+@pytest.mark.parametrize("said, text", [
+    ("cone_half_angle_deg belongs to", "cone_half_angle_deg = 10"),
+    ("cone_half_angle_deg belongs to", 'object = "cone"'),
+    ("1 to 75 is allowed", 'object = "cone"\ncone_half_angle_deg = 80'),
+    ("cone_half_angle_deg", 'object = "cone"\ncone_half_angle_deg = -5'),
+])  # fmt: skip
+def test_a_cone_that_cannot_be_is_refused(tmp_path, said, text):
+    with pytest.raises(BadInput) as refused:
+        load(protocol_file(tmp_path, f"[[trials]]\n{text}\n"))
+    assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_ring_bends_away_from_the_whisker(tmp_path):

@@ -100,6 +100,9 @@ def test_verbs_of_one_whisker_say_that_there_are_several(tmp_path):
     [
         ('shape = "ring"\npoint_mm = [0, 0, 0]', 'ring_diameter_mm belongs to shape = "ring"'),
         ("point_mm = [0, 0, 0]\naxis = [0, 0, 0]", "axis is a direction, not zero"),
+        ('shape = "cone"\npoint_mm = [0, 0, 0]', 'half_angle_deg belongs to shape = "cone"'),
+        ('shape = "cone"\npoint_mm = [0, 0, 60]\nhalf_angle_deg = -10', "half_angle_deg is -10; from 0.1 to 85"),
+        ('shape = "cone"\npoint_mm = [50, 0, -20]\nhalf_angle_deg = 10', "the cone's tip, point_mm, lies before every"),
         ('shape = "cube"\npoint_mm = [0, 0, 0]', "[object] shape"),
     ],
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.fit.touch import frames_that_touch
+from vision.fit.touch import begins_free, bends_tell_more, frames_that_touch
 
 MOTOR = np.radians(np.arange(0.8, 6.5, 0.7))
 
@@ -26,3 +26,20 @@ def test_noise_in_the_first_frames_is_no_touch():
 def test_without_a_bend_none_touches():
     touching, free = frames_that_touch(MOTOR, bends(9.0, 0.05, np.random.default_rng(0)))
     assert not np.any(touching) and np.all(free)
+
+
+def test_bends_tell_more_than_a_touch_known_to_no_frame():
+    """Frames 0.7 degrees apart: three sigma are a frame at 0.23 degrees. However near each other frames are, a bend is
+    sure but a quarter of a degree after touch."""
+    assert bends_tell_more(MOTOR, np.radians(0.24)) and not bends_tell_more(MOTOR, np.radians(0.23))
+    assert not bends_tell_more(MOTOR / 100.0, np.radians(0.08)) and bends_tell_more(MOTOR / 100.0, np.radians(0.09))
+
+
+def test_a_stroke_begins_free_where_its_second_frame_comes_before_touch():
+    """The second frame is at 1.5 degrees, and a bend is sure a quarter of a degree after touch. Without noise the hinge
+    is where its starts are: a tenth of a frame."""
+    none = np.random.default_rng(0)
+    assert begins_free(MOTOR, bends(1.5 + 0.25 + 0.1, 0.0, none))
+    assert not begins_free(MOTOR, bends(1.5 + 0.25 - 0.1, 0.0, none))
+    assert not begins_free(MOTOR, bends(1.0, 0.0, none))
+    assert begins_free(MOTOR, bends(9.0, 0.0, none))  # never touches

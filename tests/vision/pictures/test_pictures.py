@@ -105,6 +105,16 @@ def test_first_and_last(tmp_path):
     assert list(frames.read(4)) == []
 
 
+def test_pictures_that_are_not_picked_are_not_decoded(tmp_path):
+    """One of them is of another size, which is refused where it is read."""
+    folder = write_folder(tmp_path / "high", ".png")
+    assert cv2.imwrite(str(folder / "img_1.png"), ramp(1)[:20])
+    frames = Frames.open(folder)
+    assert [index for index, _ in frames.pick([2, 0])] == [0, 2]
+    with pytest.raises(Refused, match="the others are"):
+        list(frames.pick([1]))
+
+
 def test_orientation_tags_do_not_turn_a_picture(tmp_path):
     from PIL import Image
 

@@ -135,3 +135,16 @@ def test_a_camera_that_shows_another_wire_is_left_out(steep):
     whisk = _whisk(steep, {"high": steep.frames["high"], "low": shaken})
     assert whisk.cameras == 1 and "camera low was left out: its lines of the wire scatter by" in whisk.status
     assert abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
+
+
+def test_a_stroke_is_not_thinned_where_too_few_frames_come_before_touch(small_session):
+    """Two of seven frames do: of every second one the third, which is bent, was taken as free."""
+    few = Recorded(small_session, "gauge_roll0")
+    seen = few.see(rounds=0, every_frame=2)
+    assert seen.frames_used == len(few.rows["time_s"]) == 7
+    touch = np.radians(few.truth["touch_deg"])
+    assert abs(seen.touch_rad.value - touch) < 3 * seen.touch_rad.sigma
+
+
+def test_a_stroke_of_many_frames_is_thinned(steep):
+    assert steep.see(rounds=0, every_frame=2).frames_used == 6
