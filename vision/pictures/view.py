@@ -59,15 +59,18 @@ class View:
         return total / len(pictures)
 
     def _mean_of_clear(self, rods: Others) -> np.ndarray:
+        """Of pixels that a rod passes the median of clear frames, for where a rod is may be wrong in one of them."""
         frames = list(self.frames)
-        chosen = np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))
-        shape = self.frames[frames[0]].shape
-        total, count = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
-        for frame in (frames[k] for k in chosen):
-            clear = ~covered(rods, frame, shape)
-            total += np.where(clear, self.frames[frame], 0)
-            count += clear
-        return np.where(count >= _LEAST_CLEAR, total / np.maximum(count, 1.0), np.nan)
+        chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))]
+        hidden = np.stack([covered(rods, frame, self.frames[frame].shape) for frame in chosen])
+        passed = np.any(hidden, axis=0)
+        mean = np.mean([self.frames[frame] for frame in chosen], axis=0, dtype=np.float32)
+        values = np.stack([self.frames[frame][passed] for frame in chosen]).astype(np.float32)
+        values[hidden[:, passed]] = np.nan
+        few = np.sum(~hidden[:, passed], axis=0) < _LEAST_CLEAR
+        values[0, few] = 0.0  # of none at all there is no median
+        mean[passed] = np.where(few, np.nan, np.nanmedian(values, axis=0))
+        return mean
 
 
 def median_of(pictures: Sequence[np.ndarray]) -> np.ndarray:
