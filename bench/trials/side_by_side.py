@@ -1,7 +1,7 @@
 """Whiskers of an array in each other's pictures: where each one's wire is, before any is measured.
 
 At first all are taken to be straight and to turn with their motors. Then each is looked for where the others are not,
-twice: the first look knows the others as they are predicted, the second as the first has seen them.
+several times: each look knows the others as the one before has seen them.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from vision.lines.trace import lines_of
 from vision.pictures.others import RodLines
 from vision.truth.observe import wire_lines
 
-_LOOKS = 2  # after the first, wires are up to 20 px off where others cross them, after the second 2.2 (docs/arrays.md)
+_LOOKS = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third (docs/arrays.md)
 
 
 def array_units(
