@@ -16,7 +16,7 @@ from bench.gauges.felt import Stroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauges_file import given_gauges
 from bench.session.check import checked_views, find_damage
-from bench.session.footage import frame_count, read_frames
+from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, read_signals
@@ -27,7 +27,6 @@ from vision.boards.diagnosis import why_not_found
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.fit.touch import FEWEST_FREE
 from vision.geometry.counted import counted
-from vision.pictures.files import read_picture
 
 _BOARD_LOOKS = 2  # pictures of a series: a board that is in none of them is in few
 _FRAME_LOOKS = 5  # of a trial: exposure and scene
@@ -65,7 +64,10 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
     if session.whisker is not None:
         with doubts.guard():
             given_gauges(session)
-    rig = {name: read_picture(picture) for name, picture in session.rig_pictures.items()}
+    rig: dict[str, np.ndarray | None] = {}
+    for name, picture in session.rig_pictures.items():
+        with doubts.guard():
+            rig[name] = rig_picture(picture)
     pushes: list[np.ndarray] = []
     for trial in (trial for trial in session.trials if trial.purpose != "weight"):
         with doubts.guard():
@@ -107,7 +109,7 @@ def _check_boards(session: Session, name: str) -> Iterator[str]:
         none = f"the board is found in none of {counted(len(greys), 'picture')}"
         raise BadInput(reason or none, file=f"boards/{name}")
     picture = session.rig_pictures.get(name)
-    grey = None if picture is None else read_picture(picture)
+    grey = None if picture is None else rig_picture(picture)
     if grey is not None and len(find_corners(grey, session.board)) < MIN_CORNERS:
         hint = "the board must stand in view of every camera"
         raise BadInput(f"the board on the rig is not seen; {hint}", file=f"boards/rig/{picture.name}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.threads import in_threads
-from bench.session.footage import frame_count, read_frames
+from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
 from bench.session.table import forward_in_time, read_table, require_columns
 from vision.boards.corners import Corners, find_corners, refine_corners
@@ -18,7 +18,6 @@ from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.pictures.files import read_picture
 from vision.pictures.frames import Frames
 
 # A series longer than this is sampled in runs of neighbours, which tell how the board moved.
@@ -100,9 +99,7 @@ def sampled_frames(count: int) -> set[int]:
 def rig_view(session: Session, name: str, size_px: tuple[int, int]) -> Corners:
     """Corners of the board on the rig in one camera's picture. Raises BadInput where it is of another size."""
     path = session.rig_pictures[name]
-    shown, grey = f"boards/rig/{path.name}", read_picture(path)
-    if grey is None:
-        raise BadInput("cannot be read as a picture", file=shown)
+    shown, grey = f"boards/rig/{path.name}", rig_picture(path)
     if grey.shape[::-1] != tuple(size_px):
         found = f"is {grey.shape[1]} x {grey.shape[0]} px"
         raise BadInput(f"{found}, boards/{name} is {size_px[0]} x {size_px[1]} px; take both alike", file=shown)

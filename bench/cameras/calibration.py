@@ -17,7 +17,7 @@ from bench.cameras.calibrate import board_in_world, calibrate_from, report_lines
 from bench.cameras.cameras_file import write_cameras
 from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.scale import check_scale
-from bench.session.footage import frame_count, read_frames
+from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
 from vision.boards.corners import refine_corners
 from vision.boards.static_board import camera_moved
@@ -27,7 +27,6 @@ from vision.geometry.camera import Cameras
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
-from vision.pictures.files import read_picture
 
 # Sigmas, px: a camera whose board stands farther elsewhere than both was moved. Set by eye.
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
@@ -145,7 +144,7 @@ def _key(session: Session) -> str:
 def _backgrounds(session: Session, cameras: Cameras) -> dict[str, np.ndarray | None]:
     """The rig picture of each camera, in which neither whisker nor bar stands; without one, the trials' median."""
     paths = {name: session.rig_pictures.get(name) for name in cameras.names}
-    return {name: _median(session, name) if path is None else read_picture(path) for name, path in paths.items()}
+    return {name: _median(session, name) if path is None else rig_picture(path) for name, path in paths.items()}
 
 
 def _median(session: Session, camera: str) -> np.ndarray | None:

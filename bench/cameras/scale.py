@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.cameras.first_look import spread
-from bench.session.footage import read_frames
+from bench.session.footage import read_frames, rig_picture
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import read_signals
@@ -16,7 +16,6 @@ from vision.calibration.known_lengths import check_known_lengths
 from vision.geometry.camera import Cameras
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Bar
-from vision.pictures.files import read_picture
 
 _MOST_TRIALS, _MOST_PICTURES = 3, 11  # trials and pictures of each: a median over them. Set by eye
 _UNCONFIRMED = 0.05  # of one trial alone
@@ -56,7 +55,7 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str
 
 
 def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:
-    background = {n: read_picture(p) for n, p in session.rig_pictures.items() if n in cameras}
+    background = {n: rig_picture(p) for n, p in session.rig_pictures.items() if n in cameras}
     for trial in trials:
         try:
             pictures = {n: _spread(trial, n) for n in trial.camera_sources if n in cameras}

@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from vision.geometry.errors import Refused
-from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES, natural_order, pictures_in
+from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES, natural_order, pictures_in, read_picture
 from vision.pictures.frames import Frames
 
 
@@ -38,6 +38,14 @@ def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
             raise BadInput(f"camera {entry.stem} has two pictures here; keep one", file=shown)
         pictures[entry.stem] = entry
     return pictures
+
+
+def rig_picture(path: Path) -> np.ndarray:
+    """One of `Session.rig_pictures`, grey (h, w). Raises BadInput where it cannot be read."""
+    grey = read_picture(path)
+    if grey is None:
+        raise BadInput("cannot be read as a picture", file=f"boards/rig/{path.name}")
+    return grey
 
 
 def frame_count(source: Path) -> int:

@@ -28,7 +28,7 @@ from vision.lines.trace import lines_of
 from vision.pictures.others import RodLines
 from vision.truth.observe import wire_lines
 
-_LOOKS = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third (docs/arrays.md)
+_LOOKS = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
 
 
 def array_units(

@@ -106,6 +106,12 @@ def test_a_rig_board_that_is_hidden(small_copy):
     ]
 
 
+@pytest.mark.parametrize("boards", [True, False])  # without, as where cameras are brought along
+def test_a_rig_picture_that_cannot_be_read(small_copy, boards):
+    (small_copy / "boards" / "rig" / "low.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    assert set(found(small_copy, boards=boards).refusals) == {"boards/rig/low.png: cannot be read as a picture"}
+
+
 @pytest.mark.parametrize("lost", [[], [4], [4, 5], [2, 7]])
 def test_frames_between_the_times_are_counted(lost):
     time_s = np.delete(0.05 * np.arange(12), lost)

@@ -1,6 +1,6 @@
 """The study of thresholds sets a number wherever it is used, and tells what it moved."""
 
-from tests.ladder.thresholds import SESSION, _look, compared, put, seen_values
+from tests.ladder.thresholds import SESSION, compared, look_at, put, seen_values
 from tests.scenes.recorded import exact_cameras
 from vision.fit import problem, reshaped
 
@@ -22,5 +22,5 @@ def test_moves_sigmas_and_lost_truths_are_told():
 
 
 def test_a_whisk_is_seen_as_on_a_trial():
-    seen = seen_values(_look(SESSION, "b60_4", exact_cameras(SESSION)))
+    seen = seen_values(look_at(SESSION, "b60_4", exact_cameras(SESSION)))
     assert abs(seen["d_x"][0] - 64.949) < 3 * seen["d_x"][1] < 0.1  # truth.toml's

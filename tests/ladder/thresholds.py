@@ -102,10 +102,10 @@ def whisks() -> dict[str, partial]:
     """By name, a call that looks at a trial and gives the truth of its one whisk."""
     scenes = {path.name: (path, "w", read_cameras(path / "cameras.toml")) for path in sorted(SCENES.iterdir())}
     small = {trial: (SESSION, trial, exact_cameras(SESSION)) for trial in ("b30_3", "b60_4")}
-    return {name: _look(*what) for name, what in (small | scenes).items()}
+    return {name: look_at(*what) for name, what in (small | scenes).items()}
 
 
-def _look(folder: Path, name: str, cameras: Cameras) -> partial:
+def look_at(folder: Path, name: str, cameras: Cameras) -> partial:
     session = load_session(folder)
     trial = session.trial(name)
     times, signals = frame_times(trial), read_signals(trial)

@@ -140,7 +140,8 @@ def _texture(of_stretch, weight, light, behind, noise) -> tuple[np.ndarray, floa
 
     By a piece and the mean of the two beside it, so that what changes steadily along the bar does not count, nor what
     follows the picture without rods, by the share that is seen. A product of one figure a stretch and one across. A
-    piece of which a place has hardly a part of a pixel counts as little: whether it has any, rounding may say.
+    piece of which a place has hardly a part of a pixel counts as little: whether it has any, rounding may say. Pieces
+    differ by their noise at least: the only one that tells leaves nothing but rounding, beside which any is rough.
     """
     light, behind = (one[1:-1] - 0.5 * (one[:-2] + one[2:]) for one in (light, behind))
     doubt, noise = (one[1:-1] + 0.25 * (one[:-2] + one[2:]) for one in (1.0 / np.maximum(weight, _NOTHING), noise))
@@ -152,11 +153,12 @@ def _texture(of_stretch, weight, light, behind, noise) -> tuple[np.ndarray, floa
     spread, noise = (np.sum(counts * one, axis=0) / (1.5 * number) for one in (left**2, noise))
     # where a tilted bar's edge passes a few pieces differ
     usual = _weighted_median(left**2, told) / (1.5 * _MEDIAN_SQUARED)
-    spread = np.maximum(uniform_filter1d(np.minimum(spread, _FEW_DIFFER * usual), _SMOOTHED), _NOTHING)
+    spread, noise = (uniform_filter1d(one, _SMOOTHED) for one in (np.minimum(spread, _FEW_DIFFER * usual), noise))
+    spread = np.maximum(spread, np.maximum(noise, _NOTHING))
     left = left * np.sqrt(counts / (1.5 * spread))
     rougher = ((np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH)
                / (np.sum(of_stretch @ counts, axis=1) + _AS_ROUGH))
-    return np.maximum(rougher[:, None] * spread - uniform_filter1d(noise, _SMOOTHED), 0.0), _alike(left)
+    return np.maximum(rougher[:, None] * spread - noise, 0.0), _alike(left)
 
 
 def _weighted_median(values, weight) -> np.ndarray:

@@ -147,8 +147,11 @@ def _model(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _edge(dx, dy, turn, log_blur) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """A blurred edge erf(e / (√2 s)), −1 to 1, with its derivatives by x0, y0, turn and log s. Each (n, k)."""
-    cosine, sine, blur = np.cos(turn), np.sin(turn), np.exp(log_blur)
+    """A blurred edge erf(e / (√2 s)), −1 to 1, with its derivatives by x0, y0, turn and log s. Each (n, k).
+
+    NumPy 1.26 takes a column's exp otherwise, by 1e-16, where its result happens to lie right behind in memory.
+    """
+    cosine, sine, blur = np.cos(turn), np.sin(turn), np.exp(log_blur.copy())
     t = (cosine * dx + sine * dy) / blur
     slope = np.sqrt(2 / np.pi) * np.exp(-0.5 * t * t)
     per_px = slope / blur

@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+from scipy.sparse import csr_array
 
 WAVES, RIMS = 8, 6  # how many functions of the angle describe a thin rod, and the rims of a thick one
 # Gauss–Legendre nodes over the rod's half circumference, where the integrand is smooth: 1e-5 of the contrast.
@@ -12,26 +13,33 @@ _RATIO_STEP, _ROWS_PER_BLUR, _REACH_BLURS = 0.05, 12, 6.0
 _LEAST_RADIUS_PX = 0.05  # thinner is as good as nothing
 
 
-def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, terms: int) -> np.ndarray:
+def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, terms: int,
+                  weight: np.ndarray | None = None, room: int = 0) -> np.ndarray:
     """Blurred pictures (..., terms + 2) of a cylinder whose radiance is each function of `round_the_rod` in turn; the
     last two are `rim_bells`.
 
     The first term is the share of the pixel that the rod covers. offset_px (...): distance from the axis; radius_px:
     one, or (s, 1) for offsets (s, p). One table serves all pixels of nearly the same radius, stretched by it (which
-    stretches the blur with it, by as little).
+    stretches the blur with it, by as little). weight (...): of each pixel; room: so many more columns, of zeros.
     """
+    weight = np.ones(offset_px.shape) if weight is None else weight
     ratio = _one_ratio(radius_px, blur_px)
     if ratio is None:
-        values = np.empty((*offset_px.shape, terms + 2))
+        values = np.empty((*offset_px.shape, terms + 2 + room))
         for some in _alike(radius_px[:, 0]):
-            values[some] = shading_basis(offset_px[some], radius_px[some], blur_px, terms)
+            values[some] = shading_basis(offset_px[some], radius_px[some], blur_px, terms, weight[some], room)
         return values
     rows, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows, len(table))
-    values = np.diff(table, axis=0).take(before, axis=0, mode="clip")
-    values *= part[..., None]
-    values += table.take(before, axis=0, mode="clip")
-    return values
+    shares, places = np.empty((*before.shape, 2)), np.empty((*before.shape, 2), dtype=np.int32)
+    np.multiply(part, weight, out=shares[..., 1])
+    np.subtract(weight, shares[..., 1], out=shares[..., 0])
+    places[..., 0], places[..., 1] = before, before + 1
+    ends = np.arange(0, shares.size + 1, 2, dtype=np.int32)
+    between = csr_array((shares.ravel(), places.ravel(), ends), shape=(before.size, len(table)))
+    wide = np.zeros((len(table), table.shape[1] + room))
+    wide[:, :table.shape[1]] = table
+    return (between @ wide).reshape(*before.shape, wide.shape[1])
 
 
 def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,
@@ -50,13 +58,14 @@ def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,
     radius_px, terms = radius_px[:, None], waves.shape[1]
     rows, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows, len(table))
-    own = table[:, :terms] @ waves.T
     each = before * len(waves) + np.arange(len(waves))[:, None]
-    for k, (profile, place, next_row) in enumerate(((own, each, len(waves)), (table[:, 0], before, 1))):
-        for into in (slopes[k], curvatures[k]):
-            profile = np.gradient(profile, axis=0)
-            here = profile.take(place, mode="clip")
-            into[:] = here + part * (profile.take(place + next_row, mode="clip") - here)
+    places = ((each, each + len(waves)), (before, before + 1))
+    change = table[:, :terms]
+    for found in (slopes, curvatures):
+        change = np.gradient(change, axis=0)
+        for into, profile, (row, next_row) in zip(found, (change @ waves.T, change[:, 0]), places):
+            here = profile.take(row)
+            into[:] = here + part * (profile.take(next_row) - here)
     return slopes * (rows / radius_px), curvatures * (rows / radius_px) ** 2
 
 

@@ -36,6 +36,7 @@ _STIFFER, _EASIER, _UNDAMPED = 10.0, 5.0, 1e-2  # what a step makes of it; of _D
 # What a step may still gain in chi² by what all share, which it moves by a seventh of a sigma at most, and in the mean
 # by a piece's own position, which it moves by 0.03 sigma: pieces that tell nothing wander on for ever.
 _SETTLED, _SETTLED_EACH = 0.02, 1e-3
+_ROUGHLY = 25.0  # times as much: of what another descent begins from
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def _start(task: Task) -> tuple[float, float]:
     for one in begins:
         if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
             chosen.append(one)
-    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust)) for one in chosen[:_MOST_STARTS])
+    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust), _ROUGHLY) for one in chosen[:_MOST_STARTS])
     best = min(ends, key=lambda one: one.doubt)
     return float(np.median(best.shift_px)), float(np.log(best.blur_px))
 
@@ -141,7 +142,7 @@ def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
     return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
 
 
-def _descend(here: "_Point") -> Shared:
+def _descend(here: "_Point", roughly: float = 1.0) -> Shared:
     """Downhill from a point, the pieces weighed as there: weighed anew at each step, those that a shift spoils would
     count ever less.
 
@@ -150,7 +151,7 @@ def _descend(here: "_Point") -> Shared:
     arrow, damped = _Arrow(here), _DAMPED
     for _ in range(_MOST_STEPS):
         step, by_blur, gain = arrow.step(damped)
-        if gain[0] < _SETTLED and gain[1] < _SETTLED_EACH * len(here.shift_px):
+        if gain[0] < roughly * _SETTLED and gain[1] < roughly * _SETTLED_EACH * len(here.shift_px):
             break
         there = here.moved(step, by_blur)
         if there.misfit > here.misfit:

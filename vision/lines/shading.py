@@ -112,24 +112,18 @@ class Equations:
     """
 
     def __init__(self, pieces: Pieces, blur_px: float, terms: int):
-        self.pieces, self.blur_px = pieces, blur_px
-        basis = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms)
-        basis *= pieces.weight[..., None]
-        self._rod = basis[..., :terms]
-        self._rest = rest = np.empty((len(pieces), 3, pieces.offset_px.shape[1]))  # background's two, and what is seen
-        np.subtract(pieces.weight, self._rod[..., 0], out=rest[:, 1])
-        np.multiply(rest[:, 1], pieces.background, out=rest[:, 0])
-        rest[:, 0] += _not_leaked(pieces, basis[..., terms:], blur_px)
-        np.multiply(pieces.grey, pieces.weight, out=rest[:, 2])
-        own = rest @ rest.transpose(0, 2, 1)
-        self._inverse = _inverse_of_two(own[:, :2, :2] + _WEAK * np.eye(2))
-        mixed = rest @ self._rod
-        self._around, seen = mixed[:, :2], own[:, :2, 2:]
-        turned = self._around.transpose(0, 2, 1)
-        explained = self._inverse @ seen
-        self.gram = self._rod.transpose(0, 2, 1) @ self._rod - turned @ (self._inverse @ self._around)
-        self.moment = mixed[:, 2] - (turned @ explained)[..., 0]
-        self.power = own[:, 2, 2] - np.sum(seen * explained, axis=(1, 2))
+        self.pieces, self.blur_px, weight = pieces, blur_px, pieces.weight
+        # of each pixel the light, the background by gain and offset, what is seen
+        columns = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms, weight, 1)
+        leaked, open_share = _not_leaked(pieces, columns[..., -3:-1], blur_px), weight - columns[..., 0]
+        columns[..., -3] = open_share * pieces.background + leaked
+        columns[..., -2] = open_share
+        columns[..., -1] = pieces.grey * weight
+        self._columns, normal = columns, columns.transpose(0, 2, 1) @ columns
+        self._around = normal[:, -3:-1]
+        self._inverse = _inverse_of_two(self._around[:, :, -3:-1] + _WEAK * np.eye(2))
+        normal = normal - self._around.transpose(0, 2, 1) @ (self._inverse @ self._around)
+        self.gram, self.moment, self.power = normal[:, :terms, :terms], normal[:, :terms, -1], normal[:, -1, -1]
 
     def shared(self, hats: np.ndarray, robust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix (size, size) and right side (size,) of all knots' coefficients, the pieces' positions kept.
@@ -149,22 +143,23 @@ class Equations:
 
     def linearised(self, waves: np.ndarray) -> "Slopes":
         """How pieces of this shading, waves (s, terms), change with position and blur; what leaks is taken to stay."""
-        pieces, rest = self.pieces, self._rest
-        left = rest[:, 2] - (self._rod @ waves[..., None])[..., 0]
-        explained = self._inverse @ (rest[:, :2] @ left[..., None])  # gain and constant
+        pieces, pixels, terms = self.pieces, self._columns, waves.shape[1]
+        seen, behind = pixels[..., -1], pixels[..., -3:-1]
+        left = seen - (pixels[..., :terms] @ waves[..., None])[..., 0]
+        explained = self._inverse @ (behind.transpose(0, 2, 1) @ left[..., None])  # gain and constant
         by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
         slopes, curvatures = slopes_of(pieces.offset_px, pieces.radius_px, self.blur_px, waves)
-        columns = np.empty_like(rest)
+        columns = np.empty((len(pieces), 3, left.shape[1]))
         columns[:, 0] = -(slopes[0] + slopes[1] * by_cover)
         # a normal density of variance v changes with v by half its second derivative
         columns[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
         columns[:, :2] *= pieces.weight[:, None]
         columns[:, 2] = left
-        mixed = columns @ rest[:, :2].transpose(0, 2, 1)
-        reduced = mixed @ self._inverse
-        gram = columns @ columns.transpose(0, 2, 1) - reduced @ mixed.transpose(0, 2, 1)
-        rod = columns[:, :2] @ self._rod - reduced[:, :2] @ self._around
-        covered = left - rest[:, 2] - self._rod[..., 0] * by_cover
+        mixed = columns @ pixels
+        reduced = mixed[..., -3:-1] @ self._inverse
+        gram = columns @ columns.transpose(0, 2, 1) - reduced @ mixed[..., -3:-1].transpose(0, 2, 1)
+        rod = (mixed - reduced @ self._around)[:, :2, :terms]
+        covered = left - seen - pixels[..., 0] * by_cover
         return Slopes(rod, gram, np.sqrt(np.sum(covered**2, axis=1)))
 
 
@@ -210,12 +205,9 @@ _TURNED_SHARE = 0.3
 
 
 def stiffness(prior: np.ndarray, knots: Knots) -> np.ndarray:
-    """Inverse covariance (…, size, size) of all coefficients of waves with these priors (…, terms): each knot's own,
-    and its differences to its neighbours."""
-    terms = prior.shape[-1]
-    own = (np.eye(terms) * (prior**-2.0)[..., None, :])[..., None, :, None, :]
-    size = len(knots) * terms
-    return (between_knots(knots)[:, None, :, None] * own).reshape(*prior.shape[:-1], size, size)
+    """Inverse covariance (size, size) of all coefficients of waves with these priors (terms,): each knot's own, and its
+    differences to its neighbours."""
+    return np.kron(between_knots(knots), np.diag(prior**-2.0))
 
 
 def between_knots(knots: Knots) -> np.ndarray:

@@ -19,10 +19,10 @@ def wire_looks(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     chosen = np.unique(np.linspace(0, len(fitted.frames) - 1, _LOOKS).astype(int)).tolist()
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
     axis, some = bar_axis(fitted.problem, fitted.state.vector), {fitted.frames[k]: curves.one(k) for k in chosen}
-    found = {}
+    found, knots = {}, wire_knots(whisk.during(list(some)))
     for view in whisk.views:
         name, pieces = view.camera.name, clear_pieces(whisk, view, axis, some)
-        width = log_width(pieces, whisk.light[name].blur_px, wire_knots(whisk)) if len(pieces) else None
+        width = log_width(pieces, whisk.light[name].blur_px, knots) if len(pieces) else None
         if width is not None:
             factor, half_px = float(np.exp(width[0])), float(np.median(pieces.radius_px))
             found[name] = Value(factor, float(np.hypot(factor * width[1], LIGHT_PX / half_px)))

@@ -36,7 +36,7 @@ def verdict(
         f"{session}: truth for {with_truth} of {counted(len(seen), 'measured whisk')}"
         if pictures
         else f"{session}: no pictures, so no truth; {counted(len(seen), 'measured whisk')} felt"
-    ) + (f"; {doubtful} doubtful, see below." if doubtful else "; nothing doubtful.")
+    ) + (f"; {counted(doubtful, 'doubt')}, see below." if doubtful else "; nothing doubtful.")
 
 
 def _without_or_doubted(asked: Sequence[Judged]) -> str:

@@ -101,6 +101,19 @@ def test_the_radius_of_a_ball_is_within_what_is_said_of_it(tmp_path):
             assert float(row["lateral_per_mm"]) > 2 * float(row["lateral_sigma_per_mm"])
 
 
+def test_of_a_slip_angle_that_turns_far_the_first_angles_tell(tmp_path):
+    """On a ball of 40 mm φ doubles over 12°: by all angles the radius was 7 sigma off, and lateral curvature 8."""
+    ball = 'd_x_mm = 60.0\nobject = "sphere"\n'
+    text = PROTOCOL.replace("d_x_mm = 40.0\n", ball).replace("30.0", "40.0").replace("[0, 20, 30]", "[20, 30, 40]")
+    session = simulate(tmp_path / "session", protocol=protocol_file(tmp_path, text), signals_only=True, seed=2)
+    evaluate(session, tmp_path / "out", Settings(), workers=0)
+    with (tmp_path / "out" / "curvature.csv").open(newline="") as file:
+        for row in csv.DictReader(file):
+            assert int(row["angles"]) < 9
+            assert abs(float(row["radius_mm"]) - 20.0) < 2 * float(row["radius_sigma_mm"])
+            assert abs(float(row["lateral_per_mm"]) - 0.049) < 2 * float(row["lateral_sigma_per_mm"])
+
+
 @pytest.mark.parametrize("r_n, told", [(1.0, True), (1e6, False)])
 def test_an_estimate_against_what_turns_the_slip_angle_says_so(r_n, told):
     """At κ_n = 1 φ turns by about sin β_0 a radian, 2° at θ = 3°, of which (10) knows nothing: 2 % of d_x."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
+from bench.base.settings import Settings
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.trial import (
     Clock,
@@ -19,6 +20,7 @@ from bench.report.assembly import beam_rows, budget_rows
 from bench.report.run import Section
 from bench.report.summary.page import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
+from bench.report.summary.verdict import verdict
 from bench.trials.estimates import as_felt
 from estimator.signal import Touch
 from vision.fit.beam_check import BeamCheck, Compared
@@ -92,6 +94,15 @@ def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
     assert shown[-3:] == ["  and 10 more, in summary.txt", "", where]
     assert len(shown) == 26 and not any("camera high" in line for line in shown)
     assert Summary(("sample.",), (), sections[:1]).on_screen(tmp_path).splitlines()[:2] == ["sample.", ""]
+
+
+@pytest.mark.parametrize(
+    ("doubts", "said"), [(0, "nothing doubtful."), (1, "1 doubt, see below."), (2, "2 doubts, see below.")]
+)
+def test_doubts_are_counted_apart_from_whisks(doubts, said):
+    """Of one whisk there may be two."""
+    *_, last = verdict("s", True, [result()], [], Settings(), doubts)
+    assert last == f"s: truth for 1 of 1 measured whisk; {said}"
 
 
 @pytest.mark.parametrize(("count", "said"), [(0, "0 frames"), (1, "1 frame"), (2, "2 frames")])
