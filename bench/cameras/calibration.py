@@ -26,7 +26,7 @@ from vision.calibration.place import Placement, by_board, placed
 from vision.geometry.camera import Cameras
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
-from vision.geometry.rotation import compose, invert_transform, log_rotation
+from vision.geometry.rotation import compose, invert_transform, log_rotation, skew
 
 # Sigmas, px: a camera whose board stands farther elsewhere than both was moved. Set by eye.
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
@@ -70,25 +70,30 @@ def at_base(calibration: SessionCalibration, view: Session) -> SessionCalibratio
     As well as the rig frame is known the base's is, and besides as well as the base: both by the sigmas of the view's
     board (see `by_board`), or, of cameras that were brought along, by the sigmas of the base.
     """
-    cameras = calibration.cameras
-    if cameras is None:
+    if calibration.cameras is None:
         return calibration
-    T_rig_base, exact = view.base.T_rig_base, np.zeros((6, 6))
-    step = np.append(log_rotation(T_rig_base[:, :3]), T_rig_base[:, 3])
-    turned, whole = np.kron(np.eye(2), T_rig_base[:, :3]), view.whole
-    if whole.cameras_toml is not None:
-        before = cameras.placement if cameras.placement is not None else exact
-        own = before + np.diag(np.repeat([view.base.sigma_rad**2, view.base.sigma_mm**2], 3))
-    else:
-        before = by_board(whole.T_rig_board, whole.T_rig_board_sigma_mm, whole.T_rig_board_sigma_rad).covariance
-        board = by_board(view.T_rig_board, view.T_rig_board_sigma_mm, view.T_rig_board_sigma_rad)
-        own = turned @ board.covariance @ turned.T
-    there = placed(cameras, Placement(np.zeros(6), before), Placement(step, own))
+    there = _at_base(calibration.cameras, view)
     T_base_board = calibration.T_rig_board
     if T_base_board is not None:
         T_base_board = compose(view.base.T_base_rig, T_base_board)
     made = hash_of(calibration.hash, view.base)
     return replace(calibration, cameras=there, T_rig_board=T_base_board, hash=made)
+
+
+def _at_base(cameras: Cameras, view: Session) -> Cameras:
+    T_rig_base, whole, base = view.base.T_rig_base, view.whole, view.base
+    step = np.append(log_rotation(T_rig_base[:, :3]), T_rig_base[:, 3])
+    if whole.cameras_toml is not None:
+        before = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
+        lever = np.eye(6)
+        lever[3:, :3] = -skew(T_rig_base[:, 3])
+        own = lever @ before @ lever.T + np.diag(np.repeat([base.sigma_rad**2, base.sigma_mm**2], 3))
+    else:
+        before = by_board(whole.T_rig_board, whole.T_rig_board_sigma_mm, whole.T_rig_board_sigma_rad).covariance
+        board = by_board(view.T_rig_board, view.T_rig_board_sigma_mm, view.T_rig_board_sigma_rad).covariance
+        turned = np.kron(np.eye(2), T_rig_base[:, :3])
+        own = turned @ board @ turned.T
+    return placed(cameras, Placement(np.zeros(6), before), Placement(step, own))
 
 
 def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
