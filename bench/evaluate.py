@@ -25,8 +25,10 @@ from bench.session.trial import Trial
 from bench.trials.estimates import estimators
 from bench.trials.exchanged import exchanged_signals
 from bench.trials.lost import evaluated
-from bench.trials.of_session import judged, placed_units, require_some, with_gauges
+from bench.trials.of_session import first_units, judged, require_some, settled_units, with_gauges
 from bench.trials.one_camera import require_camera
+from bench.trials.side_by_side import array_units
+from bench.trials.unit import Unit
 
 DONE, DOUBTFUL = 0, 1
 
@@ -60,7 +62,8 @@ def evaluate(
     require_some(recorded[0], settings)
     with lock_output(out), _workers(dask, workers, out, progress) as pool:
         if views[0].base is None:
-            summary = _evaluated(views[0], recorded[0], out, settings, pool, doubts, figure_formats)
+            units = first_units(views[0], recorded[0], out, settings)
+            summary = _evaluated(views[0], units, out, settings, pool, doubts, figure_formats)
         else:
             summary = _array(views, recorded, out, settings, pool, doubts, figure_formats)
     announce(summary.on_screen(out))
@@ -81,24 +84,24 @@ def _array(
     from bench.report.score import score_all
 
     folders = [folder_of(out, view.base.name) for view in views]
-    for view, trials, folder in zip(views, recorded, folders):
+    for view, folder, units in zip(views, folders, array_units(views, recorded, out, folders, settings, pool)):
         with lock_output(folder):
-            _evaluated(view, trials, folder, settings, pool, Doubts(), figure_formats)
+            _evaluated(view, units, folder, settings, pool, Doubts(), figure_formats)
     write_array_record(out, array_record(views, doubts.notes, score_all(list(zip(views, folders)))))
     return write_array(out)
 
 
 def _evaluated(
     session: Session,
-    recorded: Sequence[Trial],
+    units: Sequence[Unit],
     out: Path,
     settings: Settings,
     pool: Workers,
     doubts: Doubts,
     figure_formats: Sequence[str],
 ) -> Summary:
-    """The recorded trials of one whisker's session into the folder `out`, which is locked."""
-    calibration, units = placed_units(session, recorded, out, settings, pool, doubts)
+    """The recorded trials of one whisker's session, a unit each, into the folder `out`, which is locked."""
+    calibration, units = settled_units(session, units, pool, doubts)
     gauges, certificate, units = with_gauges(units, pool, doubts)
     chosen = [unit for unit in units if settings.takes(unit.trial.name)]
     whole = finished(evaluated(chosen, pool), session.whisker, settings)

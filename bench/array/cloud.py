@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.array.surface import Surface
+from bench.array.surface import Surface, seen_surface
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
@@ -72,13 +72,19 @@ class Mount:
 
 
 def contacts(mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, Surface]) -> Iterator[Contact]:
-    """Every whisk's contact, as seen where it is and by each estimator that gives a distance. surfaces: by trial."""
+    """Every whisk's contact, as seen where it is and by each estimator that gives a distance.
+
+    surfaces: by trial, as stated. Where none is, a contact felt is beside the bar as this whisker's own cameras see it:
+    what its base is off by moves both alike. A contact seen lies on that bar by its making, and is beside none.
+    """
     for result, seen, felt in whisks(results):
         if result.trial.purpose != "measure":
             continue
-        surface = surfaces.get(result.trial.name)
+        stated = surfaces.get(result.trial.name)
+        surface = stated or seen_surface(seen, result.seen.bar_radius_mm, mount.wire, mount.base)
         for contact in _of_whisk(mount, result.trial.name, seen, felt):
-            yield contact if surface is None else _beside(contact, surface)
+            alone = surface is None or (stated is None and contact.estimator == SEEN)
+            yield contact if alone else _beside(contact, surface)
 
 
 def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Iterator[Contact]:
@@ -139,7 +145,7 @@ def _beside(contact: Contact, surface: Surface) -> Contact:
     nearest = surface.nearest_arc_mm(start, towards, wire.length_mm)
     (outside, _), (normal, own) = surface.distance_mm(np.array([contact.point_mm, start + nearest * towards]))
     across, along = (
-        float(np.sqrt(way @ contact.covariance_mm2 @ way + surface.sigma_mm**2)) for way in (normal, towards)
+        float(np.sqrt(way @ (contact.covariance_mm2 + surface.covariance_mm2) @ way)) for way in (normal, towards)
     )
     cosine = np.clip(contact.normal @ own, -1.0, 1.0)
     return replace(

@@ -1,12 +1,14 @@
 """The object that an array feels: where its surface is, from the manifest or from pictures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from bench.records.trial import SeenTrial
+from bench.records.trial import SeenWhisk
 from bench.session.session import Base
 from bench.session.trial import Trial
+from vision.geometry.centreline import rotation_z
+from vision.geometry.rods import Wire
 
 STATED, SEEN = "manifest", "pictures"
 _ARC_MM = 1e-6  # mm: as near as an arc is looked for
@@ -19,7 +21,7 @@ class Surface:
 
     point_mm (3,): of the straight line, the centre, or the cone's tip; axis (3,), unit: the line's direction, the
     normal of the circle's plane, or where the cone points; ring_radius_mm: of the circle, 0 of others; half_angle_rad:
-    of the cone. sigma_mm: of each of the point's coordinates; source: STATED or SEEN.
+    of the cone. covariance_mm2 (3, 3): of where it is; source: STATED or SEEN.
     """
 
     shape: str
@@ -27,7 +29,7 @@ class Surface:
     axis: np.ndarray
     radius_mm: float
     ring_radius_mm: float = 0.0
-    sigma_mm: float = 0.0
+    covariance_mm2: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
     source: str = STATED
     half_angle_rad: float = 0.0
 
@@ -83,14 +85,23 @@ def stated_surface(trial: Trial) -> Surface | None:
     thick = 0.0 if given.shape == "cone" else trial.bar_diameter_mm
     radii = 0.5 * thick, 0.5 * (given.ring_diameter_mm or 0.0)
     angle = float(np.radians(given.half_angle_deg or 0.0))
-    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, given.point_sigma_mm, half_angle_rad=angle)
+    told = {"covariance_mm2": given.point_sigma_mm**2 * np.eye(3), "half_angle_rad": angle}
+    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, **told)
 
 
-def seen_surface(seen: SeenTrial, base: Base) -> Surface | None:
-    """The bar as one whisker's cameras show it, in the rig frame; None where they do not."""
-    if seen.bar is None or not np.isfinite(seen.bar.point_mm).all():
+def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:
+    """The bar as a whisk shows it, in the rig frame, as well known as where it is touched; None where no touch is seen.
+
+    Its axis is away from the contact by both radii, at right angles to whisker and axis.
+    """
+    if not seen.has_truth or seen.point_covariance_mm2 is None or not np.isfinite(bar_radius_mm):
         return None
-    turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
-    point, axis = turn @ seen.bar.point_mm + shift, turn @ seen.bar.direction
-    return Surface("bar", point, axis, seen.bar_radius_mm, source=SEEN)
-
+    beta, psi, touch = seen.beta_rad.value, seen.psi_rad.value, seen.touch_rad.value
+    turn = base.T_rig_base[:, :3] @ rotation_z(touch)
+    axis = turn @ [np.sin(psi), np.cos(psi) * np.sin(beta), np.cos(psi) * np.cos(beta)]
+    across = np.cross(axis, turn[:, 0])
+    reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
+    contact = base.T_rig_base[:, :3] @ seen.point_mm.value + base.T_rig_base[:, 3]
+    covariance = base.T_rig_base[:, :3] @ seen.point_covariance_mm2 @ base.T_rig_base[:, :3].T
+    point = contact + reach_mm * across / np.linalg.norm(across)
+    return Surface("bar", point, axis, bar_radius_mm, covariance_mm2=covariance, source=SEEN)

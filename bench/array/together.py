@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bench.array.cloud import Contact, Mount, contacts
+from bench.array.exchanged import exchanged
 from bench.array.page import write_page
 from bench.array.size import felt_sizes, size_lines, write_sizes
 from bench.array.surface import Surface, seen_surface, stated_surface
@@ -15,6 +16,7 @@ from bench.base.errors import BadInput
 from bench.base.tables import write_table
 from bench.friction.runs import alpha_est_sigma
 from bench.records.plain import from_plain, to_plain
+from bench.records.trial import whisks
 from bench.report.assembly import ESTIMATE_COLUMNS, WHISK_COLUMNS, estimate_rows, whisk_rows
 from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
@@ -97,8 +99,7 @@ def write_array(out: Path) -> Summary:
     record = read_array_record(out)
     runs = [_read(base, folder_of(out, base.name)) for base in record.bases]
     _write_tables(out, runs)
-    surfaces = _seen(runs) | record.surfaces
-    cloud = [contact for run in runs for contact in contacts(run.mount, run.whole.results, surfaces)]
+    cloud = [contact for run in runs for contact in contacts(run.mount, run.whole.results, record.surfaces)]
     write_surface(out / "surface.csv", cloud)
     sizes = felt_sizes(cloud, record.surfaces)
     write_sizes(out / "size.csv", sizes)
@@ -107,7 +108,7 @@ def write_array(out: Path) -> Summary:
     if runs[0].record.settings.figures:
         from bench.array.figure import write_figures  # with all of matplotlib
 
-        figures = write_figures(out, cloud, surfaces)
+        figures = write_figures(out, cloud, _seen(runs) | record.surfaces)
     write_page(out, record.session, summary, [(run.base.name, run.record) for run in runs], figures)
     write_whole(out / "summary.txt", summary.text)
     write_array_record(out, replace(record, verdict=summary.verdict, doubtful=summary.doubtful))
@@ -120,11 +121,11 @@ def _read(base: Base, folder: Path) -> WhiskerRun:
 
 
 def _seen(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
-    """The bar of each trial, as the first whisker whose cameras show it has it."""
+    """The bar of each trial, as the first whisk that shows it has it."""
     found = {}
     for run in runs:
-        for result in run.whole.results:
-            surface = seen_surface(result.seen, run.base)
+        for result, seen, _ in whisks(run.whole.results):
+            surface = seen_surface(seen, result.seen.bar_radius_mm, run.mount.wire, run.base)
             if surface is not None:
                 found.setdefault(result.trial.name, surface)
     return found
@@ -141,7 +142,8 @@ def _write_tables(out: Path, runs: Sequence[WhiskerRun]) -> None:
 
 
 def _summary(record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Contact], sizes) -> Summary:
-    doubtful = [*record.doubts, *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts)]
+    swapped = exchanged({run.base.name: run.whole.results for run in runs})
+    doubtful = [*record.doubts, *swapped, *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts)]
     judged = [replace(j, trial=f"{j.trial}, {run.base.name}") for run in runs for j in judge(run.whole.results)]
     results = [result for run in runs for result in run.whole.results]
     pictures = any(run.record.has_pictures for run in runs)

@@ -19,6 +19,7 @@ _TRUTH_FILES = re.compile(r"truth(@.+)?\.(csv|toml|json)")  # of one whisker, or
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
 SEEING = (
     *("vision", "bench/session", "bench/cameras", "bench/gauges/felt.py", "bench/trials/seen.py"),
+    *("bench/trials/pictures.py", "bench/trials/other_wires.py", "bench/trials/whose_wire.py"),
     *("bench/trials/consistency.py", "bench/trials/placing.py", "bench/trials/scene.py", "bench/trials/seeing.py"),
     *("bench/records", "bench/base/results.py", "bench/base/settings.py"),
     *("bench/trials/one_camera.py", "estimator/seen_shape.py", "estimator/beam.py", "estimator/load_cell.py"),

@@ -22,11 +22,11 @@ from bench.session.session import Session
 from vision.boards.corners import refine_corners
 from vision.boards.static_board import camera_moved
 from vision.calibration.cameras_file import read_cameras
-from vision.calibration.place import Placement, placed
+from vision.calibration.place import Placement, by_board, placed
 from vision.geometry.camera import Cameras
 from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
-from vision.geometry.rotation import compose, invert_transform, log_rotation
+from vision.geometry.rotation import compose, invert_transform, log_rotation, skew
 
 # Sigmas, px: a camera whose board stands farther elsewhere than both was moved. Set by eye.
 _MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
@@ -62,6 +62,38 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     background = _backgrounds(session, cameras)
     content = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras], list(background.values())
     return SessionCalibration(cameras, background, hash_of(*content), notes, T_rig_board)
+
+
+def at_base(calibration: SessionCalibration, view: Session) -> SessionCalibration:
+    """An array's calibration in the base frame of the whisker whose view this is.
+
+    As well as the rig frame is known the base's is, and besides as well as the base: both by the sigmas of the view's
+    board (see `by_board`), or, of cameras that were brought along, by the sigmas of the base.
+    """
+    if calibration.cameras is None:
+        return calibration
+    there = _at_base(calibration.cameras, view)
+    T_base_board = calibration.T_rig_board
+    if T_base_board is not None:
+        T_base_board = compose(view.base.T_base_rig, T_base_board)
+    made = hash_of(calibration.hash, view.base)
+    return replace(calibration, cameras=there, T_rig_board=T_base_board, hash=made)
+
+
+def _at_base(cameras: Cameras, view: Session) -> Cameras:
+    T_rig_base, whole, base = view.base.T_rig_base, view.whole, view.base
+    step = np.append(log_rotation(T_rig_base[:, :3]), T_rig_base[:, 3])
+    if whole.cameras_toml is not None:
+        before = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
+        lever = np.eye(6)
+        lever[3:, :3] = -skew(T_rig_base[:, 3])
+        own = lever @ before @ lever.T + np.diag(np.repeat([base.sigma_rad**2, base.sigma_mm**2], 3))
+    else:
+        before = by_board(whole.T_rig_board, whole.T_rig_board_sigma_mm, whole.T_rig_board_sigma_rad).covariance
+        board = by_board(view.T_rig_board, view.T_rig_board_sigma_mm, view.T_rig_board_sigma_rad).covariance
+        turned = np.kron(np.eye(2), T_rig_base[:, :3])
+        own = turned @ board @ turned.T
+    return placed(cameras, Placement(np.zeros(6), before), Placement(step, own))
 
 
 def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:

@@ -176,17 +176,19 @@ def _paired(
     rigid_Nmm: float,
     theta_rad: float,
 ) -> Pairs | None:
-    """Volts at the same motor angles, each from a short line through the samples around it."""
+    """Volts at the same motor angles, each from a short line through the samples around it. None where the wanted
+    pushing angle, as seen, is reached before a touch is felt."""
     theta = reference.motor_rad - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(reference.motor_rad), initial=np.inf))
     after = theta > 0.5 * _LEAST_THETA_RAD
     read = [stroke.at(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
     kept = np.array([r is not None and not r.status for r in read], dtype=bool)
-    if not kept.any():
+    wanted = reference.touch_rad + theta_rad - touch.motor_rad
+    if not kept.any() or wanted <= 0.0:
         return None
     read, rows = [r for r, keep in zip(read, kept) if keep], np.repeat(kept, 2)
     moments, covariance = _seen_from_follicle(trial, reference.moments[kept], reference.covariance[np.ix_(rows, rows)])
-    at = stroke.at(reference.touch_rad + theta_rad - touch.motor_rad, touch)
+    at = stroke.at(wanted, touch)
     return Pairs(
         trial.name,
         whisk,

@@ -13,7 +13,7 @@ from bench.plan.sight import bar_points, curves_of
 from bench.plan.staged import Staged
 from bench.rig import boards, build
 from bench.rig.album import JPEG_QUALITY
-from bench.rig.parts import moments_of
+from bench.rig.moments import moments_of
 from bench.rig.protocol import Protocol
 from bench.rig.scene import block_corners_mm
 from bench.rig.studio import Setting, Studio

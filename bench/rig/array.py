@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from bench.base.errors import BadInput
@@ -45,7 +44,7 @@ def mounted(protocol: Protocol, rng: np.random.Generator) -> list[Mounted]:
 
 
 def _of_column(protocol, column, rng) -> Iterator[Mounted]:
-    whisker, turn = protocol.whisker, _turn(column.base_deg)
+    whisker, turn = protocol.whisker, build.column_pose(column)[:, :3]
     for number, height in enumerate(column.heights_mm):
         sizes = {key: _one(getattr(column, key), number) or getattr(whisker, key) for key in _SIZES}
         rest = Rest(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
@@ -60,12 +59,6 @@ def _of_column(protocol, column, rng) -> Iterator[Mounted]:
 
 def _one(given, number):
     return given[number] if isinstance(given, list) else given
-
-
-def _turn(base_deg) -> np.ndarray:
-    """(3, 3): about the rig's x, then y, then z."""
-    about_x, about_y, about_z = (cv2.Rodrigues(turn)[0] for turn in np.diag(np.radians(base_deg)))
-    return about_z @ about_y @ about_x
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from bench.rig.camera import Camera
 from bench.rig.gauges import Gauges
 from bench.rig.light import Light, Material
 from bench.rig.load_cell import LoadCell
-from bench.rig.protocol import Protocol
+from bench.rig.protocol import ColumnTable, Protocol
 from bench.rig.rod import Rest, Rod
-from bench.rig.scene import Looks, Scene
+from bench.rig.scene import Looks, Scene, Stand
 from bench.rig.sensor import Sensor
 
 
@@ -82,7 +82,19 @@ def scene(protocol: Protocol) -> Scene:
                   Material(table.wire_matt, table.wire_shiny, table.wire_gloss, table.wire_rim),
                   Material(table.bar_matt, table.bar_shiny, table.bar_gloss, table.bar_rim),
                   Material(0.03), table.floor, table.wall)
-    return Scene(board(protocol), T_rig_board(protocol), looks)
+    return Scene(board(protocol), T_rig_board(protocol), looks, _stands(protocol))
+
+
+def _stands(protocol: Protocol) -> tuple[Stand, ...]:
+    if not protocol.columns:
+        return (Stand.alone(),)
+    return tuple(Stand.of_column(column_pose(column), column.heights_mm) for column in protocol.columns)
+
+
+def column_pose(column: ColumnTable) -> np.ndarray:
+    """Of a column's height 0 in the rig frame, (3, 4): turned about the rig's x, then y, then z."""
+    about_x, about_y, about_z = (cv2.Rodrigues(turn)[0] for turn in np.diag(np.radians(column.base_deg)))
+    return np.column_stack([about_z @ about_y @ about_x, column.base_mm])
 
 
 def sensor(protocol: Protocol) -> Sensor:

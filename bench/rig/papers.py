@@ -114,13 +114,15 @@ def signals_csv(recording: Recording) -> str:
     return "\n".join([",".join(_GAUGED + _FORCES * has_forces), *lines]) + "\n"
 
 
-def array_trial_toml(recording: ArrayRecording) -> str:
-    """trial.toml of an array's recording: slope and distance are not those of any one whisker."""
+def array_trial_toml(recording: ArrayRecording, *, says_where: bool = True) -> str:
+    """trial.toml of an array's recording: slope and distance are not those of any one whisker. says_where: and where
+    the object stands, as people know it who take no pictures."""
     run, table = recording.run, recording.run.table
     trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "purpose": table.purpose}
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
-    trial["object"] = _object(recording.bar)
+    if says_where:
+        trial["object"] = _object(recording.bar)
     return tomli_w.dumps(trial)
 
 
@@ -142,9 +144,10 @@ def array_signals_csv(recording: ArrayRecording) -> str:
     return "\n".join([",".join(recording.channels), *lines]) + "\n"
 
 
-def array_frames_csv(recording: ArrayRecording) -> str:
-    """frames.csv of an array's recording."""
-    lines = [f"{i},{time:.6f}" for i, time in enumerate(np.concatenate(recording.frame_times_s))]
+def array_frames_csv(recording: ArrayRecording, clock_offset_s: float) -> str:
+    """frames.csv of an array's recording, as `frames_csv`."""
+    times = np.concatenate(recording.frame_times_s)
+    lines = [f"{i},{time - clock_offset_s:.6f}" for i, time in enumerate(times)]
     return "\n".join(["frame,time_s", *lines]) + "\n"
 
 

@@ -11,12 +11,10 @@ import numpy as np
 from bench.rig import boards, build, papers
 from bench.rig.album import write_frames, write_picture
 from bench.rig.array import ArrayRecording, Mounted, mounted
-from bench.rig.marched import MarchedWhisk
+from bench.rig.moments import moments_of, moments_of_array
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
-from bench.rig.scene import HUB_FRONT_MM
-from bench.rig.studio import Moment, Studio
-from bench.rig.tube import Tube
+from bench.rig.studio import Studio
 
 _BOARDS, _RIG, _TRIAL, _POSE, _ARRAY = range(5)  # first words of the random streams
 
@@ -113,13 +111,18 @@ def _array_trial(job, number, folder):
     run, streams = job.protocol.runs()[number], [job.stream(_TRIAL, number)]
     streams += [job.stream(_ARRAY, number, whisker) for whisker in range(len(job.whiskers))]
     recording = ArrayRecording.make(job.protocol, run, job.whiskers, streams)
-    texts = {"trial.toml": papers.array_trial_toml(recording), "signals.csv": papers.array_signals_csv(recording),
-             "frames.csv": papers.array_frames_csv(recording)}
+    seen = bool(job.protocol.cameras) and not job.signals_only
+    texts = {"trial.toml": papers.array_trial_toml(recording, says_where=not seen),
+             "signals.csv": papers.array_signals_csv(recording),
+             "frames.csv": papers.array_frames_csv(recording, job.protocol.pictures.clock_offset_s)}
     for name, one in recording.recordings.items():
         if one is not None:
             texts |= {f"truth@{name}.csv": papers.truth_csv(one), f"truth@{name}.toml": papers.truth_toml(one)}
     for name, text in texts.items():
         papers.write(folder / name, text)
+    for i, studio in enumerate(job.studios if seen else ()):
+        frames = array_frames_of(job, number, i, recording)
+        write_frames(folder, studio.camera.name, job.protocol.pictures.moving, frames)
 
 
 def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterator[np.ndarray]:
@@ -137,19 +140,11 @@ def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterat
         yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))
 
 
-def moments_of(
-    protocol: Protocol, studio: Studio, recording: Recording, whisk: MarchedWhisk, motor: float, back: bool
-) -> list[Moment]:
-    """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
-    pictures, length = protocol.pictures, recording.rod.length_mm
-    swept = np.radians(recording.run.speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0
-    near = np.linalg.norm(studio.camera.centre_mm - recording.touch.point_mm)
-    count = 1 + int(2 * swept * length * studio.camera.matrix[0, 0] / near)
-    angles = motor + swept * ((np.arange(count) + 0.5) / count - 0.5)
-    return [Moment(m, _whisker(whisk, m, back, studio.scene.looks.wire)) for m in angles.tolist()]
-
-
-def _whisker(whisk, motor, back, material):
-    arc = np.linspace(HUB_FRONT_MM, whisk.rod.length_mm, 257)
-    points = whisk.centreline_mm(motor, whisk.way(back).state_between(motor), arc)
-    return Tube(points, np.maximum(whisk.rod.radius_mm(arc), 0.01), material)
+def array_frames_of(job: Job, trial: int, camera: int, recording: ArrayRecording) -> Iterator[np.ndarray]:
+    """As `frames_of`, of an array's trial."""
+    studio = job.studios[camera]
+    setting = studio.setting(recording.bar, recording.bar.point_mm)
+    times = ((time_s, whisk) for whisk, times in enumerate(recording.frame_times_s) for time_s in times.tolist())
+    for number, (time_s, whisk) in enumerate(times):
+        moments = moments_of_array(job.protocol, studio, recording, job.whiskers, time_s, whisk)
+        yield studio.sensor.exposed(setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number))

@@ -1,7 +1,7 @@
 """What stands in front of a camera: floor, board, post and hub, whisker, bar with its block. Drawn far to near."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,14 @@ from bench.rig.board import Board, Ink, marker
 from bench.rig.camera import Camera
 from bench.rig.light import Light, Material
 from bench.rig.plate import Plate, Print
-from bench.rig.tube import Tube
+from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 
 HUB_FRONT_MM = 5.0  # how far the hub reaches along the whisker
 # mm: corners of the hub's block, its own axes
 _HUB_LOW, _HUB_HIGH = np.array([-17.0, -9.0, -6.0]), np.array([HUB_FRONT_MM, 9.0, 7.0])
+_SLIM_MM = 4.0  # half the width of a hub that has neighbours
+_SHAFT_X_MM = -6.0  # of the motor's shaft, in the hub's axes
 _BLOCK_HALF = np.array([9.0, 9.0, 7.0])  # mm: half the bar's block, each way
 _BLOCK_UP_MM = 52.0  # along the bar from where it is touched
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
@@ -47,6 +49,7 @@ class Box:
     axes: np.ndarray
     origin_mm: np.ndarray
     reflectance: float
+    marked: bool = False
 
     def faces(self) -> Iterator[tuple[tuple[int, int], Plate]]:
         """(name, plate) of the six faces, prints facing outwards."""
@@ -77,12 +80,53 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
+class Stand:
+    """Where a hub turns: the pose (3, 4) of its base in the rig frame, the corners (3,) of its block in its own axes,
+    mm; whether it has a marker, and a post round its shaft."""
+
+    pose: np.ndarray
+    low_mm: np.ndarray
+    high_mm: np.ndarray
+    has_marker: bool = False
+
+    @classmethod
+    def alone(cls) -> "Stand":
+        """The hub of one whisker at the rig's origin."""
+        return cls(np.eye(3, 4), _HUB_LOW, _HUB_HIGH, True)
+
+    @classmethod
+    def of_column(cls, pose: np.ndarray, heights_mm: Sequence[float]) -> "Stand":
+        """A slim hub that holds whiskers at these heights."""
+        low, high = ([x, side * _SLIM_MM, z + height] for (x, _, z), side, height in (
+            (_HUB_LOW, -1, min(heights_mm)), (_HUB_HIGH, 1, max(heights_mm))))
+        return cls(pose, np.array(low), np.array(high))
+
+    def hub(self, motor_rad: float) -> Box:
+        """The hub at a motor angle."""
+        axes = self.pose[:, :3] @ turned(np.eye(3), motor_rad).T
+        return Box(self.low_mm, self.high_mm, axes, self.pose[:, 3], 0.05, self.has_marker)
+
+    def posts(self, looks: Looks) -> Iterator[Tube]:
+        """Down to the floor."""
+        floor = looks.floor_z_mm - self.pose[2, 3]
+        if self.has_marker:
+            yield self._along_shaft(self.low_mm[2] - 12.0, floor, 11.0, looks)
+            floor = self.low_mm[2] - 13.0
+        yield self._along_shaft(self.low_mm[2] + 2.0, floor, 3.0, looks)
+
+    def _along_shaft(self, from_mm, to_mm, radius_mm, looks):
+        ends = (self.pose[:, :3] @ [_SHAFT_X_MM, 0.0, z] + self.pose[:, 3] for z in (from_mm, to_mm))
+        return Tube.straight(*ends, radius_mm, looks.dark)
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """The rig that a board, a bar and a whisker make. `T_rig_board` (3, 4)."""
+    """The rig that a board, a bar and whiskers on their stands make. `T_rig_board` (3, 4)."""
 
     board: Board
     T_rig_board: np.ndarray
     looks: Looks
+    stands: tuple[Stand, ...]
 
     def backdrop(self, window: Window) -> np.ndarray:
         """Floor, wall and board: what the rig's board picture shows."""
@@ -97,11 +141,10 @@ class Scene:
         plate.draw(window, radiance, looks.light)
 
     def stand_bar(self, window: Window, radiance: np.ndarray, bar: Bar, middle_mm: np.ndarray) -> None:
-        """The post under the hub, and the bar (its middle where first touched) with a block at its upper end."""
+        """The posts under the hubs, and the bar (its middle where first touched) with a block at its upper end."""
         looks = self.looks
-        post = Tube.straight([-6, 0, -18], [-6, 0, looks.floor_z_mm], 11.0, looks.dark)
-        post.draw(window, radiance, looks.light)
-        Tube.straight([-6, 0, -4], [-6, 0, -19], 3.0, looks.dark).draw(window, radiance, looks.light)
+        for post in (post for stand in self.stands for post in stand.posts(looks)):
+            post.draw(window, radiance, looks.light)
         down, block = middle_mm - self._reach_down(bar, middle_mm) * bar.axis, _block(bar, middle_mm)
         Tube.straight(down, block.origin_mm, bar.radius_mm, looks.bar).draw(window, radiance, looks.light)
         print_ = marker(self.board.dictionary, self._marker(_BLOCK_MARKER), 10.0, looks.ink)
@@ -118,26 +161,25 @@ class Scene:
         known = self.board.opencv().getDictionary()
         return len(known.bytesList) + from_end
 
-    def hub(self, motor_rad: float) -> Box:
-        """The hub at a motor angle."""
-        return Box(_HUB_LOW, _HUB_HIGH, turned(np.eye(3), motor_rad).T, np.zeros(3), 0.05)
+    def move(self, window: Window, radiance: np.ndarray, hubs: Sequence[Box], whiskers: Sequence[Tube]) -> None:
+        """Hubs and whiskers: a hub whose front, out of which its whiskers stand, faces the camera is behind all
+        whiskers, another one before them."""
+        centre = window.camera.centre_mm
+        behind = [dict(hub.faces())[(0, 1)].faces(centre) for hub in hubs]
+        self._draw_hubs(window, radiance, [hub for hub, is_behind in zip(hubs, behind) if is_behind])
+        draw_tubes(whiskers, window, radiance, self.looks.light)
+        self._draw_hubs(window, radiance, [hub for hub, is_behind in zip(hubs, behind) if not is_behind])
 
-    def move(self, window: Window, radiance: np.ndarray, motor_rad: float, whisker: Tube) -> None:
-        """The hub at a motor angle and the whisker; the nearer of the two last."""
-        hub = self.hub(motor_rad)
-        print_ = marker(self.board.dictionary, self._marker(_HUB_MARKER), 10.0, self.looks.ink)
-        front = dict(hub.faces())[(0, 1)]
-        if front.faces(window.camera.centre_mm):
-            hub.draw(window, radiance, self.looks.light, print_)
-            whisker.draw(window, radiance, self.looks.light)
-        else:
-            whisker.draw(window, radiance, self.looks.light)
-            hub.draw(window, radiance, self.looks.light, print_)
+    def _draw_hubs(self, window, radiance, hubs):
+        centre = window.camera.centre_mm
+        for hub in sorted(hubs, key=lambda hub: -np.linalg.norm(hub.origin_mm - centre)):
+            print_ = marker(self.board.dictionary, self._marker(_HUB_MARKER), 10.0, self.looks.ink)
+            hub.draw(window, radiance, self.looks.light, print_ if hub.marked else None)
 
-    def moving_px(self, camera: Camera, motor_rad: float, whisker: Tube) -> np.ndarray:
+    def moving_px(self, camera: Camera, hubs: Sequence[Box], whiskers: Sequence[Tube]) -> np.ndarray:
         """Pixels (n, 2) between which all that moves lies."""
-        corners = np.concatenate([p.corners_mm() for _, p in self.hub(motor_rad).faces()])
-        return np.concatenate([camera.project(corners), *whisker.silhouette(camera)])
+        corners = np.concatenate([plate.corners_mm() for hub in hubs for _, plate in hub.faces()])
+        return np.concatenate([camera.project(corners), *(px for one in whiskers for px in one.silhouette(camera))])
 
 
 def _block(bar: Bar, middle_mm: np.ndarray) -> Box:

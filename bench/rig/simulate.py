@@ -78,9 +78,10 @@ def _check_can_be_built(job, name):
 def _check_can_be_rendered(job, name):
     if job.signals_only or not job.protocol.cameras:
         return
+    trials = job.protocol.trials
     felt_alone = {
-        "a ring, sphere or cone (object)": any(t.object for t in job.protocol.trials),
-        "an array ([[columns]])": bool(job.whiskers),
+        "a ring, sphere or cone (object)": any(t.object for t in trials),
+        "an array ([[columns]]) before a soft bar": bool(job.whiskers) and any(t.stiffness_N_mm for t in trials),
     }
     for what, there in felt_alone.items():
         if there:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.rig.bar import Bar
 from bench.rig.camera import Camera
-from bench.rig.scene import Scene, floor_and_wall
+from bench.rig.scene import Box, Scene, Stand, floor_and_wall
 from bench.rig.sensor import Sensor
 from bench.rig.tube import Tube
 from bench.rig.window import Window
@@ -19,10 +19,15 @@ _FINE, _SOFT_PX = 3, 0.2
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What moves, at one instant: motor angle, the whisker as a tube."""
+    """What moves, at one instant: hubs, and whiskers as tubes."""
 
-    motor_rad: float
-    whisker: Tube
+    hubs: tuple[Box, ...]
+    whiskers: tuple[Tube, ...]
+
+    @classmethod
+    def alone(cls, motor_rad: float, whisker: Tube) -> "Moment":
+        """Of one whisker at the rig's origin."""
+        return cls((Stand.alone().hub(motor_rad),), (whisker,))
 
 
 class Studio:
@@ -78,7 +83,7 @@ class Setting:
     def brightness(self, moments: list[Moment]) -> np.ndarray:
         """One exposure, the mean over its moments (one where nothing moves far)."""
         studio, blur = self._studio, self._studio.sensor.blur_px
-        px = [studio.scene.moving_px(studio.camera, m.motor_rad, m.whisker) for m in moments]
+        px = [studio.scene.moving_px(studio.camera, m.hubs, m.whiskers) for m in moments]
         part = studio.window.around(np.concatenate(px), 4 * blur + 3)
         picture = self._seen.copy()
         if part is not None:
@@ -91,7 +96,7 @@ class Setting:
         total = np.zeros_like(still)
         for moment in moments:
             radiance = still.copy()
-            self._studio.scene.move(part, radiance, moment.motor_rad, moment.whisker)
+            self._studio.scene.move(part, radiance, moment.hubs, moment.whiskers)
             total += radiance
         return total / np.float32(len(moments))
 

@@ -1,5 +1,6 @@
 """Round things along a curve: whisker, bar, posts. Their edges are the exact silhouettes, integrated over the blur."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,16 +56,25 @@ class Tube:
 
     def draw(self, window: Window, radiance: np.ndarray, light: Light) -> None:
         """Over what is drawn."""
+        layer = self.layer(window, light)
+        if layer is not None:
+            at = layer.at
+            radiance[at] += (layer.cover * (layer.tone - radiance[at])).astype(np.float32)
+
+    def layer(self, window: Window, light: Light) -> "Layer | None":
+        """What the tube is in the samples of a window; None where it is not in it."""
         edges = self.silhouette(window.camera)
         part = window.around(np.concatenate(edges), 4 * window.soft_px + 2)
         if part is None:
-            return
-        canvas, frame = radiance[part.within(window)], _Frame.of(edges)
+            return None
+        frame = _Frame.of(edges)
         at, u, v = _band(part, frame, edges, 4.5 * window.soft_px + 1)
         along, side = frame.of_px(np.stack([u, v], -1))
         cover, across, per_px = frame.cover(along, side, window.soft_px)
         tone = self._shade(window.camera, light, frame, along, across, per_px / window.fine)
-        canvas[at] += (cover * (tone - canvas[at])).astype(np.float32)
+        depth = frame.at(along, np.linalg.norm(self.axis_mm - window.camera.centre_mm, axis=1))
+        rows, columns = part.within(window)
+        return Layer((at[0] + rows.start, at[1] + columns.start), cover, tone, depth)
 
     def _shade(self, camera, light, frame, along, across, sample):
         """Mean brightness over a sample's part of the tube: two Gauss points, both on the tube."""
@@ -79,6 +89,39 @@ class Tube:
         limit = np.maximum(1 - sample / 4, 0)
         points = (np.clip(across + s * sample * _GAUSS, -limit, limit) for s in (-1, 1))
         return 0.5 * sum(round_shade(light, self.material, p, *lamp, mirror) for p in points)
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """A tube in samples (n,) of a window: rows and columns, how much of each it covers, how bright it is there, and how
+    far its axis is from the camera, mm."""
+
+    at: tuple[np.ndarray, np.ndarray]
+    cover: np.ndarray
+    tone: np.ndarray
+    depth_mm: np.ndarray
+
+
+def draw_tubes(tubes: Sequence[Tube], window: Window, radiance: np.ndarray, light: Light) -> None:
+    """Several tubes over what is drawn: in each sample the nearer over the farther."""
+    if len(tubes) == 1:
+        tubes[0].draw(window, radiance, light)
+        return
+    layers = [layer for layer in (tube.layer(window, light) for tube in tubes) if layer is not None]
+    if not layers:
+        return
+    rows, columns = (np.concatenate([layer.at[axis] for layer in layers]) for axis in (0, 1))
+    values = ([one.cover, one.tone, one.depth_mm] for one in layers)
+    cover, tone, depth = (np.concatenate(column) for column in zip(*values))
+    order = np.lexsort((-depth, columns, rows))
+    rows, columns, cover, tone = rows[order], columns[order], cover[order], tone[order]
+    first = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))
+    number = np.arange(len(rows))
+    rank = number - np.maximum.accumulate(np.where(first, number, 0))  # of each sample's layers from afar
+    for nearer in range(int(rank.max()) + 1):
+        now = rank == nearer
+        at = rows[now], columns[now]
+        radiance[at] += (cover[now] * (tone[now] - radiance[at])).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)

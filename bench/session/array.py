@@ -4,6 +4,7 @@ All conventions of one whisker hold in that frame: its origin is the base, its z
 its x the whisker at motor angle 0. Every step of an evaluation can so take a view as it takes a session.
 """
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -20,11 +21,11 @@ from bench.session.signals import FORCES, MOMENTS, MOTOR, TIME, VOLTS
 from bench.session.strict_toml import values
 from bench.session.table import column_names
 from bench.session.trial import Trial
+from vision.geometry.rotation import compose
 
 _PARALLEL = 1e-6  # rounding of cosines: axes of bases on one motor
 _OWN = (*VOLTS, *MOMENTS, *FORCES)  # columns that no two whiskers share
 
-_NO_PICTURES = {"camera_names": (), "board_sources": {}, "rig_pictures": {}, "cameras_toml": None}
 _OWN_GAUGES = "give each of [[whiskers]] its own: [whiskers.gauges]"
 
 
@@ -56,7 +57,9 @@ def load_views(
             _check_motors(bases, channels[trial.name])
             _check_cone(bases, trial)
     if any(trial.camera_sources for trial in session.trials):
-        doubts.note("pictures of several whiskers are not looked at: what is felt has no truth beside it")
+        _check_placed(session)
+        if any(trial.camera_sources and not _is_bar(trial) for trial in session.trials):
+            doubts.note("pictures of rings, spheres and cones are not looked at: what is felt has no truth beside it")
     readable = tuple(trial for trial in session.trials if trial.name in channels)
     return tuple(_view(session, named[base.name], base, readable, channels) for base in bases)
 
@@ -69,6 +72,18 @@ def _check_tables(session: Session, keys: manifest.SessionKeys) -> None:
         raise BadInput(f"[gauges] are one whisker's; {_OWN_GAUGES}", file=MANIFEST)
     if session.gauges_toml is not None:
         raise BadInput(f"is one whisker's; {_OWN_GAUGES}", file="gauges.toml")
+
+
+def _check_placed(session: Session) -> None:
+    """Pictures of several wires do not tell where the bases stand. Raises BadInput."""
+    if session.T_rig_board is None and session.cameras_toml is None:
+        asked = "measure it, or bring cameras.toml: of several wires it says which is whose"
+        raise BadInput(f"[rig] T_rig_board is missing; {asked}", file=MANIFEST)
+
+
+def _is_bar(trial: Trial) -> bool:
+    """Whether the object is a straight bar, as far as trial.toml says."""
+    return trial.object is None or trial.object.shape == "bar"
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -159,9 +174,11 @@ def _check_cone(bases: Sequence[Base], trial: Trial) -> None:
 
 
 def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels) -> Session:
-    """The session as that whisker alone would have recorded it, in its base frame, without pictures."""
+    """The session as that whisker alone would have recorded it, in its base frame; the other wires are in its pictures,
+    too."""
     own = tuple(
-        replace(trial, daq=channels[trial.name][base.name], whisker=base.name, camera_sources={},
+        replace(trial, daq=channels[trial.name][base.name], whisker=base.name,
+                camera_sources=trial.camera_sources if _is_bar(trial) else {},
                 object_velocity_mm_s=_turned(trial.object_velocity_mm_s, base)) for trial in trials
     )  # fmt: skip
     return replace(
@@ -171,7 +188,10 @@ def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels)
         gauges=given_gauges(keys.gauges),
         trials=own,
         base=base,
-        **_NO_PICTURES,
+        whole=session,
+        T_rig_board=None if session.T_rig_board is None else compose(base.T_base_rig, session.T_rig_board),
+        T_rig_board_sigma_mm=math.hypot(session.T_rig_board_sigma_mm, base.sigma_mm),
+        T_rig_board_sigma_rad=math.hypot(session.T_rig_board_sigma_rad, base.sigma_rad),
     )
 
 

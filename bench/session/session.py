@@ -19,7 +19,7 @@ from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
 from vision.geometry.board import Board
 from vision.geometry.errors import Refused
-from vision.geometry.rotation import nearest_rotation
+from vision.geometry.rotation import invert_transform, nearest_rotation
 from vision.pictures.files import natural_order
 
 FORMAT = 1  # of session.toml; another one is refused
@@ -51,13 +51,19 @@ class Base:
     sigma_mm: float
     sigma_rad: float
 
+    @property
+    def T_base_rig(self) -> np.ndarray:
+        """(3, 4): coordinates of the rig frame to those of the base's."""
+        return invert_transform(self.T_rig_base)
+
 
 @dataclass(frozen=True)
 class Session:
     """What session.toml and the folders say; T_rig_board is (3, 4), mm; sigmas are 0 where taken as exact.
 
     whisker and bar are given wherever there are trials; board wherever there is no cameras.toml but pictures. base: of
-    the whisker whose view of an array this is (`bench.session.array`), None where the session is one whisker's.
+    the whisker whose view of an array this is (`bench.session.array`), whole: the array's session, in the rig frame;
+    both None where the session is one whisker's.
     """
 
     path: Path
@@ -77,6 +83,7 @@ class Session:
     cameras_toml: Path | None
     gauges_toml: Path | None
     base: Base | None = None
+    whole: "Session | None" = None
 
     @property
     def whole_name(self) -> str:

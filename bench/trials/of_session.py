@@ -67,8 +67,24 @@ def placed_units(
 ) -> tuple[SessionCalibration, list[Unit]]:
     """The session's cameras in the rig frame of board and free strokes, and a unit of work for each trial, so far
     without gauges. Raises BadInput."""
-    calibration = calibrate_session(session, out)
-    units = [Unit(session, trial, hash_of_files([trial.folder]), calibration, settings, out) for trial in trials]
+    return settled_units(session, first_units(session, trials, out, settings), pool, doubts)
+
+
+def first_units(
+    session: Session, trials: Sequence[Trial], out: Path, settings: Settings,
+    calibration: SessionCalibration | None = None
+) -> list[Unit]:
+    """A unit of work for each trial, by the cameras where the board has them; calibration: where there is one already.
+    Raises BadInput."""
+    calibration = calibration or calibrate_session(session, out)
+    return [Unit(session, trial, hash_of_files([trial.folder]), calibration, settings, out) for trial in trials]
+
+
+def settled_units(
+    session: Session, units: Sequence[Unit], pool: Workers, doubts: Doubts
+) -> tuple[SessionCalibration, list[Unit]]:
+    """The session's cameras in the rig frame of board and free strokes, and the units by these. Raises BadInput."""
+    calibration = units[0].calibration
     calibration = place_rig(session, calibration, units, pool, doubts)
     return calibration, [replace(unit, calibration=calibration) for unit in units]
 

@@ -1,6 +1,6 @@
 """The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from functools import partial
 
@@ -10,41 +10,45 @@ from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial import BackStroke, BarLine, Clock, Deflection, Drawing, SeenTrial, SeenWhisk
-from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
+from bench.session.frame_times import FrameTimes, dropped
 from bench.session.session import Session
-from bench.session.signals import Signals, forward_strokes, ways_back
+from bench.session.signals import Signals, forward_strokes
 from bench.session.trial import Trial
 from bench.trials.consistency import cone_doubt, length_doubt, slope_doubt, turns_doubt, width_doubt, wire_doubt
 from bench.trials.one_camera import by_one_camera
-from bench.trials.scene import still_scene
+from bench.trials.pictures import Shown
 from bench.trials.seeing import rungs
 from vision.geometry.errors import Refused
-from vision.geometry.rods import Bar, Rods
+from vision.pictures.others import RodLines
 from vision.truth.observe import observe_trial
 from vision.truth.records import TrialTruth, WhiskTruth
-from vision.truth.trial_pictures import TrialPictures
 
 NO_PICTURES = "no pictures"
 _MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
-_FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
 _MOST_NAMED = 5  # frames in a line
 _SAME = tuple({f.name for f in fields(SeenWhisk)} & {f.name for f in fields(WhiskTruth)} - {"status", "overlay"})
 
 
 def see_trial(
-    session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration, settings: Settings
+    session: Session,
+    trial: Trial,
+    signals: Signals,
+    calibration: SessionCalibration,
+    settings: Settings,
+    wires: Mapping[str, Mapping[str, RodLines]] | None = None,
 ) -> SeenTrial:
-    """Whisks of a trial as the cameras show them.
+    """Whisks of a trial as the cameras show them. wires: by camera, those of an array's whiskers by name.
 
     What keeps a trial from being seen is the status of its whisks; the others go on.
     """
-    strokes = forward_strokes(signals)
+    count = len(forward_strokes(signals))
     if not trial.camera_sources or calibration.cameras is None:
-        return unseen(len(strokes), NO_PICTURES)
+        return unseen(count, NO_PICTURES)
     try:
-        return _see(session, trial, signals, strokes, calibration, settings)
+        shown = Shown.of(session, trial, signals, calibration, settings, wires or {})
+        return _see(session, trial, shown, calibration, settings)
     except Refused as reason:
-        return unseen(len(strokes), str(reason))
+        return unseen(count, str(reason))
 
 
 def unseen(count: int, status: str) -> SeenTrial:
@@ -53,27 +57,11 @@ def unseen(count: int, status: str) -> SeenTrial:
 
 
 def _see(
-    session: Session, trial: Trial, signals: Signals, strokes, calibration: SessionCalibration, settings: Settings
+    session: Session, trial: Trial, shown: Shown, calibration: SessionCalibration, settings: Settings
 ) -> SeenTrial:
-    times = frame_times(trial)
-    frames = read_trial(trial, times)
-    scene = still_scene(session, calibration, frames)
-    wire = session.whisker.wire
+    times, scene, places, back, rods = shown.times, shown.scene, shown.places, shown.back, shown.rods
     clock_sigma_s = times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
-    places = [times.frames_in(signals, stroke) for stroke in strokes]
-    wanted = ways_back(signals) if trial.both_ways else ways_back(signals)[:1]
-    back = {k: where for k, one in enumerate(wanted) if (where := _backwards(signals, times, one)) is not None}
-    pictures = TrialPictures(
-        {name: f for name, f in scene.frames.items() if name not in scene.left_out and settings.seeing.asks(name)},
-        times.time_s,
-        np.interp(times.time_s, signals.time_s, signals.motor_rad),  # frames outside belong to no whisk
-        calibration.background,
-        trial.object_velocity_mm_s and np.array(trial.object_velocity_mm_s),
-        trial.object_velocity_sigma_mm_s,
-        trial.object_gives_way,
-    )
-    rods = Rods(wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))
-    observe = partial(observe_trial, pictures, cameras=calibration.cameras, rods=rods)
+    observe = partial(observe_trial, shown.pictures, cameras=calibration.cameras, rods=rods)
     first, *harder = [(one.name, replace(one.vision, clock_sigma_s=clock_sigma_s)) for one in rungs(settings)]
     truth = observe(whisks=[*places, *back.values()], settings=first[1])
     looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]
@@ -89,10 +77,10 @@ def _see(
             replace(whisk, looked=name, by_one_camera=by_one_camera(one, session.whisker, settings))
             for whisk, (name, one) in zip(whisks, looked)
         ),
-        (*truth.notes, *_lost(frames, times), *dropped(times, places), *scene.notes),
+        (*truth.notes, *_lost(shown.frames, times), *dropped(times, places), *scene.notes),
         BarLine(truth.bar_point_mm, truth.bar_direction),
         0.5 * trial.bar_diameter_mm,
-        0.5 * wire.diameter_mm,
+        0.5 * rods.wire.diameter_mm,
         Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
         truth.bar_looks,
         _touch_alone(truth.whisks[len(places)]) if 0 in back else None,
@@ -118,17 +106,6 @@ def _seen_back(truths: dict[int, WhiskTruth], count: int, settings: Settings) ->
     """The way back of each whisk, by the number of that."""
     seen = {k: whisk_record(replace(truth, whisk=k), settings) for k, truth in truths.items()}
     return tuple(seen.get(k, SeenWhisk(k, NO_PICTURES)) for k in range(count))
-
-
-def _backwards(signals: Signals, times: FrameTimes, where: slice | None) -> slice | None:
-    """Frames of a back stroke, last to first, so that the whisker comes to the bar; None where few were taken.
-
-    A clock that is late has the whisker touch late on the way there and early on the way back.
-    """
-    frames = None if where is None else times.frames_in(signals, where)
-    if frames is None or frames.stop - frames.start < _FEWEST_BACK:
-        return None
-    return slice(frames.stop - 1, frames.start - 1 if frames.start else None, -1)
 
 
 def _touch_alone(truth: WhiskTruth) -> BackStroke | None:

@@ -40,9 +40,11 @@ from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_of
 from bench.trials.moving import ASKED, MOVING, with_motion
+from bench.trials.other_wires import lines_in
 from bench.trials.phases import phases_of
 from bench.trials.seen import see_trial
 from bench.trials.sensors import with_others
+from bench.trials.whose_wire import with_whose
 from estimator.builtin import ESTIMATORS
 from estimator.sensors import SENSORS
 from estimator.signal import NOT_REACHED
@@ -59,7 +61,8 @@ OWN_GAUGES = "not judged: without this trial the gauges are not known"
 class Unit:
     """What one trial's result is made from. files: hash of the trial's files. drift_rate: (2,), of the channels per
     second, and force_drift_rate (3,) of a load cell; gauges: None where volts cannot become moments. stage: folder of
-    what is seen before all is known."""
+    what is seen before all is known. wires: of an array, by the names of its whiskers, files that say where
+    their wires are in the pictures, with the hash of all of them; straight: the same were all wires straight."""
 
     session: Session
     trial: Trial
@@ -71,6 +74,9 @@ class Unit:
     gauges: Gauges | None = None
     stage: str = "seen"
     force_drift_rate: np.ndarray | None = None
+    wires: tuple[tuple[str, Path], ...] = ()
+    wires_hash: str = ""
+    straight: tuple[tuple[str, Path], ...] = ()
 
     @property
     def path(self) -> Path:
@@ -95,6 +101,7 @@ class Unit:
             session.T_rig_board,
             self.calibration.hash,
             self.settings.seen(),
+            *filter(None, [self.wires_hash]),
         )
 
     @property
@@ -120,7 +127,11 @@ def see_unit(unit: Unit) -> SeenTrial:
 
 
 def _see(unit: Unit, signals: Signals) -> SeenTrial:
-    return see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings)
+    made_from = unit.session, unit.trial, signals, unit.calibration, unit.settings
+    if not unit.wires:
+        return see_trial(*made_from)
+    looked = lines_in(unit.wires)
+    return with_whose(see_trial(*made_from, looked), lines_in(unit.straight), looked, unit.session.base.name)
 
 
 def kept_seen(unit: Unit) -> SeenTrial | None:

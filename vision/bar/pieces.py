@@ -39,6 +39,7 @@ def bar_pieces(view: View, noise: Noise, axis: BarAxis, radius_mm: float, wires_
     band = _from_whole(read_band(view.mean, view.background, middle, place, radius, half), settings.bar_piece_px)
     pieces = cut_pieces([band], settings.bar_piece_px, noise)
     in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
+    wires_px = wires_px if view.itself is None else ()  # where they are known they are not in the mean
     return pieces.select(in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0))
 
 

@@ -112,5 +112,10 @@ def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSett
 
 
 def _median_picture(view: View) -> np.ndarray:
-    """Median of some frames at every HALF-th pixel: a wire that moves vanishes."""
-    return median_of([np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)])
+    """Median of some frames at every HALF-th pixel: a wire that moves vanishes. Where rods are known, a mean without
+    these: one that rests on the bar vanishes, too."""
+    median = median_of([np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)])
+    if view.itself is None:
+        return median
+    mean = view.mean[::HALF, ::HALF]
+    return np.where(np.isnan(mean), median, mean)

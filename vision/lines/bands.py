@@ -23,7 +23,8 @@ class Band:
 
     offset_px (n, k): signed distance of each pixel from the curve along its normal; grey, background (n, k);
     foot_px (n, 2): the curve; normal (n, 2): its unit normal; place (n,): the curve's own parameter (mm);
-    radius_px (n,): half the width that the rod has in the picture. Pixels outside the picture are NaN.
+    radius_px (n,): half the width that the rod has in the picture. Pixels outside the picture, or
+    hidden, are NaN.
     """
 
     offset_px: np.ndarray
@@ -36,8 +37,9 @@ class Band:
 
 
 def read_band(grey: np.ndarray, background: np.ndarray, curve_px: np.ndarray, place: np.ndarray, radius_px: np.ndarray,
-              half_width_px: int) -> Band:
-    """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along.
+              half_width_px: int, hidden: np.ndarray | None = None) -> Band:
+    """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along. hidden (h, w):
+    those that show something else, bool.
 
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals point to the same
     hand of the way along which `place` grows, whichever way that is in the picture.
@@ -56,6 +58,8 @@ def read_band(grey: np.ndarray, background: np.ndarray, curve_px: np.ndarray, pl
     foot[:, along], foot[:, 1 - along] = step, across
     normal[:, along], normal[:, 1 - along] = -slope * cosine, cosine
     pixels = [_pick(picture, step, line, along) for picture in (grey, background)]
+    if hidden is not None:
+        pixels[0][_pick(hidden, step, line, along) > 0] = np.nan
     at = [np.interp(step, curve[:, along], values) for values in (place, radius)]
     left = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
     return Band(left * offset, *pixels, foot, left * normal, *at)
@@ -107,6 +111,11 @@ class Pieces:
         """The same pieces with those of their pixels where `keep` (p,) holds."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
+
+    def show_rod(self, margin_px: float) -> np.ndarray:
+        """Which pieces (s,) lack no pixel of the rod, where it is expected, nor within a margin beside it."""
+        needed = np.abs(self.offset_px) <= self.radius_px[:, None] + margin_px
+        return ~np.any(needed & (self.weight == 0), axis=1)
 
     def below(self, grey: float) -> "Pieces":
         """The same pieces; pixels of this grey level or above weigh nothing."""

@@ -14,6 +14,7 @@ from vision.lines.binned import binned, without
 from vision.lines.joint import BLUR_SIGMA, Task, settled, solve_jointly
 from vision.lines.points import SHARED, LinePoints, Observed
 from vision.lines.shading import Knots, Located
+from vision.pictures.others import RodLines, covered
 from vision.pictures.view import View
 
 NEAR_CLAMP_MM = 6.0  # hub and set-screw hide or shade the wire up to here
@@ -32,10 +33,22 @@ def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px:
     outlines = [_outline(view.camera, curve, wire) for curve in curves.values()]
     # one width for all bands: a wire may pass from one whole pixel of radius to the next within a whisk
     half = int(np.ceil(max(np.nanmax(radius) for *_, radius in outlines))) + margin_px
-    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half)
+    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half, _hidden(view, frame))
              for frame, (arc, middle, radius) in zip(curves, outlines)]
     pieces = cut_pieces(bands, length_px, view.noise)
     return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
+
+
+def lines_of(camera: Camera, wire: Wire, curves: Mapping[int, Curves]) -> RodLines:
+    """What a wire of these centrelines, by frame, is in a camera's pictures."""
+    outlines = [_outline(camera, curve, wire) for curve in curves.values()]
+    half_px = np.array([np.max(radius) for *_, radius in outlines])
+    return RodLines(np.array(list(curves), dtype=int), np.array([middle for _, middle, _ in outlines]), half_px)
+
+
+def _hidden(view: View, frame: int) -> np.ndarray | None:
+    """Pixels (h, w), bool, of a frame that other rods may have covered; None where there are none."""
+    return covered(view.others, frame, view.frames[frame].shape)
 
 
 def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

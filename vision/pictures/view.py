@@ -1,27 +1,32 @@
 """One camera's pictures of a whisk, beside the picture without rods."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.pictures.others import Others, RodLines, covered
 from vision.pictures.pixel_noise import Noise
 
 _SCALE_OF = 3  # frames: what is saturated is so in all of them
 SATURATED = 250.0 / 255.0  # of full scale: what the sensor cut off is not known
 MEAN_OF = 40  # frames: more would not make a still thing clearer
+_LEAST_CLEAR = 2  # frames that show a pixel without a rod: one is as noisy as a frame
 
 
 @dataclass(frozen=True)
 class View:
-    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise."""
+    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise. others: rods in
+    them that are not looked for; itself: the wire that is, where its place is known to a pixel or two."""
 
     camera: Camera
     frames: Mapping[int, np.ndarray]
     background: np.ndarray
     noise: Noise
+    others: Others = field(default_factory=dict)
+    itself: RodLines | None = None
 
     def some(self, most: int) -> list[np.ndarray]:
         """At most so many of the pictures, spread over all of them."""
@@ -36,17 +41,36 @@ class View:
 
     @property
     def mean_share(self) -> float:
-        """What part of one picture's variance the mean has."""
+        """What part of one picture's variance the mean has; where rods are known, the pixel with most has."""
+        if self.itself is not None:
+            return 1.0 / _LEAST_CLEAR
         return 1.0 / min(len(self.frames), MEAN_OF)
 
     @cached_property
     def mean(self) -> np.ndarray:
-        """Mean (h, w) of the pictures, of MEAN_OF at most."""
+        """Mean (h, w) of the pictures, of MEAN_OF at most; where rods are known, of those in which none covers a pixel,
+        NaN where one does in nearly all."""
+        if self.itself is not None:
+            return self._mean_of_clear({"": self.itself, **self.others})
         pictures = self.some(MEAN_OF)
         total = np.zeros(pictures[0].shape, dtype=np.float32)
         for picture in pictures:
             total += picture
         return total / len(pictures)
+
+    def _mean_of_clear(self, rods: Others) -> np.ndarray:
+        """Of pixels that a rod passes the median of clear frames, for where a rod is may be wrong in one of them."""
+        frames = list(self.frames)
+        chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))]
+        hidden = np.stack([covered(rods, frame, self.frames[frame].shape) for frame in chosen])
+        passed = np.any(hidden, axis=0)
+        mean = np.mean([self.frames[frame] for frame in chosen], axis=0, dtype=np.float32)
+        values = np.stack([self.frames[frame][passed] for frame in chosen]).astype(np.float32)
+        values[hidden[:, passed]] = np.nan
+        few = np.sum(~hidden[:, passed], axis=0) < _LEAST_CLEAR
+        values[0, few] = 0.0  # of none at all there is no median
+        mean[passed] = np.where(few, np.nan, np.nanmedian(values, axis=0))
+        return mean
 
 
 def median_of(pictures: Sequence[np.ndarray]) -> np.ndarray:

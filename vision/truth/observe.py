@@ -12,21 +12,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.bar.search import see_bar
+from vision.bar.search import SeenBar, see_bar
 from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.first_bends import contact_arc
 from vision.fit.motion import Gives, Told
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import is_before
+from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
 from vision.geometry.counted import counted
 from vision.geometry.errors import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.lines.one_sided import one_sided_lines
+from vision.lines.trace import lines_of
+from vision.pictures.others import RodLines
 from vision.pictures.scale import shrunk_cameras
 from vision.pictures.view import View
 from vision.truth.moving_bar import in_one_frame
@@ -34,7 +37,7 @@ from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.rows import to_whisk
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.value import Value
-from vision.truth.whisk import fit_whisk, free_stroke
+from vision.truth.whisk import coarse_shapes, fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.wire_end import wire_ends
 from vision.truth.wire_width import wire_looks
@@ -51,25 +54,54 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
     whisks: slices of frame indices, one a forward stroke. What keeps a whisk from having a truth is its status; raises
     Refused only for input that no trial could be seen with.
     """
-    pictures, cameras = pictures.shrunk(settings.picture_scale), shrunk_cameras(cameras, settings.picture_scale)
-    time_s, motor_rad = (np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad))
     try:
-        cameras, behind = _that_face_it(cameras, rods.wire, motor_rad)
-        views = pictures.views(cameras)
-        used = cameras.subset([view.camera.name for view in views])
-        strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
-        told, stands = _told(pictures, strokes, views)
-        bar_seen = see_bar(stands, used, rods, motor_rad, settings)
+        seen, bar_seen, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
-    gives = Gives() if pictures.object_gives_way else None
-    seen = [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
-                          left_out=tuple(behind), told=told, gives=gives) for number, stroke in enumerate(strokes)]
     rows = tuple(_see_whisk(whisk) for whisk in seen)
+    motor_rad = np.asarray(pictures.motor_rad, dtype=float)
     axis, light = bar_seen.axis, [whisk.light for whisk in seen]
     looks = seen_over_given(stands, bar_seen, rods, motor_rad, settings)
     bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
+
+
+def wire_lines(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
+               settings: VisionSettings = _USUAL) -> dict[str, RodLines]:
+    """Where the wire is in the pictures of each camera, by a first look, to a pixel or two; straight, as the motor has
+    it, in whisks in which it is not seen. Arguments and errors as of `observe_trial`."""
+    seen, _, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
+    curves = {frame: curve for whisk in seen for frame, curve in _first_curves(whisk.without_gaps()).items()}
+    return {view.camera.name: lines_of(view.camera, rods.wire, curves) for view in stands if curves}
+
+
+def _first_curves(whisk: WhiskPictures) -> dict[int, Curves]:
+    """The wire's centreline in each frame by a first look."""
+    try:
+        rest, bends = coarse_shapes(whisk)
+    except Refused:
+        rest, bends = np.zeros((2, REST_POWERS)), dict.fromkeys(whisk.frames, np.zeros(2))
+    axis, wire = whisk.bar.axis, whisk.rods.wire
+    arcs = {f: contact_arc(rest, bends[f], motor, axis, wire) for f, motor in whisk.motor.items()}
+    return {f: one_curve(rest, bends[f], arcs[f], motor, wire) for f, motor in whisk.motor.items()}
+
+
+def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
+               settings: VisionSettings) -> tuple[list[WhiskPictures], SeenBar, Sequence[View]]:
+    """The whisks with all that is known before a wire is looked for, the bar, and views in which it stands. Raises
+    Refused."""
+    pictures, cameras = pictures.shrunk(settings.picture_scale), shrunk_cameras(cameras, settings.picture_scale)
+    time_s, motor_rad = (np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad))
+    cameras, behind = _that_face_it(cameras, rods.wire, motor_rad)
+    views = pictures.views(cameras)
+    used = cameras.subset([view.camera.name for view in views])
+    strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
+    told, stands = _told(pictures, strokes, views)
+    bar_seen = see_bar(stands, used, rods, motor_rad, settings)
+    gives = Gives() if pictures.object_gives_way else None
+    return [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
+                          left_out=tuple(behind), told=told, gives=gives)
+            for number, stroke in enumerate(strokes)], bar_seen, stands
 
 
 def _told(pictures: TrialPictures, strokes, views: Sequence[View]) -> tuple[Told | None, Sequence[View]]:

@@ -25,6 +25,7 @@ from vision.truth.strategies import BarMiddles, Touch, TouchByClearance, early, 
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _WIRE_KNOT_MM = 12.0
+_EDGE_PX = 3.0  # beside the wire: as far as a lens blur of a pixel spreads its edge
 BESIDE_BAR_PX = 4.0
 # What changes slowly over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 _FREE_SHARED = 4.0
@@ -90,10 +91,7 @@ def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, touch: Touch
 def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Look]:
     """The whisk in the frames to fit, and what coarse points tell of them."""
     axis, wire = whisk.bar.axis, whisk.rods.wire
-    sights = [Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views]
-    free = np.array(whisk.frames)[early(whisk.angles_rad)]
-    rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
-    coarse = follow_bends(sights, axis, rest, whisk.motor)
+    rest, coarse = coarse_shapes(whisk)
     if whisk.is_thinned and not begins_free(whisk.angles_rad, np.array(list(coarse.values()))):
         raise TooFewFrames("too few of the frames before touch were looked at")
     whisk = whisk.during(touch.near(whisk.motor, coarse))
@@ -107,6 +105,16 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
         first = int(np.argmax(touching))
         whisk = whisk.yielding(came, float(np.mean(whisk.angles_rad[[np.flatnonzero(free[:first])[-1], first]])))
     return whisk, _Look(axis, came, rest, bend, arcs, curves, touching, free)
+
+
+def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """Rest shape (2, 4), mm, and the bend (2,), rad, of every frame, to a pixel or two. Raises Refused where no whisker
+    is seen to swing."""
+    axis = whisk.bar.axis
+    sights = [Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views]
+    free = np.array(whisk.frames)[early(whisk.angles_rad)]
+    rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
+    return rest, follow_bends(sights, axis, rest, whisk.motor)
 
 
 def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
@@ -215,6 +223,8 @@ def clear_pieces(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mappin
     """Pieces of the wire beside curves, clear of clamp and bar, in one of a whisk's cameras."""
     settings = whisk.settings
     pieces = wire_pieces(view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    if view.others:
+        pieces = pieces.select(pieces.show_rod(_EDGE_PX))
     pieces = pieces.below(SATURATED * view.full_scale)
     outline = outline_of_bar(view.camera, axis, whisk.bar_swept_mm)
     return pieces.select(clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM))

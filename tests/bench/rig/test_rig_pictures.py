@@ -138,7 +138,8 @@ def test_the_print_is_opencvs(legacy, inverted):
 
 def moment(motor_rad, material=None):
     rod, arc = Rod("cylinder", 100.0, 1.0, 60.0), np.linspace(HUB_FRONT_MM, 100, 257)
-    return Moment(motor_rad, Tube(unloaded(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25)))
+    tube = Tube(unloaded(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25))
+    return Moment.alone(motor_rad, tube)
 
 
 @pytest.fixture(scope="module", params=[0, 1])
@@ -152,7 +153,7 @@ def test_a_frame_is_the_still_scene_but_for_what_moves(setting):
     still, camera, _ = setting
     first, second = (still.brightness([moment(m)]) for m in (0.0, 0.01))
     changed = np.abs(first - second) > 1e-4
-    px = np.concatenate([camera.project(moment(m).whisker.axis_mm) for m in (0.0, 0.01)])
+    px = np.concatenate([camera.project(moment(m).whiskers[0].axis_mm) for m in (0.0, 0.01)])
     rows, columns = np.nonzero(changed)
     assert 500 < len(rows) < 0.1 * changed.size
     hub = camera.project(np.array([[x, y, z] for x in (-18, 6) for y in (-10, 10) for z in (-7, 8)]))
