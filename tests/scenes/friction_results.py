@@ -3,6 +3,7 @@
 import numpy as np
 
 from bench.base.results import plain
+from bench.friction import direction
 from bench.records.plain import from_plain
 from bench.records.trial import TrialResult, WhiskerFacts
 from bench.session.whisker import Whisker
@@ -21,12 +22,15 @@ PHI_SIGMA = np.radians(0.3)
 
 
 def deflection(d_x, beta):
-    """Of a whisker that slides, frame by frame, small angles."""
+    """Of a whisker that slides, frame by frame, small angles but for the way that the force turns."""
     theta = np.radians([1.0, 2.0, 3.0, 4.0])
     phi = slip.slip_angle(beta, ALPHA)
     size = d_x * theta * np.cos(beta) / np.cos(beta - phi)
+    slid = size * np.sin(phi) / max(np.cos(beta), 1e-9)
+    if phi != 0:
+        phi = np.sign(beta) * direction.slip_angle(theta, abs(beta), np.full(4, ALPHA))
     y, z = size * np.cos(phi), size * np.sin(phi)
-    rows = {"theta_rad": theta, "slip_mm": z / max(np.cos(beta), 1e-9), "across_y_mm": y, "across_z_mm": z}
+    rows = {"theta_rad": theta, "slip_mm": slid, "across_y_mm": y, "across_z_mm": z}
     rows |= {"motor_rad": theta, "along_mm": np.full(4, d_x), "past_mm": np.zeros(4)}
     return rows | {"covariance": 1e-6 * np.eye(8)}
 

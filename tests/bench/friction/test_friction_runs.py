@@ -8,6 +8,7 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.friction.alphas import felt_friction, mean_alpha, seen_friction
+from bench.friction.direction import slip_angle
 from bench.friction.runs import FITTED, SEEN, _rescaled, with_runs
 from bench.friction.section_vii import Contact, by_consistency, by_smoothness, by_tilting, weights
 from bench.friction.tables import alpha_lines, friction_of, write_friction
@@ -117,7 +118,7 @@ def test_friction_along_the_whisker_counts():
     found = felt_friction(replace(seen, deflection=wandering), felt, THETA)[0]
     assert found == pytest.approx(np.arctan(np.sqrt(2.0) * np.tan(ALPHA)), abs=1e-6)
     cos = 1.0 / np.hypot(1.0, d.theta_rad / THETA)
-    bent = d.across_y_mm * np.tan(np.radians(60.0) - np.arctan(np.tan(ALPHA) * cos))
+    bent = d.across_y_mm * np.tan(slip_angle(d.theta_rad, np.radians(60.0), np.arctan(np.tan(ALPHA) * cos)))
     assert seen_friction(replace(seen, deflection=replace(wandering, across_z_mm=bent)))[0] == pytest.approx(
         ALPHA, abs=1e-4)  # fmt: skip
     assert seen_friction(seen)[0] == pytest.approx(ALPHA, abs=1e-6)
