@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.array.surface import Surface, seen_surface
+from bench.base.doubts import in_one_status
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
@@ -95,7 +96,7 @@ def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Ite
         yield Contact(*of_whisk, SEEN, *placed, seen.beta_rad.sigma, seen.status, *whisker)
     for answer in (*felt.estimates, *felt.sensors):
         if math.isfinite(answer.d_x_est_mm.value) and math.isfinite(felt.touch_felt_rad.value):
-            status = "; ".join(dict.fromkeys(filter(None, [felt.status, answer.status])))
+            status = in_one_status(felt.status, answer.status)
             found = *_felt(mount, felt, answer), status, *whisker, _by_alpha_mm(answer), not felt.status
             yield Contact(*of_whisk, answer.estimator, *found)
 

@@ -8,6 +8,11 @@ from typing import Any
 from bench.base.errors import BadInput
 
 
+def in_one_status(*said: str | None) -> str:
+    """Sentences as one status, each once; what is empty is left out."""
+    return "; ".join(dict.fromkeys(filter(None, said)))
+
+
 @dataclass
 class Doubts:
     """Refusals (bad input) and notes (usable, but look at it), in the order in which they were found."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.doubts import in_one_status
 from bench.base.tables import sigma_name, write_table
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from estimator.distance import cartesian, contact_point
@@ -141,7 +142,7 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
 
 def status_of(seen: SeenWhisk, felt: FeltWhisk) -> str:
     """What is doubtful of a whisk, seen and felt, each thing once."""
-    return "; ".join(dict.fromkeys(filter(None, [seen.status, felt.status])))
+    return in_one_status(seen.status, felt.status)
 
 
 def _whisk_of(result: TrialResult, seen: SeenWhisk) -> dict:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
 from bench.base.tables import write_table
 from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
@@ -81,7 +82,7 @@ def _row(one: WayBack) -> dict:
     row |= {"error_mm": one.error_mm, "error_percent": 100.0 * one.error_mm / float(one.d_x_mm.value)}
     inside, said = one.inside, (seen.status, felt.status, answer.status)
     row["inside"] = None if inside is None else int(inside)
-    return row | {"status": "; ".join(dict.fromkeys(filter(None, said)))}
+    return row | {"status": in_one_status(*said)}
 
 
 def both_ways_lines(found: Sequence[WayBack]) -> Iterator[str]:

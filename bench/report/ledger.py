@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.doubts import in_one_status
 from bench.base.tables import write_table
 from bench.records.trial import TrialResult, whisks
 from bench.report.left_out import COST_PERCENT, NAMES, WhiskAtHand, of_estimate, of_truth
@@ -98,7 +99,7 @@ def _entry(name: str, here: WhiskAtHand) -> Entry:
         np.degrees(here.felt.touch_felt_rad.sigma),
         d_x_est.sigma,
     )
-    status = "; ".join(dict.fromkeys(filter(None, [seen.why, felt.why])))
+    status = in_one_status(seen.why, felt.why)
     named = (dict(zip(QUANTITIES, map(float, values))) for values in (effects, sigmas))
     return Entry(here.result.trial.name, here.seen.whisk, name, *named, status)
 

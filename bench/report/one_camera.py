@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.doubts import in_one_status
 from bench.base.tables import write_table
 from bench.records.trial import ByOneCamera, SeenWhisk, TrialResult, whisks
 from estimator.uncertainty import Z_95
@@ -81,7 +82,7 @@ def _row(one: ShapeSeen) -> dict:
     row |= {name: getattr(said, name) for name in ("stiffness_N_mm", "stiffness_sigma_N_mm", "stiffness_low_N_mm")}
     row |= {"error_mm": one.error_mm, "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value)}
     row["inside"] = None if one.inside is None else int(one.inside)
-    return row | {"status": "; ".join(dict.fromkeys(filter(None, (seen.status, said.status))))}
+    return row | {"status": in_one_status(seen.status, said.status)}
 
 
 def one_camera_lines(found: Sequence[ShapeSeen]) -> Iterator[str]:

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from bench.base.doubts import in_one_status
 from bench.base.settings import Settings
 from bench.cameras.calibration import SessionCalibration
 from bench.gauges.felt import motor_speed
@@ -131,7 +132,7 @@ def whisk_record(
     """One whisk: at first touch, at the wanted angle, a row a frame, and lines to draw."""
     at = truth.at(settings.theta_rad)
     contradictions = [*contradictions, turns_doubt(truth.turns, motor_speed(truth.frames)) if truth.frames else ""]
-    status = "; ".join(dict.fromkeys(filter(None, [truth.status, at.status, *contradictions, *doubts])))
+    status = in_one_status(truth.status, at.status, *contradictions, *doubts)
     drawn = _overlay(truth, at.theta_rad)
     same = {name: getattr(truth, name) for name in _SAME}
     odd = any(contradictions)
