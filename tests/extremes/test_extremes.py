@@ -59,4 +59,7 @@ def test_an_object_that_leans_far_is_told_by_its_stroke(psi_deg, told):
 def test_the_edges_hold(extreme, value):
     rows = [row(extreme, value, seed) for seed in range(3)]
     for seen in rows:
+        if extreme == "sights_deg" and "d_x_mm_error" not in seen:  # no two cameras, and no one alone, tell it
+            assert seen["status"]
+            continue
         assert abs(seen["d_x_mm_error"]) < 4 * seen["d_x_mm_sigma"]

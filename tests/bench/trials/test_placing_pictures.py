@@ -103,7 +103,7 @@ def test_a_board_1_mm_across_is_an_alarm(wide, tmp_path):
 def test_the_swing_alone_places_the_rig(wide, tmp_path):
     session = replace(wide, T_rig_board=None)
     cameras, T_rig_board, note = on_the_rig(session, moved(wide, invert_transform(wide.T_rig_board)), np.eye(3, 4))
-    assert "a first look at 1 strokes" in note
+    assert "a first look at 1 stroke " in note
     _, doubts, unit = place(session, cameras, T_rig_board, tmp_path)
     assert not doubts
     truth = tomllib.loads((unit.trial.folder / "truth.toml").read_text())
