@@ -17,7 +17,9 @@ from scipy.special import chdtrc
 from bench.array.cloud import Contact
 from bench.array.surface import STATED, Surface
 from bench.array.verdict import FELT
+from bench.base.doubts import in_one_status
 from bench.base.tables import sigma_name, write_table
+from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
@@ -28,7 +30,6 @@ COLUMNS = (
 _SIZES = {"bar": "radius_mm", "sphere": "radius_mm", "ring": "ring_radius_mm", "cone": "half_angle_rad"}
 _STEP = 1e-3  # mm, rad: of differences
 _LEAST_CHANCE = 1e-3  # that contacts on such a surface lie as far off it: one sound object in a thousand
-_TOLD = 1.959964  # sigmas: a size whose 95 % interval holds 0 is not told
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def felt_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> Felt
 def _status(size: Value, chance: float) -> str:
     if chance < _LEAST_CHANCE:
         return f"contacts lie farther off such a surface than their sigmas let them (chance {chance:.1g})"
-    return "not told: the interval holds 0" if size.value < _TOLD * size.sigma else ""
+    return "not told: the interval holds 0" if size.value < Z_95 * size.sigma else ""
 
 
 def _free(surface: Surface) -> np.ndarray:
@@ -198,4 +199,4 @@ def size_lines(found: Iterable[Felt]) -> Iterator[str]:
             yield f"{what}: no size; {felt.status}"
             continue
         told = f"{name.rpartition('_')[0].replace('_', '-')} {value:.2f} ± {sigma:.2f} {unit}, stated {stated:.2f}"
-        yield "; ".join(filter(None, [f"{what}: {told}", felt.status]))
+        yield in_one_status(f"{what}: {told}", felt.status)

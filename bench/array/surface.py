@@ -7,7 +7,7 @@ import numpy as np
 from bench.records.trial import SeenWhisk
 from bench.session.session import Base
 from bench.session.trial import Trial
-from vision.geometry.centreline import rotation_z
+from vision.bar.find import axis_from_angles
 from vision.geometry.rods import Wire
 
 STATED, SEEN = "manifest", "pictures"
@@ -96,12 +96,10 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
     """
     if not seen.has_truth or seen.point_covariance_mm2 is None or not np.isfinite(bar_radius_mm):
         return None
-    beta, psi, touch = seen.beta_rad.value, seen.psi_rad.value, seen.touch_rad.value
-    turn = base.T_rig_base[:, :3] @ rotation_z(touch)
-    axis = turn @ [np.sin(psi), np.cos(psi) * np.sin(beta), np.cos(psi) * np.cos(beta)]
-    across = np.cross(axis, turn[:, 0])
+    turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
     reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
-    contact = base.T_rig_base[:, :3] @ seen.point_mm.value + base.T_rig_base[:, 3]
-    covariance = base.T_rig_base[:, :3] @ seen.point_covariance_mm2 @ base.T_rig_base[:, :3].T
-    point = contact + reach_mm * across / np.linalg.norm(across)
+    angles = seen.touch_rad.value, seen.beta_rad.value, seen.psi_rad.value
+    from_contact = axis_from_angles(0.0, *angles, reach_mm)
+    point, axis = turn @ (seen.point_mm.value + from_contact.point_mm) + shift, turn @ from_contact.direction
+    covariance = turn @ seen.point_covariance_mm2 @ turn.T
     return Surface("bar", point, axis, bar_radius_mm, covariance_mm2=covariance, source=SEEN)

@@ -21,7 +21,7 @@ SEEING = (
     *("vision", "bench/session", "bench/cameras", "bench/gauges/felt.py", "bench/trials/seen.py"),
     *("bench/trials/pictures.py", "bench/trials/other_wires.py", "bench/trials/whose_wire.py"),
     *("bench/trials/consistency.py", "bench/trials/placing.py", "bench/trials/scene.py", "bench/trials/seeing.py"),
-    *("bench/records", "bench/base/results.py", "bench/base/settings.py"),
+    *("bench/records", "bench/base/doubts.py", "bench/base/results.py", "bench/base/settings.py"),
     *("bench/trials/one_camera.py", "estimator/seen_shape.py", "estimator/beam.py", "estimator/load_cell.py"),
 )
 ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")

@@ -59,19 +59,20 @@ def curved(felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sig
         return Curved(len(chosen), status=TOO_FEW)
     theta, moments = np.array([at.theta_rad for at in chosen]), np.array([(at.m_y_Nmm.value, at.m_z_Nmm.value)
                                                                         for at in chosen])  # fmt: skip
-    phi, phi_rate = _rate(theta, np.arctan2(*moments.T), [phi_sigma(at) for at in chosen])
+    phis = np.arctan2(*moments.T)
+    phi, phi_rate = _rate(theta, phis, [phi_sigma(at) for at in chosen])
     beam, held = whisker.beam, abs(phi.value) <= _HELD_SIGMAS * phi.sigma
-    turned = float(np.ptp(np.arctan2(*moments.T)))
-    if not held and turned > _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma:
+    span = float(np.ptp(phis))
+    if not held and span > _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma:
         if len(chosen) > _FEWEST:
             return curved(chosen[:-1], whisker, alpha_rad, alpha_sigma_rad)
-        return Curved(len(chosen), phi_0_rad=phi, status=f"phi turns by {np.degrees(turned):.0f} degrees: too far")
+        return Curved(len(chosen), phi_0_rad=phi, status=f"phi turns by {np.degrees(span):.0f} degrees: too far")
     distances = [_distance(at, alpha_rad, beam) for at in chosen]
     if not np.isfinite(distances).all():
         return Curved(len(chosen), phi_0_rad=phi, status="(10) has no distance at all of the angles")
     d_x, creep = _rate(theta, *np.array(distances).T)
-    leans = 0.0 if held else _turned(d_x.value, phi.value, phi_rate, alpha_rad)
-    radius = _radius(d_x.value, creep, 0.0 if held else phi.value, (alpha_rad, alpha_sigma_rad), leans, whisker)
+    turned = 0.0 if held else _turned(d_x.value, phi.value, phi_rate, alpha_rad)
+    radius = _radius(d_x.value, creep, 0.0 if held else phi.value, (alpha_rad, alpha_sigma_rad), turned, whisker)
     if held:
         return Curved(len(chosen), radius, phi, status="does not slip sideways: no lateral curvature")
     return Curved(len(chosen), radius, phi, *_lateral(phi.value, phi_rate, d_x.value, alpha_rad))

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -100,9 +100,9 @@ def trial_toml(recording: Recording) -> str:
     return tomli_w.dumps(trial)
 
 
-def frames_csv(recording: Recording, clock_offset_s: float) -> str:
+def frames_csv(times_s: Iterable[float], clock_offset_s: float) -> str:
     """frames.csv, by a clock that is late by so much."""
-    lines = [f"{i},{time - clock_offset_s:.6f}" for i, time in enumerate(recording.frames.time_s)]
+    lines = [f"{i},{time - clock_offset_s:.6f}" for i, time in enumerate(times_s)]
     return "\n".join(["frame,time_s", *lines]) + "\n"
 
 
@@ -142,13 +142,6 @@ def array_signals_csv(recording: ArrayRecording) -> str:
     form = ",".join("%.5f" if name.startswith("motor_deg") else "%.6f" for name in recording.channels)
     lines = [form % tuple(row) for row in np.column_stack(list(recording.channels.values())).tolist()]
     return "\n".join([",".join(recording.channels), *lines]) + "\n"
-
-
-def array_frames_csv(recording: ArrayRecording, clock_offset_s: float) -> str:
-    """frames.csv of an array's recording, as `frames_csv`."""
-    times = np.concatenate(recording.frame_times_s)
-    lines = [f"{i},{time - clock_offset_s:.6f}" for i, time in enumerate(times)]
-    return "\n".join(["frame,time_s", *lines]) + "\n"
 
 
 def truth_csv(recording: Recording) -> str:

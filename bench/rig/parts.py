@@ -97,7 +97,7 @@ def _trial(job, number, folder):
     run, pictures = job.protocol.runs()[number], job.protocol.pictures
     recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
     texts = {"trial.toml": papers.trial_toml(recording), "signals.csv": papers.signals_csv(recording),
-             "frames.csv": papers.frames_csv(recording, pictures.clock_offset_s),
+             "frames.csv": papers.frames_csv(recording.frames.time_s, pictures.clock_offset_s),
              "truth.csv": papers.truth_csv(recording), "truth.toml": papers.truth_toml(recording)}
     for name, text in texts.items():
         papers.write(folder / name, text)
@@ -111,10 +111,10 @@ def _array_trial(job, number, folder):
     run, streams = job.protocol.runs()[number], [job.stream(_TRIAL, number)]
     streams += [job.stream(_ARRAY, number, whisker) for whisker in range(len(job.whiskers))]
     recording = ArrayRecording.make(job.protocol, run, job.whiskers, streams)
-    seen = bool(job.protocol.cameras) and not job.signals_only
+    seen, clock_offset_s = bool(job.protocol.cameras) and not job.signals_only, job.protocol.pictures.clock_offset_s
     texts = {"trial.toml": papers.array_trial_toml(recording, says_where=not seen),
              "signals.csv": papers.array_signals_csv(recording),
-             "frames.csv": papers.array_frames_csv(recording, job.protocol.pictures.clock_offset_s)}
+             "frames.csv": papers.frames_csv(np.concatenate(recording.frame_times_s), clock_offset_s)}
     for name, one in recording.recordings.items():
         if one is not None:
             texts |= {f"truth@{name}.csv": papers.truth_csv(one), f"truth@{name}.toml": papers.truth_toml(one)}

@@ -101,6 +101,12 @@ def _agree(values: np.ndarray, variances: np.ndarray) -> bool:
     return len(values) == 1 or Difference(values, _without_mean(np.diag(variances)), len(values) - 1).is_chance
 
 
+def _logs(looks: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
+    """Logarithms (n,) of what cameras see, and their variances."""
+    values, sigmas = np.array([(one.value, one.sigma) for one in looks.values()]).T
+    return np.log(values), (sigmas / values) ** 2
+
+
 def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
     motor, index, n = turns.motor_rad, turns.index, len(turns.index)
     none, ahead = np.zeros(n), np.diff(motor, append=2.0 * motor[-1] - motor[-2])
@@ -144,8 +150,8 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
     if not bar_looks:
         return ""
     looks, looks_sigma = in_all({name: (one.value, one.sigma) for name, one in bar_looks.items()})
-    each = np.array([[np.log(one.value / looks), (one.value / one.sigma) ** 2] for one in bar_looks.values()])
-    if len(each) > 1 and not Difference(each[:, 0], np.diag(each[:, 1]), len(each) - 1).is_chance:
+    logs, variances = _logs(bar_looks)
+    if not _agree(logs, variances):
         low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))
         found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
         return f"{found}: check its diameter_mm, or something else is taken for it"
@@ -167,8 +173,7 @@ def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> str:
     camera."""
     if not looks:
         return ""
-    logs = np.log([one.value for one in looks.values()])
-    variances = np.array([(one.sigma / one.value) ** 2 for one in looks.values()])
+    logs, variances = _logs(looks)
     stated = (whisker.diameter_sigma_mm / whisker.diameter_mm) ** 2
     of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
     if of_all.is_chance or not _agree(logs, variances):

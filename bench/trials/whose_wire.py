@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.base.doubts import in_one_status
 from bench.records.trial import SeenTrial, SeenWhisk
 from vision.fit.problem import REST_PRIOR_MM
 from vision.pictures.others import Others, RodLines
@@ -42,7 +43,7 @@ def _checked(whisk: SeenWhisk, straight, looked, own: str, radius_mm: float) -> 
         taken += [nearest] * (nearest != own and nearest not in taken)
     if taken:
         said.append(f"its wire may be that of {' or '.join(taken)}")
-    status = "; ".join(filter(None, [whisk.status, *said]))
+    status = in_one_status(whisk.status, *said)
     return replace(whisk, status=status, contradicted=whisk.contradicted or bool(said))
 
 

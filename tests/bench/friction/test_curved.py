@@ -73,11 +73,23 @@ def test_a_short_push_does_not_tell():
     assert found.status == TOO_FEW and np.isnan([found.radius_mm.value, found.lateral_per_mm.value]).all()
 
 
+def curvatures(folder, text: str) -> list[dict]:
+    """The rows of curvature.csv of a protocol, simulated and evaluated."""
+    session = simulate(folder / "session", protocol=protocol_file(folder, text), signals_only=True, seed=2)
+    evaluate(session, folder / "out", Settings(), workers=0)
+    with (folder / "out" / "curvature.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def felt_on_ball(folder, diameter_mm: str, beta_deg: str) -> list[dict]:
+    """The same of a ball, 60 mm away."""
+    ball = 'd_x_mm = 60.0\nobject = "sphere"\n'
+    text = PROTOCOL.replace("d_x_mm = 40.0\n", ball).replace("30.0", diameter_mm).replace("[0, 20, 30]", beta_deg)
+    return curvatures(folder, text)
+
+
 def test_the_radius_of_a_thick_bar_is_felt(tmp_path):
-    session = simulate(tmp_path / "session", protocol=protocol_file(tmp_path, PROTOCOL), signals_only=True, seed=2)
-    evaluate(session, tmp_path / "out", Settings(), workers=0)
-    with (tmp_path / "out" / "curvature.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = curvatures(tmp_path, PROTOCOL)
     for row in rows:
         radius, sigma = float(row["radius_mm"]), float(row["radius_sigma_mm"])
         assert sigma < 12.0 and abs(radius - 15.0) < 2 * sigma  # by a lean of 5° that nobody excludes
@@ -91,27 +103,17 @@ def test_the_radius_of_a_thick_bar_is_felt(tmp_path):
 def test_the_radius_of_a_ball_is_within_what_is_said_of_it(tmp_path):
     """There φ turns as the contact slips, and (10) falls short for that, too: at 40° on one of 80 mm by twice as much
     as for the rolling."""
-    ball = 'd_x_mm = 60.0\nobject = "sphere"\n'
-    text = PROTOCOL.replace("d_x_mm = 40.0\n", ball).replace("30.0", "80.0").replace("[0, 20, 30]", "[30, 40, 50]")
-    session = simulate(tmp_path / "session", protocol=protocol_file(tmp_path, text), signals_only=True, seed=2)
-    evaluate(session, tmp_path / "out", Settings(), workers=0)
-    with (tmp_path / "out" / "curvature.csv").open(newline="") as file:
-        for row in csv.DictReader(file):
-            assert abs(float(row["radius_mm"]) - 40.0) < 2 * float(row["radius_sigma_mm"])
-            assert float(row["lateral_per_mm"]) > 2 * float(row["lateral_sigma_per_mm"])
+    for row in felt_on_ball(tmp_path, "80.0", "[30, 40, 50]"):
+        assert abs(float(row["radius_mm"]) - 40.0) < 2 * float(row["radius_sigma_mm"])
+        assert float(row["lateral_per_mm"]) > 2 * float(row["lateral_sigma_per_mm"])
 
 
 def test_of_a_slip_angle_that_turns_far_the_first_angles_tell(tmp_path):
     """On a ball of 40 mm φ doubles over 12°: by all angles the radius was 7 sigma off, and lateral curvature 8."""
-    ball = 'd_x_mm = 60.0\nobject = "sphere"\n'
-    text = PROTOCOL.replace("d_x_mm = 40.0\n", ball).replace("30.0", "40.0").replace("[0, 20, 30]", "[20, 30, 40]")
-    session = simulate(tmp_path / "session", protocol=protocol_file(tmp_path, text), signals_only=True, seed=2)
-    evaluate(session, tmp_path / "out", Settings(), workers=0)
-    with (tmp_path / "out" / "curvature.csv").open(newline="") as file:
-        for row in csv.DictReader(file):
-            assert int(row["angles"]) < 9
-            assert abs(float(row["radius_mm"]) - 20.0) < 2 * float(row["radius_sigma_mm"])
-            assert abs(float(row["lateral_per_mm"]) - 0.049) < 2 * float(row["lateral_sigma_per_mm"])
+    for row in felt_on_ball(tmp_path, "40.0", "[20, 30, 40]"):
+        assert int(row["angles"]) < 9
+        assert abs(float(row["radius_mm"]) - 20.0) < 2 * float(row["radius_sigma_mm"])
+        assert abs(float(row["lateral_per_mm"]) - 0.049) < 2 * float(row["lateral_sigma_per_mm"])
 
 
 @pytest.mark.parametrize("r_n, told", [(1.0, True), (1e6, False)])
