@@ -75,17 +75,17 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
     grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
     steps, best = 0.5 * np.array([one[1] - one[0] for one in values]), grid
     for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)):
-        near = [_spread(one, spread * one.half_px) for one in seen]
+        near = [spread_out(one, spread * one.half_px) for one in seen]
         last = spread == _SPREADS[-1]
         counts, along_mm = (_COUNTS, _ALONG_MM) if last else (np.maximum(_COUNTS, 0.0), _ALONG_MM[::2])
         score = partial(_clear_in_all, near, axis_of, radius_mm, counts, along_mm)
         if best is grid:
-            best = _apart(grid, score(grid), 4.0 * steps, _STARTS)
-        best = _apart(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
+            best = apart_from_others(grid, score(grid), 4.0 * steps, _STARTS)
+        best = apart_from_others(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
     return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(best)).values())]
 
 
-def _spread(seen: Clear, blur_px: float) -> Clear:
+def spread_out(seen: Clear, blur_px: float) -> Clear:
     """The same, blurred; with no edges at the picture's border, where lines end that leave it."""
     field = gaussian_filter(seen.field, (0.0, blur_px, blur_px))
     field[:, [0, -1]] = field[:, :, [0, -1]] = 0.0
@@ -97,7 +97,7 @@ def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, co
     return np.mean([both_edges(axis_of(each), one, radius_mm, counts, along_mm) for one in seen], axis=0)
 
 
-def _apart(each, score, apart, most: int) -> np.ndarray:
+def apart_from_others(each, score, apart, most: int) -> np.ndarray:
     """At most so many of the hypotheses (n, k), the best, of which no two lie within so much of each other (k,)."""
     chosen: list[np.ndarray] = []
     for one in each[np.argsort(score)[::-1]]:

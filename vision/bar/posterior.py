@@ -119,7 +119,7 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
     rod = LitRod(seen)
     under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
-    own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
+    own = np.array([one.of_bar[..., 0] for one in under]) / overstated(_best(under), seen)[:, None]
     total = np.sum(-2.0 * np.logaddexp(-0.5 * (own - own.min(axis=(0, 2), keepdims=True)), -0.5 * _MOST), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
 
@@ -155,7 +155,7 @@ def _best(under: Sequence[Evidence]) -> Evidence:
     return min(under, key=lambda one: one.least.sum())
 
 
-def _overstated(one: Evidence, seen: Profiles) -> np.ndarray:
+def overstated(one: Evidence, seen: Profiles) -> np.ndarray:
     """By how much (k,) the evidence of each stretch is: noise goes together as far as pieces show it; what is left
     beyond noise is light that no such model has, and goes together as far as the lens blurs it: exp(-x² / 4 blur²).
     """
@@ -173,7 +173,7 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
     ends = [np.linspace(-most, most, window.lines) for most in window.most_px]
     lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
     logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
-    temper = _overstated(_best(under), seen)
+    temper = overstated(_best(under), seen)
     own = np.stack([one.of_bar for one in under], axis=-1) / temper[:, None, None, None]
     if len(logs) > 2 and np.max(np.diff(logs)) < _SPLINE:
         log_blurs = np.linspace(logs[0], logs[-1], _BLURS)

@@ -12,7 +12,7 @@ from vision.fit.problem import BAR, REST, REST_PRIOR_MM, Problem, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, one_curve
-from vision.geometry.contact import BarAxis, closest_arc, outline_of_bar
+from vision.geometry.contact import Axis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.rods import Rods, Wire
@@ -46,7 +46,7 @@ class Sight:
     bar_px: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, view: View, rods: Rods, axis: BarAxis, frames: Sequence[int],
+    def of(cls, view: View, rods: Rods, axis: Axis, frames: Sequence[int],
            bar_mm: float) -> "Sight":
         """frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is."""
         frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))]
@@ -61,7 +61,7 @@ class Sight:
         return votes(pieces.select(clear), still.background[clear], self.still_share, reach_px)
 
 
-def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: BarAxis, motor_rad: Mapping[int, float]) -> np.ndarray:
+def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: Axis, motor_rad: Mapping[int, float]) -> np.ndarray:
     """Rest shape (2, 4) in mm from frames {index: motor angle} in which nothing touches.
 
     Raises Refused where no whisker is seen to swing.
@@ -95,7 +95,7 @@ def _resting_points(sight: Sight, curves: Mapping[int, Curves]) -> tuple[LinePoi
     return points.select(keep), seen.pieces.source[keep]
 
 
-def follow_bends(sights: Sequence[Sight], axis: BarAxis, rest_mm: np.ndarray,
+def follow_bends(sights: Sequence[Sight], axis: Axis, rest_mm: np.ndarray,
                  motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
     bend_rad: dict[int, np.ndarray] = {}
@@ -165,7 +165,7 @@ def _fit_bend(model: _Model, bend, seen: Sequence[LinePoints], pull, rounds: int
     return bend
 
 
-def _pull(axis: BarAxis, views: int) -> np.ndarray:
+def _pull(axis: Axis, views: int) -> np.ndarray:
     """Inverse covariance (2, 2) of a bend before it is seen: weak, but for one view, to which a part of it is hidden:
     the bar pushes at right angles to itself, and friction adds a part of that."""
     if views > 1:
@@ -174,7 +174,7 @@ def _pull(axis: BarAxis, views: int) -> np.ndarray:
     return np.eye(2) / _PULL_RAD**2 + np.outer(along, along) / _ALONG_BAR_RAD**2
 
 
-def contact_arc(rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: BarAxis, wire: Wire) -> float:
+def contact_arc(rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: Axis, wire: Wire) -> float:
     """Arc length in mm at which a whisker of this rest shape (2, 4), mm, and bend (2,), rad, is nearest to the axis."""
     straight = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
     arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)

@@ -1,7 +1,7 @@
 """What is known, seen and looked for of one whisk: the fit's observations and parameters, and the curves they mean."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from vision.fit.motion import Motion, Yielding, between
 from vision.fit.onset import Onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import BarAxis, axis_frame, closest_arc, shifted_axis
+from vision.geometry.contact import Axis, axis_frame, closest_arc, shifted_axis
 from vision.geometry.rods import Rods, Wire
 from vision.lines.points import SHARED, Observed
 
@@ -42,7 +42,7 @@ class Problem:
     """What is known and seen of one whisk.
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
-    axis: where the bar's four parameters are counted from. onset: when the whisker is seen to begin to bend, where the
+    axis: where the bar's four parameters are counted from, and a fifth of a rounded object, along its direction. onset: when the whisker is seen to begin to bend, where the
     cameras do not know whisker and bar well enough in space to tell when they touch, or when a bar begins to give way:
     then as late beside it as the motion's first parameter has it. alike: by camera, how much of its
     error a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`). motion: of a bar
@@ -51,7 +51,7 @@ class Problem:
 
     cameras: Cameras
     rods: Rods
-    axis: BarAxis
+    axis: Axis
     motor_rad: np.ndarray
     touching: np.ndarray
     bent: np.ndarray
@@ -78,9 +78,14 @@ class Problem:
 
     @property
     def bar_moves(self) -> slice:
-        """Parameters of the bar's motion: none where it stands still."""
+        """Parameters of the bar's motion: none where it stands still. Of a rounded object that along its direction."""
         first = BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
-        return slice(first, first + (0 if self.motion is None else len(self.motion)))
+        return slice(first, first + (0 if self.motion is None else len(self.motion)) + self.is_rounded)
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether what is touched is no straight bar; it stands still then."""
+        return self.rods.bar.form is not None
 
     def bend_of(self, frame: int) -> slice:
         """Parameters of a frame's bend; the frame may bend."""
@@ -106,9 +111,13 @@ class State:
     arcs_mm: np.ndarray
 
 
-def bar_axis(problem: Problem, vector: np.ndarray) -> BarAxis:
-    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start."""
-    return shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
+def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
+    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start; of a rounded
+    object a shift along it, too."""
+    axis = shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
+    if not problem.is_rounded:
+        return axis
+    return replace(axis, point_mm=axis.point_mm + vector[..., problem.bar_moves] * problem.axis.direction)
 
 
 def shifts_mm(problem: Problem, vector: np.ndarray) -> np.ndarray:
@@ -118,14 +127,14 @@ def shifts_mm(problem: Problem, vector: np.ndarray) -> np.ndarray:
     return problem.motion.shift_mm(vector[..., problem.bar_moves])
 
 
-def bar_axes(problem: Problem, vector: np.ndarray) -> BarAxis:
+def bar_axes(problem: Problem, vector: np.ndarray) -> Axis:
     """The bar's axis (…, f, 3) in each frame; (…, 1, 3) where it stands."""
     axis = bar_axis(problem, vector)
     point, direction = axis.point_mm[..., None, :], axis.direction[..., None, :]
     if problem.motion is None:
-        return BarAxis(point, direction)
+        return replace(axis, point_mm=point, direction=direction)
     point = point + shifts_mm(problem, vector)
-    return BarAxis(point, np.broadcast_to(direction, point.shape))
+    return replace(axis, point_mm=point, direction=np.broadcast_to(direction, point.shape))
 
 
 def shift_at_mm(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:

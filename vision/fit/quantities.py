@@ -12,7 +12,7 @@ from vision.fit.differences import perturbed
 from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, rest_shape, shift_at_mm, shifts_mm
 from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
+from vision.geometry.contact import BarAxis, bar_at, clearance, contact_frame_angles
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,14 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     each = bar_axes(problem, vector)
     curves, _ = curves_of(problem, vector, arcs_mm)
     _, arc, point = clearance(curves, each)
-    beta, psi = contact_frame_angles(axis.direction, touch.motor_rad)
+    touched = bar_at(axis, touch.point_mm)
+    beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
     whisk = {"touch": touch.motor_rad, "d_x": np.linalg.norm(touch.point_mm, axis=-1), "beta": beta, "psi": psi,
              **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")}}
     came = shifts_mm(problem, vector) - shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
-    slip = np.sum((point - touch.point_mm[..., None, :] - came) * each.direction, axis=-1)
+    slip = np.sum((point - touch.point_mm[..., None, :] - came) * touched.direction[..., None, :], axis=-1)
     d_y, d_z = _deflection(problem, vector, touch, point)
-    alpha = _angle_to_normal(_force(curves, touch, arc, d_y, d_z), each, point, beta)
+    alpha = _angle_to_normal(_force(curves, touch, arc, d_y, d_z), bar_at(each, point), point, beta)
     frame = {"slip": slip, "longitudinal_slip": arc - touch.arc_mm[..., None], "d_y": d_y, "d_z": d_z, "arc": arc,
              "phi": np.arctan2(d_z, d_y), "alpha": alpha,
              **{name: point[..., k] for k, name in enumerate("xyz")}}

@@ -22,7 +22,7 @@ from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
 from vision.fit.uncertainty import by_lens
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
 from vision.geometry.centreline import REST_POWERS, Curves, rotation_z, simpson, tangent_growth
-from vision.geometry.contact import BarAxis, closest_arc
+from vision.geometry.contact import closest_arc
 from vision.geometry.rods import Wire
 from vision.lines.one_sided import WireAppearance
 
@@ -129,7 +129,8 @@ def _contacts_of_small_angles(problem: Problem, state: State, curves: Curves, ar
     moves = _in_rig(problem, curves, [_small_angles(problem, state, curves, arcs_mm)])
     moved = Curves(curves.arc_mm, curves.points_mm + moves.points_mm[0], curves.tangents + moves.tangents[0])
     axis = bar_axes(problem, state.vector)
-    each = BarAxis(*(np.broadcast_to(part, (len(arcs_mm), 3)) for part in (axis.point_mm, axis.direction)))
+    point, direction = (np.broadcast_to(part, (len(arcs_mm), 3)) for part in (axis.point_mm, axis.direction))
+    each = replace(axis, point_mm=point, direction=direction)
     return closest_arc(moved, each, arcs_mm)
 
 

@@ -3,11 +3,13 @@
 moves: `Curves` whose points and tangents (k, f, m, 3) are what each of k changes adds to those of the f frames.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axes
 from vision.geometry.centreline import Curves
-from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.contact import bar_at, clearance
 from vision.lines.points import Observed
 
 
@@ -40,8 +42,10 @@ def by_contacts(
         np.concatenate([still[None], still + step * moved])
         for still, moved in ((curves.points_mm, moves.points_mm), (curves.tangents, moves.tangents))
     )
-    wide = BarAxis(*(np.broadcast_to(part, (*points.shape[:2], 3)) for part in (axis.point_mm, axis.direction)))
+    point, direction = (np.broadcast_to(part, (*points.shape[:2], 3)) for part in (axis.point_mm, axis.direction))
+    wide = replace(axis, point_mm=point, direction=direction)
     distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), wide)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
-    slip = (contact[1:, frame] - contact[0, frame]) @ axis.direction[0] / step
+    along = bar_at(axis, contact[0, frame]).direction[0]
+    slip = (contact[1:, frame] - contact[0, frame]) @ along / step
     return by_change[:, problem.touching].T, slip

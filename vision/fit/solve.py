@@ -17,6 +17,8 @@ from vision.fit.differences import perturbed, steps
 from vision.fit.onset import Onset
 from vision.fit.problem import (
     BAR,
+    BAR_MODES_PX,
+    BAR_OFFSET_PX,
     BAR_PRIOR,
     BAR_TILT_ARM_MM,
     BEND_PRIOR_RAD,
@@ -36,6 +38,7 @@ from vision.fit.problem import (
 )
 from vision.geometry.centreline import Curves, centrelines
 from vision.geometry.contact import clearance
+from vision.geometry.grazing import sights_beside
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.silhouette import edges
 from vision.lines.points import LinePoints, Observed
@@ -129,6 +132,8 @@ def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm, frame) -> t
 def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns, vector):
     """Residuals and Jacobian rows of one camera's points of the bar: of its middle, or of an edge."""
     points = _together(group)
+    if problem.is_rounded:
+        return _limb_block(problem, number, points, bool(columns), vector)
     side, frame = (np.repeat(of, [len(s.points) for s in group]) for of in zip(*((s.side, s.bar_in) for s in group)))
     moves = range(problem.size)[problem.bar_moves]
     moving = [*range(BAR), *([REACH] if np.any(side) else []), *moves] if columns else []
@@ -139,6 +144,22 @@ def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns
     jacobian[:, moving] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
     modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
     return _over_sigma(points, px[0], jacobian, problem.bar_off(number), modes, vector)
+
+
+def _limb_block(problem: Problem, number: int, points: LinePoints, by_all: bool, vector):
+    """The same of points of a rounded object's outline: how far their sights pass outside of it."""
+    along = problem.bar_moves.start
+    moving = [*range(BAR), along] if by_all else []
+    step = steps(problem)[moving]
+    moved = np.vstack([vector, vector + step[:, None] * np.eye(problem.size)[moving]])
+    camera, radius_mm = problem.cameras.cameras[number], problem.rods.bar.radius_mm
+    grazing = sights_beside(camera, bar_axis(problem, moved), points.px, points.place)
+    off_px = grazing.px_per_mm(camera, points.normal) * (grazing.outside_mm - radius_mm - vector[REACH])
+    jacobian = np.zeros((len(points), problem.size))
+    jacobian[:, moving] = -(off_px[1:] - off_px[0]).T / step
+    jacobian[:, REACH] = grazing.px_per_mm(camera, points.normal)
+    return _over_sigma(points, points.px - off_px[0][:, None] * points.normal, jacobian, problem.bar_off(number),
+                       points.normal * (BAR_OFFSET_PX / BAR_MODES_PX), vector)  # moved along rows and columns alike
 
 
 def _bar_px(problem: Problem, camera, vector, points: LinePoints, side, frame) -> np.ndarray:
@@ -189,7 +210,7 @@ def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
 def _prior_block(problem: Problem, vector):
     sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
                             [max(problem.rods.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
-                            [] if problem.motion is None else problem.motion.sigma,
+                            [] if problem.motion is None else problem.motion.sigma, BAR_PRIOR[:problem.is_rounded],
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 

@@ -1,18 +1,19 @@
 """First touch as the pictures show it: the motor angle at which the unbent whisker reaches the bar."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vision.fit.problem import REACH, Problem, bar_axis, rest_shape, shift_at_mm
 from vision.geometry.centreline import centrelines
-from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.contact import Axis, clearance
 from vision.geometry.rods import Rods
 
 FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
 _SURE_BEND_RAD = np.radians(0.25)
 _STEP = 1e-5  # mm and rad, of differences
 _TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
+_SCAN_RAD = np.radians(0.5)  # half a millimetre at the contact, when a rounded object's touch is looked for
 _STARTS_PER_FRAME = 10  # of the hinge: finer than frames tell
 _SURE_SIGMAS, _LEAST_MARGIN_RAD = 3.0, np.radians(0.02)  # from touch, within which frames are left undecided
 
@@ -31,12 +32,12 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
     axis = bar_axis(problem, vector)
 
     def gap(motor_rad):
-        there = BarAxis(axis.point_mm + shift_at_mm(problem, vector, motor_rad), axis.direction)
+        there = replace(axis, point_mm=axis.point_mm + shift_at_mm(problem, vector, motor_rad))
         return _gap(rest, motor_rad, there, vector[..., REACH], problem.rods)
 
     rest = rest_shape(vector)
-    low = np.full(vector.shape[:-1], np.min(problem.motor_rad))
-    high = np.full(vector.shape[:-1], np.max(problem.motor_rad))
+    ends = _about_touch(problem, vector) if problem.is_rounded else (np.min(problem.motor_rad), np.max(problem.motor_rad))
+    low, high = (np.full(vector.shape[:-1], end) for end in ends)
     gap_low, gap_high = (gap(m)[0] for m in (low, high))
     for _ in range(rounds):
         moving = np.abs(gap_high) > _TOUCH_GAP_MM
@@ -45,6 +46,17 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
         low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
         high, (gap_high, arc, point) = new, gap(new)
     return FirstTouch(high, point, arc)
+
+
+def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:
+    """Two motor angles, rad, between which the resting whisker first comes to touch a rounded object, which it may pass
+    beside later: by the first of a batch. The whole swing where it does not touch."""
+    first = vector.reshape(-1, vector.shape[-1])[0]
+    low, high = float(np.min(problem.motor_rad)), float(np.max(problem.motor_rad))
+    angles = np.linspace(low, high, 2 + int((high - low) / _SCAN_RAD))
+    gaps, _, _ = _gap(rest_shape(first), angles, bar_axis(problem, first), first[REACH], problem.rods)
+    touches = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
+    return (angles[touches[0]], angles[touches[0] + 1]) if len(touches) else (low, high)
 
 
 def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) -> tuple[float, float]:
@@ -59,7 +71,7 @@ def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) ->
     return here, float(np.sqrt(slope @ answer[np.ix_(geometry, geometry)] @ slope))
 
 
-def _gap(rest_mm, motor_rad, axis: BarAxis, wider_mm, rods: Rods):
+def _gap(rest_mm, motor_rad, axis: Axis, wider_mm, rods: Rods):
     """How far the resting whisker still is from touching, mm; contact arc and point. wider_mm: the reach's error."""
     none = np.zeros((*motor_rad.shape, 2))
     curves = centrelines(rest_mm, none, np.full(motor_rad.shape, rods.wire.length_mm / 2), motor_rad, rods.wire)

@@ -11,6 +11,7 @@ from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, p
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
 from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
+from vision.geometry.grazing import sights_beside
 from vision.geometry.silhouette import grazed
 from vision.lines.points import Observed
 
@@ -129,6 +130,9 @@ def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> l
         one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
         return [one.at(seen.points.place)[0]]
     axis, camera = bar_axis(problem, state.vector), problem.cameras.cameras[seen.camera]
+    if problem.is_rounded:
+        grazing = sights_beside(camera, axis, seen.points.px, seen.points.place)
+        return [grazing.points_mm]
     points = axis.point_mm + seen.points.place[:, None] * axis.direction
     points = points + shifts_mm(problem, state.vector)[seen.bar_in]
     edges = grazed(camera, points, np.broadcast_to(axis.direction, points.shape),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
+from vision.geometry.rounded import Form
 
 SHAPES = ("cylinder", "cone", "tapered")
 
@@ -46,13 +47,19 @@ class Wire:
 
 @dataclass(frozen=True)
 class Bar:
-    """The bar that the whisker pushes against: a round one."""
+    """The bar that the whisker pushes against: a round one; or what is told of another object in its place, a sphere
+    as thick, a bar as thick bent to a ring, or a cone (without a thickness of its own, 0)."""
 
     diameter_mm: float
     diameter_sigma_mm: float = 0.0
+    form: Form | None = None
 
     def __post_init__(self):
-        require_length("bar", diameter_mm=self.diameter_mm)
+        if self.form is None or self.form.shape != "cone":
+            require_length("bar", diameter_mm=self.diameter_mm)
+        if self.form is not None and self.form.shape == "ring":
+            wide = self.form.ring_diameter_mm
+            require(wide > self.diameter_mm, f"ring of {wide:g} mm: its bar is {self.diameter_mm:g} mm thick")
         require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
 
     @property

@@ -1,0 +1,252 @@
+"""The outline of a rounded object in one camera: where its edges are, stretch by stretch.
+
+As the line of a bar is read (see `vision.bar.evidence`), but that each stretch of the outline has one edge and speaks for
+itself: what lies within is lit in any way, what lies beyond is the picture without rods, and both are blurred by the
+lens. Nothing is said here of which outlines are possible: the fit knows that.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.special import logsumexp
+
+from vision.bar.evidence import LitRod, evidence
+from vision.bar.posterior import overstated
+from vision.bar.profiles import FULL_SCALE, OUTSIDE_PX, profiles
+from vision.geometry.rounded import Rounded
+from vision.geometry.settings import VisionSettings
+from vision.lines.bands import Pieces
+from vision.lines.points import LinePoints
+from vision.pictures.view import SATURATED, View
+
+STRETCHES = 8  # of each side
+_INSIDE_PX = 9.0  # of the object that are read beside an edge
+_WIDEST_PX = 40.0  # half a width; wider, an object's light changes no faster beside its edge
+_BLURS_PX, _FINE_BLURS = (0.6, 0.85, 1.2, 1.7), np.exp(np.array([-0.2, -0.1, 0.0, 0.1, 0.2]))
+_GAMMAS = (1.0, 2.2)
+_LEAST_CHANCE = 0.001  # of a transfer curve
+_FEWEST_PIECES = 4
+_FINE_REACH_PX = 1.0
+_LEAST_EVIDENCE = 6.0  # for an edge in a stretch and against none, tempered
+# A stretch's error beyond its formal one, as of a bar's edge (see `vision.bar.edges`).
+_EDGE_PX, _FORMAL_TO_TRUE = 0.08, 1.5
+
+
+@dataclass(frozen=True)
+class Limb:
+    """Points of an outline, their `place` how far away the sight grazes, mm; by how much more probable an edge is than
+    none in each (n,), and the lens blur, px, that the most probable is seen with."""
+
+    points: LinePoints
+    for_edge: np.ndarray
+    asked: int
+    blur_px: float
+
+    @property
+    def share(self) -> float:
+        """Of the stretches that were looked at those in which there is an edge."""
+        return len(self.points) / max(self.asked, 1)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One side of a predicted outline: its stations in the picture and in space."""
+
+    px: np.ndarray
+    normal: np.ndarray
+    far_mm: np.ndarray
+    half_px: float
+
+
+def measure_limb(view: View, axis: Rounded, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
+                 reach_px: float, before: Limb | None = None) -> Limb:
+    """The edges beside a predicted outline that is at most reach_px off. before: of a look that told the blur, by which
+    it is measured finely."""
+    sides = _sides(view, axis, radius_mm, settings)
+    pieces = [(side, _pieces(view, side, wires_px, settings, reach_px)) for side in sides]
+    pieces = [(side, some) for side, some in pieces if len(some) >= _FEWEST_PIECES]
+    if not pieces:
+        nothing = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+        return Limb(nothing, np.zeros(0), 0, _BLURS_PX[1])
+    blurs = _BLURS_PX if before is None else before.blur_px * _FINE_BLURS
+    looks = [_looks(some, reach_px, blurs, gamma, fine=before is not None) for gamma in _GAMMAS for _, some in pieces]
+    return _limb([side for side, _ in pieces], [some for _, some in pieces], looks, blurs)
+
+
+def _sides(view: View, axis: Rounded, radius_mm: float, settings: VisionSettings) -> list[_Side]:
+    """Both sides of the outline, a station every pixel or so."""
+    camera = view.camera
+    points, normals = axis.limb(camera.centre_mm, radius_mm, settings.bar_reach_mm, 400)
+    sides = []
+    for some, out in zip(points, normals):
+        px, by_point, _ = camera.project_with_jacobians(some)
+        normal = np.einsum("nij,nj->ni", by_point, out)
+        scale = np.linalg.norm(normal, axis=1)
+        if np.all(np.isfinite(px)):
+            half = float(np.median(scale)) * max(radius_mm, 1.0)
+            sides.append(_Side(px, normal / scale[:, None], np.linalg.norm(some - camera.centre_mm, axis=1), half))
+    return sides
+
+
+def _pieces(view: View, side: _Side, wires_px: Sequence[np.ndarray], settings: VisionSettings, reach_px: float) -> Pieces:
+    """The pixels beside one side, as pieces along it: each a row."""
+    inside, outside = reach_px + _INSIDE_PX, reach_px + OUTSIDE_PX + 1.0
+    pixels = _pixels_near(view.mean.shape, side, inside, outside)
+    if not len(pixels):
+        return _no_pieces()
+    _, nearest = cKDTree(side.px).query(pixels)
+    away = pixels - side.px[nearest]
+    offset = np.sum(away * side.normal[nearest], axis=1)
+    tangent = np.stack([-side.normal[:, 1], side.normal[:, 0]], axis=1)
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(side.px, axis=0), axis=1))])
+    tangent *= np.sign(np.sum(np.gradient(side.px, axis=0) * tangent, axis=1))[:, None]
+    along = run[nearest] + np.sum(away * tangent[nearest], axis=1)
+    keep = (offset > -inside) & (offset < outside) & (along >= 0.0) & (along <= run[-1])
+    if len(wires_px) and view.itself is None:
+        wire = np.concatenate([_dense(line) for line in wires_px])
+        keep &= ~np.isfinite(cKDTree(wire).query(pixels, distance_upper_bound=settings.bar_piece_px / 2 + 5.0)[0])
+    return _as_rows(view, side, pixels[keep], offset[keep], along[keep], run, settings.bar_piece_px)
+
+
+def _dense(line: np.ndarray) -> np.ndarray:
+    """A line (m, 2) by a point every pixel or two, without what is not finite."""
+    line = line[np.all(np.isfinite(line), axis=1)]
+    if len(line) < 2:
+        return line
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    at = np.arange(0.0, run[-1], 2.0)
+    return np.stack([np.interp(at, run, line[:, k]) for k in range(2)], axis=1)
+
+
+def _pixels_near(shape: tuple[int, int], side: _Side, inside: float, outside: float) -> np.ndarray:
+    """Whole pixels (n, 2) within so much of the stations, x and y."""
+    steps = np.arange(-inside, outside + 0.5, 0.5)
+    near = np.round(side.px[:, None] + steps[:, None] * side.normal[:, None]).astype(int).reshape(-1, 2)
+    within = np.all((near >= 0) & (near < np.array(shape[::-1])), axis=1)
+    code = np.unique(near[within, 1] * shape[1] + near[within, 0])
+    return np.stack([code % shape[1], code // shape[1]], axis=1).astype(float)
+
+
+def _no_pieces() -> Pieces:
+    return Pieces(*[np.zeros((0, 1))] * 6, np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)),
+                  np.zeros(0, dtype=int))
+
+
+def _as_rows(view: View, side: _Side, pixels, offset, along, run, length_px: int) -> Pieces:
+    """Pieces of this length along the side, their pixels in rows that are filled up with some of no weight. place: along
+    it, px."""
+    column, row = pixels.astype(int).T
+    scale = FULL_SCALE / view.full_scale
+    grey, behind = view.mean[row, column], view.background[row, column]
+    gradient = _gradient(view.background, row, column)
+    piece = (along // length_px).astype(int)
+    slope = np.sum(gradient * side.normal[np.clip(np.searchsorted(run, along), 0, len(run) - 1)], axis=1)
+    noise = view.noise.times(view.mean_share)
+    seen = np.isfinite(grey) & np.isfinite(behind) & (np.nan_to_num(grey) < SATURATED * view.full_scale)
+    weight = np.where(seen, 1.0 / noise.sigma(np.where(seen, grey, 0.0)), 0.0) / scale
+    order = np.argsort(piece, kind="stable")
+    names, first, count = np.unique(piece[order], return_index=True, return_counts=True)
+    if not len(names):
+        return _no_pieces()
+    place = np.arange(len(order)) - np.repeat(first, count)
+    rows = np.repeat(np.arange(len(names)), count)
+    half = min(side.half_px, _WIDEST_PX)
+    filled = []
+    for values, empty in ((offset + half, 0.0), (grey * scale, 1.0), (behind * scale, 1.0), (slope * scale, 0.0),
+                          (weight, 0.0)):
+        table = np.full((len(names), int(count.max())), empty)
+        table[rows, place] = np.nan_to_num(values[order], nan=empty)
+        filled.append(table)
+    middle = (names + 0.5) * length_px
+    station = np.clip(np.searchsorted(run, middle), 0, len(run) - 1)
+    offset, grey, behind, slope, weight = filled
+    return Pieces(offset, grey, behind, slope, np.zeros_like(slope), weight, middle, np.full(len(names), half),
+                  side.px[station], side.normal[station], station)
+
+
+def _gradient(picture, row, column) -> np.ndarray:
+    """Change (n, 2) of a picture by x and y at whole pixels, by their neighbours."""
+    height, width = picture.shape
+    by_x = picture[row, np.minimum(column + 1, width - 1)] - picture[row, np.maximum(column - 1, 0)]
+    by_y = picture[np.minimum(row + 1, height - 1), column] - picture[np.maximum(row - 1, 0), column]
+    return 0.5 * np.stack([by_x, by_y], axis=1)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Of one side under one transfer curve: by blur (b,) minus twice the log probability; by blur and stretch (b, k)
+    mean and variance of the shift, px; evidence (k,) for an edge; and what a stretch says of the curve."""
+
+    against: np.ndarray
+    mean: np.ndarray
+    variance: np.ndarray
+    for_edge: np.ndarray
+    of_curve: float
+
+
+def _looks(pieces: Pieces, reach_px: float, blurs_px: Sequence[float], gamma: float, *, fine: bool) -> _Look:
+    seen = profiles(pieces, STRETCHES, reach_px, gamma)
+    rod = LitRod(seen)
+    under = [evidence(rod, reach_px, float(blur), 2 if fine else 1, all_light=fine, every=1) for blur in blurs_px]
+    best = min(under, key=lambda one: one.least.sum())
+    temper = overstated(best, seen)
+    against, mean, variance = [], [], []
+    for one in under:
+        own = -0.5 * one.of_bar / temper[:, None, None]
+        total = logsumexp(own, axis=(1, 2))
+        chance = np.sum(np.exp(own - total[:, None, None]), axis=2)
+        mean.append(chance @ one.shift_px)
+        variance.append(chance @ one.shift_px**2 - mean[-1] ** 2)
+        against.append(-2.0 * total.sum())
+    return _Look(np.array(against), np.array(mean), np.array(variance), (best.of_none - best.least) / temper,
+                 float(np.mean(best.least / temper)))
+
+
+def _limb(sides: Sequence[_Side], pieces: Sequence[Pieces], looks: Sequence[_Look], blurs_px) -> Limb:
+    """Points by all blurs and transfer curves, each by its chance: these are of the whole camera."""
+    count = len(sides)
+    curves = [looks[first:first + count] for first in range(0, len(looks), count)]
+    against = np.array([sum(look.of_curve for look in curve) for curve in curves])
+    chances = np.exp(-0.5 * (against - against.min()))
+    chances = np.where(chances < _LEAST_CHANCE * chances.max(), 0.0, chances) / chances.sum()
+    best_blur, points, edges, asked = [], [], [], 0
+    for number, (side, some) in enumerate(zip(sides, pieces)):
+        mean, square, for_edge = 0.0, 0.0, 0.0
+        for chance, curve in zip(chances, curves):
+            by_blur = sum(look.against for look in curve)
+            share = np.exp(-0.5 * (by_blur - by_blur.min()))
+            share = chance * share / share.sum()
+            look = curve[number]
+            mean = mean + share @ look.mean
+            square = square + share @ (look.variance + look.mean**2)
+            for_edge = for_edge + chance * look.for_edge
+            best_blur.append((chance, float(np.log(blurs_px) @ share / share.sum())) if share.sum() else (0.0, 0.0))
+        stations = _stations(some, len(mean))
+        sigma = np.hypot(_FORMAL_TO_TRUE * np.sqrt(np.maximum(square - mean**2, 0.0)), _EDGE_PX)
+        px = side.px[stations] + mean[:, None] * side.normal[stations]
+        keep = for_edge > _LEAST_EVIDENCE
+        asked += len(keep)
+        points.append(LinePoints(px, side.normal[stations], sigma, side.far_mm[stations]).select(keep))
+        edges.append(for_edge[keep])
+    weights, logs = np.array(best_blur).T
+    joined = LinePoints(*(np.concatenate([getattr(one, name) for one in points])
+                          for name in LinePoints.__dataclass_fields__))
+    return Limb(joined, np.concatenate(edges), asked, float(np.exp(weights @ logs / weights.sum())))
+
+
+def _stations(pieces: Pieces, count: int) -> np.ndarray:
+    """The station in the middle of each stretch, as `profiles` parts them."""
+    order = np.argsort(pieces.place)
+    return np.array([int(np.median(pieces.source[some])) for some in np.array_split(order, count)])
+
+
+def measure_limbs(views: Sequence[View], axis: Rounded, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
+                  settings: VisionSettings, reach_px: float, before: Mapping[str, Limb] | None = None
+                  ) -> dict[str, Limb]:
+    """`measure_limb` in each view, by camera."""
+    before = before or {}
+    return {view.camera.name: measure_limb(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings,
+                                           _FINE_REACH_PX if view.camera.name in before else reach_px,
+                                           before.get(view.camera.name)) for view in views}

@@ -1,0 +1,183 @@
+"""A rounded object in space before any wire is known: looked for by its outline, then settled by its edges."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from vision.bar.find import Clear, apart_from_others, clear_edges, climb, spread_out
+from vision.bar.limb import Limb, measure_limbs
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.centreline import resting_lines, rotation_z
+from vision.geometry.contact import axis_frame, shifted_axis
+from vision.geometry.errors import Refused
+from vision.geometry.grazing import sights_beside
+from vision.geometry.newton import cauchy_weights
+from vision.geometry.rods import Bar, Rods
+from vision.geometry.rounded import Form, Rounded
+from vision.geometry.settings import VisionSettings
+from vision.lines.points import LinePoints
+from vision.pictures.change import HALF
+from vision.pictures.view import View
+
+_EDGE_MM = 3.0  # half the width of a bar whose edges are as sharp as what is looked for
+_SPREADS, _KEPT = (0.5, 0.2, 0.08), (12, 8, 6)
+_STARTS = 32
+_STATIONS, _OUTLINE_MM = 8, 30.0
+_BETA_RAD, _PSI_RAD = np.radians(np.arange(-78.0, 79.0, 6.0)), np.radians([-8.0, 0.0, 8.0])
+_CONE_RADII_MM = np.log([1.5, 3.0, 6.0, 12.0, 24.0])
+_X_MM, _TOUCH_MM = 2.4, 2.4
+_AT_ONCE = 4000
+_REACHES_PX = (9.0, 5.0, 3.0)  # round by round, as the object is settled
+_PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera tells as it was
+_STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
+_ROUNDS = 6
+_LEAST_SHARE = 0.3  # of the stretches of an outline, in each camera, that show an edge
+_WIRES = 8
+_NAMES = {"ring": "ring of {ring:g} mm", "sphere": "sphere of {thick:g} mm", "cone": "cone of {angle:g} deg half-angle"}
+
+
+def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.ndarray, settings: VisionSettings,
+                still: Callable[[View], np.ndarray]) -> Rounded:
+    """Where it stands, by the pictures of all frames. still: a view's picture of what stands still, at every HALF-th
+    pixel. Raises Refused where none is seen."""
+    span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    small = Rods(rods.wire, Bar(2.0 * _EDGE_MM))
+    clear = [clear_edges(view.camera, still(view), view.background[::HALF, ::HALF], small, sum(span) / 2)
+             for view in views]
+    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
+    found = [settled(axis, views, cameras, rods, wires, settings) for axis in likely_places(clear, rods, span)]
+    axis, share = max(found, key=lambda one: one[1])
+    if share < _LEAST_SHARE:
+        form = rods.bar.form
+        name = _NAMES[form.shape].format(ring=form.ring_diameter_mm, thick=rods.bar.diameter_mm,
+                                         angle=np.degrees(form.half_angle_rad))
+        raise Refused(f"no {name} is seen near the whisker; record with it in view of every camera")
+    return axis
+
+
+def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings
+            ) -> tuple[Rounded, float]:
+    """The object whose outline passes through the edges near that of a first one, and how clearly it is there: the
+    smallest share, of all cameras, of the outline's stretches that have an edge where it is."""
+    radius_mm = rods.bar.radius_mm
+    for reach_px in _REACHES_PX:
+        limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px)
+        if not all(len(limb.points) for limb in limbs.values()):
+            return axis, 0.0
+        axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)
+    return axis, min(_share_on(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items())
+
+
+def _share_on(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> float:
+    left, _ = _rows(axis, np.zeros((2, 3)), camera, limb.points, radius_mm, none=True)
+    return float(np.sum(np.abs(left) < 4.0)) / max(limb.asked, 1)
+
+
+def settle_by_limbs(axis: Rounded, cameras: Cameras, limbs: Mapping[str, LinePoints], radius_mm: float) -> Rounded:
+    """The object whose outline passes through edges in each camera; what they cannot tell stays as it was."""
+    across, vector = axis_frame(axis.direction), np.zeros(5)
+    for _ in range(_ROUNDS):
+        here = moved(axis, across, vector)
+        rows = [_rows(here, across, cameras[name], points, radius_mm) for name, points in limbs.items() if len(points)]
+        rows.append((-vector / _PRIOR, np.diag(1.0 / _PRIOR)))
+        left, jacobian = (np.concatenate(part) for part in zip(*rows))
+        step = np.linalg.lstsq(jacobian, left, rcond=None)[0]
+        vector = vector + step
+        if np.all(np.abs(step) < _STEPS):
+            break
+    return moved(axis, across, vector)
+
+
+def moved(axis: Rounded, across: np.ndarray, vector: np.ndarray) -> Rounded:
+    """Moved by two shifts, two tilts and a shift along itself, (…, 5)."""
+    there = shifted_axis(axis, across, vector)
+    return replace(there, point_mm=there.point_mm + vector[..., 4:] * axis.direction)
+
+
+def _rows(axis: Rounded, across, camera: Camera, points: LinePoints, radius_mm: float, none: bool = False):
+    """What is left between points and outline over sigma, robustly weighted, and its Jacobian (n, 5)."""
+    steps = np.zeros((1, 5)) if none else np.concatenate([np.zeros((1, 5)), np.diag(_STEPS)])
+    near = sights_beside(camera, moved(axis, across, steps), points.px, points.place)
+    off = (near.outside_mm - radius_mm) * near.px_per_mm(camera, points.normal) / points.sigma_px
+    weight = 1.0 if none else np.sqrt(cauchy_weights(off[0], 5.0))
+    columns = -(off[1:] - off[0]).T / (1.0 if none else _STEPS)
+    return off[0] * weight, columns * (weight if none else weight[:, None])
+
+
+def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, float]) -> list[Rounded]:
+    """Objects whose outlines stand out the most in all cameras, of those that the whisker would touch."""
+    values, axis_of = hypotheses(rods, motor_rad)
+    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    steps = np.array([0.5 * (one[1] - one[0]) if len(one) > 1 else 0.0 for one in values])
+    best = grid
+    for spread, kept in zip(_SPREADS, _KEPT):
+        near = [spread_out(one, spread * one.half_px) for one in clear]
+        score = partial(_clear_in_all, near, axis_of, rods.bar.radius_mm)
+        if best is grid:
+            best = apart_from_others(grid, score(grid), 4.0 * steps, _STARTS)
+        best = apart_from_others(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
+    found = axis_of(best)
+    return [replace(found, point_mm=found.point_mm[k], direction=found.direction[k], spot_mm=found.spot_mm[k])
+            for k in range(len(best))]
+
+
+def hypotheses(rods: Rods, motor_rad: tuple[float, float]) -> tuple[list[np.ndarray], Callable]:
+    """Values of the numbers that say where the object is, and the objects (n, 3) that these (n, k) mean: where along the
+    whisker it is first touched, mm; at which motor angle; the slope there; and what its shape leaves free."""
+    length, form = rods.wire.length_mm, rods.bar.form
+    x = np.arange(10.0, length, _X_MM)
+    touch = np.linspace(*motor_rad, max(3, int(np.ceil(np.ptp(motor_rad) * 0.5 * length / _TOUCH_MM))))
+    more = {"sphere": [], "ring": [_PSI_RAD, np.radians([-20.0, 0.0, 20.0])],
+            "cone": [_CONE_RADII_MM, np.array([-1.0, 1.0])]}[form.shape]
+    return [x, touch, _BETA_RAD, *more], partial(placed, form, rods)
+
+
+def placed(form: Form, rods: Rods, each: np.ndarray) -> Rounded:
+    """The objects (n, 3) that a straight whisker first touches so, see `hypotheses`."""
+    x, touch, beta, *more = each.T
+    zero = np.zeros_like(x)
+    psi = more[0] if form.shape == "ring" else zero
+    along = np.stack([np.sin(psi), np.cos(psi) * np.sin(beta), np.cos(psi) * np.cos(beta)], axis=-1)
+    inwards = np.stack([zero, np.cos(beta), -np.sin(beta)], axis=-1)
+    spot = np.stack([x, zero, zero], axis=-1) + rods.wire.radius_mm(x)[:, None] * inwards
+    direction = along
+    if form.shape == "sphere":
+        point = spot + rods.bar.radius_mm * inwards
+    elif form.shape == "ring":
+        turn = more[1][:, None]
+        towards = np.cos(turn) * inwards + np.sin(turn) * np.cross(along, inwards)
+        point = spot + rods.bar.radius_mm * inwards + 0.5 * form.ring_diameter_mm * towards
+        direction = np.cross(along, towards)
+    else:
+        radius, way = np.exp(more[0])[:, None], np.sign(more[1])[:, None]
+        sin, cos = np.sin(form.half_angle_rad), np.cos(form.half_angle_rad)
+        point = spot + radius * cos / sin * way * along
+        direction = cos * way * along - sin * inwards
+    turn = rotation_z(touch)
+    point, direction, spot = (np.einsum("nij,nj->ni", turn, one) for one in (point, direction, spot))
+    return Rounded(point, direction, form, spot)
+
+
+def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, each: np.ndarray) -> np.ndarray:
+    """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1."""
+    groups = np.array_split(each, -(-len(each) // _AT_ONCE))
+    return np.concatenate([np.mean([_outline_clear(axis_of(some), one, radius_mm) for one in clear], axis=0)
+                           for some in groups])
+
+
+def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float) -> np.ndarray:
+    camera = seen.camera
+    limb, normals = axis.limb(camera.centre_mm, radius_mm, _OUTLINE_MM, _STATIONS)
+    px = camera.project(np.concatenate([limb.reshape(-1, 3), (limb + 0.2 * normals).reshape(-1, 3)]))
+    px, beyond = np.split(px / HALF, 2)
+    normal = beyond - px
+    with np.errstate(invalid="ignore"):
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    x, y = np.nan_to_num(normal).T
+    height, width = seen.field.shape[1:]
+    column, row = (np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5 for one, size in zip(px.T, (width, height)))
+    there = seen.field.reshape(3, -1).take(np.nan_to_num(row).astype(np.intp) * width + np.nan_to_num(column).astype(np.intp), axis=1)
+    edge = (x * x * there[0] + 2.0 * x * y * there[1] + y * y * there[2]).reshape(*limb.shape[:-1])
+    return np.sqrt(np.prod(np.mean(edge, axis=-1), axis=-1))

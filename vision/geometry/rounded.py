@@ -1,0 +1,164 @@
+"""Objects that are no straight bar: a bar bent to a circle, a sphere, a cone.
+
+To a contact each is a bar whose axis turns as the contact moves on it (`Rounded.near`); to a camera each is an outline,
+where sights graze its surface (`Rounded.limb`). All are the surface of balls along a line: of one size along a circle
+(ring), of a size that grows from a tip (cone), or a single one (sphere).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from vision.geometry.checks import require, require_length
+
+_UP = np.array([0.0, 0.0, 1.0])
+_TINY = 1e-12
+_MOST_TURN_RAD = np.radians(60.0)  # of a ring to either side of the contact: farther round it hides itself
+_LEAST_RADIUS_MM = 0.3  # of a cone: nearer to its tip its two edges are one
+_ROUNDS = 5  # from one mm off: each divides what is left by ten and more
+
+
+@dataclass(frozen=True)
+class Form:
+    """What is told of such an object beside its thickness: a ring's diameter along its middle, a cone's half-angle.
+
+    Refused where it has no such shape.
+    """
+
+    shape: Literal["ring", "sphere", "cone"]
+    ring_diameter_mm: float = 0.0
+    half_angle_rad: float = 0.0
+
+    def __post_init__(self):
+        if self.shape == "ring":
+            require_length("ring", ring_diameter_mm=self.ring_diameter_mm)
+        if self.shape == "cone":
+            require(0.0 < self.half_angle_rad < 0.5 * np.pi, f"cone half_angle_rad {self.half_angle_rad:g}: 0 to pi/2")
+
+
+@dataclass(frozen=True)
+class Local:
+    """What points see of an object: the nearest point of its middle (…, 3), the direction (…, 3) of its surface's
+    straightest way there, z positive, and by how much the middle is farther from the surface than the object's own
+    radius (…)."""
+
+    foot_mm: np.ndarray
+    direction: np.ndarray
+    wider_mm: np.ndarray
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """Where such an object stands, in the rig frame: centre of ring or sphere, or tip of a cone (…, 3), mm; normal of a
+    ring's plane, or where a cone points (…, 3), unit, of no meaning for a sphere. spot_mm (3,): about where it is
+    touched, from which stations along it are counted."""
+
+    point_mm: np.ndarray
+    direction: np.ndarray
+    form: Form
+    spot_mm: np.ndarray
+
+    def near(self, points_mm: np.ndarray) -> Local:
+        """What points (…, k, 3) see."""
+        centre, axis = np.asarray(self.point_mm)[..., None, :], np.asarray(self.direction)[..., None, :]
+        apart = points_mm - centre
+        if self.form.shape == "sphere":
+            normal = _unit(apart)
+            upright = _unit(_UP - normal[..., 2:] * normal)
+            return Local(np.broadcast_to(centre, apart.shape), upright, np.zeros(apart.shape[:-1]))
+        high = np.sum(apart * axis, axis=-1, keepdims=True)
+        flat = apart - high * axis
+        far = np.linalg.norm(flat, axis=-1, keepdims=True)
+        outward = flat / np.maximum(far, _TINY)
+        if self.form.shape == "ring":
+            foot = centre + 0.5 * self.form.ring_diameter_mm * outward
+            return Local(foot, _upwards(np.cross(axis, outward)), np.zeros(apart.shape[:-1]))
+        sin, cos = np.sin(self.form.half_angle_rad), np.cos(self.form.half_angle_rad)
+        down = far * sin / cos - high
+        return Local(centre - down * axis, _upwards(cos * axis - sin * outward), (down * sin)[..., 0])
+
+    def outside_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, Local]:
+        """How far points (…, k, 3) are from the middle, beyond what `Local.wider_mm` is: (…, k), positive; the normals
+        there (…, k, 3); and what they see."""
+        local = self.near(points_mm)
+        away = points_mm - local.foot_mm
+        length = np.linalg.norm(away, axis=-1)
+        return length - local.wider_mm, away / np.maximum(length, _TINY)[..., None], local
+
+    def nearest_on_lines(self, begin_mm, towards, at_mm, rounds: int = _ROUNDS) -> np.ndarray:
+        """Where (…, k), mm from begin, straight lines (…, k, 3) come nearest, from near there."""
+        for _ in range(rounds):
+            points = begin_mm + at_mm[..., None] * towards
+            at_mm = at_mm + nearer_by(self, points, towards)
+        return at_mm
+
+    def limb(self, centre_mm: np.ndarray, radius_mm: float, reach_mm: float, stations: int
+             ) -> tuple[np.ndarray, np.ndarray]:
+        """Points (…, 2, m, 3) of the surface that sights from a camera (3,) graze, to both sides, and the normals
+        (…, 2, m, 3) there; of ring and cone up to reach_mm of the middle from where it is touched."""
+        if self.form.shape == "sphere":
+            return self._round_limb(centre_mm, radius_mm, stations)
+        middle, ahead, radius, grows = self._stations(radius_mm, reach_mm, stations)
+        sight = middle - centre_mm
+        along = np.sum(sight * ahead, axis=-1, keepdims=True)
+        towards = sight - along * ahead
+        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
+        towards = towards / distance
+        root = np.sqrt(1.0 - grows**2)
+        cosine = np.clip((grows * along - radius) / (root * distance), -1.0, 1.0)
+        aside = np.sqrt(1.0 - cosine**2) * np.cross(ahead, towards)
+        normals = np.stack([root * (cosine * towards + side * aside) - grows * ahead for side in (1.0, -1.0)], axis=-3)
+        return middle[..., None, :, :] + radius[..., None, :, :] * normals, normals
+
+    def _round_limb(self, centre_mm, radius_mm, stations):
+        """Of a sphere: a circle, in two halves."""
+        sight = np.asarray(self.point_mm) - centre_mm
+        distance = np.linalg.norm(sight, axis=-1, keepdims=True)[..., None]
+        ahead = _unit(sight)[..., None, :]
+        right = _unit(np.cross(ahead, _UP + 0.01))
+        turn = (np.arange(2 * stations) + 0.5) * np.pi / stations
+        ring = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * np.cross(ahead, right)
+        cosine = radius_mm / distance
+        normals = -cosine * ahead + np.sqrt(1.0 - cosine**2) * ring
+        normals = normals.reshape(*normals.shape[:-2], 2, stations, 3)
+        return np.asarray(self.point_mm)[..., None, None, :] + radius_mm * normals, normals
+
+    def _stations(self, radius_mm, reach_mm, stations):
+        """Of ring and cone: points (…, m, 3) of the middle, directions (…, m, 3) along it, radii (…, m, 1) of the balls
+        there, and how those grow along it."""
+        point, axis = np.asarray(self.point_mm)[..., None, :], np.asarray(self.direction)[..., None, :]
+        foot = self.near(np.broadcast_to(self.spot_mm, self.point_mm.shape)[..., None, :]).foot_mm
+        if self.form.shape == "ring":
+            across = 0.5 * self.form.ring_diameter_mm
+            most = min(reach_mm / across, _MOST_TURN_RAD)
+            turn = np.linspace(-most, most, stations)[:, None]
+            out = _unit(foot - point)
+            ahead = np.cross(axis, out)
+            outward = np.cos(turn) * out + np.sin(turn) * ahead
+            middle, ahead = point + across * outward, np.cross(axis, outward)
+            return middle, ahead, np.full((*middle.shape[:-1], 1), radius_mm), 0.0
+        sin = np.sin(self.form.half_angle_rad)
+        at = np.sum((point - foot) * axis, axis=-1, keepdims=True)
+        share = np.linspace(0.0, 1.0, stations)[:, None]
+        nearest = np.maximum(at - reach_mm, _LEAST_RADIUS_MM / sin)
+        down = nearest + share * (np.maximum(at, nearest) + reach_mm - nearest)
+        middle = point - down * axis
+        return middle, np.broadcast_to(axis, middle.shape), down * sin, -sin
+
+
+def nearer_by(axis: Rounded, points_mm: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """How far (…, k) to go on along curves to come nearest, by Newton's method as for the bar that each point
+    (…, k, 3) sees; towards (…, k, 3): the curves' tangents there."""
+    local = axis.near(points_mm)
+    away = points_mm - local.foot_mm
+    across = towards - np.sum(towards * local.direction, axis=-1, keepdims=True) * local.direction
+    return -np.sum(away * towards, axis=-1) / np.maximum(np.sum(across**2, axis=-1), 1e-6)
+
+
+def _unit(vectors):
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
+
+
+def _upwards(directions):
+    return np.where(directions[..., 2:] >= 0.0, directions, -directions)
