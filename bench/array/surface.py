@@ -79,7 +79,7 @@ class Surface:
 def stated_surface(trial: Trial) -> Surface | None:
     """The object as the manifest states it; None where it does not, or does not say how thick it is."""
     given = trial.object
-    if given is None or (trial.bar_diameter_mm is None and given.shape != "cone"):
+    if given is None or given.point_mm is None or (trial.bar_diameter_mm is None and given.shape != "cone"):
         return None
     point, axis = np.array(given.point_mm, dtype=float), np.array(given.axis, dtype=float)
     thick = 0.0 if given.shape == "cone" else trial.bar_diameter_mm

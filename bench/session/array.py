@@ -159,8 +159,8 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
 
 
 def _check_cone(bases: Sequence[Base], trial: Trial) -> None:
-    """Raises BadInput for a cone that ends before it comes to any whisker's plane of whisking."""
-    if trial.object is None or trial.object.shape != "cone":
+    """Raises BadInput for a cone that is said to end before it comes to any whisker's plane of whisking."""
+    if trial.object is None or trial.object.shape != "cone" or trial.object.point_mm is None:
         return
     tip, axis = (np.array(given, dtype=float) for given in (trial.object.point_mm, trial.object.axis))
     opening = np.radians(trial.object.half_angle_deg)

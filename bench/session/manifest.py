@@ -119,12 +119,12 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
 
 
 class ObjectKeys(Keys, kw_only=True):
-    """[object] of trial.toml: where the object stands, in the rig frame."""
+    """[object] of trial.toml: what the object is, and perhaps where it stands, in the rig frame."""
 
     shape: Literal["bar", "ring", "sphere", "cone"] = "bar"
-    point_mm: Three
+    point_mm: Three | None = None
     point_sigma_mm: float = 0.0
-    axis: Three = msgspec.field(default_factory=lambda: [0.0, 0.0, 1.0])
+    axis: Three | None = None
     ring_diameter_mm: float | None = None
     half_angle_deg: float | None = None
 

@@ -12,18 +12,19 @@ from bench.session.strict_toml import as_keys, read_toml, values
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
+_UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it is not said
 
 
 @dataclass(frozen=True)
 class StatedObject:
-    """Where the object stands, in the rig frame, with one sigma of each coordinate. point_mm (3,): of a bar's axis, the
-    centre of a ring or sphere, or a cone's tip; axis (3,): the bar's direction, the normal of the ring's plane, or
-    where the cone points."""
+    """What the object is, and where it stands in the rig frame, with one sigma of each coordinate; None where that is
+    not said. point_mm (3,): of a bar's axis, the centre of a ring or sphere, or a cone's tip; axis (3,): the bar's
+    direction, the normal of the ring's plane, or where the cone points."""
 
     shape: str
-    point_mm: tuple[float, ...]
+    point_mm: tuple[float, ...] | None
     point_sigma_mm: float
-    axis: tuple[float, ...]
+    axis: tuple[float, ...] | None
     ring_diameter_mm: float | None
     half_angle_deg: float | None = None
 
@@ -142,10 +143,15 @@ def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None
     for key, shape in (("ring_diameter_mm", "ring"), ("half_angle_deg", "cone")):
         if (keys.shape == shape) != (getattr(keys, key) is not None):
             raise BadInput(f'[object] {key} belongs to shape = "{shape}", and to no other shape', file=shown)
-    if not any(keys.axis):
+    if keys.axis is not None and not any(keys.axis):
         raise BadInput("[object] axis is a direction, not zero", file=shown)
-    point, axis = tuple(keys.point_mm), tuple(keys.axis)
-    return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, keys.ring_diameter_mm, keys.half_angle_deg)
+    sizes = keys.ring_diameter_mm, keys.half_angle_deg
+    if keys.point_mm is None:
+        if keys.axis is not None or keys.point_sigma_mm:
+            raise BadInput("[object] says how it stands, and not where; point_mm is missing", file=shown)
+        return StatedObject(keys.shape, None, 0.0, None, *sizes)
+    point, axis = tuple(keys.point_mm), tuple(keys.axis or _UPRIGHT)
+    return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, *sizes)
 
 
 def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:

@@ -104,6 +104,8 @@ def test_verbs_of_one_whisker_say_that_there_are_several(tmp_path):
         ('shape = "cone"\npoint_mm = [0, 0, 60]\nhalf_angle_deg = -10', "half_angle_deg is -10; from 0.1 to 85"),
         ('shape = "cone"\npoint_mm = [50, 0, -20]\nhalf_angle_deg = 10', "the cone's tip, point_mm, lies before every"),
         ('shape = "cube"\npoint_mm = [0, 0, 0]', "[object] shape"),
+        ('shape = "sphere"\naxis = [0, 0, 1]', "point_mm is missing"),
+        ("point_sigma_mm = 0.1", "point_mm is missing"),
     ],
 )
 def test_an_object_that_cannot_be_is_refused(tmp_path, text, said):
@@ -112,3 +114,10 @@ def test_an_object_that_cannot_be_is_refused(tmp_path, text, said):
     with pytest.raises(BadInput) as refused:
         load_views(folder)
     assert said in str(refused.value)
+
+
+def test_an_object_may_be_told_by_its_shape_alone(tmp_path):
+    folder = session(tmp_path)
+    (folder / "trials" / "t" / "trial.toml").write_text('[object]\nshape = "cone"\nhalf_angle_deg = 20\n')
+    stated = load_views(folder)[0].trials[0].object
+    assert (stated.shape, stated.half_angle_deg, stated.point_mm, stated.axis) == ("cone", 20, None, None)
