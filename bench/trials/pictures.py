@@ -13,6 +13,7 @@ from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.trial import Trial
 from bench.trials.scene import StillScene, still_scene
 from vision.geometry.rods import Bar, Rods
+from vision.geometry.rounded import Form
 from vision.pictures.others import RodLines
 from vision.truth.trial_pictures import TrialPictures
 
@@ -57,8 +58,19 @@ class Shown:
             {camera: some[own] for camera, some in wires.items() if own in some},
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
-        rods = Rods(session.whisker.wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm))
+        rods = Rods(session.whisker.wire, touched(trial))
         return cls(times, frames, scene, places, back, pictures, rods)
+
+
+def touched(trial: Trial) -> Bar:
+    """What is touched, as vision takes it: a cone has no thickness of its own."""
+    given = trial.object
+    if given is None or given.shape == "bar":
+        return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)
+    form = Form(given.shape, given.ring_diameter_mm or 0.0, float(np.radians(given.half_angle_deg or 0.0)))
+    if given.shape == "cone":
+        return Bar(0.0, 0.0, form)
+    return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm, form)
 
 
 def _backwards(signals: Signals, times: FrameTimes, where: slice | None) -> slice | None:

@@ -10,9 +10,10 @@ from vision.bar.axis import settle_axis
 from vision.bar.find import Clear, clear_edges, find_bars
 from vision.bar.line import FAR_PX, NEAR_PX, BarLine, find_lines, measure_bars
 from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
+from vision.bar.rounded import see_rounded
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
-from vision.geometry.contact import BarAxis
+from vision.geometry.contact import Axis, BarAxis
 from vision.geometry.errors import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.settings import VisionSettings
@@ -30,9 +31,9 @@ _MEDIAN_OF = 11  # frames: more would not make the bar clearer
 
 @dataclass(frozen=True)
 class SeenBar:
-    """An axis and the lines of the bar by which it was settled."""
+    """An axis and the lines of the bar by which it was settled; of a rounded object none."""
 
-    axis: BarAxis
+    axis: Axis
     lines: Mapping[str, BarLine]
 
     @property
@@ -61,6 +62,8 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
     sights of all cameras are nearly the same, or not all see it, each is asked alone, too: by its two edges one camera
     tells roughly how far away a bar is, and finds no other for it.
     """
+    if rods.bar.form is not None:
+        return SeenBar(see_rounded(views, cameras, rods, motor_rad, settings, _median_picture), {})
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
     clear = [clear_edges(view.camera, _median_picture(view), view.background[::HALF, ::HALF], rods, sum(span) / 2)
              for view in views]

@@ -56,6 +56,11 @@ def _across(vectors, axis: BarAxis) -> np.ndarray:
     return vectors - np.sum(vectors * a, axis=-1, keepdims=True) * a
 
 
+def drawn_as_bar(axis: Axis) -> BarAxis:
+    """The bar that is seen where an object is touched."""
+    return bar_at(axis, axis.spot_mm) if isinstance(axis, Rounded) else axis
+
+
 _ROUNDS_FROM_NODE, _ROUNDS_FROM_NEAR = 4, 2
 _MORE_ROUNDS = 3  # on an object whose axis turns with the contact
 _OUTLINE_MM = 60.0  # to either side of its point, where a bar may hide the wire

@@ -23,6 +23,7 @@ from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
+from vision.geometry.contact import drawn_as_bar
 from vision.geometry.counted import counted
 from vision.geometry.errors import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire
@@ -60,7 +61,7 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
         return _nothing(whisks, str(reason))
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     motor_rad = np.asarray(pictures.motor_rad, dtype=float)
-    axis, light = bar_seen.axis, [whisk.light for whisk in seen]
+    axis, light = drawn_as_bar(bar_seen.axis), [whisk.light for whisk in seen]
     looks = seen_over_given(stands, bar_seen, rods, motor_rad, settings)
     bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
@@ -96,7 +97,7 @@ def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Camera
     views = pictures.views(cameras)
     used = cameras.subset([view.camera.name for view in views])
     strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
-    told, stands = _told(pictures, strokes, views)
+    told, stands = _told(pictures, strokes, views, rods.bar.form is not None)
     bar_seen = see_bar(stands, used, rods, motor_rad, settings)
     gives = Gives() if pictures.object_gives_way else None
     return [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
@@ -104,9 +105,11 @@ def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Camera
             for number, stroke in enumerate(strokes)], bar_seen, stands
 
 
-def _told(pictures: TrialPictures, strokes, views: Sequence[View]) -> tuple[Told | None, Sequence[View]]:
+def _told(pictures: TrialPictures, strokes, views: Sequence[View], is_rounded: bool) -> tuple[Told | None, Sequence[View]]:
     """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
     stands: of that frame alone. Raises Refused for what is not told of it."""
+    if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):
+        raise Refused("an object that moves or gives way is seen where it is a straight bar; this one is none")
     if pictures.object_gives_way:
         return None, _at_first(views, strokes)
     if pictures.object_velocity_mm_s is None:

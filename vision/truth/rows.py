@@ -3,7 +3,7 @@
 import numpy as np
 
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import bar_axes, bends, curves_of, rest_shape, shifts_mm
+from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.uncertainty import variance_by_cause
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
@@ -181,6 +181,8 @@ def _budget(fitted: FittedWhisk) -> dict[str, float]:
 def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, dict[str, np.ndarray]]]:
     """Per frame and camera: wire, the bar's two edges (m, 2) and the contact (2,) in pixels."""
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
+    if fitted.problem.is_rounded:
+        return _overlay_of_rounded(whisk, fitted, curves)
     axes = bar_axes(fitted.problem, fitted.state.vector)
     place = np.linspace(-_DRAWN_MM, _DRAWN_MM, 81)
     drawn: dict = {}
@@ -191,6 +193,22 @@ def _overlay(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[int, dict[str, d
         contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
         drawn[int(f)] = {view.camera.name: _drawn(view.camera, one, along, axis, contact, whisk.rods.bar.radius_mm,
                                                   whisk.settings.picture_scale) for view in whisk.views}
+    return drawn
+
+
+def _overlay_of_rounded(whisk: WhiskPictures, fitted: FittedWhisk, curves: Curves) -> dict:
+    """The same, its outline's two sides in place of the bar's edges."""
+    axis = bar_axis(fitted.problem, fitted.state.vector)
+    contacts = np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
+    drawn: dict = {int(f): {} for f in fitted.frames}
+    for view in whisk.views:
+        camera = view.camera
+        sides, _ = axis.limb(camera.centre_mm, whisk.rods.bar.radius_mm, _DRAWN_MM, 81)
+        left, right = (camera.project(side) for side in sides)
+        for k, f in enumerate(fitted.frames):
+            lines = {"wire": camera.project(curves.points_mm[k]), "bar_left": left, "bar_right": right,
+                     "contact": camera.project(contacts[k:k + 1])[0]}
+            drawn[int(f)][camera.name] = {name: full_px(px, whisk.settings.picture_scale) for name, px in lines.items()}
     return drawn
 
 

@@ -10,14 +10,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vision.bar.edges import measure_edges
+from vision.bar.limb import Limb, measure_limbs
 from vision.bar.line import BarLine, measure_bars
 from vision.bar.one_view import seen_from_one_side
 from vision.fit.problem import Problem, State
 from vision.fit.solve import solve
 from vision.fit.touch import FEWEST_FREE, bends_tell_more, frames_by_touch, frames_that_touch, touch_and_sigma
 from vision.fit.touch_by_onset import touch_by_onset
+from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.errors import Refused
+from vision.geometry.rounded import Rounded
 from vision.geometry.settings import VisionSettings
 from vision.lines.points import LinePoints
 from vision.pictures.view import View
@@ -27,6 +30,8 @@ from vision.truth.whisk_pictures import WhiskPictures
 # another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
 _EARLY_PARTS = 7.0  # the first of so many parts of a stroke is taken as free before anything is known
+_OFF_PX = 3.0  # how far off an outline may be that was settled by rough edges
+_LEAST_SIGHTS_RAD = np.radians(8.0)  # two sights nearer to each other tell no place along them
 NEVER_TOUCHES = "the whisker never touches"
 STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
@@ -60,6 +65,25 @@ class BarMiddles:
         """By camera (frame of the fit, side, points) of the bar's lines; one that stands is seen in no frame alone."""
         seen = self.points(axis, wires_px, last=last)
         return {name: [(0, side, points) for side, points in sides.items()] for name, sides in seen.items()}
+
+
+@dataclass
+class Outline:
+    """A rounded object by the edges of its outline in each view; limbs: as measured the time before, by which they are
+    measured finely."""
+
+    views: Sequence[View]
+    radius_mm: float
+    settings: VisionSettings
+    limbs: dict[str, Limb] = field(default_factory=dict)
+
+    def observed(self, axis: Rounded, came_mm: np.ndarray, frames: Sequence[int],
+                 wires_px: Mapping[str, Sequence[np.ndarray]], *,
+                 last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
+        """As `BarMiddles.observed`; all points are of an edge, against what lies within."""
+        for _ in range(2 if last and not self.limbs else 1):
+            self.limbs = measure_limbs(self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX, self.limbs)
+        return {name: [(0, 1, limb.points)] for name, limb in self.limbs.items() if len(limb.points)}
 
 
 class BarEdges(BarMiddles):
@@ -153,6 +177,10 @@ def ways_to_see(whisk: WhiskPictures) -> list[tuple[BarMiddles, Touch]]:
     cameras may still tell touch by clearance, two at least.
     """
     cameras, radius_mm = whisk.cameras, whisk.rods.bar.radius_mm
+    if isinstance(whisk.bar.axis, Rounded):
+        if widest_sights_rad(cameras, whisk.bar.axis.spot_mm) < _LEAST_SIGHTS_RAD:
+            raise Refused("an object that is no straight bar is seen by two cameras or more, from different sides")
+        return [(Outline(whisk.views, radius_mm, whisk.settings), TouchByClearance(fewest_cameras=2))]
     seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
     if seen_from_one_side(cameras, whisk.bar.axis):
         return [(BarEdges(seeing or whisk.views, radius_mm, whisk.settings), TouchByOnset())]
@@ -160,6 +188,13 @@ def ways_to_see(whisk: WhiskPictures) -> list[tuple[BarMiddles, Touch]]:
         return [(BarEdges(seeing, radius_mm, whisk.settings), touch)
                 for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())]
     return [(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
+
+
+def widest_sights_rad(cameras: Cameras, point_mm: np.ndarray) -> float:
+    """Between the sights of a point (3,) of the two cameras that see it from the most different sides."""
+    sights = np.array([point_mm - camera.centre_mm for camera in cameras])
+    sights /= np.linalg.norm(sights, axis=1, keepdims=True)
+    return float(np.arccos(np.clip(np.min(sights @ sights.T), -1.0, 1.0)))
 
 
 def early(motor_rad: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import begins_free
 from vision.geometry.centreline import Curves, one_curve
-from vision.geometry.contact import BarAxis, clearance, outline_of_bar, upward
+from vision.geometry.contact import Axis, clearance, outline_of_bar, upward
 from vision.geometry.errors import Misled, Refused, TooFewFrames
 from vision.lines.bands import Pieces
 from vision.lines.one_sided import WireAppearance, seen_width
@@ -21,7 +21,7 @@ from vision.lines.shading import Knots
 from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
 from vision.pictures.view import SATURATED, View
 from vision.truth.moving_bar import BarInFrames
-from vision.truth.strategies import BarMiddles, Touch, TouchByClearance, early, ways_to_see
+from vision.truth.strategies import BarMiddles, Outline, Touch, TouchByClearance, early, ways_to_see
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 _WIRE_KNOT_MM = 12.0
@@ -38,7 +38,7 @@ class _Look:
     shape (2, 4), bend (f, 2) and contact arc (f,) in each frame, the curves by frame, which frames touch or are free
     (f,), and by a round before each camera's lens blur, px."""
 
-    axis: BarAxis
+    axis: Axis
     came_mm: np.ndarray
     rest_mm: np.ndarray
     bend_rad: np.ndarray
@@ -72,7 +72,7 @@ def _moving(whisk: WhiskPictures) -> tuple[BarInFrames, Touch]:
     return BarInFrames(whisk.views, whisk.rods.bar.radius_mm, whisk.settings), TouchByClearance()
 
 
-def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, touch: Touch) -> FittedWhisk:
+def _fitted_by(whisk: WhiskPictures, bar: BarMiddles | BarInFrames | Outline, touch: Touch) -> FittedWhisk:
     whisk, look = _first_look(whisk, touch)
     for _ in range(whisk.settings.rounds):
         seen = _trace_all(whisk, bar, look, last=False)
@@ -181,7 +181,7 @@ def _begin(problem: Problem, look: _Look) -> State:
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
 
-def _trace_all(whisk: WhiskPictures, bar: BarMiddles | BarInFrames, look: _Look, *, last: bool) -> list[Observed]:
+def _trace_all(whisk: WhiskPictures, bar: BarMiddles | BarInFrames | Outline, look: _Look, *, last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. Raises Refused where one of them is seen in none."""
     wires_px = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
                 for view in whisk.views}
@@ -202,7 +202,7 @@ def require_both_rods(seen: Sequence[Observed]) -> None:
             raise Refused(f"no camera shows enough of the {rod}")
 
 
-def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[int, Curves],
+def trace_wire(whisk: WhiskPictures, view: View, axis: Axis, curves: Mapping[int, Curves],
                seen_blur_px: Mapping[str, float] | None = None, *, last: bool = True) -> list[Observed]:
     """Line points of the wire in one of a whisk's cameras, by frame, beside curves in each of them.
 
@@ -219,7 +219,7 @@ def trace_wire(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[
     return observed(points, source, whisk.cameras.names.index(view.camera.name), list(curves))
 
 
-def clear_pieces(whisk: WhiskPictures, view: View, axis: BarAxis, curves: Mapping[int, Curves]) -> Pieces:
+def clear_pieces(whisk: WhiskPictures, view: View, axis: Axis, curves: Mapping[int, Curves]) -> Pieces:
     """Pieces of the wire beside curves, clear of clamp and bar, in one of a whisk's cameras."""
     settings = whisk.settings
     pieces = wire_pieces(view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px)
