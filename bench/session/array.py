@@ -58,8 +58,6 @@ def load_views(
             _check_cone(bases, trial)
     if any(trial.camera_sources for trial in session.trials):
         _check_placed(session)
-        if any(trial.camera_sources and not _is_bar(trial) for trial in session.trials):
-            doubts.note("pictures of rings, spheres and cones are not looked at: what is felt has no truth beside it")
     readable = tuple(trial for trial in session.trials if trial.name in channels)
     return tuple(_view(session, named[base.name], base, readable, channels) for base in bases)
 
@@ -79,11 +77,6 @@ def _check_placed(session: Session) -> None:
     if session.T_rig_board is None and session.cameras_toml is None:
         asked = "measure it, or bring cameras.toml: of several wires it says which is whose"
         raise BadInput(f"[rig] T_rig_board is missing; {asked}", file=MANIFEST)
-
-
-def _is_bar(trial: Trial) -> bool:
-    """Whether the object is a straight bar, as far as trial.toml says."""
-    return trial.object is None or trial.object.shape == "bar"
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -178,7 +171,6 @@ def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels)
     too."""
     own = tuple(
         replace(trial, daq=channels[trial.name][base.name], whisker=base.name,
-                camera_sources=trial.camera_sources if _is_bar(trial) else {},
                 object_velocity_mm_s=_turned(trial.object_velocity_mm_s, base)) for trial in trials
     )  # fmt: skip
     return replace(

@@ -74,6 +74,11 @@ class Trial:
     whisker: str = ""
 
     @property
+    def is_bar(self) -> bool:
+        """Whether the object is a straight bar, as far as trial.toml says."""
+        return self.object is None or self.object.shape == "bar"
+
+    @property
     def place(self) -> str:
         """How messages name it: by the path inside the session, and the whisker of an array."""
         return f"trials/{self.name}{self._of_whisker}"

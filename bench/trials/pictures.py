@@ -65,7 +65,7 @@ class Shown:
 def touched(trial: Trial) -> Bar:
     """What is touched, as vision takes it: a cone has no thickness of its own."""
     given = trial.object
-    if given is None or given.shape == "bar":
+    if trial.is_bar:
         return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)
     form = Form(given.shape, given.ring_diameter_mm or 0.0, float(np.radians(given.half_angle_deg or 0.0)))
     if given.shape == "cone":

@@ -25,6 +25,7 @@ STRETCHES = 8  # of each side
 _INSIDE_PX = 9.0  # of the object that are read beside an edge
 _WIDEST_PX = 40.0  # half a width; wider, an object's light changes no faster beside its edge
 _BLURS_PX, _FINE_BLURS = (0.6, 0.85, 1.2, 1.7), np.exp(np.array([-0.2, -0.1, 0.0, 0.1, 0.2]))
+_ROUGH_BLURS_PX, _ROUGH_EVERY = (1.0,), 2  # of a quick look; steps of the grid, half a blur
 _GAMMAS = (1.0, 2.2)
 _LEAST_CHANCE = 0.001  # of a transfer curve
 _FEWEST_PIECES = 4
@@ -61,17 +62,20 @@ class _Side:
 
 
 def measure_limb(view: View, axis: Rounded, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
-                 reach_px: float, before: Limb | None = None) -> Limb:
+                 reach_px: float, before: Limb | None = None, *, rough: bool = False) -> Limb:
     """The edges beside a predicted outline that is at most reach_px off. before: of a look that told the blur, by which
-    it is measured finely."""
+    it is measured finely. rough: by one quick look."""
     sides = _sides(view, axis, radius_mm, settings)
     pieces = [(side, _pieces(view, side, wires_px, settings, reach_px)) for side in sides]
     pieces = [(side, some) for side, some in pieces if len(some) >= _FEWEST_PIECES]
     if not pieces:
         nothing = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
         return Limb(nothing, np.zeros(0), 0, _BLURS_PX[1])
-    blurs = _BLURS_PX if before is None else before.blur_px * _FINE_BLURS
-    looks = [_looks(some, reach_px, blurs, gamma, fine=before is not None) for gamma in _GAMMAS for _, some in pieces]
+    blurs, gammas, every = _BLURS_PX if before is None else before.blur_px * _FINE_BLURS, _GAMMAS, 1
+    if rough:
+        blurs, gammas, every = _ROUGH_BLURS_PX, _GAMMAS[:1], _ROUGH_EVERY
+    looks = [_looks(some, reach_px, blurs, gamma, every, fine=before is not None) for gamma in gammas
+             for _, some in pieces]
     return _limb([side for side, _ in pieces], [some for _, some in pieces], looks, blurs)
 
 
@@ -186,10 +190,11 @@ class _Look:
     of_curve: float
 
 
-def _looks(pieces: Pieces, reach_px: float, blurs_px: Sequence[float], gamma: float, *, fine: bool) -> _Look:
+def _looks(pieces: Pieces, reach_px: float, blurs_px: Sequence[float], gamma: float, every: int, *, fine: bool
+           ) -> _Look:
     seen = profiles(pieces, STRETCHES, reach_px, gamma)
     rod = LitRod(seen)
-    under = [evidence(rod, reach_px, float(blur), 2 if fine else 1, all_light=fine, every=1) for blur in blurs_px]
+    under = [evidence(rod, reach_px, float(blur), 2 if fine else 1, all_light=fine, every=every) for blur in blurs_px]
     best = min(under, key=lambda one: one.least.sum())
     temper = overstated(best, seen)
     against, mean, variance = [], [], []
@@ -243,10 +248,10 @@ def _stations(pieces: Pieces, count: int) -> np.ndarray:
 
 
 def measure_limbs(views: Sequence[View], axis: Rounded, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
-                  settings: VisionSettings, reach_px: float, before: Mapping[str, Limb] | None = None
-                  ) -> dict[str, Limb]:
+                  settings: VisionSettings, reach_px: float, before: Mapping[str, Limb] | None = None, *,
+                  rough: bool = False) -> dict[str, Limb]:
     """`measure_limb` in each view, by camera."""
     before = before or {}
     return {view.camera.name: measure_limb(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings,
                                            _FINE_REACH_PX if view.camera.name in before else reach_px,
-                                           before.get(view.camera.name)) for view in views}
+                                           before.get(view.camera.name), rough=rough) for view in views}

@@ -34,6 +34,7 @@ _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 _ROUNDS = 6
 _LEAST_SHARE = 0.3  # of the stretches of an outline, in each camera, that show an edge
+_SURE_SHARE = 0.85  # beyond which no other place is asked
 _WIRES = 8
 _NAMES = {"ring": "ring of {ring:g} mm", "sphere": "sphere of {thick:g} mm", "cone": "cone of {angle:g} deg half-angle"}
 
@@ -47,7 +48,11 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
     clear = [clear_edges(view.camera, still(view), view.background[::HALF, ::HALF], small, sum(span) / 2)
              for view in views]
     wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
-    found = [settled(axis, views, cameras, rods, wires, settings) for axis in likely_places(clear, rods, span)]
+    found: list[tuple[Rounded, float]] = []
+    for axis in likely_places(clear, rods, span):
+        found.append(settled(axis, views, cameras, rods, wires, settings))
+        if found[-1][1] > _SURE_SHARE:
+            break
     axis, share = max(found, key=lambda one: one[1])
     if share < _LEAST_SHARE:
         form = rods.bar.form
@@ -63,7 +68,7 @@ def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, 
     smallest share, of all cameras, of the outline's stretches that have an edge where it is."""
     radius_mm = rods.bar.radius_mm
     for reach_px in _REACHES_PX:
-        limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px)
+        limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px, rough=True)
         if not all(len(limb.points) for limb in limbs.values()):
             return axis, 0.0
         axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)

@@ -152,7 +152,9 @@ def nearer_by(axis: Rounded, points_mm: np.ndarray, towards: np.ndarray) -> np.n
     (…, k, 3) sees; towards (…, k, 3): the curves' tangents there."""
     local = axis.near(points_mm)
     away = points_mm - local.foot_mm
-    across = towards - np.sum(towards * local.direction, axis=-1, keepdims=True) * local.direction
+    across = towards
+    if axis.form.shape != "sphere":
+        across = towards - np.sum(towards * local.direction, axis=-1, keepdims=True) * local.direction
     return -np.sum(away * towards, axis=-1) / np.maximum(np.sum(across**2, axis=-1), 1e-6)
 
 
