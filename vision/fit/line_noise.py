@@ -13,7 +13,8 @@ class LineNoise:
 
     wire_px: sigma of a point of the wire (one for each piece), scatter about the fit and what neighbours share
     included; NaN where it has none. alike: how much of its error a point shares with the next one. bar_px (k, 3): of
-    each line of the bar its side (0 the middle, ±1 an edge), and sigma at the two places where it is handed on.
+    each line of the bar its side (0 the middle, ±1 an edge), and sigma at the two places where it is handed on; none of an
+    outline that is no bar's.
     """
 
     wire_px: float
@@ -34,5 +35,6 @@ def _of_wire(problem: Problem, camera: int) -> float:
 
 
 def _of_bar(problem: Problem, camera: int) -> np.ndarray:
-    lines = [[seen.side, *seen.points.sigma_px] for seen in problem.seen if seen.camera == camera and seen.frame < 0]
+    bars = () if problem.is_rounded else [one for one in problem.seen if one.camera == camera and one.frame < 0]
+    lines = [[seen.side, *seen.points.sigma_px] for seen in bars]
     return np.array(lines, dtype=float).reshape(-1, 3)
