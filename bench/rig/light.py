@@ -40,7 +40,16 @@ def round_shade(
     against `across`.
     """
     up = np.sqrt(np.maximum(1 - across**2, 0))
-    diffuse = np.maximum(up * facing + across * aside, 0)
-    highlight = np.maximum(up * mirror[0] + across * mirror[1], 0) ** material.gloss
+    return surface_shade(light, material, up * facing + across * aside, up * mirror[0] + across * mirror[1], up)
+
+
+def surface_shade(
+    light: Light, material: Material, lamp: np.ndarray, mirror: np.ndarray, up: np.ndarray
+) -> np.ndarray:
+    """Brightness of a surface by the cosines between its normal and the lamp, the direction half-way between lamp and
+    camera, and the camera's as it is seen across a round bar.
+    """
+    diffuse = np.maximum(lamp, 0)
+    highlight = np.maximum(mirror, 0) ** material.gloss
     edge = up**material.rim if material.rim else 1.0
     return (material.matt * (light.soft + light.lamp * diffuse) + material.shiny * light.lamp * highlight) * edge

@@ -97,7 +97,7 @@ def trial_toml(recording: Recording) -> str:
         trial["object_gives_way"] = True
     if table.purpose == "gauge":
         trial["follicle_roll_deg"] = table.follicle_roll_deg
-    return tomli_w.dumps(trial)
+    return tomli_w.dumps(trial | _said_object(recording.bar, says_where=False))
 
 
 def frames_csv(times_s: Iterable[float], clock_offset_s: float) -> str:
@@ -115,26 +115,31 @@ def signals_csv(recording: Recording) -> str:
 
 
 def array_trial_toml(recording: ArrayRecording, *, says_where: bool = True) -> str:
-    """trial.toml of an array's recording: slope and distance are not those of any one whisker. says_where: and where
-    the object stands, as people know it who take no pictures."""
+    """trial.toml of an array's recording: slope and distance are not those of any one whisker. says_where: where the
+    object stands, too, as people know it who take no pictures."""
     run, table = recording.run, recording.run.table
     trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "purpose": table.purpose}
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
-    if says_where:
-        trial["object"] = _object(recording.bar)
-    return tomli_w.dumps(trial)
+    return tomli_w.dumps(trial | _said_object(recording.bar, says_where=says_where))
 
 
-def _object(bar: Bar) -> dict:
-    """Where it stands, as session.toml has it."""
-    stated = {"shape": "bar", "point_mm": bar.point_mm.tolist(), "axis": bar.axis.tolist()}
+def _said_object(bar: Bar, *, says_where: bool) -> dict:
+    """[object] of trial.toml: nothing of a straight bar whose place is not said."""
+    return {"object": _object(bar, says_where=says_where)} if says_where or type(bar) is not Bar else {}
+
+
+def _object(bar: Bar, *, says_where: bool = True) -> dict:
+    """What it is and where it stands, as [object] has it."""
+    shape, point, sizes = "bar", bar.point_mm, {}
     if isinstance(bar, Sphere):
-        return {"shape": "sphere", "point_mm": stated["point_mm"]}
+        shape = "sphere"
     if isinstance(bar, Cone):
-        angle = math.degrees(bar.half_angle_rad)
-        return stated | {"shape": "cone", "point_mm": bar.tip_mm.tolist(), "half_angle_deg": angle}
-    return stated | {"shape": "ring", "ring_diameter_mm": 2 * bar.ring_radius_mm} if isinstance(bar, Ring) else stated
+        shape, point, sizes = "cone", bar.tip_mm, {"half_angle_deg": math.degrees(bar.half_angle_rad)}
+    if isinstance(bar, Ring):
+        shape, sizes = "ring", {"ring_diameter_mm": 2 * bar.ring_radius_mm}
+    where = {"point_mm": point.tolist()} | ({} if shape == "sphere" else {"axis": bar.axis.tolist()})
+    return {"shape": shape} | (where if says_where else {}) | sizes
 
 
 def array_signals_csv(recording: ArrayRecording) -> str:
@@ -177,13 +182,20 @@ def _truth_row(frame, whisk, time_s, motor_rad, back, slips=None):
 
 
 def truth_toml(recording: Recording) -> str:
-    """One value a key, or a list where the recording holds several whisks."""
+    """One value a key, or a list where the recording holds several whisks; and what is touched, where it is rounded."""
     values = [_whisk_truth(whisk) for whisk in recording.whisks]
     lines = []
     for key in values[0]:
         texts = [f"{v[key]:.6f}" for v in values]
         lines.append(f"{key} = {texts[0] if len(texts) == 1 else '[' + ', '.join(texts) + ']'}")
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + _true_object(recording.bar)
+
+
+def _true_object(bar: Bar) -> str:
+    """[object] of truth.toml: shape, size and where it stands at first touch; nothing of a straight bar."""
+    if type(bar) is Bar:
+        return ""
+    return "\n" + tomli_w.dumps({"object": _object(bar) | {"diameter_mm": 2 * bar.radius_mm}})
 
 
 def _whisk_truth(whisk):

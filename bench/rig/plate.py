@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
+from bench.rig.layer import Layer
 from bench.rig.light import Light
 from bench.rig.window import Window
 
@@ -64,21 +65,31 @@ class Plate:
         part = window.around(camera.project(self.corners_mm()), 4 * window.soft_px + 2)
         if part is None:
             return
-        cover, tone = _printed(self.print, *_on_plane(camera, self.pose, part))
+        cover, tone = _printed(self.print, *_on_plane(camera, self.pose, *part.rays(), part.soft_px))
         canvas = radiance[part.within(window)]
         canvas += cover * (np.float32(light.flat(-self.pose[:, 2])) * tone - canvas)
 
+    def hides(self, window: Window, layer: Layer) -> np.ndarray:
+        """How much (n,) of each sample of a layer in a window is behind it."""
+        camera = window.camera
+        if not self.faces(camera.centre_mm):
+            return np.zeros(len(layer.cover))
+        x, y = (ray[layer.at] for ray in window.rays())
+        across, down, soft_across, soft_down, _ = _on_plane(camera, self.pose, x, y, window.soft_px)
+        cover = _inside(self.print.x_mm, across, soft_across) * _inside(self.print.y_mm, down, soft_down)
+        points = self.pose[:, 3] + np.multiply.outer(across, self.pose[:, 0]) + np.multiply.outer(down, self.pose[:, 1])
+        return cover * (np.linalg.norm(points - camera.centre_mm, axis=1) < layer.depth_mm)
 
-def _on_plane(camera, pose, window):
-    """Where the samples' rays meet the plane (mm), the two axes' blur (mm) there, and the correlation of the two."""
-    x, y = window.rays()
+
+def _on_plane(camera, pose, x, y, soft_px):
+    """Where samples' rays meet the plane (mm), the two axes' blur (mm) there, and the correlation of the two."""
     to_camera = camera.rotation @ pose[:, :2]
     place = camera.rotation @ pose[:, 3] + camera.translation_mm
     inverse = np.linalg.inv(np.column_stack([to_camera, place])).astype(np.float32)
     # The third component is one over the depth; rays that miss the plane in front of the camera get one far away on it.
     scale = 1 / np.maximum(inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2], np.float32(_NEVER))
     across, down = ((inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2]) * scale for i in (0, 1))
-    soft = np.float32(window.soft_px) / np.float32([camera.matrix[0, 0], camera.matrix[1, 1]])
+    soft = np.float32(soft_px) / np.float32([camera.matrix[0, 0], camera.matrix[1, 1]])
     (a0, a1), (d0, d1) = (((inverse[i, 0] - p * inverse[2, 0]) * scale * soft[0],
                            (inverse[i, 1] - p * inverse[2, 1]) * scale * soft[1]) for i, p in ((0, across), (1, down)))
     soft_across, soft_down = np.sqrt(a0**2 + a1**2), np.sqrt(d0**2 + d1**2)

@@ -2,15 +2,18 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.rig.bar import Bar, turned
 from bench.rig.board import Board, Ink, marker
 from bench.rig.camera import Camera
+from bench.rig.layer import Front, draw_layers
 from bench.rig.light import Light, Material
 from bench.rig.plate import Plate, Print
+from bench.rig.rounded import Ring
+from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 
@@ -21,6 +24,7 @@ _SLIM_MM = 4.0  # half the width of a hub that has neighbours
 _SHAFT_X_MM = -6.0  # of the motor's shaft, in the hub's axes
 _BLOCK_HALF = np.array([9.0, 9.0, 7.0])  # mm: half the bar's block, each way
 _BLOCK_UP_MM = 52.0  # along the bar from where it is touched
+_ROD_MM, _ROD_RADIUS_MM = 150.0, 2.5  # that holds an object which is no bar, from behind
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
 
 
@@ -136,19 +140,36 @@ class Scene:
 
     def print_board(self, window: Window, radiance: np.ndarray, T_rig_board: np.ndarray) -> None:
         """The board anywhere, as the views for the lens show it."""
-        looks = self.looks
-        plate = Plate(self.board.printed(looks.ink, looks.margin_mm), T_rig_board)
-        plate.draw(window, radiance, looks.light)
+        self._board_plate(T_rig_board).draw(window, radiance, self.looks.light)
+
+    def _board_plate(self, T_rig_board):
+        return Plate(self.board.printed(self.looks.ink, self.looks.margin_mm), T_rig_board)
 
     def stand_bar(self, window: Window, radiance: np.ndarray, bar: Bar, middle_mm: np.ndarray) -> None:
         """The posts under the hubs, and the bar (its middle where first touched) with a block at its upper end."""
         looks = self.looks
-        for post in (post for stand in self.stands for post in stand.posts(looks)):
-            post.draw(window, radiance, looks.light)
+        self._stand_posts(window, radiance)
         down, block = middle_mm - self._reach_down(bar, middle_mm) * bar.axis, _block(bar, middle_mm)
         Tube.straight(down, block.origin_mm, bar.radius_mm, looks.bar).draw(window, radiance, looks.light)
         print_ = marker(self.board.dictionary, self._marker(_BLOCK_MARKER), 10.0, looks.ink)
         block.draw(window, radiance, looks.light, print_, (1, 1))
+
+    def stand_rounded(self, window: Window, radiance: np.ndarray, thing: Bar) -> Front | None:
+        """The posts under the hubs, and a ring, sphere or cone on a rod from behind; the object as it hides what is
+        behind it, None where it is not seen. What is below the board is hidden."""
+        looks = self.looks
+        self._stand_posts(window, radiance)
+        held = held_mm(thing)
+        rod = Tube.straight(held, held + [0.0, _ROD_MM, 0.0], _ROD_RADIUS_MM, looks.dark)
+        layers = [rod.layer(window, looks.light), Solid(thing, looks.bar).layer(window, looks.light)]
+        board = self._board_plate(self.T_rig_board)
+        left = [replace(layer, cover=layer.cover * (1 - board.hides(window, layer))) for layer in layers if layer]
+        draw_layers(left, radiance)
+        return Front.of(left[-1], window) if layers[-1] else None
+
+    def _stand_posts(self, window, radiance):
+        for post in (post for stand in self.stands for post in stand.posts(self.looks)):
+            post.draw(window, radiance, self.looks.light)
 
     def _reach_down(self, bar, middle):
         """To the board, but no further than a rod of this length would."""
@@ -161,13 +182,16 @@ class Scene:
         known = self.board.opencv().getDictionary()
         return len(known.bytesList) + from_end
 
-    def move(self, window: Window, radiance: np.ndarray, hubs: Sequence[Box], whiskers: Sequence[Tube]) -> None:
+    def move(
+        self, window: Window, radiance: np.ndarray, hubs: Sequence[Box], whiskers: Sequence[Tube],
+        front: Front | None = None
+    ) -> None:
         """Hubs and whiskers: a hub whose front, out of which its whiskers stand, faces the camera is behind all
-        whiskers, another one before them."""
+        whiskers, another one before them. front: an object that may hide whiskers."""
         centre = window.camera.centre_mm
         behind = [dict(hub.faces())[(0, 1)].faces(centre) for hub in hubs]
         self._draw_hubs(window, radiance, [hub for hub, is_behind in zip(hubs, behind) if is_behind])
-        draw_tubes(whiskers, window, radiance, self.looks.light)
+        draw_tubes(whiskers, window, radiance, self.looks.light, front)
         self._draw_hubs(window, radiance, [hub for hub, is_behind in zip(hubs, behind) if not is_behind])
 
     def _draw_hubs(self, window, radiance, hubs):
@@ -180,6 +204,14 @@ class Scene:
         """Pixels (n, 2) between which all that moves lies."""
         corners = np.concatenate([plate.corners_mm() for hub in hubs for _, plate in hub.faces()])
         return np.concatenate([camera.project(corners), *(px for one in whiskers for px in one.silhouette(camera))])
+
+
+def held_mm(thing: Bar) -> np.ndarray:
+    """Where a rod holds it, (3,): a ring at its farthest from the base along the rig's y, others in their middle."""
+    if not isinstance(thing, Ring):
+        return thing.point_mm
+    way = np.array([0.0, 1.0, 0.0]) - thing.axis[1] * thing.axis
+    return thing.point_mm + thing.ring_radius_mm * way / np.linalg.norm(way)
 
 
 def _block(bar: Bar, middle_mm: np.ndarray) -> Box:

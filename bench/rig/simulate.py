@@ -78,14 +78,9 @@ def _check_can_be_built(job, name):
 def _check_can_be_rendered(job, name):
     if job.signals_only or not job.protocol.cameras:
         return
-    trials = job.protocol.trials
-    felt_alone = {
-        "a ring, sphere or cone (object)": any(t.object for t in trials),
-        "an array ([[columns]]) before a soft bar": bool(job.whiskers) and any(t.stiffness_N_mm for t in trials),
-    }
-    for what, there in felt_alone.items():
-        if there:
-            raise BadInput(f"{what} is simulated in signals alone; add --signals-only", file=name)
+    if job.whiskers and any(trial.stiffness_N_mm for trial in job.protocol.trials):
+        found = "an array ([[columns]]) before a soft bar is simulated in signals alone"
+        raise BadInput(f"{found}; add --signals-only", file=name)
 
 
 def _claim(job):

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.rig.bar import Bar
 from bench.rig.camera import Camera
+from bench.rig.layer import Front
 from bench.rig.scene import Box, Scene, Stand, floor_and_wall
 from bench.rig.sensor import Sensor
 from bench.rig.tube import Tube
@@ -59,10 +60,13 @@ class Studio:
         return self.cropped(self.window.seen(self.backdrop, self.sensor.blur_px))
 
     def setting(self, bar: Bar, middle_mm: np.ndarray) -> "Setting":
-        """The still scene of a trial: the rig with a bar whose middle is near a point."""
-        radiance = self.backdrop.copy()
-        self.scene.stand_bar(self.window, radiance, bar, middle_mm)
-        return Setting(self, radiance, self.window.seen(radiance, self.sensor.blur_px))
+        """The still scene of a trial: the rig with a bar whose middle is near a point, or with a ring, sphere or cone."""
+        radiance, front = self.backdrop.copy(), None
+        if type(bar) is Bar:
+            self.scene.stand_bar(self.window, radiance, bar, middle_mm)
+        else:
+            front = self.scene.stand_rounded(self.window, radiance, bar)
+        return Setting(self, radiance, self.window.seen(radiance, self.sensor.blur_px), front)
 
     def cropped(self, picture: np.ndarray) -> np.ndarray:
         """The camera's picture out of a wider one."""
@@ -72,8 +76,8 @@ class Studio:
 class Setting:
     """A trial's still scene, ready for its frames."""
 
-    def __init__(self, studio: Studio, radiance: np.ndarray, seen: np.ndarray):
-        self._studio, self._radiance, self._seen = studio, radiance, seen
+    def __init__(self, studio: Studio, radiance: np.ndarray, seen: np.ndarray, front: Front | None = None):
+        self._studio, self._radiance, self._seen, self._front = studio, radiance, seen, front
 
     @property
     def empty(self) -> np.ndarray:
@@ -96,7 +100,7 @@ class Setting:
         total = np.zeros_like(still)
         for moment in moments:
             radiance = still.copy()
-            self._studio.scene.move(part, radiance, moment.hubs, moment.whiskers)
+            self._studio.scene.move(part, radiance, moment.hubs, moment.whiskers, self._front)
             total += radiance
         return total / np.float32(len(moments))
 

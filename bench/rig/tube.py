@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from bench.rig.camera import Camera
+from bench.rig.layer import Front, Layer, draw_layers
 from bench.rig.light import Light, Material, round_shade
 from bench.rig.window import Window
 
@@ -91,37 +92,15 @@ class Tube:
         return 0.5 * sum(round_shade(light, self.material, p, *lamp, mirror) for p in points)
 
 
-@dataclass(frozen=True, eq=False)
-class Layer:
-    """A tube in samples (n,) of a window: rows and columns, how much of each it covers, how bright it is there, and how
-    far its axis is from the camera, mm."""
-
-    at: tuple[np.ndarray, np.ndarray]
-    cover: np.ndarray
-    tone: np.ndarray
-    depth_mm: np.ndarray
-
-
-def draw_tubes(tubes: Sequence[Tube], window: Window, radiance: np.ndarray, light: Light) -> None:
-    """Several tubes over what is drawn: in each sample the nearer over the farther."""
-    if len(tubes) == 1:
+def draw_tubes(
+    tubes: Sequence[Tube], window: Window, radiance: np.ndarray, light: Light, front: Front | None = None
+) -> None:
+    """Several tubes over what is drawn: in each sample the nearer over the farther, all but behind an object."""
+    if len(tubes) == 1 and front is None:
         tubes[0].draw(window, radiance, light)
         return
     layers = [layer for layer in (tube.layer(window, light) for tube in tubes) if layer is not None]
-    if not layers:
-        return
-    rows, columns = (np.concatenate([layer.at[axis] for layer in layers]) for axis in (0, 1))
-    values = ([one.cover, one.tone, one.depth_mm] for one in layers)
-    cover, tone, depth = (np.concatenate(column) for column in zip(*values))
-    order = np.lexsort((-depth, columns, rows))
-    rows, columns, cover, tone = rows[order], columns[order], cover[order], tone[order]
-    first = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))
-    number = np.arange(len(rows))
-    rank = number - np.maximum.accumulate(np.where(first, number, 0))  # of each sample's layers from afar
-    for nearer in range(int(rank.max()) + 1):
-        now = rank == nearer
-        at = rows[now], columns[now]
-        radiance[at] += (cover[now] * (tone[now] - radiance[at])).astype(np.float32)
+    draw_layers(layers if front is None else [front.left_of(layer, window) for layer in layers], radiance)
 
 
 @dataclass(frozen=True, eq=False)
