@@ -26,6 +26,7 @@ _INSIDE_PX = 9.0  # of the object that are read beside an edge
 _WIDEST_PX = 40.0  # half a width; wider, an object's light changes no faster beside its edge
 _BLURS_PX, _FINE_BLURS = (0.6, 0.85, 1.2, 1.7), np.exp(np.array([-0.2, -0.1, 0.0, 0.1, 0.2]))
 _ROUGH_BLURS_PX, _ROUGH_EVERY = (1.0,), 2  # of a quick look; steps of the grid, half a blur
+_CLEAR_PX = 5.0  # beside an edge, where nothing else of the object may be
 _GAMMAS = (1.0, 2.2)
 _LEAST_CHANCE = 0.001  # of a transfer curve
 _FEWEST_PIECES = 4
@@ -53,11 +54,13 @@ class Limb:
 
 @dataclass(frozen=True)
 class _Side:
-    """One side of a predicted outline: its stations in the picture and in space."""
+    """One side of a predicted outline: its stations in the picture, how far away each is, and whether it is before
+    nothing but the background."""
 
     px: np.ndarray
     normal: np.ndarray
     far_mm: np.ndarray
+    clear: np.ndarray
     half_px: float
 
 
@@ -90,7 +93,10 @@ def _sides(view: View, axis: Rounded, radius_mm: float, settings: VisionSettings
         scale = np.linalg.norm(normal, axis=1)
         if np.all(np.isfinite(px)):
             half = float(np.median(scale)) * max(radius_mm, 1.0)
-            sides.append(_Side(px, normal / scale[:, None], np.linalg.norm(some - camera.centre_mm, axis=1), half))
+            beside = some + (_CLEAR_PX / scale)[:, None] * out
+            clear = ~axis.hides_itself(camera.centre_mm, beside, radius_mm)
+            far = np.linalg.norm(some - camera.centre_mm, axis=1)
+            sides.append(_Side(px, normal / scale[:, None], far, clear, half))
     return sides
 
 
@@ -107,7 +113,7 @@ def _pieces(view: View, side: _Side, wires_px: Sequence[np.ndarray], settings: V
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(side.px, axis=0), axis=1))])
     tangent *= np.sign(np.sum(np.gradient(side.px, axis=0) * tangent, axis=1))[:, None]
     along = run[nearest] + np.sum(away * tangent[nearest], axis=1)
-    keep = (offset > -inside) & (offset < outside) & (along >= 0.0) & (along <= run[-1])
+    keep = side.clear[nearest] & (offset > -inside) & (offset < outside) & (along >= 0.0) & (along <= run[-1])
     if len(wires_px) and view.itself is None:
         wire = np.concatenate([_dense(line) for line in wires_px])
         keep &= ~np.isfinite(cKDTree(wire).query(pixels, distance_upper_bound=settings.bar_piece_px / 2 + 5.0)[0])

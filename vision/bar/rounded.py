@@ -22,19 +22,21 @@ from vision.pictures.change import HALF
 from vision.pictures.view import View
 
 _EDGE_MM = 3.0  # half the width of a bar whose edges are as sharp as what is looked for
-_SPREADS, _KEPT = (0.5, 0.2, 0.08), (12, 8, 6)
+_SPREADS, _KEPT = (0.5, 0.2, 0.08), (16, 12, 8)
 _STARTS = 32
 _STATIONS, _OUTLINE_MM = 8, 30.0
 _BETA_RAD, _PSI_RAD = np.radians(np.arange(-78.0, 79.0, 6.0)), np.radians([-8.0, 0.0, 8.0])
 _CONE_RADII_MM = np.log([1.5, 3.0, 6.0, 12.0, 24.0])
 _X_MM, _TOUCH_MM = 2.4, 2.4
 _AT_ONCE = 4000
-_REACHES_PX = (9.0, 5.0, 3.0)  # round by round, as the object is settled
+_BESIDE_MM, _FEWEST_SHOWN = 0.8, 3  # beside an edge; stations of a side that are not hidden
+_REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)  # round by round, as the object is settled
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera tells as it was
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 _ROUNDS = 6
 _LEAST_SHARE = 0.3  # of the stretches of an outline, in each camera, that show an edge
-_SURE_SHARE = 0.85  # beyond which no other place is asked
+_SETTLED_MM = 0.1
+_SURE_SHARE = 0.9  # beyond which no other place is asked
 _WIRES = 8
 _NAMES = {"ring": "ring of {ring:g} mm", "sphere": "sphere of {thick:g} mm", "cone": "cone of {angle:g} deg half-angle"}
 
@@ -71,7 +73,10 @@ def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, 
         limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px, rough=True)
         if not all(len(limb.points) for limb in limbs.values()):
             return axis, 0.0
+        before = axis
         axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)
+        if reach_px == _REACHES_PX[-1] and np.linalg.norm(axis.point_mm - before.point_mm) < _SETTLED_MM:
+            break
     return axis, min(_share_on(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items())
 
 
@@ -119,7 +124,7 @@ def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, fl
     best = grid
     for spread, kept in zip(_SPREADS, _KEPT):
         near = [spread_out(one, spread * one.half_px) for one in clear]
-        score = partial(_clear_in_all, near, axis_of, rods.bar.radius_mm)
+        score = partial(_clear_in_all, near, axis_of, rods.bar.radius_mm, spread == _SPREADS[-1])
         if best is grid:
             best = apart_from_others(grid, score(grid), 4.0 * steps, _STARTS)
         best = apart_from_others(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
@@ -165,14 +170,16 @@ def placed(form: Form, rods: Rods, each: np.ndarray) -> Rounded:
     return Rounded(point, direction, form, spot)
 
 
-def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, each: np.ndarray) -> np.ndarray:
-    """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1."""
+def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, shown: bool, each: np.ndarray
+                  ) -> np.ndarray:
+    """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1; shown: of what
+    an object does not hide of itself."""
     groups = np.array_split(each, -(-len(each) // _AT_ONCE))
-    return np.concatenate([np.mean([_outline_clear(axis_of(some), one, radius_mm) for one in clear], axis=0)
+    return np.concatenate([np.mean([_outline_clear(axis_of(some), one, radius_mm, shown) for one in clear], axis=0)
                            for some in groups])
 
 
-def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float) -> np.ndarray:
+def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float, shown: bool) -> np.ndarray:
     camera = seen.camera
     limb, normals = axis.limb(camera.centre_mm, radius_mm, _OUTLINE_MM, _STATIONS)
     px = camera.project(np.concatenate([limb.reshape(-1, 3), (limb + 0.2 * normals).reshape(-1, 3)]))
@@ -185,4 +192,10 @@ def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float) -> np.ndarray:
     column, row = (np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5 for one, size in zip(px.T, (width, height)))
     there = seen.field.reshape(3, -1).take(np.nan_to_num(row).astype(np.intp) * width + np.nan_to_num(column).astype(np.intp), axis=1)
     edge = (x * x * there[0] + 2.0 * x * y * there[1] + y * y * there[2]).reshape(*limb.shape[:-1])
-    return np.sqrt(np.prod(np.mean(edge, axis=-1), axis=-1))
+    if not shown or axis.form.shape != "ring":
+        return np.sqrt(np.prod(np.mean(edge, axis=-1), axis=-1))
+    hidden = axis.hides_itself(camera.centre_mm, limb + _BESIDE_MM * normals, radius_mm)
+    count = np.sum(~hidden, axis=-1)
+    sides = np.sum(np.where(hidden, 0.0, edge), axis=-1) / np.maximum(count, 1)
+    sides = np.where(count >= _FEWEST_SHOWN, sides, sides[..., ::-1])
+    return np.sqrt(np.prod(sides, axis=-1)) * np.where(np.max(count, axis=-1) >= _FEWEST_SHOWN, 1.0, 0.0)

@@ -16,7 +16,8 @@ _UP = np.array([0.0, 0.0, 1.0])
 _TINY = 1e-12
 _MOST_TURN_RAD = np.radians(60.0)  # of a ring to either side of the contact: farther round it hides itself
 _LEAST_RADIUS_MM = 0.3  # of a cone: nearer to its tip its two edges are one
-_ROUNDS = 5  # from one mm off: each divides what is left by ten and more
+_LEAST_BEND, _LONGEST_MM = 0.02, 10.0  # of a Newton step, where a sight runs along a ring
+_ROUNDS = 8  # from one mm off: each divides what is left by ten and more
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,31 @@ class Rounded:
         length = np.linalg.norm(away, axis=-1)
         return length - local.wider_mm, away / np.maximum(length, _TINY)[..., None], local
 
+    def follows(self, local: Local, away: np.ndarray) -> np.ndarray | float:
+        """By how much (…, k) the middle's nearest point goes on with a point that goes along it, which is so far away
+        (…, k, 3) from it: on a circle less than on a straight line, if that is outside of it."""
+        if self.form.shape != "ring":
+            return 0.0 if self.form.shape == "sphere" else 1.0
+        radius = 0.5 * self.form.ring_diameter_mm
+        outward = (local.foot_mm - np.asarray(self.point_mm)[..., None, :]) / radius
+        return radius / np.maximum(radius + np.sum(away * outward, axis=-1), 0.1 * radius)
+
+    def hides_itself(self, centre_mm: np.ndarray, points_mm: np.ndarray, radius_mm: float) -> np.ndarray:
+        """Whether (…,) a sight from a camera (3,) through points (…, 3) beside the surface meets it elsewhere."""
+        if self.form.shape != "ring":
+            return np.zeros(points_mm.shape[:-1], dtype=bool)
+        sight = points_mm - centre_mm
+        far = np.linalg.norm(sight, axis=-1, keepdims=True)
+        steps = np.arange(-1.0, 1.0, radius_mm / self.form.ring_diameter_mm) * (self.form.ring_diameter_mm + radius_mm)
+        axis, batch = np.asarray(self.direction), self.point_mm.shape[:-1]
+        start = (points_mm.reshape(*batch, -1, 3) - np.asarray(self.point_mm)[..., None, :])
+        ahead = (sight / far).reshape(*batch, -1, 3)
+        high, climbs = (np.einsum("...kj,...j->...k", one, axis)[..., None] for one in (start, ahead))
+        far2 = np.sum(start**2, axis=-1)[..., None] + 2.0 * steps * np.sum(start * ahead, axis=-1)[..., None] + steps**2
+        high = high + steps * climbs
+        across = np.sqrt(np.maximum(far2 - high**2, 0.0)) - 0.5 * self.form.ring_diameter_mm
+        return np.any(across**2 + high**2 < radius_mm**2, axis=-1).reshape(points_mm.shape[:-1])
+
     def nearest_on_lines(self, begin_mm, towards, at_mm, rounds: int = _ROUNDS) -> np.ndarray:
         """Where (…, k), mm from begin, straight lines (…, k, 3) come nearest, from near there."""
         for _ in range(rounds):
@@ -148,14 +174,13 @@ class Rounded:
 
 
 def nearer_by(axis: Rounded, points_mm: np.ndarray, towards: np.ndarray) -> np.ndarray:
-    """How far (…, k) to go on along curves to come nearest, by Newton's method as for the bar that each point
-    (…, k, 3) sees; towards (…, k, 3): the curves' tangents there."""
+    """How far (…, k) to go on along curves to come nearest, by Newton's method; towards (…, k, 3): the curves' tangents,
+    of about unit length, at points (…, k, 3)."""
     local = axis.near(points_mm)
     away = points_mm - local.foot_mm
-    across = towards
-    if axis.form.shape != "sphere":
-        across = towards - np.sum(towards * local.direction, axis=-1, keepdims=True) * local.direction
-    return -np.sum(away * towards, axis=-1) / np.maximum(np.sum(across**2, axis=-1), 1e-6)
+    follows = axis.follows(local, away) * np.sum(towards * local.direction, axis=-1) ** 2
+    bends = np.sum(towards**2, axis=-1) - follows
+    return np.clip(-np.sum(away * towards, axis=-1) / np.maximum(bends, _LEAST_BEND), -_LONGEST_MM, _LONGEST_MM)
 
 
 def _unit(vectors):
