@@ -142,8 +142,8 @@ class SeenRing:
         return np.repeat(np.repeat(near, _COARSE, 0), _COARSE, 1)[:rows, :columns]
 
     def _nearest(self, ways: np.ndarray) -> np.ndarray:
-        """Angles (n,) of the circle's points that are nearest to rays (n, 3). A ray comes near it twice at most: the two
-        lowest of stations that are lower than their neighbours, then Newton's method."""
+        """Angles (n,) of the circle's points that are nearest to rays (n, 3). A ray comes near it twice at most: the
+        two lowest of stations that are lower than their neighbours, then Newton's method."""
         square = _HalfSquare.of(ways, self.thing, _across(self.thing.axis))
         found = [square.lowest(angles) for angles in square.low_stations()]
         return np.where(square.at(found[0]) <= square.at(found[1]), *found)

@@ -97,5 +97,5 @@ def test_a_hub_a_column(tmp_path):
 
 
 def test_a_soft_bar_is_refused_with_pictures(tmp_path):
-    with pytest.raises(BadInput, match="before a soft bar.*signals-only"):
+    with pytest.raises(BadInput, match=r"before a soft bar.*signals-only"):
         simulate(tmp_path / "session", protocol=protocol_file(tmp_path, ARRAY + "stiffness_N_mm = 0.5\n"))

@@ -122,7 +122,7 @@ THINGS = {
 
 @pytest.mark.parametrize("name", THINGS)
 def test_outlines_are_where_rays_graze(name):
-    """The amount of a column that it covers, and its middle, within 0.01 px; at three samples a pixel."""
+    """The amount of a column that it covers, and its middle, within 0.012 px, where most edges are oblique to it."""
     thing, window = THINGS[name], Window.whole(CAMERA, 3, 0.2, 4)
     layer = Solid(thing, Material(1.0)).layer(window, EVEN)
     cover = np.zeros(window.shape)
@@ -131,15 +131,17 @@ def test_outlines_are_where_rays_graze(name):
     for column in np.linspace(columns[0] + 9, columns[-1] - 9, 4).astype(int):
         long, middle = amount(thing, window.u_px[column], 0.2)
         profile = cover[:, column] / window.fine
-        assert profile.sum() == pytest.approx(long, abs=0.01)
-        assert profile @ window.v_px / profile.sum() == pytest.approx(middle, abs=0.01)
+        assert profile.sum() == pytest.approx(long, abs=0.012)
+        assert profile @ window.v_px / profile.sum() == pytest.approx(middle, abs=0.006)
 
 
 @pytest.mark.parametrize("name", THINGS)
 def test_what_is_seen_is_what_sights_meet_first(name):
     thing, window = THINGS[name], Window.whole(CAMERA, 1, 0.3)
     layer = Solid(thing, Material(1.0)).layer(window, EVEN)
-    whole = np.flatnonzero(layer.cover > 1 - 1e-9)[::97]
+    inner = np.zeros(window.shape, np.uint8)
+    inner[layer.at] = layer.cover > 1 - 1e-9
+    whole = np.flatnonzero(cv2.erode(inner, np.ones((5, 5)))[layer.at])[::97]
     ways = rays(window.u_px[layer.at[1][whole]], window.v_px[layer.at[0][whole]])
     seen = layer.depth_mm[whole]
     before, behind = (within(thing, CAMERA.centre_mm + (seen + step)[:, None] * ways) for step in (-0.02, 0.02))
@@ -164,7 +166,7 @@ def test_a_large_ring_looks_like_a_straight_bar():
 
 def test_a_wire_is_seen_before_an_object_and_not_behind_it():
     thing, window = sphere(20), Window.whole(CAMERA, 3, 0.2)
-    layer, light = Solid(thing, Material(0.6)).layer(window, EVEN), EVEN
+    layer = Solid(thing, Material(0.6)).layer(window, EVEN)
     front = Front.of(layer, window)
     towards = (CAMERA.centre_mm - thing.point_mm) / np.linalg.norm(CAMERA.centre_mm - thing.point_mm)
     still = np.full(window.shape, 0.3, np.float32)
@@ -172,19 +174,21 @@ def test_a_wire_is_seen_before_an_object_and_not_behind_it():
     part = window.around(np.array([[60.0, 60.0], [260.0, 200.0]]), 3)
     for away_mm, is_seen in ((30.0, True), (-30.0, False)):
         middle = thing.point_mm + away_mm * towards
-        wire = Tube.straight(middle - [35.0, 0, 0], middle + [35.0, 0, 0], 0.5, Material(0.05))
+        half = np.array([35.0, 0, 0])
+        wire = Tube.straight(middle - half, middle + half, 0.5, Material(0.05))
         drawn = still[part.within(window)].copy()
-        draw_tubes([wire], part, drawn, light, front)
+        draw_tubes([wire], part, drawn, EVEN, front)
         dark = drawn < 0.1
         on = front.cover[part.within(window)] > 0.99
         assert dark[~on].sum() > 300
         assert (dark[on].sum() > 300) == is_seen
-        assert is_seen or np.abs(drawn - still[part.within(window)])[on].max() < 1e-5
+        assert is_seen or np.abs(drawn - still[part.within(window)])[on].max() < 1e-4
 
 
 def test_an_object_beside_a_camera_is_refused():
+    beside = Sphere(CAMERA.centre_mm + 3.0, np.array([0, 0, 1.0]), 5.0)
     with pytest.raises(BadInput, match="camera small stands within"):
-        Solid(Sphere(CAMERA.centre_mm + 3.0, np.array([0, 0, 1.0]), 5.0), METAL).layer(Window.whole(CAMERA, 1, 0.3), EVEN)
+        Solid(beside, METAL).layer(Window.whole(CAMERA, 1, 0.3), EVEN)
 
 
 OBJECTS = {
