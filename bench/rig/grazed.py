@@ -142,27 +142,11 @@ class SeenRing:
         return np.repeat(np.repeat(near, _COARSE, 0), _COARSE, 1)[:rows, :columns]
 
     def _nearest(self, ways: np.ndarray) -> np.ndarray:
-        """Angles (n,) of the circle's points that are nearest to rays (n, 3): of stations the nearest, then Newton's
-        method on the distance's square, half of it, a + e·cos + f·sin − (b + c·cos + d·sin)²/2."""
-        unit = ways / np.linalg.norm(ways, axis=1)[:, None]
-        first, second = (self.thing.ring_radius_mm * way for way in _across(self.thing.axis))
-        centre = self.thing.point_mm
-        (b, c, d), (e, f) = (unit @ way for way in (centre, first, second)), (centre @ first, centre @ second)
-        stations = np.linspace(0, 2 * np.pi, _STATIONS, endpoint=False)
-        best, least = np.zeros(len(ways)), np.full(len(ways), np.inf)
-        for angle in stations.tolist():
-            cos, sin = math.cos(angle), math.sin(angle)
-            square = e * cos + f * sin - 0.5 * (b + c * cos + d * sin) ** 2
-            nearer = square < least
-            best[nearer], least[nearer] = angle, square[nearer]
-        for _ in range(6):
-            cos, sin = np.cos(best), np.sin(best)
-            along, turned = b + c * cos + d * sin, d * cos - c * sin
-            slope = f * cos - e * sin - along * turned
-            bend = -e * cos - f * sin - turned**2 + along * (c * cos + d * sin)
-            step = np.where(bend > 0, slope / np.where(bend > 0, bend, 1), np.sign(slope) * stations[1])
-            best = best - np.clip(step, -stations[1], stations[1])
-        return best
+        """Angles (n,) of the circle's points that are nearest to rays (n, 3). A ray comes near it twice at most: the
+        two lowest of stations that are lower than their neighbours, then Newton's method."""
+        square = _HalfSquare.of(ways, self.thing, _across(self.thing.axis))
+        found = [square.lowest(angles) for angles in square.low_stations()]
+        return np.where(square.at(found[0]) <= square.at(found[1]), *found)
 
     def hits(self, rays: np.ndarray) -> Hits:
         """As `Seen.hits`: by steps along the ray as long as the surface is far."""
@@ -183,6 +167,59 @@ class SeenRing:
         along = np.cross(thing.axis, normals)
         along /= np.linalg.norm(along, axis=1)[:, None]
         return Hits(np.where(at < end, at / length, np.nan), normals, _off(unit, along))
+
+
+@dataclass(frozen=True, eq=False)
+class _HalfSquare:
+    """Half the squares of the distances (n,) between rays and points of a circle, by the points' angle, but for what is
+    the same of all angles: p·cos + q·sin − (a + b·cos + c·sin)²/2."""
+
+    p: float
+    q: float
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+
+    @classmethod
+    def of(cls, ways: np.ndarray, ring: Ring, across: tuple[np.ndarray, np.ndarray]) -> "_HalfSquare":
+        """Of rays (n, 3) and a ring's circle, angles from the first of two ways (3,) across its axis."""
+        first, second = (ring.ring_radius_mm * way for way in across)
+        unit, centre = ways / np.linalg.norm(ways, axis=1)[:, None], ring.point_mm
+        return cls(centre @ first, centre @ second, unit @ centre, unit @ first, unit @ second)
+
+    def at(self, angles: np.ndarray | float) -> np.ndarray:
+        """Of one angle a ray, or of one for all."""
+        cos, sin = np.cos(angles), np.sin(angles)
+        return self.p * cos + self.q * sin - 0.5 * (self.a + self.b * cos + self.c * sin) ** 2
+
+    def low_stations(self) -> tuple[np.ndarray, np.ndarray]:
+        """The lowest and the next lowest (n,) of the stations that are lower than their neighbours."""
+        stations = np.linspace(0, 2 * np.pi, _STATIONS, endpoint=False)
+        lowest, lower = (np.full(len(self.a), np.inf) for _ in range(2))
+        first, second = np.zeros(len(self.a)), np.zeros(len(self.a))
+        before, here = self.at(stations[-1]), self.at(stations[0])
+        for angle, after in zip(stations, np.roll(stations, -1)):
+            value = self.at(after)
+            low = (here <= before) & (here < value)
+            best = low & (here < lowest)
+            next_best = low & ~best & (here < lower)
+            lower, second = np.where(best, lowest, lower), np.where(best, first, second)
+            lower[next_best], second[next_best] = here[next_best], angle
+            lowest[best], first[best] = here[best], angle
+            before, here = here, value
+        return first, np.where(np.isfinite(lower), second, first)
+
+    def lowest(self, angles: np.ndarray) -> np.ndarray:
+        """Where it is lowest near angles (n,)."""
+        for _ in range(6):
+            cos, sin = np.cos(angles), np.sin(angles)
+            along, turned = self.a + self.b * cos + self.c * sin, self.c * cos - self.b * sin
+            slope = self.q * cos - self.p * sin - along * turned
+            bend = -self.p * cos - self.q * sin - turned**2 + along * (self.b * cos + self.c * sin)
+            most = 2 * np.pi / _STATIONS
+            step = np.where(bend > 0, slope / np.where(bend > 0, bend, 1), np.sign(slope) * most)
+            angles = angles - np.clip(step, -most, most)
+        return angles
 
 
 @dataclass(frozen=True, eq=False)

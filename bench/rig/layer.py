@@ -10,8 +10,8 @@ from bench.rig.window import Window
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """A thing in samples (n,) of a window: rows and columns, how much of each it covers, how bright it is there, and how
-    far it (a tube: its axis) is from the camera, mm."""
+    """A thing in samples (n,) of a window: rows and columns, how much of each it covers, how bright it is there, and
+    how far it (a tube: its axis) is from the camera, mm."""
 
     at: tuple[np.ndarray, np.ndarray]
     cover: np.ndarray

@@ -24,6 +24,7 @@ _SLIM_MM = 4.0  # half the width of a hub that has neighbours
 _SHAFT_X_MM = -6.0  # of the motor's shaft, in the hub's axes
 _BLOCK_HALF = np.array([9.0, 9.0, 7.0])  # mm: half the bar's block, each way
 _BLOCK_UP_MM = 52.0  # along the bar from where it is touched
+_AWAY = np.array([0.0, 1.0, 0.0])  # (3,): from whiskers and cameras
 _ROD_MM, _ROD_RADIUS_MM = 150.0, 2.5  # that holds an object which is no bar, from behind
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
 
@@ -160,7 +161,7 @@ class Scene:
         looks = self.looks
         self._stand_posts(window, radiance)
         held = held_mm(thing)
-        rod = Tube.straight(held, held + [0.0, _ROD_MM, 0.0], _ROD_RADIUS_MM, looks.dark)
+        rod = Tube.straight(held, held + _ROD_MM * _AWAY, _ROD_RADIUS_MM, looks.dark)
         layers = [rod.layer(window, looks.light), Solid(thing, looks.bar).layer(window, looks.light)]
         board = self._board_plate(self.T_rig_board)
         left = [replace(layer, cover=layer.cover * (1 - board.hides(window, layer))) for layer in layers if layer]
@@ -210,7 +211,7 @@ def held_mm(thing: Bar) -> np.ndarray:
     """Where a rod holds it, (3,): a ring at its farthest from the base along the rig's y, others in their middle."""
     if not isinstance(thing, Ring):
         return thing.point_mm
-    way = np.array([0.0, 1.0, 0.0]) - thing.axis[1] * thing.axis
+    way = _AWAY - thing.axis[1] * thing.axis
     return thing.point_mm + thing.ring_radius_mm * way / np.linalg.norm(way)
 
 

@@ -60,7 +60,7 @@ class Studio:
         return self.cropped(self.window.seen(self.backdrop, self.sensor.blur_px))
 
     def setting(self, bar: Bar, middle_mm: np.ndarray) -> "Setting":
-        """The still scene of a trial: the rig with a bar whose middle is near a point, or with a ring, sphere or cone."""
+        """The still scene of a trial: the rig with a bar whose middle is near a point, or a ring, sphere or cone."""
         radiance, front = self.backdrop.copy(), None
         if type(bar) is Bar:
             self.scene.stand_bar(self.window, radiance, bar, middle_mm)
