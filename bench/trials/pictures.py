@@ -1,7 +1,7 @@
 """A trial's pictures as vision takes them: frames held to the still scene, on the clock of the signals, by whisks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,7 +69,7 @@ def touched(trial: Trial) -> Bar:
         return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)
     form = Form(given.shape, given.ring_diameter_mm or 0.0, float(np.radians(given.half_angle_deg or 0.0)))
     if given.shape == "cone":
-        return Bar(0.0, 0.0, form)
+        return Bar(0.0, 0.0, replace(form, about_mm=trial.bar_diameter_mm or 0.0))
     return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm, form)
 
 

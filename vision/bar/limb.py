@@ -23,6 +23,7 @@ from vision.pictures.view import SATURATED, View
 
 STRETCHES = 8  # of each side
 _INSIDE_PX = 9.0  # of the object that are read beside an edge
+_LEAST_HALF_PX = 5.0  # half a width: thinner, both edges are one
 _WIDEST_PX = 40.0  # half a width; wider, an object's light changes no faster beside its edge
 _BLURS_PX, _FINE_BLURS = (0.6, 0.85, 1.2, 1.7), np.exp(np.array([-0.2, -0.1, 0.0, 0.1, 0.2]))
 _ROUGH_BLURS_PX, _ROUGH_EVERY = (1.0,), 2  # of a quick look; steps of the grid, half a blur
@@ -54,14 +55,14 @@ class Limb:
 
 @dataclass(frozen=True)
 class _Side:
-    """One side of a predicted outline: its stations in the picture, how far away each is, and whether it is before
-    nothing but the background."""
+    """One side of a predicted outline: its stations in the picture, how far away each is, whether it is before
+    nothing but the background, and half the object's width there."""
 
     px: np.ndarray
     normal: np.ndarray
     far_mm: np.ndarray
     clear: np.ndarray
-    half_px: float
+    half_px: np.ndarray
 
 
 def measure_limb(view: View, axis: Rounded, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
@@ -86,17 +87,17 @@ def _sides(view: View, axis: Rounded, radius_mm: float, settings: VisionSettings
     """Both sides of the outline, a station every pixel or so."""
     camera = view.camera
     points, normals = axis.limb(camera.centre_mm, radius_mm, settings.bar_reach_mm, 400)
+    px = camera.project(points.reshape(-1, 3)).reshape(2, -1, 2)
+    if not np.all(np.isfinite(px)):
+        return []
+    half = 0.5 * np.linalg.norm(px[0] - px[1], axis=1)
     sides = []
-    for some, out in zip(points, normals):
-        px, by_point, _ = camera.project_with_jacobians(some)
-        normal = np.einsum("nij,nj->ni", by_point, out)
+    for some, out, there in zip(points, normals, px):
+        normal = np.einsum("nij,nj->ni", camera.project_with_jacobians(some)[1], out)
         scale = np.linalg.norm(normal, axis=1)
-        if np.all(np.isfinite(px)):
-            half = float(np.median(scale)) * max(radius_mm, 1.0)
-            beside = some + (_CLEAR_PX / scale)[:, None] * out
-            clear = ~axis.hides_itself(camera.centre_mm, beside, radius_mm)
-            far = np.linalg.norm(some - camera.centre_mm, axis=1)
-            sides.append(_Side(px, normal / scale[:, None], far, clear, half))
+        beside = some + (_CLEAR_PX / scale)[:, None] * out
+        clear = (half > _LEAST_HALF_PX) & ~axis.hides_itself(camera.centre_mm, beside, radius_mm)
+        sides.append(_Side(there, normal / scale[:, None], np.linalg.norm(some - camera.centre_mm, axis=1), clear, half))
     return sides
 
 
@@ -113,7 +114,7 @@ def _pieces(view: View, side: _Side, wires_px: Sequence[np.ndarray], settings: V
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(side.px, axis=0), axis=1))])
     tangent *= np.sign(np.sum(np.gradient(side.px, axis=0) * tangent, axis=1))[:, None]
     along = run[nearest] + np.sum(away * tangent[nearest], axis=1)
-    keep = side.clear[nearest] & (offset > -inside) & (offset < outside) & (along >= 0.0) & (along <= run[-1])
+    keep = side.clear[nearest] & (offset > -np.minimum(inside, side.half_px[nearest])) & (offset < outside) & (along >= 0.0) & (along <= run[-1])
     if len(wires_px) and view.itself is None:
         wire = np.concatenate([_dense(line) for line in wires_px])
         keep &= ~np.isfinite(cKDTree(wire).query(pixels, distance_upper_bound=settings.bar_piece_px / 2 + 5.0)[0])
@@ -162,7 +163,7 @@ def _as_rows(view: View, side: _Side, pixels, offset, along, run, length_px: int
         return _no_pieces()
     place = np.arange(len(order)) - np.repeat(first, count)
     rows = np.repeat(np.arange(len(names)), count)
-    half = min(side.half_px, _WIDEST_PX)
+    half = min(float(np.median(side.half_px[side.clear])), _WIDEST_PX)
     filled = []
     for values, empty in ((offset + half, 0.0), (grey * scale, 1.0), (behind * scale, 1.0), (slope * scale, 0.0),
                           (weight, 0.0)):

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from vision.bar.find import Clear, apart_from_others, clear_edges, climb, spread_out
-from vision.bar.limb import Limb, measure_limbs
+from vision.bar.limb import STRETCHES, Limb, measure_limbs
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import axis_frame, shifted_axis
@@ -22,11 +22,12 @@ from vision.pictures.change import HALF
 from vision.pictures.view import View
 
 _EDGE_MM = 3.0  # half the width of a bar whose edges are as sharp as what is looked for
-_SPREADS, _KEPT = (0.5, 0.2, 0.08), (16, 12, 8)
+_SPREADS, _KEPT = (0.5, 0.2, 0.08), (24, 20, 12)
 _STARTS = 32
-_STATIONS, _OUTLINE_MM = 8, 30.0
+_STATIONS, _OUTLINE_MM = 8, {"ring": 30.0, "sphere": 30.0, "cone": 20.0}
 _BETA_RAD, _PSI_RAD = np.radians(np.arange(-78.0, 79.0, 6.0)), np.radians([-8.0, 0.0, 8.0])
-_CONE_RADII_MM = np.log([1.5, 3.0, 6.0, 12.0, 24.0])
+_CONE_RADII_MM, _ABOUT = np.array([3.0, 6.0, 12.0, 24.0]), np.array([0.6, 1.0, 1.7])  # mm; of what is told of it
+_WAY = 4  # index of the number that says on which side a cone's tip is
 _X_MM, _TOUCH_MM = 2.4, 2.4
 _AT_ONCE = 4000
 _BESIDE_MM, _FEWEST_SHOWN = 0.8, 3  # beside an edge; stations of a side that are not hidden
@@ -34,9 +35,9 @@ _REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)  # round by round, as the object is se
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera tells as it was
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 _ROUNDS = 6
-_LEAST_SHARE = 0.3  # of the stretches of an outline, in each camera, that show an edge
+_ON_SIGMAS = 4.0  # by which a stretch's edge may be off
 _SETTLED_MM = 0.1
-_SURE_SHARE = 0.9  # beyond which no other place is asked
+_LEAST_CLEAR, _SURE = 0.2, 0.8  # of an object that is there; of one beside which no other is asked for
 _WIRES = 8
 _NAMES = {"ring": "ring of {ring:g} mm", "sphere": "sphere of {thick:g} mm", "cone": "cone of {angle:g} deg half-angle"}
 
@@ -53,10 +54,10 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
     found: list[tuple[Rounded, float]] = []
     for axis in likely_places(clear, rods, span):
         found.append(settled(axis, views, cameras, rods, wires, settings))
-        if found[-1][1] > _SURE_SHARE:
+        if found[-1][1] > _SURE:
             break
-    axis, share = max(found, key=lambda one: one[1])
-    if share < _LEAST_SHARE:
+    axis, clearness = max(found, key=lambda one: one[1])
+    if clearness < _LEAST_CLEAR:
         form = rods.bar.form
         name = _NAMES[form.shape].format(ring=form.ring_diameter_mm, thick=rods.bar.diameter_mm,
                                          angle=np.degrees(form.half_angle_rad))
@@ -66,23 +67,27 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
 
 def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings
             ) -> tuple[Rounded, float]:
-    """The object whose outline passes through the edges near that of a first one, and how clearly it is there: the
-    smallest share, of all cameras, of the outline's stretches that have an edge where it is."""
+    """The object whose outline passes through the edges near that of a first one, and how clearly it is there, from
+    -1 to 1: see `_on_less_off`, mean of the cameras."""
     radius_mm = rods.bar.radius_mm
     for reach_px in _REACHES_PX:
         limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px, rough=True)
-        if not all(len(limb.points) for limb in limbs.values()):
+        limbs = {name: limb for name, limb in limbs.items() if limb.asked}
+        if not any(len(limb.points) for limb in limbs.values()):
             return axis, 0.0
         before = axis
         axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)
         if reach_px == _REACHES_PX[-1] and np.linalg.norm(axis.point_mm - before.point_mm) < _SETTLED_MM:
             break
-    return axis, min(_share_on(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items())
+    return axis, sum(_on_less_off(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items()) / len(views)
 
 
-def _share_on(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> float:
+def _on_less_off(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> float:
+    """Stretches of an outline that have an edge where it is, less those that have none there, over all that a whole
+    outline has."""
     left, _ = _rows(axis, np.zeros((2, 3)), camera, limb.points, radius_mm, none=True)
-    return float(np.sum(np.abs(left) < 4.0)) / max(limb.asked, 1)
+    on = int(np.sum(np.abs(left) < _ON_SIGMAS))
+    return (2.0 * on - limb.asked) / (2 * STRETCHES)
 
 
 def settle_by_limbs(axis: Rounded, cameras: Cameras, limbs: Mapping[str, LinePoints], radius_mm: float) -> Rounded:
@@ -120,7 +125,8 @@ def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, fl
     """Objects whose outlines stand out the most in all cameras, of those that the whisker would touch."""
     values, axis_of = hypotheses(rods, motor_rad)
     grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
-    steps = np.array([0.5 * (one[1] - one[0]) if len(one) > 1 else 0.0 for one in values])
+    steps = np.array([0.5 * (one[1] - one[0]) for one in values])
+    steps[_WAY:] = 0.0  # a tip is above or below, and nowhere between
     best = grid
     for spread, kept in zip(_SPREADS, _KEPT):
         near = [spread_out(one, spread * one.half_px) for one in clear]
@@ -140,7 +146,8 @@ def hypotheses(rods: Rods, motor_rad: tuple[float, float]) -> tuple[list[np.ndar
     x = np.arange(10.0, length, _X_MM)
     touch = np.linspace(*motor_rad, max(3, int(np.ceil(np.ptp(motor_rad) * 0.5 * length / _TOUCH_MM))))
     more = {"sphere": [], "ring": [_PSI_RAD, np.radians([-20.0, 0.0, 20.0])],
-            "cone": [_CONE_RADII_MM, np.array([-1.0, 1.0])]}[form.shape]
+            "cone": [np.log(0.5 * form.about_mm * _ABOUT if form.about_mm else _CONE_RADII_MM), np.array([-1.0, 1.0])],
+            }[form.shape]
     return [x, touch, _BETA_RAD, *more], partial(placed, form, rods)
 
 
@@ -175,23 +182,28 @@ def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, s
     """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1; shown: of what
     an object does not hide of itself."""
     groups = np.array_split(each, -(-len(each) // _AT_ONCE))
-    return np.concatenate([np.mean([_outline_clear(axis_of(some), one, radius_mm, shown) for one in clear], axis=0)
-                           for some in groups])
+    found = []
+    for some in groups:
+        each_sees = np.log(np.maximum([_outline_clear(axis_of(some), one, radius_mm, shown) for one in clear], 1e-3))
+        seen = np.isfinite(each_sees)
+        mean = np.sum(np.where(seen, each_sees, 0.0), axis=0) / np.maximum(np.sum(seen, axis=0), 1)
+        found.append(np.where(np.any(seen, axis=0), np.exp(mean), 0.0))
+    return np.concatenate(found)
 
 
 def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float, shown: bool) -> np.ndarray:
     camera = seen.camera
-    limb, normals = axis.limb(camera.centre_mm, radius_mm, _OUTLINE_MM, _STATIONS)
+    limb, normals = axis.limb(camera.centre_mm, radius_mm, _OUTLINE_MM[axis.form.shape], _STATIONS)
     px = camera.project(np.concatenate([limb.reshape(-1, 3), (limb + 0.2 * normals).reshape(-1, 3)]))
     px, beyond = np.split(px / HALF, 2)
     normal = beyond - px
-    with np.errstate(invalid="ignore"):
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     x, y = np.nan_to_num(normal).T
     height, width = seen.field.shape[1:]
     column, row = (np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5 for one, size in zip(px.T, (width, height)))
     there = seen.field.reshape(3, -1).take(np.nan_to_num(row).astype(np.intp) * width + np.nan_to_num(column).astype(np.intp), axis=1)
     edge = (x * x * there[0] + 2.0 * x * y * there[1] + y * y * there[2]).reshape(*limb.shape[:-1])
+    edge[~np.isfinite(limb[..., 0])] = np.nan
     if not shown or axis.form.shape != "ring":
         return np.sqrt(np.prod(np.mean(edge, axis=-1), axis=-1))
     hidden = axis.hides_itself(camera.centre_mm, limb + _BESIDE_MM * normals, radius_mm)

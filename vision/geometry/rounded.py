@@ -22,7 +22,8 @@ _ROUNDS = 8  # from one mm off: each divides what is left by ten and more
 
 @dataclass(frozen=True)
 class Form:
-    """What is told of such an object beside its thickness: a ring's diameter along its middle, a cone's half-angle.
+    """What is told of such an object beside its thickness: a ring's diameter along its middle, a cone's half-angle and
+    about how thick that is, across its surface, where it is touched (0: not told).
 
     Refused where it has no such shape.
     """
@@ -30,6 +31,7 @@ class Form:
     shape: Literal["ring", "sphere", "cone"]
     ring_diameter_mm: float = 0.0
     half_angle_rad: float = 0.0
+    about_mm: float = 0.0
 
     def __post_init__(self):
         if self.shape == "ring":
@@ -122,7 +124,7 @@ class Rounded:
     def limb(self, centre_mm: np.ndarray, radius_mm: float, reach_mm: float, stations: int
              ) -> tuple[np.ndarray, np.ndarray]:
         """Points (…, 2, m, 3) of the surface that sights from a camera (3,) graze, to both sides, and the normals
-        (…, 2, m, 3) there; of ring and cone up to reach_mm of the middle from where it is touched."""
+        (…, 2, m, 3) there, NaN where none does: before its tip a cone has no outline but that of its base; of ring and cone up to reach_mm of the middle from where it is touched."""
         if self.form.shape == "sphere":
             return self._round_limb(centre_mm, radius_mm, stations)
         middle, ahead, radius, grows = self._stations(radius_mm, reach_mm, stations)
@@ -132,7 +134,8 @@ class Rounded:
         distance = np.linalg.norm(towards, axis=-1, keepdims=True)
         towards = towards / distance
         root = np.sqrt(1.0 - grows**2)
-        cosine = np.clip((grows * along - radius) / (root * distance), -1.0, 1.0)
+        cosine = (grows * along - radius) / (root * distance)
+        cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
         aside = np.sqrt(1.0 - cosine**2) * np.cross(ahead, towards)
         normals = np.stack([root * (cosine * towards + side * aside) - grows * ahead for side in (1.0, -1.0)], axis=-3)
         return middle[..., None, :, :] + radius[..., None, :, :] * normals, normals
