@@ -65,22 +65,82 @@ class _Side:
     half_px: np.ndarray
 
 
-def measure_limb(view: View, axis: Rounded, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
-                 reach_px: float, before: Limb | None = None, *, rough: bool = False) -> Limb:
-    """The edges beside a predicted outline that is at most reach_px off. before: of a look that told the blur, by which
-    it is measured finely. rough: by one quick look."""
-    sides = _sides(view, axis, radius_mm, settings)
-    pieces = [(side, _pieces(view, side, wires_px, settings, reach_px)) for side in sides]
-    pieces = [(side, some) for side, some in pieces if len(some) >= _FEWEST_PIECES]
-    if not pieces:
-        nothing = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
-        return Limb(nothing, np.zeros(0), 0, _BLURS_PX[1])
-    blurs, gammas, every = _BLURS_PX if before is None else before.blur_px * _FINE_BLURS, _GAMMAS, 1
-    if rough:
-        blurs, gammas, every = _ROUGH_BLURS_PX, _GAMMAS[:1], _ROUGH_EVERY
-    looks = [_looks(some, reach_px, blurs, gamma, every, fine=before is not None) for gamma in gammas
-             for _, some in pieces]
-    return _limb([side for side, _ in pieces], [some for _, some in pieces], looks, blurs)
+def measure_limbs(views: Sequence[View], axis: Rounded, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
+                  settings: VisionSettings, reach_px: float, before: Mapping[str, Limb] | None = None, *,
+                  rough: bool = False) -> dict[str, Limb]:
+    """By camera the edges beside a predicted outline that is at most reach_px off. before: of a look that told the
+    blurs, by which they are measured finely. rough: by one quick look. wires_px: by camera lines (m, 2) where the wire
+    lies in some frame."""
+    before = before or {}
+    seen = [_Seen.of(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings, reach_px,
+                     before.get(view.camera.name), rough) for view in views]
+    against = np.sum([one.of_curves for one in seen], axis=0)
+    chances = np.exp(-0.5 * (against - against.min()))
+    chances = np.where(chances < _LEAST_CHANCE * chances.max(), 0.0, chances)
+    return {view.camera.name: one.limb(chances / chances.sum()) for view, one in zip(views, seen)}
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What one camera shows beside a predicted outline: its sides, their pieces, and looks at these by transfer curve,
+    under these blurs."""
+
+    sides: Sequence["_Side"]
+    pieces: Sequence[Pieces]
+    looks: Sequence[Sequence["_Look"]]
+    blurs_px: Sequence[float]
+
+    @classmethod
+    def of(cls, view: View, axis: Rounded, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
+           reach_px: float, before: Limb | None, rough: bool) -> "_Seen":
+        """Arguments as of `measure_limbs`."""
+        reach_px = reach_px if before is None else _FINE_REACH_PX
+        pairs = [(side, _pieces(view, side, wires_px, settings, reach_px)) for side in
+                 _sides(view, axis, radius_mm, settings)]
+        pairs = [(side, some) for side, some in pairs if len(some) >= _FEWEST_PIECES]
+        blurs, gammas, every = _BLURS_PX if before is None else before.blur_px * _FINE_BLURS, _GAMMAS, 1
+        if rough:
+            blurs, gammas, every = _ROUGH_BLURS_PX, _GAMMAS[:1], _ROUGH_EVERY
+        looks = [[_look(some, reach_px, blurs, gamma, every, fine=before is not None) for _, some in pairs]
+                 for gamma in gammas]
+        return cls([side for side, _ in pairs], [some for _, some in pairs], looks, blurs)
+
+    @property
+    def of_curves(self) -> list[float]:
+        """Minus twice the log probability of each transfer curve: all stretches of a side are lit nearly alike, so that
+        what they say of it counts once."""
+        return [sum(look.of_curve for look in curve) for curve in self.looks]
+
+    def limb(self, chances: np.ndarray) -> Limb:
+        """The edges by all transfer curves and blurs, each by its chance: these are of the whole camera."""
+        shares = [chance * _chances(sum(look.against for look in curve)) for chance, curve in zip(chances, self.looks)
+                  if curve]
+        if not shares:
+            nothing = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+            return Limb(nothing, np.zeros(0), 0, _BLURS_PX[1])
+        found = [self._of_side(number, chances, shares) for number in range(len(self.sides))]
+        points, edges, asked = zip(*found)
+        joined = LinePoints(*(np.concatenate([getattr(one, name) for one in points])
+                              for name in LinePoints.__dataclass_fields__))
+        blur = float(np.exp(np.log(self.blurs_px) @ np.sum(shares, axis=0)))
+        return Limb(joined, np.concatenate(edges), sum(asked), blur)
+
+    def _of_side(self, number: int, chances, shares) -> tuple[LinePoints, np.ndarray, int]:
+        side, looks = self.sides[number], [curve[number] for curve in self.looks]
+        mean = sum(share @ look.mean for share, look in zip(shares, looks))
+        square = sum(share @ (look.variance + look.mean**2) for share, look in zip(shares, looks))
+        for_edge = sum(chance * look.for_edge for chance, look in zip(chances, looks))
+        sigma = np.hypot(_FORMAL_TO_TRUE * np.sqrt(np.maximum(square - mean**2, 0.0)), _EDGE_PX)
+        at = _stations(self.pieces[number], len(mean))
+        points = LinePoints(side.px[at] + mean[:, None] * side.normal[at], side.normal[at], sigma, side.far_mm[at])
+        keep = for_edge > _LEAST_EVIDENCE
+        return points.select(keep), for_edge[keep], len(keep)
+
+
+def _chances(against: np.ndarray) -> np.ndarray:
+    """Of minus twice the logarithms of probabilities."""
+    chance = np.exp(-0.5 * (against - against.min()))
+    return chance / chance.sum()
 
 
 def _sides(view: View, axis: Rounded, radius_mm: float, settings: VisionSettings) -> list[_Side]:
@@ -197,7 +257,7 @@ class _Look:
     of_curve: float
 
 
-def _looks(pieces: Pieces, reach_px: float, blurs_px: Sequence[float], gamma: float, every: int, *, fine: bool
+def _look(pieces: Pieces, reach_px: float, blurs_px: Sequence[float], gamma: float, every: int, *, fine: bool
            ) -> _Look:
     seen = profiles(pieces, STRETCHES, reach_px, gamma)
     rod = LitRod(seen)
@@ -216,49 +276,7 @@ def _looks(pieces: Pieces, reach_px: float, blurs_px: Sequence[float], gamma: fl
                  float(np.mean(best.least / temper)))
 
 
-def _limb(sides: Sequence[_Side], pieces: Sequence[Pieces], looks: Sequence[_Look], blurs_px) -> Limb:
-    """Points by all blurs and transfer curves, each by its chance: these are of the whole camera."""
-    count = len(sides)
-    curves = [looks[first:first + count] for first in range(0, len(looks), count)]
-    against = np.array([sum(look.of_curve for look in curve) for curve in curves])
-    chances = np.exp(-0.5 * (against - against.min()))
-    chances = np.where(chances < _LEAST_CHANCE * chances.max(), 0.0, chances) / chances.sum()
-    best_blur, points, edges, asked = [], [], [], 0
-    for number, (side, some) in enumerate(zip(sides, pieces)):
-        mean, square, for_edge = 0.0, 0.0, 0.0
-        for chance, curve in zip(chances, curves):
-            by_blur = sum(look.against for look in curve)
-            share = np.exp(-0.5 * (by_blur - by_blur.min()))
-            share = chance * share / share.sum()
-            look = curve[number]
-            mean = mean + share @ look.mean
-            square = square + share @ (look.variance + look.mean**2)
-            for_edge = for_edge + chance * look.for_edge
-            best_blur.append((chance, float(np.log(blurs_px) @ share / share.sum())) if share.sum() else (0.0, 0.0))
-        stations = _stations(some, len(mean))
-        sigma = np.hypot(_FORMAL_TO_TRUE * np.sqrt(np.maximum(square - mean**2, 0.0)), _EDGE_PX)
-        px = side.px[stations] + mean[:, None] * side.normal[stations]
-        keep = for_edge > _LEAST_EVIDENCE
-        asked += len(keep)
-        points.append(LinePoints(px, side.normal[stations], sigma, side.far_mm[stations]).select(keep))
-        edges.append(for_edge[keep])
-    weights, logs = np.array(best_blur).T
-    joined = LinePoints(*(np.concatenate([getattr(one, name) for one in points])
-                          for name in LinePoints.__dataclass_fields__))
-    return Limb(joined, np.concatenate(edges), asked, float(np.exp(weights @ logs / weights.sum())))
-
-
 def _stations(pieces: Pieces, count: int) -> np.ndarray:
     """The station in the middle of each stretch, as `profiles` parts them."""
     order = np.argsort(pieces.place)
     return np.array([int(np.median(pieces.source[some])) for some in np.array_split(order, count)])
-
-
-def measure_limbs(views: Sequence[View], axis: Rounded, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
-                  settings: VisionSettings, reach_px: float, before: Mapping[str, Limb] | None = None, *,
-                  rough: bool = False) -> dict[str, Limb]:
-    """`measure_limb` in each view, by camera."""
-    before = before or {}
-    return {view.camera.name: measure_limb(view, axis, radius_mm, wires_px.get(view.camera.name, []), settings,
-                                           _FINE_REACH_PX if view.camera.name in before else reach_px,
-                                           before.get(view.camera.name), rough=rough) for view in views}

@@ -31,6 +31,8 @@ WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
 WANDER_PX, WANDER_MM = 0.25, 12.0
 BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
 BAR_TILT_ARM_MM = 20.0
+# By so much an outline is read too far out, or in, as a whole: by the wrong transfer curve some 0.5 px, else hardly.
+OUTWARD_PX = 0.3
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
 # Sigmas of all that a camera's lines are off by as a whole.
 LIGHT_PX = np.array([*WIRE_MODES_PX, *np.ones(SHARED), *BAR_MODES_PX])
@@ -78,9 +80,16 @@ class Problem:
 
     @property
     def bar_moves(self) -> slice:
-        """Parameters of the bar's motion: none where it stands still. Of a rounded object that along its direction."""
+        """Parameters of the bar's motion: none where it stands still. Of a rounded object the shift along its direction,
+        and by how much each camera's outline is read too far out, px."""
         first = BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
-        return slice(first, first + (0 if self.motion is None else len(self.motion)) + self.is_rounded)
+        more = 1 + len(self.cameras) if self.is_rounded else 0
+        return slice(first, first + (0 if self.motion is None else len(self.motion)) + more)
+
+    @property
+    def outline_prior(self) -> np.ndarray:
+        """Sigmas of what a rounded object has in the place of a bar's motion; none of a bar."""
+        return np.array([BAR_PRIOR[0], *[OUTWARD_PX] * len(self.cameras)] if self.is_rounded else [])
 
     @property
     def is_rounded(self) -> bool:
@@ -117,7 +126,7 @@ def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
     axis = shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
     if not problem.is_rounded:
         return axis
-    return replace(axis, point_mm=axis.point_mm + vector[..., problem.bar_moves] * problem.axis.direction)
+    return replace(axis, point_mm=axis.point_mm + vector[..., problem.bar_moves.start, None] * problem.axis.direction)
 
 
 def shifts_mm(problem: Problem, vector: np.ndarray) -> np.ndarray:

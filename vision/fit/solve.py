@@ -158,6 +158,9 @@ def _limb_block(problem: Problem, number: int, points: LinePoints, by_all: bool,
     jacobian = np.zeros((len(points), problem.size))
     jacobian[:, moving] = -(off_px[1:] - off_px[0]).T / step
     jacobian[:, REACH] = grazing.px_per_mm(camera, points.normal)
+    outward = along + 1 + number
+    jacobian[:, outward] = 1.0
+    off_px[0] -= vector[outward]
     return _over_sigma(points, points.px - off_px[0][:, None] * points.normal, jacobian, problem.bar_off(number),
                        points.normal * (BAR_OFFSET_PX / BAR_MODES_PX), vector)  # moved along rows and columns alike
 
@@ -210,7 +213,7 @@ def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
 def _prior_block(problem: Problem, vector):
     sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
                             [max(problem.rods.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
-                            [] if problem.motion is None else problem.motion.sigma, BAR_PRIOR[:problem.is_rounded],
+                            [] if problem.motion is None else problem.motion.sigma, problem.outline_prior,
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 
