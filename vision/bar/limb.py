@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
+from vision.bar.edges import EDGE_PX, FORMAL_TO_TRUE
 from vision.bar.evidence import LitRod, evidence
 from vision.bar.posterior import overstated
 from vision.bar.profiles import FULL_SCALE, OUTSIDE_PX, profiles
@@ -31,10 +32,9 @@ _CLEAR_PX = 5.0  # beside an edge, where nothing else of the object may be
 _GAMMAS = (1.0, 2.2)
 _LEAST_CHANCE = 0.001  # of a transfer curve
 _FEWEST_PIECES = 4
-_FINE_REACH_PX = 1.0
+_FINE_REACH_PX = 1.5
+_MOST_UNSURE = 0.4  # sigma over reach: 0.58 where an edge may be anywhere, which is no edge
 _LEAST_EVIDENCE = 6.0  # for an edge in a stretch and against none, tempered
-# A stretch's error beyond its formal one, as of a bar's edge (see `vision.bar.edges`).
-_EDGE_PX, _FORMAL_TO_TRUE = 0.08, 1.5
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,7 @@ class _Seen:
     pieces: Sequence[Pieces]
     looks: Sequence[Sequence["_Look"]]
     blurs_px: Sequence[float]
+    reach_px: float
 
     @classmethod
     def of(cls, view: View, axis: Rounded, radius_mm: float, wires_px: Sequence[np.ndarray], settings: VisionSettings,
@@ -103,7 +104,7 @@ class _Seen:
             blurs, gammas, every = _ROUGH_BLURS_PX, _GAMMAS[:1], _ROUGH_EVERY
         looks = [[_look(some, reach_px, blurs, gamma, every, fine=before is not None) for _, some in pairs]
                  for gamma in gammas]
-        return cls([side for side, _ in pairs], [some for _, some in pairs], looks, blurs)
+        return cls([side for side, _ in pairs], [some for _, some in pairs], looks, blurs, reach_px)
 
     @property
     def of_curves(self) -> list[float]:
@@ -130,10 +131,11 @@ class _Seen:
         mean = sum(share @ look.mean for share, look in zip(shares, looks))
         square = sum(share @ (look.variance + look.mean**2) for share, look in zip(shares, looks))
         for_edge = sum(chance * look.for_edge for chance, look in zip(chances, looks))
-        sigma = np.hypot(_FORMAL_TO_TRUE * np.sqrt(np.maximum(square - mean**2, 0.0)), _EDGE_PX)
+        formal = np.sqrt(np.maximum(square - mean**2, 0.0))
+        sigma = np.hypot(FORMAL_TO_TRUE * formal, EDGE_PX)
         at = _stations(self.pieces[number], len(mean))
         points = LinePoints(side.px[at] + mean[:, None] * side.normal[at], side.normal[at], sigma, side.far_mm[at])
-        keep = for_edge > _LEAST_EVIDENCE
+        keep = (for_edge > _LEAST_EVIDENCE) & (formal < _MOST_UNSURE * self.reach_px)
         return points.select(keep), for_edge[keep], len(keep)
 
 

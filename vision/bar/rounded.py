@@ -35,9 +35,9 @@ _REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)  # round by round, as the object is se
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera tells as it was
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 _ROUNDS = 6
-_ON_SIGMAS = 4.0  # by which a stretch's edge may be off
+_MOST_SAID = 3.0  # by one stretch: a logarithm of probabilities
 _SETTLED_MM = 0.1
-_LEAST_CLEAR, _SURE = 0.2, 0.8  # of an object that is there; of one beside which no other is asked for
+_LEAST_CLEAR, _SURE = 0.1, 0.5  # of an object that is there; of one beside which no other is asked for
 _WIRES = 8
 _NAMES = {"ring": "ring of {ring:g} mm", "sphere": "sphere of {thick:g} mm", "cone": "cone of {angle:g} deg half-angle"}
 
@@ -68,7 +68,7 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
 def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings
             ) -> tuple[Rounded, float]:
     """The object whose outline passes through the edges near that of a first one, and how clearly it is there, from
-    -1 to 1: see `_on_less_off`, mean of the cameras."""
+    -1 to 1: see `_clearness`, mean of the cameras."""
     radius_mm = rods.bar.radius_mm
     for reach_px in _REACHES_PX:
         limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px, rough=True)
@@ -79,15 +79,15 @@ def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, 
         axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)
         if reach_px == _REACHES_PX[-1] and np.linalg.norm(axis.point_mm - before.point_mm) < _SETTLED_MM:
             break
-    return axis, sum(_on_less_off(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items()) / len(views)
+    return axis, sum(_clearness(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items()) / len(views)
 
 
-def _on_less_off(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> float:
-    """Stretches of an outline that have an edge where it is, less those that have none there, over all that a whole
-    outline has."""
+def _clearness(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> float:
+    """How much more probable edges are where an outline is than anywhere within reach: the mean logarithm over all
+    stretches that a whole outline has, over the most that a stretch may say."""
     left, _ = _rows(axis, np.zeros((2, 3)), camera, limb.points, radius_mm, none=True)
-    on = int(np.sum(np.abs(left) < _ON_SIGMAS))
-    return (2.0 * on - limb.asked) / (2 * STRETCHES)
+    there = np.log(2.0 * _REACHES_PX[-1] / (np.sqrt(2.0 * np.pi) * limb.points.sigma_px)) - 0.5 * left**2
+    return float(np.sum(np.clip(there, -_MOST_SAID, _MOST_SAID))) / (2 * STRETCHES * _MOST_SAID)
 
 
 def settle_by_limbs(axis: Rounded, cameras: Cameras, limbs: Mapping[str, LinePoints], radius_mm: float) -> Rounded:
