@@ -69,6 +69,9 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
     protocol = load(str(path))
     if not protocol.cameras:
         raise BadInput("has no [[cameras]]: there is nothing to see by", file=path)
+    if any(trial.object for trial in protocol.trials):
+        found = "how sure a ring, sphere or cone is seen is not planned"
+        raise BadInput(f"object: {found}; leave such trials out", file=path)
     _check_can_be_built(protocol, path)
     staged = dict(_staged(protocol))
     if not staged:

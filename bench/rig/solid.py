@@ -7,9 +7,10 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.rig.bar import Bar
-from bench.rig.grazed import Hits, Rays, Seen, seen
+from bench.rig.grazed import seen
 from bench.rig.layer import Layer
 from bench.rig.light import Light, Material, surface_shade
+from bench.rig.sights import Hits, Rays, Seen
 from bench.rig.window import Window
 
 _COVERS = 1e-6  # of a sample: what covers less is not drawn, what covers all but so much has no edge there

@@ -158,3 +158,10 @@ def test_a_sessions_manifest_is_no_rig(small_session, tmp_path):
     with pytest.raises(BadInput, match=r"session\.toml: is a recorded session's; give the session's folder"):
         plan(small_session / "session.toml", tmp_path / "out", Options())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_rounded_object_is_refused(tmp_path):
+    """It would be taken for a bar along a ring's normal."""
+    text = SMALL + 'object = "ring"\nring_diameter_mm = 80\n'
+    with pytest.raises(BadInput, match="a ring, sphere or cone is seen is not planned"):
+        plan(protocol_file(tmp_path, text), tmp_path / "out", Options())
