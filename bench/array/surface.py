@@ -90,13 +90,20 @@ def stated_surface(trial: Trial) -> Surface | None:
 
 
 def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:
-    """The bar as a whisk shows it, in the rig frame, as well known as where it is touched; None where no touch is seen.
+    """The object as a whisk shows it, in the rig frame, as well known as where it is touched; None where no touch is
+    seen.
 
-    Its axis is away from the contact by both radii, at right angles to whisker and axis.
+    A bar's axis is away from the contact by both radii, at right angles to whisker and axis.
     """
-    if not seen.has_truth or seen.point_covariance_mm2 is None or not np.isfinite(bar_radius_mm):
+    if not seen.has_truth or seen.point_covariance_mm2 is None:
         return None
     turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
+    if (there := seen.rounded) is not None:
+        place = turn @ there.point_mm + shift, turn @ there.axis, there.radius_mm, there.ring_radius_mm
+        covariance = turn @ seen.point_covariance_mm2 @ turn.T
+        return Surface(there.shape, *place, covariance, SEEN, there.half_angle_rad)
+    if not np.isfinite(bar_radius_mm):
+        return None
     reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
     angles = seen.touch_rad.value, seen.beta_rad.value, seen.psi_rad.value
     from_contact = axis_from_angles(0.0, *angles, reach_mm)

@@ -13,7 +13,7 @@ from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.truth.at_angle import TruthAtAngle
-from vision.truth.records import FrameTruth, GaveWay, WireShape
+from vision.truth.records import FrameTruth, GaveWay, SeenObject, WireShape
 from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
 
 
@@ -120,6 +120,7 @@ class SeenWhisk:
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
     gave: GaveWay | None = field(default=None, metadata=WHERE_THERE)
+    rounded: SeenObject | None = field(default=None, metadata=WHERE_THERE)
     frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None

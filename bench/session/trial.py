@@ -106,7 +106,7 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq:
     signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
         raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{signals_path.name}")
-    return Trial(
+    trial = Trial(
         name=folder.name,
         folder=folder,
         camera_sources=camera_sources(folder, shown),
@@ -114,6 +114,21 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq:
         daq=daq,
         **values(keys) | _bar(keys, session.bar) | {"object": _object(keys.object, f"{shown}/{MANIFEST}")},
     )
+    _check_size(trial, f"{shown}/{MANIFEST}")
+    return trial
+
+
+def _check_size(trial: Trial, shown: str) -> None:
+    """Raises BadInput for an object that is no straight bar and as said cannot be, or cannot be looked for."""
+    if trial.is_bar:
+        return
+    shape, thick, wide = trial.object.shape, trial.bar_diameter_mm, trial.object.ring_diameter_mm
+    if thick is None and shape != "cone" and trial.camera_sources:
+        found = f'[object] shape = "{shape}" in pictures is looked for by its size; bar_diameter_mm is missing'
+        raise BadInput(found, file=shown)
+    if wide is not None and thick is not None and wide <= thick:
+        found = f"[object] ring_diameter_mm is {wide:g}, of a bar of {thick:g} mm (bar_diameter_mm)"
+        raise BadInput(f"{found}; it is the diameter along the bar's middle, and larger", file=shown)
 
 
 def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts) -> manifest.TrialKeys:

@@ -39,18 +39,14 @@ _LEAST_EVIDENCE = 6.0  # for an edge in a stretch and against none, tempered
 
 @dataclass(frozen=True)
 class Limb:
-    """Points of an outline, their `place` how far away the sight grazes, mm; by how much more probable an edge is than
-    none in each (n,), and the lens blur, px, that the most probable is seen with."""
+    """Points of an outline, their `place` how far away the sight grazes, mm; of how many
+    stretches that were asked for an edge; the lens blur, px; and how much more probable edges are there than anywhere
+    within reach: a logarithm."""
 
     points: LinePoints
-    for_edge: np.ndarray
     asked: int
     blur_px: float
-
-    @property
-    def share(self) -> float:
-        """Of the stretches that were looked at those in which there is an edge."""
-        return len(self.points) / max(self.asked, 1)
+    said: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -118,15 +114,16 @@ class _Seen:
                   if curve]
         if not shares:
             nothing = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
-            return Limb(nothing, np.zeros(0), 0, _BLURS_PX[1])
+            return Limb(nothing, 0, _BLURS_PX[1])
         found = [self._of_side(number, chances, shares) for number in range(len(self.sides))]
-        points, edges, asked = zip(*found)
+        points, asked = zip(*found)
         joined = LinePoints(*(np.concatenate([getattr(one, name) for one in points])
                               for name in LinePoints.__dataclass_fields__))
         blur = float(np.exp(np.log(self.blurs_px) @ np.sum(shares, axis=0)))
-        return Limb(joined, np.concatenate(edges), sum(asked), blur)
+        said = float(np.sum(np.log(2.0 * self.reach_px / (np.sqrt(2.0 * np.pi) * joined.sigma_px))))
+        return Limb(joined, sum(asked), blur, said)
 
-    def _of_side(self, number: int, chances, shares) -> tuple[LinePoints, np.ndarray, int]:
+    def _of_side(self, number: int, chances, shares) -> tuple[LinePoints, int]:
         side, looks = self.sides[number], [curve[number] for curve in self.looks]
         mean = sum(share @ look.mean for share, look in zip(shares, looks))
         square = sum(share @ (look.variance + look.mean**2) for share, look in zip(shares, looks))
@@ -136,7 +133,7 @@ class _Seen:
         at = _stations(self.pieces[number], len(mean))
         points = LinePoints(side.px[at] + mean[:, None] * side.normal[at], side.normal[at], sigma, side.far_mm[at])
         keep = (for_edge > _LEAST_EVIDENCE) & (formal < _MOST_UNSURE * self.reach_px)
-        return points.select(keep), for_edge[keep], len(keep)
+        return points.select(keep), len(keep)
 
 
 def _chances(against: np.ndarray) -> np.ndarray:

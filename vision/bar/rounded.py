@@ -184,9 +184,13 @@ def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, s
     groups = np.array_split(each, -(-len(each) // _AT_ONCE))
     found = []
     for some in groups:
-        each_sees = np.log(np.maximum([_outline_clear(axis_of(some), one, radius_mm, shown) for one in clear], 1e-3))
+        each_sees = np.array([_outline_clear(axis_of(some), one, radius_mm, shown) for one in clear])
         seen = np.isfinite(each_sees)
-        mean = np.sum(np.where(seen, each_sees, 0.0), axis=0) / np.maximum(np.sum(seen, axis=0), 1)
+        if np.all(seen):
+            found.append(np.mean(each_sees, axis=0))
+            continue
+        each_sees = np.where(seen, np.log(np.maximum(each_sees, 1e-3)), 0.0)
+        mean = np.sum(each_sees, axis=0) / np.maximum(np.sum(seen, axis=0), 1)
         found.append(np.where(np.any(seen, axis=0), np.exp(mean), 0.0))
     return np.concatenate(found)
 

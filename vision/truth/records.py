@@ -55,6 +55,20 @@ class GaveWay:
 
 
 @dataclass(frozen=True, eq=False)
+class SeenObject:
+    """An object that is no straight bar, where a whisk shows it: centre of ring or sphere, or the cone's tip (3,), mm; the
+    normal of the ring's plane, or where the cone points (3,); as said radius of the sphere or of the ring's bar and of
+    the ring, mm, and half-angle, rad."""
+
+    shape: str
+    point_mm: np.ndarray
+    axis: np.ndarray
+    radius_mm: float
+    ring_radius_mm: float
+    half_angle_rad: float
+
+
+@dataclass(frozen=True)
 class WhiskTruth:
     """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
 
@@ -65,7 +79,8 @@ class WhiskTruth:
     each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end; looks: how
     thick it looks over how thick it is said to be, of a trial's first whisk.
     point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of
-    an object that moves, as seen; None where it stands. gave: of one that gives way. problem: what was fitted, from
+    an object that moves, as seen; None where it stands. gave: of one that gives way. rounded: one
+    that is no straight bar. problem: what was fitted, from
     which `sights_of` takes what one camera shows.
     """
 
@@ -93,6 +108,7 @@ class WhiskTruth:
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
     gave: GaveWay | None = None
+    rounded: SeenObject | None = None
     problem: Problem | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:

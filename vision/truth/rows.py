@@ -11,7 +11,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import normals, outline
 from vision.pictures.scale import full_px
 from vision.truth.at_angle import Smooth
-from vision.truth.records import FrameTruth, GaveWay, WhiskTruth, WireShape
+from vision.truth.records import FrameTruth, GaveWay, SeenObject, WhiskTruth, WireShape
 from vision.truth.value import FIELDS, Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -40,7 +40,14 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
                       budget=_budget(fitted), lines=line_noise(fitted.problem),
                       shape=_shape(fitted), velocity_mm_s=_velocity(whisk, fitted),
                       gave=_gave(fitted) if whisk.gives is not None and is_known else None,
+                      rounded=_rounded(fitted) if fitted.problem.is_rounded and is_known else None,
                       problem=fitted.problem, **truth)
+
+
+def _rounded(fitted: FittedWhisk) -> SeenObject:
+    bar, axis = fitted.problem.rods.bar, bar_axis(fitted.problem, fitted.state.vector)
+    sizes = bar.radius_mm, 0.5 * bar.form.ring_diameter_mm, bar.form.half_angle_rad
+    return SeenObject(bar.form.shape, axis.point_mm, axis.direction, *sizes)
 
 
 def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:

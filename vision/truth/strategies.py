@@ -19,7 +19,6 @@ from vision.fit.touch import FEWEST_FREE, bends_tell_more, frames_by_touch, fram
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
-from vision.geometry.counted import counted
 from vision.geometry.errors import Refused
 from vision.geometry.rounded import Rounded
 from vision.geometry.settings import VisionSettings
@@ -32,7 +31,9 @@ from vision.truth.whisk_pictures import WhiskPictures
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
 _EARLY_PARTS = 7.0  # the first of so many parts of a stroke is taken as free before anything is known
 _OFF_PX = 3.0  # how far off an outline may be that was settled by rough edges
-_FEWEST_EDGES = 6  # stretches of an outline in all cameras: one more than where an object may be
+# Logarithm of how much more probable an outline's edges are than edges anywhere: places that are none say 2 (once, of a
+# ring seen from its edge), others 3.8 and more (tests/ladder/rounded_seen.py).
+_LEAST_SAID = 3.0
 _LEAST_SIGHTS_RAD = np.radians(8.0)  # two sights nearer to each other tell no place along them
 NEVER_TOUCHES = "the whisker never touches"
 STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
@@ -85,9 +86,8 @@ class Outline:
         """As `BarMiddles.observed`; all points are of an edge, against what lies within."""
         for _ in range(2 if last and not self.limbs else 1):
             self.limbs = measure_limbs(self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX, self.limbs)
-        there = sum(len(limb.points) for limb in self.limbs.values())
-        if there < _FEWEST_EDGES:
-            raise Refused(f"the object's outline is seen in {counted(there, 'place')} only, {_FEWEST_EDGES} are needed")
+        if sum(limb.said for limb in self.limbs.values()) < _LEAST_SAID:
+            raise Refused("no clear outline of the object is seen: too little of its edges stands out")
         return {name: [(0, 1, limb.points)] for name, limb in self.limbs.items() if len(limb.points)}
 
 
