@@ -29,7 +29,8 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str
     """
     if session.whisker is None or session.board is None:
         return [], []
-    trials = [t for t in session.trials if t.bar_diameter_mm and t.is_bar and set(t.camera_sources) & set(session.rig_pictures)]
+    shown = set(session.rig_pictures)
+    trials = [t for t in session.trials if t.bar_diameter_mm and t.is_bar and shown & set(t.camera_sources)]
     shares = np.array(list(_seen_over_given(session, cameras, spread(trials, _MOST_TRIALS))))
     if not len(shares):
         return [], []

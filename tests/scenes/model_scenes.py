@@ -9,6 +9,7 @@ from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Bar, Rods, Wire
+from vision.geometry.rounded import Rounded
 from vision.geometry.silhouette import normals, outline
 from vision.lines.points import LinePoints, Observed
 
@@ -57,9 +58,38 @@ def _bent_until_touching(problem, state, slope=0.35):
         vector = state.vector.copy()
         vector[problem.first_bend:] = np.stack([middle, -slope * middle], axis=1).ravel()
         curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=6)
-        gap = clearance(curves, bar_axes(problem, vector))[0][problem.bent] - REACH
+        gap = (clearance(curves, bar_axes(problem, vector))[0] - problem.rods.reach_mm(arcs))[problem.bent]
         low, high = np.where(gap < 0, middle, low), np.where(gap < 0, high, middle)
     return State(vector, arcs)
+
+
+def rounded_scene(form, thick_mm, stands):
+    """As `scene`, of an object that is no straight bar. stands: where it does, from the point (3,) that is touched, the
+    way (3,) from the whisker into it and the direction (3,) of the bar that the contact sees."""
+    turn, beta = rotation_z(np.radians(2.3)), np.radians(40.0)
+    inwards, along = turn @ [0, np.cos(beta), -np.sin(beta)], turn @ [0.0, np.sin(beta), np.cos(beta)]
+    spot = turn @ [60.0, 0.0, 0.0] + 0.5 * WIRE.diameter_mm * inwards
+    axis = Rounded(*stands(spot, inwards, along), form, spot)
+    problem, state = scene()
+    problem = replace(problem, axis=axis, rods=Rods(WIRE, Bar(thick_mm, 0.0, form)))
+    vector = np.zeros(problem.size)
+    vector[4:12] = state.vector[4:12]
+    return problem, _bent_until_touching(problem, State(vector, np.full(len(problem.motor_rad), 60.0)), 0.9)
+
+
+def with_outline(problem, state, rng=None, sigma=0.05):
+    """The problem with line points of the wire, and points of a rounded object's outline."""
+    axis, radius_mm = bar_axis(problem, state.vector), problem.rods.bar.radius_mm
+    seen = [one for one in with_points(problem, state, rng, sigma).seen if one.frame >= 0]
+    for number, view in enumerate(problem.cameras):
+        points, ways = (of.reshape(-1, 3) for of in axis.limb(view.centre_mm, radius_mm, 25.0, 12))
+        px, by_point, _ = view.project_with_jacobians(points)
+        normal = np.einsum("nij,nj->ni", by_point, ways)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        noise = 0.0 if rng is None else sigma * rng.standard_normal(len(px))[:, None]
+        far = np.linalg.norm(points - view.centre_mm, axis=1)
+        seen.append(Observed(-1, number, LinePoints(px + noise * normal, normal, np.full(len(px), sigma), far), 1))
+    return replace(problem, seen=seen)
 
 
 def with_points(problem, state, rng=None, sigma=0.05):
@@ -71,6 +101,8 @@ def with_points(problem, state, rng=None, sigma=0.05):
             place = np.linspace(8.0, 95.0, 30)
             one = Curves(curves.arc_mm, curves.points_mm[frame], curves.tangents[frame])
             seen.append(Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng)))
+        if problem.is_rounded:
+            continue
         place = np.linspace(-25.0, 25.0, 20)
         for frame in range(1 if problem.motion is None else len(problem.motor_rad)):
             px = bar_middle(problem, view, state.vector, place, frame)

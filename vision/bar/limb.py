@@ -1,8 +1,8 @@
 """The outline of a rounded object in one camera: where its edges are, stretch by stretch.
 
-As the line of a bar is read (see `vision.bar.evidence`), but that each stretch of the outline has one edge and speaks for
-itself: what lies within is lit in any way, what lies beyond is the picture without rods, and both are blurred by the
-lens. Nothing is said here of which outlines are possible: the fit knows that.
+As the line of a bar is read (see `vision.bar.evidence`), but that each stretch of the outline has one edge and speaks
+for itself: what lies within is lit in any way, what lies beyond is the picture without rods, and both are blurred by
+the lens. Nothing is said here of which outlines are possible: the fit knows that.
 """
 
 from collections.abc import Mapping, Sequence
@@ -156,11 +156,13 @@ def _sides(view: View, axis: Rounded, radius_mm: float, settings: VisionSettings
         scale = np.linalg.norm(normal, axis=1)
         beside = some + (_CLEAR_PX / scale)[:, None] * out
         clear = (half > _LEAST_HALF_PX) & ~axis.hides_itself(camera.centre_mm, beside, radius_mm)
-        sides.append(_Side(there, normal / scale[:, None], np.linalg.norm(some - camera.centre_mm, axis=1), clear, half))
+        far = np.linalg.norm(some - camera.centre_mm, axis=1)
+        sides.append(_Side(there, normal / scale[:, None], far, clear, half))
     return sides
 
 
-def _pieces(view: View, side: _Side, wires_px: Sequence[np.ndarray], settings: VisionSettings, reach_px: float) -> Pieces:
+def _pieces(view: View, side: _Side, wires_px: Sequence[np.ndarray], settings: VisionSettings,
+            reach_px: float) -> Pieces:
     """The pixels beside one side, as pieces along it: each a row."""
     inside, outside = reach_px + _INSIDE_PX, reach_px + OUTSIDE_PX + 1.0
     pixels = _pixels_near(view.mean.shape, side, inside, outside)
@@ -173,7 +175,8 @@ def _pieces(view: View, side: _Side, wires_px: Sequence[np.ndarray], settings: V
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(side.px, axis=0), axis=1))])
     tangent *= np.sign(np.sum(np.gradient(side.px, axis=0) * tangent, axis=1))[:, None]
     along = run[nearest] + np.sum(away * tangent[nearest], axis=1)
-    keep = side.clear[nearest] & (offset > -np.minimum(inside, side.half_px[nearest])) & (offset < outside) & (along >= 0.0) & (along <= run[-1])
+    keep = side.clear[nearest] & (offset > -np.minimum(inside, side.half_px[nearest])) & (offset < outside)
+    keep &= (along >= 0.0) & (along <= run[-1])
     if len(wires_px) and view.itself is None:
         wire = np.concatenate([_dense(line) for line in wires_px])
         keep &= ~np.isfinite(cKDTree(wire).query(pixels, distance_upper_bound=settings.bar_piece_px / 2 + 5.0)[0])
@@ -205,8 +208,8 @@ def _no_pieces() -> Pieces:
 
 
 def _as_rows(view: View, side: _Side, pixels, offset, along, run, length_px: int) -> Pieces:
-    """Pieces of this length along the side, their pixels in rows that are filled up with some of no weight. place: along
-    it, px."""
+    """Pieces of this length along the side, their pixels in rows that are filled up with some of no weight. place:
+    along it, px."""
     column, row = pixels.astype(int).T
     scale = FULL_SCALE / view.full_scale
     grey, behind = view.mean[row, column], view.background[row, column]

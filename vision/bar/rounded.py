@@ -140,8 +140,8 @@ def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, fl
 
 
 def hypotheses(rods: Rods, motor_rad: tuple[float, float]) -> tuple[list[np.ndarray], Callable]:
-    """Values of the numbers that say where the object is, and the objects (n, 3) that these (n, k) mean: where along the
-    whisker it is first touched, mm; at which motor angle; the slope there; and what its shape leaves free."""
+    """Values of the numbers that say where the object is, and the objects (n, 3) that these (n, k) mean: where along
+    the whisker it is first touched, mm; at which motor angle; the slope there; and what its shape leaves free."""
     length, form = rods.wire.length_mm, rods.bar.form
     x = np.arange(10.0, length, _X_MM)
     touch = np.linspace(*motor_rad, max(3, int(np.ceil(np.ptp(motor_rad) * 0.5 * length / _TOUCH_MM))))
@@ -179,8 +179,8 @@ def placed(form: Form, rods: Rods, each: np.ndarray) -> Rounded:
 
 def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, shown: bool, each: np.ndarray
                   ) -> np.ndarray:
-    """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1; shown: of what
-    an object does not hide of itself."""
+    """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1, geometric
+    where some see no outline; shown: of what an object does not hide of itself."""
     groups = np.array_split(each, -(-len(each) // _AT_ONCE))
     found = []
     for some in groups:
@@ -204,8 +204,9 @@ def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float, shown: bool) ->
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     x, y = np.nan_to_num(normal).T
     height, width = seen.field.shape[1:]
-    column, row = (np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5 for one, size in zip(px.T, (width, height)))
-    there = seen.field.reshape(3, -1).take(np.nan_to_num(row).astype(np.intp) * width + np.nan_to_num(column).astype(np.intp), axis=1)
+    column, row = ((np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5).astype(np.intp) for one, size in
+                   zip(np.nan_to_num(px.T), (width, height)))
+    there = seen.field.reshape(3, -1).take(row * width + column, axis=1)
     edge = (x * x * there[0] + 2.0 * x * y * there[1] + y * y * there[2]).reshape(*limb.shape[:-1])
     edge[~np.isfinite(limb[..., 0])] = np.nan
     if not shown or axis.form.shape != "ring":

@@ -13,8 +13,8 @@ class LineNoise:
 
     wire_px: sigma of a point of the wire (one for each piece), scatter about the fit and what neighbours share
     included; NaN where it has none. alike: how much of its error a point shares with the next one. bar_px (k, 3): of
-    each line of the bar its side (0 the middle, ±1 an edge), and sigma at the two places where it is handed on; none of an
-    outline that is no bar's.
+    each line of the bar its side (0 the middle, ±1 an edge), and sigma at the two places where it is handed on; none of
+    an outline that is no bar's.
     """
 
     wire_px: float

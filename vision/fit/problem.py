@@ -44,9 +44,10 @@ class Problem:
     """What is known and seen of one whisk.
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may bend;
-    axis: where the bar's four parameters are counted from, and a fifth of a rounded object, along its direction. onset: when the whisker is seen to begin to bend, where the
-    cameras do not know whisker and bar well enough in space to tell when they touch, or when a bar begins to give way:
-    then as late beside it as the motion's first parameter has it. alike: by camera, how much of its
+    axis: where the bar's four parameters are counted from, and a fifth of a rounded object, along its direction. onset:
+    when the whisker is seen to begin to bend, where the cameras do not know whisker and bar well enough in space to
+    tell when they touch, or when a bar begins to give way: then as late beside it as the motion's first parameter has
+    it. alike: by camera, how much of its
     error a point of the wire shares with the next one; nothing where empty (see `vision.fit.scatter`). motion: of a bar
     that does not stand still.
     """
@@ -80,8 +81,8 @@ class Problem:
 
     @property
     def bar_moves(self) -> slice:
-        """Parameters of the bar's motion: none where it stands still. Of a rounded object the shift along its direction,
-        and by how much each camera's outline is read too far out, px."""
+        """Parameters of the bar's motion: none where it stands still. Of a rounded object the shift along its
+        direction, and by how much each camera's outline is read too far out, px."""
         first = BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
         more = 1 + len(self.cameras) if self.is_rounded else 0
         return slice(first, first + (0 if self.motion is None else len(self.motion)) + more)
@@ -121,8 +122,8 @@ class State:
 
 
 def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
-    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start; of a rounded
-    object a shift along it, too."""
+    """The bar's axis (batch of vectors (…, size) allowed): two shifts in mm and two tilts across the start; of a
+    rounded object a shift along it, too."""
     axis = shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
     if not problem.is_rounded:
         return axis

@@ -36,7 +36,9 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
         return _gap(rest, motor_rad, there, vector[..., REACH], problem.rods)
 
     rest = rest_shape(vector)
-    ends = _about_touch(problem, vector) if problem.is_rounded else (np.min(problem.motor_rad), np.max(problem.motor_rad))
+    ends = np.min(problem.motor_rad), np.max(problem.motor_rad)
+    if problem.is_rounded:
+        ends = _about_touch(problem, vector)
     low, high = (np.full(vector.shape[:-1], end) for end in ends)
     gap_low, gap_high = (gap(m)[0] for m in (low, high))
     for _ in range(rounds):

@@ -99,8 +99,8 @@ def clearance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Signed distance (…) from axis to centreline, contact arc (…), closest point (…, 3); near_mm: see `closest_arc`.
 
-    Positive on the side that the whisker comes from (lower y), negative once the unbent whisker has passed. Of a rounded
-    object always positive, and less what its middle is farther from its surface than its own radius.
+    Positive on the side that the whisker comes from (lower y), negative once the unbent whisker has passed. Of a
+    rounded object always positive, and less what its middle is farther from its surface than its own radius.
     """
     arc = closest_arc(curves, axis, near_mm)
     point, tangent = curves.at(arc[..., None])

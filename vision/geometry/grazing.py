@@ -29,9 +29,9 @@ class Grazing:
 def sights_beside(camera: Camera, axis: Rounded, px: np.ndarray, far_mm: np.ndarray) -> Grazing:
     """Sights through pixels (n, 2) beside an object, or a batch of them; far_mm (n,): about how far away they graze."""
     rays = camera.rays(px)
-    shape = np.broadcast_shapes(axis.point_mm.shape[:-1] + (1,), (len(px),))
+    shape = np.broadcast_shapes((*axis.point_mm.shape[:-1], 1), (len(px),))
     far = axis.nearest_on_lines(camera.centre_mm, rays, np.broadcast_to(far_mm, shape))
-    outside, normals, local = axis.outside_mm(camera.centre_mm + far[..., None] * rays)
+    outside, normals, _ = axis.outside_mm(camera.centre_mm + far[..., None] * rays)
     one = (0,) * (len(shape) - 1)
     nearest = camera.centre_mm + far[one][:, None] * rays
     return Grazing(outside, nearest, normals[one])

@@ -124,7 +124,8 @@ class Rounded:
     def limb(self, centre_mm: np.ndarray, radius_mm: float, reach_mm: float, stations: int
              ) -> tuple[np.ndarray, np.ndarray]:
         """Points (…, 2, m, 3) of the surface that sights from a camera (3,) graze, to both sides, and the normals
-        (…, 2, m, 3) there, NaN where none does: before its tip a cone has no outline but that of its base; of ring and cone up to reach_mm of the middle from where it is touched."""
+        (…, 2, m, 3) there, NaN where none does: before its tip a cone has no outline but that of its base; of
+        ring and cone up to reach_mm of the middle from where it is touched."""
         if self.form.shape == "sphere":
             return self._round_limb(centre_mm, radius_mm, stations)
         middle, ahead, radius, grows = self._stations(radius_mm, reach_mm, stations)
@@ -177,8 +178,8 @@ class Rounded:
 
 
 def nearer_by(axis: Rounded, points_mm: np.ndarray, towards: np.ndarray) -> np.ndarray:
-    """How far (…, k) to go on along curves to come nearest, by Newton's method; towards (…, k, 3): the curves' tangents,
-    of about unit length, at points (…, k, 3)."""
+    """How far (…, k) to go on along curves to come nearest, by Newton's method; towards (…, k, 3): the curves'
+    tangents, of about unit length, at points (…, k, 3)."""
     local = axis.near(points_mm)
     away = points_mm - local.foot_mm
     follows = axis.follows(local, away) * np.sum(towards * local.direction, axis=-1) ** 2

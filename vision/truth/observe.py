@@ -105,7 +105,8 @@ def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Camera
             for number, stroke in enumerate(strokes)], bar_seen, stands
 
 
-def _told(pictures: TrialPictures, strokes, views: Sequence[View], is_rounded: bool) -> tuple[Told | None, Sequence[View]]:
+def _told(pictures: TrialPictures, strokes, views: Sequence[View],
+          is_rounded: bool) -> tuple[Told | None, Sequence[View]]:
     """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
     stands: of that frame alone. Raises Refused for what is not told of it."""
     if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):

@@ -56,9 +56,9 @@ class GaveWay:
 
 @dataclass(frozen=True, eq=False)
 class SeenObject:
-    """An object that is no straight bar, where a whisk shows it: centre of ring or sphere, or the cone's tip (3,), mm; the
-    normal of the ring's plane, or where the cone points (3,); as said radius of the sphere or of the ring's bar and of
-    the ring, mm, and half-angle, rad."""
+    """An object that is no straight bar, where a whisk shows it: centre of ring or sphere, or the cone's tip (3,), mm;
+    the normal of the ring's plane, or where the cone points (3,); as said radius of the sphere or of the ring's bar and
+    of the ring, mm, and half-angle, rad."""
 
     shape: str
     point_mm: np.ndarray

@@ -181,7 +181,8 @@ def _begin(problem: Problem, look: _Look) -> State:
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
 
-def _trace_all(whisk: WhiskPictures, bar: BarMiddles | BarInFrames | Outline, look: _Look, *, last: bool) -> list[Observed]:
+def _trace_all(whisk: WhiskPictures, bar: BarMiddles | BarInFrames | Outline, look: _Look, *,
+               last: bool) -> list[Observed]:
     """Line points of wire and bar in all cameras. Raises Refused where one of them is seen in none."""
     wires_px = {view.camera.name: [view.camera.project(curve.points_mm) for curve in look.curves.values()]
                 for view in whisk.views}

@@ -1,0 +1,91 @@
+"""Rings, spheres and cones as contacts and cameras see them, held to the rig's own, which share no code with them."""
+
+import numpy as np
+import pytest
+
+from bench.rig.bar import Bar, turned
+from bench.rig.rounded import Cone, Ring, Sphere
+from tests.scenes.model_scenes import CAMERAS
+from vision.geometry.centreline import Curves
+from vision.geometry.contact import bar_at, clearance, closest_arc
+from vision.geometry.errors import Refused
+from vision.geometry.grazing import sights_beside
+from vision.geometry.rods import Bar as Thick
+from vision.geometry.rounded import Form, Rounded
+
+SPOT = turned(np.array([60.0, 0.0, 0.0]), 0.04)
+
+
+def placed(radius_mm):
+    angles = {"beta_rad": 0.6, "psi_rad": 0.05, "touch_rad": 0.04}
+    return Bar.placed(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+
+
+RING, SPHERE = Ring.bent(placed(3.0), SPOT, 25.0), Sphere(placed(15.0).point_mm, placed(15.0).axis, 15.0)
+CONE = Cone.narrowing(placed(6.0), SPOT, 0.3)
+THINGS = [
+    (RING, Rounded(RING.point_mm, RING.axis, Form("ring", 50.0), SPOT), 3.0),
+    (SPHERE, Rounded(SPHERE.point_mm, SPHERE.axis, Form("sphere"), SPOT), 15.0),
+    (CONE, Rounded(CONE.tip_mm, CONE.axis, Form("cone", half_angle_rad=0.3), SPOT), 0.0),
+]
+each = pytest.mark.parametrize(("thing", "axis", "radius_mm"), THINGS, ids=["ring", "sphere", "cone"])
+
+
+@each
+def test_distance_and_slope_are_those_of_the_rig(thing, axis, radius_mm):
+    points = SPOT + np.random.default_rng(1).normal(size=(20, 3))
+    outside, _, _ = axis.outside_mm(points)
+    np.testing.assert_allclose(outside - radius_mm, thing.outside_mm(points), atol=1e-10)
+    np.testing.assert_allclose(bar_at(axis, points).direction, [thing.axis_at(p) for p in points], atol=1e-12)
+
+
+@each
+def test_sights_graze_the_outline_and_nothing_else_is_as_near(thing, axis, radius_mm):
+    """On the surface, at right angles to the normal; 0.1 mm farther out the sight passes by 0.1 mm."""
+    camera = CAMERAS.cameras[0]
+    points, normals = (of.reshape(-1, 3) for of in axis.limb(camera.centre_mm, radius_mm, 15.0, 9))
+    np.testing.assert_allclose(thing.outside_mm(points), 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.sum((points - camera.centre_mm) * normals, axis=1), 0.0, atol=1e-9)
+    far = np.linalg.norm(points - camera.centre_mm, axis=1)
+    for away_mm in (0.0, 0.1):
+        near = sights_beside(camera, axis, camera.project(points + away_mm * normals), far + 1.0)
+        np.testing.assert_allclose(near.outside_mm - radius_mm, away_mm, atol=2e-3 * away_mm + 1e-7)
+
+
+@each
+def test_a_wire_is_nearest_where_none_of_its_points_is_nearer(thing, axis, radius_mm):
+    """A straight wire that passes by, slanting; 20 001 points of it are 5 µm apart."""
+    ways = np.array([0.98, 0.1, 0.17]) / np.linalg.norm([0.98, 0.1, 0.17])
+    base = SPOT - 60.0 * ways - np.array([0.0, 2.0, -1.0])
+    arc = np.linspace(0.0, 100.0, 41)
+    wire = Curves(arc, base + arc[:, None] * ways, np.tile(ways, (41, 1)))
+    dense = thing.outside_mm(base + np.linspace(0.0, 100.0, 20001)[:, None] * ways)
+    distance, at, _ = clearance(wire, axis)
+    assert distance - radius_mm == pytest.approx(dense.min(), abs=1e-6)
+    assert at == pytest.approx(0.005 * np.argmin(dense), abs=0.02)
+    assert closest_arc(wire, axis, at) == pytest.approx(at, abs=1e-4)
+
+
+def test_a_ring_hides_its_far_side_and_a_sphere_nothing():
+    _, ring, radius_mm = THINGS[0]
+    edge_on = ring.point_mm + 300.0 * (SPOT - ring.point_mm) / np.linalg.norm(SPOT - ring.point_mm)
+    far_side = ring.point_mm - (25.0 + radius_mm + 0.1) * (SPOT - ring.point_mm) / np.linalg.norm(SPOT - ring.point_mm)
+    assert ring.hides_itself(edge_on, far_side[None], radius_mm)[0]
+    assert not ring.hides_itself(ring.point_mm + 300.0 * ring.direction, far_side[None], radius_mm)[0]
+    assert not THINGS[1][1].hides_itself(edge_on, far_side[None], 15.0)[0]
+
+
+def test_no_outline_from_before_the_tip():
+    _, cone, _ = THINGS[2]
+    assert np.all(np.isnan(cone.limb(cone.point_mm + 200.0 * cone.direction, 0.0, 15.0, 5)[0]))
+
+
+@pytest.mark.parametrize(("thick_mm", "told"), [
+    (6.0, {"shape": "ring", "ring_diameter_mm": 5.0}),
+    (6.0, {"shape": "ring"}),
+    (0.0, {"shape": "sphere"}),
+    (0.0, {"shape": "cone", "half_angle_rad": 0.0}),
+])  # fmt: skip
+def test_objects_that_cannot_be_are_refused(thick_mm, told):
+    with pytest.raises(Refused):
+        Thick(thick_mm, 0.0, Form(**told))
