@@ -47,7 +47,7 @@ def views():
 
 def test_edges_are_where_they_are(views):
     """To a tenth of a pixel, from an outline that is a millimetre off; and each to three of its sigmas."""
-    off = Rounded(CENTRE + [0.3, 0.2, -0.2], SPHERE.direction, SPHERE.form, SPHERE.spot_mm)
+    off = Rounded(CENTRE + np.array([0.3, 0.2, -0.2]), SPHERE.direction, SPHERE.form, SPHERE.spot_mm)
     rough = measure_limbs(views, off, RADIUS_MM, {}, VisionSettings(), 4.0)
     for view, limb in zip(views, measure_limbs(views, SPHERE, RADIUS_MM, {}, VisionSettings(), 2.0, rough).values()):
         near = sights_beside(view.camera, SPHERE, limb.points.px, limb.points.place)

@@ -63,7 +63,8 @@ def test_derivatives_of_the_outline_are_those_of_differences(scene):
     jacobian = linear_at(problem, truth).jacobian
     for k in (0, 1, 2, 3, problem.bar_moves.start, problem.bar_moves.start + 1):
         step = 1e-4 * (np.arange(problem.size) == k)
-        ahead, behind = (linear_at(problem, State(truth.vector + way * step, truth.arcs_mm)).residual for way in (1, -1))
+        ahead, behind = (linear_at(problem, State(truth.vector + way * step, truth.arcs_mm)).residual
+                         for way in (1, -1))
         count = np.sum(linear_at(problem, truth).is_point)
         np.testing.assert_allclose(jacobian[rows, k][:count // 4], ((ahead - behind) / 2e-4)[rows][:count // 4],
                                    atol=2e-2 * max(np.abs(jacobian[:, k]).max(), 1e-9))
