@@ -38,6 +38,7 @@ _ROUNDS = 6
 _MOST_SAID = 3.0  # by one stretch: a logarithm of probabilities
 _SETTLED_MM = 0.1
 _LEAST_CLEAR, _SURE = 0.1, 0.5  # of an object that is there; of one beside which no other is asked for
+_POLISHED, _POLISHES = 3, 5  # places that are looked at closer by, and how often at most
 _WIRES = 8
 _NAMES = {"ring": "ring of {ring:g} mm", "sphere": "sphere of {thick:g} mm", "cone": "cone of {angle:g} deg half-angle"}
 
@@ -56,13 +57,28 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
         found.append(settled(axis, views, cameras, rods, wires, settings))
         if found[-1][1] > _SURE:
             break
-    axis, clearness = max(found, key=lambda one: one[1])
+    best = sorted(found, key=lambda one: one[1], reverse=True)[:_POLISHED if found[-1][1] <= _SURE else 1]
+    axis, clearness = max((polished(axis, views, cameras, rods, wires, settings) for axis, _ in best),
+                          key=lambda one: one[1])
     if clearness < _LEAST_CLEAR:
         form = rods.bar.form
         name = _NAMES[form.shape].format(ring=form.ring_diameter_mm, thick=rods.bar.diameter_mm,
                                          angle=np.degrees(form.half_angle_rad))
         raise Refused(f"no {name} is seen near the whisker; record with it in view of every camera")
     return axis
+
+
+def polished(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings
+             ) -> tuple[Rounded, float]:
+    """`settled` by closer looks."""
+    radius_mm = rods.bar.radius_mm
+    for _ in range(_POLISHES):
+        limbs = measure_limbs(views, axis, radius_mm, wires, settings, _REACHES_PX[-1])
+        before = axis
+        axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)
+        if np.linalg.norm(axis.point_mm - before.point_mm) < _SETTLED_MM:
+            break
+    return axis, sum(_clearness(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items()) / len(views)
 
 
 def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings

@@ -34,6 +34,7 @@ _OFF_PX = 3.0  # how far off an outline may be that was settled by rough edges
 # Logarithm of how much more probable an outline's edges are than edges anywhere: places that are none say 2 (once, of a
 # ring seen from its edge), others 3.8 and more (tests/ladder/rounded_seen.py).
 _LEAST_SAID = 3.0
+_ASKED = 4  # stretches: of fewer none may stand out
 _LEAST_SIGHTS_RAD = np.radians(8.0)  # two sights nearer to each other tell no place along them
 NEVER_TOUCHES = "the whisker never touches"
 STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
@@ -86,6 +87,9 @@ class Outline:
         """As `BarMiddles.observed`; all points are of an edge, against what lies within."""
         for _ in range(2 if last and not self.limbs else 1):
             self.limbs = measure_limbs(self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX, self.limbs)
+        for name, limb in self.limbs.items():
+            if limb.asked >= _ASKED and not len(limb.points):
+                raise Refused(f"camera {name} shows no edge of the object where the other cameras have it")
         if sum(limb.said for limb in self.limbs.values()) < _LEAST_SAID:
             raise Refused("no clear outline of the object is seen: too little of its edges stands out")
         return {name: [(0, 1, limb.points)] for name, limb in self.limbs.items() if len(limb.points)}
