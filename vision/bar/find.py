@@ -97,7 +97,7 @@ def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, co
     return np.mean([both_edges(axis_of(each), one, radius_mm, counts, along_mm) for one in seen], axis=0)
 
 
-def apart_from_others(each, score, apart, most: int) -> np.ndarray:
+def apart_from_others(each: np.ndarray, score: np.ndarray, apart: np.ndarray, most: int) -> np.ndarray:
     """At most so many of the hypotheses (n, k), the best, of which no two lie within so much of each other (k,)."""
     chosen: list[np.ndarray] = []
     for one in each[np.argsort(score)[::-1]]:

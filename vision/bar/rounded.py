@@ -24,6 +24,7 @@ from vision.pictures.view import View
 _EDGE_MM = 3.0  # half the width of a bar whose edges are as sharp as what is looked for
 _SPREADS, _KEPT = (0.5, 0.2, 0.08), (24, 20, 12)
 _STARTS = 32
+# Of each side of an outline that a place is judged by; up to so far from where it is touched: cones end.
 _STATIONS, _OUTLINE_MM = 8, {"ring": 30.0, "sphere": 30.0, "cone": 20.0}
 _BETA_RAD, _PSI_RAD = np.radians(np.arange(-78.0, 79.0, 6.0)), np.radians([-8.0, 0.0, 8.0])
 _CONE_RADII_MM, _ABOUT = np.array([3.0, 6.0, 12.0, 24.0]), np.array([0.6, 1.0, 1.7])  # mm; of what is told of it
@@ -68,8 +69,8 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
     return axis
 
 
-def polished(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings
-             ) -> tuple[Rounded, float]:
+def polished(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods,
+             wires: Mapping[str, Sequence[np.ndarray]], settings: VisionSettings) -> tuple[Rounded, float]:
     """`settled` by closer looks."""
     radius_mm = rods.bar.radius_mm
     for _ in range(_POLISHES):
@@ -81,8 +82,8 @@ def polished(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods,
     return axis, sum(_clearness(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items()) / len(views)
 
 
-def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods, wires, settings: VisionSettings
-            ) -> tuple[Rounded, float]:
+def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods,
+            wires: Mapping[str, Sequence[np.ndarray]], settings: VisionSettings) -> tuple[Rounded, float]:
     """The object whose outline passes through the edges near that of a first one, and how clearly it is there, from
     -1 to 1: see `_clearness`, mean of the cameras."""
     radius_mm = rods.bar.radius_mm

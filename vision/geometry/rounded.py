@@ -114,7 +114,8 @@ class Rounded:
         across = np.sqrt(np.maximum(far2 - high**2, 0.0)) - 0.5 * self.form.ring_diameter_mm
         return np.any(across**2 + high**2 < radius_mm**2, axis=-1).reshape(points_mm.shape[:-1])
 
-    def nearest_on_lines(self, begin_mm, towards, at_mm, rounds: int = _ROUNDS) -> np.ndarray:
+    def nearest_on_lines(self, begin_mm: np.ndarray, towards: np.ndarray, at_mm: np.ndarray,
+                         rounds: int = _ROUNDS) -> np.ndarray:
         """Where (…, k), mm from begin, straight lines (…, k, 3) come nearest, from near there."""
         for _ in range(rounds):
             points = begin_mm + at_mm[..., None] * towards
