@@ -84,8 +84,8 @@ class Outline:
     def observed(self, axis: Rounded, came_mm: np.ndarray, frames: Sequence[int],
                  wires_px: Mapping[str, Sequence[np.ndarray]], *,
                  last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
-        """As `BarMiddles.observed`; all points are of an edge, against what lies within. Raises Refused where no outline
-        is clear, or a camera contradicts the others."""
+        """As `BarMiddles.observed`; all points are of an edge, against what lies within. Raises Refused where no
+        outline is clear, or a camera contradicts the others."""
         for _ in range(2 if last and not self.limbs else 1):
             self.limbs = measure_limbs(self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX,
                                        self.limbs)
