@@ -119,13 +119,10 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq:
 
 
 def _check_size(trial: Trial, shown: str) -> None:
-    """Raises BadInput for an object that is no straight bar and as said cannot be, or cannot be looked for."""
+    """Raises BadInput for an object that is no straight bar and as said cannot be."""
     if trial.is_bar:
         return
-    shape, thick, wide = trial.object.shape, trial.bar_diameter_mm, trial.object.ring_diameter_mm
-    if thick is None and shape != "cone" and trial.camera_sources:
-        found = f'[object] shape = "{shape}" in pictures is looked for by its size; bar_diameter_mm is missing'
-        raise BadInput(found, file=shown)
+    thick, wide = trial.bar_diameter_mm, trial.object.ring_diameter_mm
     if wide is not None and thick is not None and wide <= thick:
         found = f"[object] ring_diameter_mm is {wide:g}, of a bar of {thick:g} mm (bar_diameter_mm)"
         raise BadInput(f"{found}; it is the diameter along the bar's middle, and larger", file=shown)

@@ -116,6 +116,14 @@ def test_an_object_that_cannot_be_is_refused(tmp_path, text, said):
     assert said in str(refused.value)
 
 
+def test_a_ring_is_wider_than_its_bar_is_thick(tmp_path):
+    folder = session(tmp_path)
+    text = '[object]\nshape = "ring"\nring_diameter_mm = 5.5\n'
+    (folder / "trials" / "t" / "trial.toml").write_text(text)
+    with pytest.raises(BadInput, match="ring_diameter_mm is 5.5, of a bar of 6 mm"):
+        load_views(folder)
+
+
 def test_an_object_may_be_told_by_its_shape_alone(tmp_path):
     folder = session(tmp_path)
     (folder / "trials" / "t" / "trial.toml").write_text('[object]\nshape = "cone"\nhalf_angle_deg = 20\n')
