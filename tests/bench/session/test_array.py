@@ -120,7 +120,7 @@ def test_a_ring_is_wider_than_its_bar_is_thick(tmp_path):
     folder = session(tmp_path)
     text = '[object]\nshape = "ring"\nring_diameter_mm = 5.5\n'
     (folder / "trials" / "t" / "trial.toml").write_text(text)
-    with pytest.raises(BadInput, match="ring_diameter_mm is 5.5, of a bar of 6 mm"):
+    with pytest.raises(BadInput, match=r"ring_diameter_mm is 5\.5, of a bar of 6 mm"):
         load_views(folder)
 
 
