@@ -22,7 +22,8 @@ from vision.pictures.view import SATURATED, View
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
 _WIDE_PX = 2.0  # an axis that rough lines settled is less far off
 _GAMMAS = (1.0, 2.2)  # of a sensor itself, and of a picture that was encoded for a screen
-_LEAST_CHANCE = 0.001  # of a transfer curve that is still looked at
+# Of a transfer curve that is still looked at, at all and after the first look, which is up to 150 times wrong about it.
+_LEAST_CHANCE, _LEAST_AT_FIRST = 1e-3, 1e-6
 _MOST = 20.0  # chi²: what one stretch may say against a transfer curve
 _LEAST_SHOWN = 0.5
 _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
@@ -37,7 +38,7 @@ class BarLine:
     probable a bar is there than none: twice the log of the ratio; and how clearly it is one, whatever its contrast: the
     log of how many times worse the light is explained without it; and what share of the lines that were possible in the
     last look still are. looks: the posterior under each transfer curve that is likely; line (2,): what they have
-    together, shift and tilt in px."""
+    together, shift and tilt in px. pieces: what was looked at."""
 
     points: LinePoints
     for_bar: float
@@ -45,6 +46,7 @@ class BarLine:
     unresolved: float
     looks: Mapping[float, Posterior]
     line: np.ndarray
+    pieces: Pieces
 
     @property
     def is_bar(self) -> bool:
@@ -66,13 +68,24 @@ class BarLine:
 
 
 def find_lines(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
-               settings: VisionSettings, off_px: float) -> dict[str, BarLine]:
-    """The lines by one quick look, for an axis that is off_px off, or no bar's. See `measure_bars`."""
-    found = {}
-    for name, pieces in clear_pieces(views, axis, radius_mm, wires_px, settings).items():
-        first = most_probable(pieces, off_px) if off_px > NEAR_PX else np.zeros(2)
-        found[name] = _bar_line(pieces, {1.0: roughly(pieces, first, min(off_px, NEAR_PX))}, np.ones(1))
-    return found
+               settings: VisionSettings) -> dict[str, BarLine]:
+    """The lines by one quick look, for an axis that is NEAR_PX off, or no bar's. See `measure_bars`."""
+    pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
+    return {name: _quick(some, np.zeros(2)) for name, some in pieces.items()}
+
+
+def look_farther(lines: Mapping[str, BarLine]) -> dict[str, BarLine]:
+    """Quick looks at the same about the most probable lines up to FAR_PX off; where that lies within what a quick look
+    has seen, this one's."""
+    farther = {}
+    for name, line in lines.items():
+        there = most_probable(line.pieces, FAR_PX)
+        farther[name] = line if np.all(np.abs(there) < NEAR_PX) else _quick(line.pieces, there)
+    return farther
+
+
+def _quick(pieces: Pieces, about: np.ndarray) -> BarLine:
+    return _bar_line(pieces, {1.0: roughly(pieces, about, NEAR_PX)}, np.ones(1))
 
 
 def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
@@ -85,13 +98,15 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
     pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
         return {}
-    before = before or {}
-    gammas = next(iter(before.values())).looks if before else _GAMMAS
-    seen = {name: before[name].seen_from(some) if name in before else _looks(some, gammas)
-            for name, some in pieces.items()}
     if before:
-        seen = {name: {gamma: closer_look(pieces[name], one, gamma, positions=2) for gamma, one in looks.items()}
-                for name, looks in seen.items()}
+        gammas = list(next(iter(before.values())).looks)
+        seen = {name: before[name].seen_from(some) if name in before else _closer(some, _first(some, gammas))
+                for name, some in pieces.items()}
+    else:
+        seen = {name: _first(some, _GAMMAS) for name, some in pieces.items()}
+        gammas = [gamma for gamma, chance in zip(_GAMMAS, _chances(seen.values())) if chance > _LEAST_AT_FIRST]
+        seen = {name: {gamma: looks[gamma] for gamma in gammas} for name, looks in seen.items()}
+    seen = {name: _closer(pieces[name], looks) for name, looks in seen.items()}
     chances = _chances(seen.values())
     likely = chances > _LEAST_CHANCE
     kept = [gamma for gamma, is_likely in zip(gammas, likely) if is_likely]
@@ -100,10 +115,14 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
             for name, looks in seen.items()}
 
 
-def _looks(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
-    """Two looks under each transfer curve, the second closer by."""
-    first = {gamma: first_look(pieces, np.zeros(2), _WIDE_PX, gamma) for gamma in gammas}
-    return {gamma: closer_look(pieces, one, gamma, positions=1) for gamma, one in first.items()}
+def _first(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
+    """First looks, by transfer curve."""
+    return {gamma: first_look(pieces, np.zeros(2), _WIDE_PX, gamma) for gamma in gammas}
+
+
+def _closer(pieces: Pieces, looks: Mapping[float, Posterior]) -> dict[float, Posterior]:
+    """The next looks."""
+    return {gamma: closer_look(pieces, one, gamma) for gamma, one in looks.items()}
 
 
 def clear_pieces(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],
@@ -134,7 +153,7 @@ def _bar_line(pieces: Pieces, looks: Mapping[float, Posterior], chances) -> BarL
     line = chances @ lines
     covariance = np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - line, lines - line))
     mixed = chances @ np.array([[one.for_bar, one.clearness, one.unresolved] for one in seen])
-    return BarLine(_two_points(pieces, line, covariance), *map(float, mixed), looks, line)
+    return BarLine(_two_points(pieces, line, covariance), *map(float, mixed), looks, line, pieces)
 
 
 def _shows(pieces: Pieces) -> bool:

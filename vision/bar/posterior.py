@@ -24,7 +24,8 @@ _ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
 _ROUGH_EVERY, _FAR_EVERY = 2, 3  # steps of the grid, about half a blur
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
 _LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by blur
-_APART_PX = 0.1  # lines of a wide window: farther apart they step over a peak
+# Lines of a wide window: farther apart they step over a peak. Of the far look, a fifth of its blur.
+_APART_PX, _FAR_APART_PX = 0.1, 0.3
 _NEXT_BLURS = 4  # of a next look
 _LONGEST_PX = 3.0
 _ASIDE_PX = 2.0  # the middle of a bar whose width is another, from where it is expected
@@ -36,16 +37,17 @@ _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hol
 @dataclass(frozen=True)
 class Window:
     """Where a line is looked for: up to so far off (2,), px, in the middle and over ARM_MM; under lens blurs (n,), px;
-    and whether all kinds of light are looked at, or the roughest only."""
+    and whether closely: under all kinds of light and at each step of the grid, or roughly, under the roughest alone."""
 
     most_px: np.ndarray
     blurs_px: np.ndarray
-    all_light: bool = True
+    closely: bool = True
+    apart_px: float = _APART_PX
 
     @property
     def lines(self) -> int:
         """How many lines are tried, by shift and by tilt."""
-        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / _APART_PX)))
+        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.apart_px)))
 
     @classmethod
     def after(cls, one: "Posterior") -> "Window":
@@ -78,22 +80,22 @@ class Posterior:
 
 def first_look(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
     """The posterior about a line (2,) that may be reach_px off, under coarse blurs."""
-    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), all_light=False), gamma, 1)
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), closely=False), gamma)
 
 
-def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
-    """The posterior about another one, at so many positions for each step across."""
-    return _look(pieces, before.line, Window.after(before), gamma, positions)
+def closer_look(pieces: Pieces, before: Posterior, gamma: float) -> Posterior:
+    """The posterior about another one."""
+    return _look(pieces, before.line, Window.after(before), gamma)
 
 
 def roughly(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
     """The posterior of one quick look, good enough to tell a bar from what is none."""
-    return _look(pieces, line, Window(np.full(2, reach_px), np.array([_ROUGH_BLUR_PX]), all_light=False), 1.0, 1)
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array([_ROUGH_BLUR_PX]), closely=False), 1.0)
 
 
 def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
-    """The most probable line (2,) by blurred pictures, up to off_px off."""
-    window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), all_light=False)
+    """The most probable line (2,) by blurred pictures, up to off_px off, to _FAR_APART_PX."""
+    window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), closely=False, apart_px=_FAR_APART_PX)
     seen = profiles(pieces, STRETCHES, off_px, 1.0)
     under = [evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
     lines, _, misfit, *_ = _over_lines(under, seen, window)
@@ -118,9 +120,9 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
     rod = LitRod(seen)
-    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
+    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
     own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
-    total = np.sum(-2.0 * np.logaddexp(-0.5 * (own - own.min(axis=(0, 2), keepdims=True)), -0.5 * _MOST), axis=1)
+    total = np.sum(_tempered(own - own.min(axis=(0, 2), keepdims=True)), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
 
 
@@ -129,13 +131,12 @@ def moved(pieces: Pieces, line: np.ndarray) -> Pieces:
     return pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
 
 
-def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) -> Posterior:
+def _look(pieces: Pieces, line, window: Window, gamma: float) -> Posterior:
     """Over lines within a window about one (2,)."""
     reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
     seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
-    every = 1 if window.all_light or len(window.blurs_px) > 1 else _ROUGH_EVERY
-    rod = LitRod(seen)
-    under = [evidence(rod, reach_px, blur_px, positions, window.all_light, every) for blur_px in window.blurs_px]
+    rod, every = LitRod(seen), 1 if window.closely else _ROUGH_EVERY
+    under = [evidence(rod, reach_px, blur_px, window.closely, every) for blur_px in window.blurs_px]
     lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()
@@ -148,6 +149,11 @@ def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) ->
     return Posterior(line + mean, covariance, least, temper, -2.0 * np.log(total * cell),
                      float(np.sum((best.of_none - best.least) / temper)), rod.clearness(best), unresolved,
                      np.exp(log_blur), float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)), step)
+
+
+def _tempered(against: np.ndarray) -> np.ndarray:
+    """What stretches say against lines, as chi², where one may say anything with a chance of exp(-_MOST / 2)."""
+    return -2.0 * np.log(np.exp(-0.5 * against) + np.exp(-0.5 * _MOST))
 
 
 def _best(under: Sequence[Evidence]) -> Evidence:
@@ -184,7 +190,7 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
     for each, place_mm, curve, low in zip(against, seen.place_mm, own, least):
         there = np.clip(lines @ [1.0, place_mm / ARM_MM], shift[0], shift[-1])
         each[:] = np.maximum(CubicSpline(shift, curve - low)(there), 0.0)
-    against = -2.0 * np.logaddexp(-0.5 * against, -0.5 * _MOST)
+    against = _tempered(against)
     total = against.sum(axis=0)
     total = least.sum(axis=0) + total / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
     line, other = np.unravel_index(np.argmin(total), total.shape)

@@ -178,4 +178,5 @@ def _alike(left) -> float:
 
 def light_range(light: np.ndarray) -> float:
     """From dark to bright of light (n,), but for the outermost twentieths; a grey level at least."""
-    return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))) if len(light) else 0.0, 1.0 / FULL_SCALE)
+    ends = np.interp([0.05, 0.95], np.linspace(0.0, 1.0, len(light)), np.sort(light)) if len(light) else np.zeros(2)
+    return max(float(ends[1] - ends[0]), 1.0 / FULL_SCALE)
