@@ -26,7 +26,7 @@ _STEP_SHARE, _RIM_SHARE = 0.3, 0.2
 _TURN_SHARES = (0.03, 0.1, 0.3)  # the same of second differences: matt bars are smooth, polished ones mirror borders
 _RIM_BLURRED_PX = 2.0
 _SLOPE_SHARE = 0.3  # of the contrast: by so much the background changes over OUTSIDE_PX
-_ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
+_ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 171)
 _SIDES = 4  # columns of level and slope beyond both edges; the picture without rods has two more
 _TOLD = 1e-3  # of its prior variance: ways in which the light may differ that no pixel tells more of are left out
 

@@ -29,7 +29,7 @@ _APART_PX, _FAR_APART_PX = 0.1, 0.3
 _NEXT_BLURS = 4  # of a next look
 _LONGEST_PX = 3.0
 _ASIDE_PX = 2.0  # the middle of a bar whose width is another, from where it is expected
-_LOG_WIDTHS, _NEAR_WIDTHS = np.linspace(-0.48, 0.48, 25), slice(6, -6)  # a bar of 4 mm for 6 is 0.41 off
+_LOG_WIDTHS, _NEAR_WIDTHS = np.linspace(-0.48, 0.48, 25), slice(8, -8)  # a bar of 4 mm for 6 is 0.41 off
 _STRETCH_ARM = 1.5  # the outermost stretch's place, over ARM_MM
 _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hole in the bench says anything
 
