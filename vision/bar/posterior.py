@@ -23,7 +23,7 @@ _BLURS_PX = 0.6, 0.85, 1.2, 1.7  # of a first look
 _ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
 _ROUGH_EVERY, _FAR_EVERY = 2, 3  # steps of the grid, about half a blur
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
-_LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by blur
+_LINES, _BLURS = 25, 9  # of the grid, at least, by shift and by tilt; and by blur
 # Lines of a wide window: farther apart they step over a peak. Of the far look, a fifth of its blur.
 _APART_PX, _FAR_APART_PX = 0.1, 0.3
 _NEXT_BLURS = 4  # of a next look

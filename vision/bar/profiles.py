@@ -178,5 +178,7 @@ def _alike(left) -> float:
 
 def light_range(light: np.ndarray) -> float:
     """From dark to bright of light (n,), but for the outermost twentieths; a grey level at least."""
-    ends = np.interp([0.05, 0.95], np.linspace(0.0, 1.0, len(light)), np.sort(light)) if len(light) else np.zeros(2)
-    return max(float(ends[1] - ends[0]), 1.0 / FULL_SCALE)
+    if len(light) == 0:
+        return 1.0 / FULL_SCALE
+    low, high = np.interp([0.05 * (len(light) - 1), 0.95 * (len(light) - 1)], np.arange(len(light)), np.sort(light))
+    return max(float(high - low), 1.0 / FULL_SCALE)

@@ -25,7 +25,7 @@ def test_squares_of_the_board_in_a_soft_shadow_are_no_edges(rng):
     seen = np.where(np.abs(x - 140.0) < 8.0, 100.0, board * shadow)
     noisy = [picture + rng.standard_normal(board.shape) for picture in (seen, board)]
     edges = edges_of(*noisy, 1.0)
-    across = edges[0, 20:-20]
+    across = edges[20:-20, :, 0]
     assert np.mean(np.max(across[:, 131:135], axis=1)) > 0.5
     assert np.mean(across[:, [24, 25, 49, 50, 74, 75, 99, 100]]) < 0.1
 
@@ -56,8 +56,15 @@ def test_where_nothing_changed_no_bar_is_seen(rng):
         see_bar(views, Cameras(tuple(view.camera for view in views)), rods, np.array([-0.1, 0.1]), VisionSettings())
 
 
-def test_climbing_ends_on_the_top():
-    top = np.array([0.3, -1.7])
-    found, score = climb(np.zeros((2, 2)), np.ones(2), lambda each: -np.sum((each - top) ** 2, axis=1))
-    assert np.all(np.abs(found - top) < 0.5)
-    assert np.all(score > -0.2)
+def test_climbing_ends_on_the_top_and_those_that_meet_go_on_as_one():
+    top, asked = np.array([0.3, -1.7]), []
+
+    def score(each):
+        asked.append(len(each))
+        return -np.sum((each - top) ** 2, axis=1)
+
+    for starts in ([[0.0, 0.0]], [[0.0, 0.0], [0.1, 0.0], [9.0, 0.0]]):
+        found, height = climb(np.array(starts), np.ones(2), score)
+        assert np.all(np.abs(found[np.argmax(height)] - top) < 0.5)
+        assert np.max(height) > -0.2
+    assert asked.count(9 * 3) == 1 and asked[-1] == 9
