@@ -165,12 +165,11 @@ def both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts: np.ndarray,
 
 def _both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) -> np.ndarray:
     camera = seen.camera
-    along = axis.point_mm[:, None] + along_mm[[0, len(along_mm) // 2, -1], None] * axis.direction[:, None]
+    along = axis.point_mm[:, None] + along_mm[:, None] * axis.direction[:, None]
     sideways = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
     sideways = radius_mm * sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
     px = camera.project(np.stack([along, along + sideways[:, None]]).reshape(-1, 3)).reshape(2, *along.shape[:2], 2)
-    px = _parabola(along_mm) @ np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 2, 1).reshape(4, 3, -1)
-    middle, aside = px.swapaxes(1, 2).reshape(2, 2, -1, len(along_mm)).astype(np.float32) / HALF  # by x and y
+    middle, aside = np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 1, 2).astype(np.float32) / HALF  # by x and y
     x, y = np.gradient(middle, axis=-1)  # both edges run nearly as the middle does
     shares = np.stack([y * y, -2.0 * x * y, x * x], axis=-1) / (x * x + y * y)[..., None]
     at = _AT[counts != 0.0]
@@ -178,12 +177,6 @@ def _both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) 
     sides = across.reshape(2, len(at), -1) * counts[counts != 0.0, None]
     best = np.max(sides, axis=1) + np.min(sides, axis=1, initial=0.0)
     return np.sqrt(np.prod(np.maximum(best, 0.0), axis=0))
-
-
-def _parabola(places: np.ndarray) -> np.ndarray:
-    """Weights (t, 3) of the first, middle and last of places (t,): a parabola through what is there."""
-    ends = places[[0, len(places) // 2, -1]]
-    return np.linalg.solve(np.vander(ends, 3).T, np.vander(places, 3).T).T
 
 
 def _across(field, px, shares) -> np.ndarray:
@@ -198,7 +191,7 @@ def _across(field, px, shares) -> np.ndarray:
 def climb(starts: np.ndarray, first_step: np.ndarray, score: Callable) -> tuple[np.ndarray, np.ndarray]:
     """Best hypotheses (n, k) and their scores (n,): from each start to the best neighbour, by ever smaller steps.
 
-    A neighbour differs in two numbers at most. Of those that meet the best goes on.
+    A neighbour differs in two numbers at most.
     """
     size = len(first_step)
     steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * size, indexing="ij"), axis=-1).reshape(-1, size)
@@ -215,12 +208,4 @@ def climb(starts: np.ndarray, first_step: np.ndarray, score: Callable) -> tuple[
         better = scores[rows, chosen]
         part[going] = np.where(better > highest[going] + 1e-3, part[going], 0.5 * part[going])
         best[going], highest[going] = around[rows, chosen], better
-        part[_met(best, highest, 0.5 * first_step)] = 0.0
     return best, highest
-
-
-def _met(each: np.ndarray, score: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Which (n,) of the hypotheses (n, k) have come so near (k,) to one that is better, or as good and before them."""
-    near = np.all(np.abs(each[:, None] - each) < apart, axis=-1)
-    order = np.arange(len(each))
-    return np.any(near & ((score > score[:, None]) | (score == score[:, None]) & (order < order[:, None])), axis=1)
