@@ -12,7 +12,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.linalg import block_diag
 from scipy.ndimage import maximum_filter1d
 from scipy.special import ndtr
 
@@ -62,9 +61,7 @@ class LitRod:
         """Inverse prior covariances (splines, splines) of the light on the rod: of ever rougher light, the last that
         which turns as suddenly as it steps."""
         varies = np.hypot(self._inside, _RIM_SHARE * self.profiles.contrast)
-        flat = np.diag(np.full(_SPLINES, self._level**-2.0))
-        steps, turns = np.diff(np.eye(_SPLINES), axis=0) / _STEP_SHARE, np.diff(np.eye(_SPLINES), 2, axis=0)
-        return [flat + (steps.T @ steps + turns.T @ turns / share**2) / varies**2 for share in _TURN_SHARES]
+        return [self._level**-2.0 * np.eye(_SPLINES) + one / varies**2 for one in _changes()]
 
     @cached_property
     def _root(self) -> np.ndarray:
@@ -87,8 +84,12 @@ class LitRod:
         seen = columns @ self._root
         size, ways = np.linalg.eigh(seen.T @ seen)
         ways = ways[:, size > _TOLD]
-        smooth = [np.linalg.inv(ways.T @ one @ ways) for one in (self._smooth if all_light else ())]
-        return self._root @ ways, [block_diag(one, np.diag(self._of_outside)) for one in (*smooth, np.eye(ways.shape[1]))]
+        rough = np.diag(np.concatenate([np.ones(ways.shape[1]), self._of_outside]))
+        smooth = []
+        for kind in self._smooth if all_light else ():
+            smooth.append(rough.copy())
+            smooth[-1][:ways.shape[1], :ways.shape[1]] = np.linalg.inv(ways.T @ kind @ ways)
+        return self._root @ ways, [*smooth, rough]
 
     @cached_property
     def of_none(self) -> tuple[np.ndarray, np.ndarray]:
@@ -197,7 +198,7 @@ def _normal(seen: Profiles, shifts, columns, steps) -> np.ndarray:
     above the diagonal."""
     own, cover, leak = columns
     most, middle = int(np.max(np.abs(shifts))), len(seen.offset_px) // 2
-    row, column = np.tril_indices(own.shape[1])
+    row, column, place = _layout(own.shape[1])
     one, other = [0, 0, 1], [0, 1, 1]
     mixed = ((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak))
     tables = (own[:, row] * own[:, column], *mixed,
@@ -208,21 +209,21 @@ def _normal(seen: Profiles, shifts, columns, steps) -> np.ndarray:
     power = np.repeat(np.sum(seen.weight * seen.light**2, axis=1), len(shifts))[:, None]
     alone, *parts = map(np.matmul, windows, tables)
     sums = [alone, parts[0] + parts[1], parts[2] + parts[3] + parts[4], parts[5], parts[6] + parts[7], power]
-    sums, place = np.concatenate(sums, axis=1), _layout(own.shape[1])
+    sums = np.concatenate(sums, axis=1)
     return sums.take(place.ravel(), axis=1).reshape(len(seen), len(shifts), *place.shape)
 
 
 @lru_cache(maxsize=_SPLINES)
-def _layout(own: int) -> np.ndarray:
-    """Where (n, n) each product is among the sums of `_normal`, of so many own columns; above the diagonal the
-    first."""
-    place = np.zeros((own + 3, own + 3), dtype=np.intp)
-    pairs = own * (own + 1) // 2
-    place[np.tril_indices(own)] = np.arange(pairs)
+def _layout(own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of so many own columns, which two (n (n + 1) / 2,) each of their products is of, and where (n + 3, n + 3) each
+    product is among the sums of `_normal`; above the diagonal the first."""
+    place, (row, column) = np.zeros((own + 3, own + 3), dtype=np.intp), np.tril_indices(own)
+    pairs = len(row)
+    place[row, column] = np.arange(pairs)
     place[own:-1, :own] = pairs + np.arange(2 * own).reshape(2, own)
     place[[-3, -2, -2], [-3, -3, -2]] = pairs + 2 * own + np.arange(3)
     place[-1] = pairs + 2 * own + 3 + np.arange(own + 3)
-    return place
+    return row, column, place
 
 
 def _columns(offset_px, on_rod, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -243,6 +244,13 @@ def _on_rod(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
     z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
     area = radius_px * np.cos(_ANGLES) * (_ANGLES[1] - _ANGLES[0]) / (blur_px * np.sqrt(2.0 * np.pi))
     return (np.exp(-0.5 * z * z) * area) @ _splines()
+
+
+@lru_cache(maxsize=1)
+def _changes() -> list[np.ndarray]:
+    """What light changes by from spline to spline (splines, splines), squared and over what it may, of each kind."""
+    steps, turns = (np.diff(np.eye(_SPLINES), order, axis=0) for order in (1, 2))
+    return [steps.T @ steps / _STEP_SHARE**2 + turns.T @ turns / share**2 for share in _TURN_SHARES]
 
 
 @lru_cache(maxsize=1)

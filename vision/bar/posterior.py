@@ -186,10 +186,9 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
         own = CubicSpline(logs, own, axis=-1)(log_blurs)
     shift, shape = under[0].shift_px, (len(lines), own.shape[2], len(log_blurs))
     own = own.reshape(len(seen), len(shift), -1)
-    least, against = own.min(axis=1), np.empty((len(seen), len(lines), own.shape[-1]))
-    for each, place_mm, curve, low in zip(against, seen.place_mm, own, least):
-        there = np.clip(lines @ [1.0, place_mm / ARM_MM], shift[0], shift[-1])
-        each[:] = np.maximum(CubicSpline(shift, curve - low)(there), 0.0)
+    least = own.min(axis=1)
+    there = np.clip(lines[:, 0] + seen.place_mm[:, None] / ARM_MM * lines[:, 1], shift[0], shift[-1])
+    against = np.maximum(CubicSpline(shift, np.eye(len(shift)))(there) @ (own - least[:, None]), 0.0)
     against = _tempered(against)
     total = against.sum(axis=0)
     total = least.sum(axis=0) + total / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
