@@ -161,22 +161,25 @@ class Evidence:
         return self.shift_px[best // self.of_bar.shape[2]]
 
 
-def evidence(rod: LitRod, reach_px: float, blur_px: float, all_light: bool = True, every: int = 1,
-             wider: float = 1.0) -> Evidence:
-    """Evidence of the bar's middle up to reach_px off, at every so many steps of the grid, in each stretch; under all
-    kinds of light, or the roughest only. wider: times the bar's width."""
+def evidence(rod: LitRod, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
+             every: int = 1, wider: float = 1.0) -> Evidence:
+    """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, or at every so
+    many steps, in each stretch; under all kinds of light, or the roughest only. wider: times the bar's width."""
     seen, radius_px = rod.profiles, wider * rod.profiles.radius_px
     most = int(np.ceil(reach_px / (every * STEP_PX)))
     shifts = every * np.arange(-most, most + 1)
-    steps = _within(seen, every * most)
-    pictures = _on_rod(STEP_PX * steps, radius_px, blur_px)
-    light, priors = rod.told(_best_seen(seen, steps, every * most)[:, None] * pictures, all_light)
-    normal = _normal(seen, shifts, _columns(STEP_PX * steps, pictures @ light, radius_px, blur_px), steps)
+    steps, more_px = _within(seen, every * most), STEP_PX / positions * np.arange(positions)
+    pictures = [_on_rod(STEP_PX * steps - more, radius_px, blur_px) for more in more_px]
+    light, priors = rod.told(_best_seen(seen, steps, every * most)[:, None] * pictures[0], all_light)
+    normal = [_normal(seen, shifts, _columns(STEP_PX * steps - more, one @ light, radius_px, blur_px), steps)
+              for more, one in zip(more_px, pictures)]
+    normal = np.stack(normal, axis=2).reshape(len(seen), -1, *normal[0].shape[-2:])
+    shift_px = (STEP_PX * shifts[:, None] + more_px).ravel()
     under = [rod.marginal(normal, prior) for prior in priors]
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
     best = np.argmin(value.reshape(len(seen), -1), axis=1)
     misfit = misfit.reshape(len(seen), -1)[np.arange(len(seen)), best]
-    return Evidence(blur_px, STEP_PX * shifts, value, misfit, rod.of_none[0])
+    return Evidence(blur_px, shift_px, value, misfit, rod.of_none[0])
 
 
 def _within(seen: Profiles, most: int) -> np.ndarray:

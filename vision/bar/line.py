@@ -100,13 +100,13 @@ def measure_bars(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_p
         return {}
     if before:
         gammas = list(next(iter(before.values())).looks)
-        seen = {name: before[name].seen_from(some) if name in before else _closer(some, _first(some, gammas))
+        seen = {name: before[name].seen_from(some) if name in before else _closer(some, _first(some, gammas), 1)
                 for name, some in pieces.items()}
     else:
         seen = {name: _first(some, _GAMMAS) for name, some in pieces.items()}
         gammas = [gamma for gamma, chance in zip(_GAMMAS, _chances(seen.values())) if chance > _LEAST_AT_FIRST]
         seen = {name: {gamma: looks[gamma] for gamma in gammas} for name, looks in seen.items()}
-    seen = {name: _closer(pieces[name], looks) for name, looks in seen.items()}
+    seen = {name: _closer(pieces[name], looks, 2 if before else 1) for name, looks in seen.items()}
     chances = _chances(seen.values())
     likely = chances > _LEAST_CHANCE
     kept = [gamma for gamma, is_likely in zip(gammas, likely) if is_likely]
@@ -120,9 +120,9 @@ def _first(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
     return {gamma: first_look(pieces, np.zeros(2), _WIDE_PX, gamma) for gamma in gammas}
 
 
-def _closer(pieces: Pieces, looks: Mapping[float, Posterior]) -> dict[float, Posterior]:
-    """The next looks."""
-    return {gamma: closer_look(pieces, one, gamma) for gamma, one in looks.items()}
+def _closer(pieces: Pieces, looks: Mapping[float, Posterior], positions: int) -> dict[float, Posterior]:
+    """The next looks, at so many positions for each step across."""
+    return {gamma: closer_look(pieces, one, gamma, positions) for gamma, one in looks.items()}
 
 
 def clear_pieces(views: Sequence[View], axis: BarAxis, radius_mm: float, wires_px: Mapping[str, Sequence[np.ndarray]],

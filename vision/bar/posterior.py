@@ -37,11 +37,13 @@ _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hol
 @dataclass(frozen=True)
 class Window:
     """Where a line is looked for: up to so far off (2,), px, in the middle and over ARM_MM; under lens blurs (n,), px;
-    and whether closely: under all kinds of light and at each step of the grid, or roughly, under the roughest alone."""
+    whether closely: under all kinds of light and at each step of the grid, or roughly, under the roughest alone; and at
+    how many positions for each step."""
 
     most_px: np.ndarray
     blurs_px: np.ndarray
     closely: bool = True
+    positions: int = 1
     apart_px: float = _APART_PX
 
     @property
@@ -50,11 +52,11 @@ class Window:
         return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.apart_px)))
 
     @classmethod
-    def after(cls, one: "Posterior") -> "Window":
-        """The next, about a posterior."""
+    def after(cls, one: "Posterior", positions: int) -> "Window":
+        """The next, about a posterior, at so many positions for each step across."""
         most = np.clip(_WITHIN_SIGMAS * np.sqrt(np.diag(one.covariance)), *_LINE_PX)
         wide = np.clip(np.hypot(_WITHIN_SIGMAS * one.log_blur_sigma, one.log_blur_step), *_LOG_BLUR)
-        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)))
+        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)), positions=positions)
 
 
 @dataclass(frozen=True)
@@ -83,9 +85,9 @@ def first_look(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) 
     return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), closely=False), gamma)
 
 
-def closer_look(pieces: Pieces, before: Posterior, gamma: float) -> Posterior:
-    """The posterior about another one."""
-    return _look(pieces, before.line, Window.after(before), gamma)
+def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
+    """The posterior about another one, at so many positions for each step across."""
+    return _look(pieces, before.line, Window.after(before, positions), gamma)
 
 
 def roughly(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
@@ -120,7 +122,7 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
     rod = LitRod(seen)
-    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
+    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
     own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
     total = np.sum(_tempered(own - own.min(axis=(0, 2), keepdims=True)), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
@@ -136,7 +138,7 @@ def _look(pieces: Pieces, line, window: Window, gamma: float) -> Posterior:
     reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
     seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
     rod, every = LitRod(seen), 1 if window.closely else _ROUGH_EVERY
-    under = [evidence(rod, reach_px, blur_px, window.closely, every) for blur_px in window.blurs_px]
+    under = [evidence(rod, reach_px, blur_px, window.positions, window.closely, every) for blur_px in window.blurs_px]
     lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()

@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.bar.axis import settle_axis
 from vision.bar.find import Clear, clear_edges, find_bars
-from vision.bar.line import NEAR_PX, BarLine, find_lines, look_farther, measure_bars
+from vision.bar.line import BarLine, find_lines, look_farther, measure_bars
 from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
@@ -22,7 +22,7 @@ from vision.pictures.view import View, median_of
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
 _NO_EDGES = 3.0  # as clearness: a bar is 5 to 9 clear
-_STOOD_PX = 0.5 * NEAR_PX  # from so far away a quick look sees the bar whole, and what is as far beside it
+_STOOD_PX = 0.5  # half of a quick look's blur: from so far away it sees the same
 _CLEARER = 1.0  # by so much one camera's axis must be clearer than one that the edges in all cameras led to
 _WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
 _NO_BAR = "no bar of diameter {:g} mm is seen near the whisker; record with the bar in view of every camera"
