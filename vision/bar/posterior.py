@@ -153,6 +153,18 @@ def _look(pieces: Pieces, line, window: Window, gamma: float) -> Posterior:
                      np.exp(log_blur), float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)), step)
 
 
+def _between(places: np.ndarray, curves: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Curves (k, g, m), given at places (g,), at others (k, n) for each: cubic splines, (k, n, m)."""
+    parts = CubicSpline(places, curves, axis=1).c
+    cell = np.clip(np.searchsorted(places, there, side="right") - 1, 0, len(places) - 2)
+    beyond, each = (there - places[cell])[..., None], np.arange(len(curves))[:, None]
+    value = parts[0][cell, each]
+    for part in parts[1:]:
+        value *= beyond
+        value += part[cell, each]
+    return value
+
+
 def _tempered(against: np.ndarray) -> np.ndarray:
     """What stretches say against lines, as chi², where one may say anything with a chance of exp(-_MOST / 2)."""
     return -2.0 * np.log(np.exp(-0.5 * against) + np.exp(-0.5 * _MOST))
@@ -190,7 +202,7 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
     own = own.reshape(len(seen), len(shift), -1)
     least = own.min(axis=1)
     there = np.clip(lines[:, 0] + seen.place_mm[:, None] / ARM_MM * lines[:, 1], shift[0], shift[-1])
-    against = np.maximum(CubicSpline(shift, np.eye(len(shift)))(there) @ (own - least[:, None]), 0.0)
+    against = np.maximum(_between(shift, own - least[:, None], there), 0.0)
     against = _tempered(against)
     total = against.sum(axis=0)
     total = least.sum(axis=0) + total / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
