@@ -114,7 +114,8 @@ def edges_px(grey: np.ndarray, background: np.ndarray, blur_px: float) -> np.nda
     """
     pictures = (np.asarray(picture, dtype=np.float32) for picture in (grey, background))
     bell, slope = _kernels(blur_px)
-    seen, behind = (np.stack([_filtered(picture, *by) for by in ((slope, bell), (bell, slope))]) for picture in pictures)
+    seen, behind = (np.stack([_filtered(picture, *by) for by in ((slope, bell), (bell, slope))])
+                   for picture in pictures)
     light = np.sum(seen * behind, axis=0) / np.maximum(np.sum(behind**2, axis=0), 1e-12)
     left = seen - np.clip(light, 0.0, _MOST_LIGHT) * behind
     size = np.hypot(*left)
@@ -172,9 +173,9 @@ def _both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) 
     middle, aside = np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 1, 2).astype(np.float32) / HALF  # by x and y
     x, y = np.gradient(middle, axis=-1)  # both edges run nearly as the middle does
     shares = np.stack([y * y, -2.0 * x * y, x * x], axis=-1) / (x * x + y * y)[..., None]
-    at = _AT[counts != 0.0]
-    across = _across(seen.field, middle + np.concatenate([at, -at]).astype(np.float32)[:, None, None, None] * aside, shares)
-    sides = across.reshape(2, len(at), -1) * counts[counts != 0.0, None]
+    at, counts = _AT[counts != 0.0].astype(np.float32), counts[counts != 0.0]
+    px = middle + np.concatenate([at, -at])[:, None, None, None] * aside
+    sides = _across(seen.field, px, shares).reshape(2, len(at), -1) * counts[:, None]
     best = np.max(sides, axis=1) + np.min(sides, axis=1, initial=0.0)
     return np.sqrt(np.prod(np.maximum(best, 0.0), axis=0))
 

@@ -104,7 +104,8 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
 
 
 def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis], SeenBar]) -> SeenBar:
-    """The clearest when settled once more, where it was not looked for there; what was less clear before, its edges taken for seen, is not asked again."""
+    """The clearest when settled once more, where its lines lay elsewhere; what was less clear before, its edges taken
+    for seen, is not asked again."""
     best = None
     for one in sorted(found, key=lambda one: one.at_best, reverse=True):
         if best is None or one.at_best > best.clearness:
