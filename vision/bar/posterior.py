@@ -21,7 +21,7 @@ _WITHIN_SIGMAS = 4.0  # a next look reaches as far
 _LINE_PX, _LOG_BLUR = (0.25, 2.0), (0.1, 0.5)
 _BLURS_PX = 0.6, 0.85, 1.2, 1.7  # of a first look
 _ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
-_ROUGH_EVERY, _FAR_EVERY = 2, 3  # steps of the grid, about half a blur
+_APART_BLURS = 0.5  # between positions of a look that is not close: a cubic spline between
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
 _LINES, _BLURS = 25, 9  # of the grid, at least, by shift and by tilt; and by blur
 # Lines of a wide window: farther apart they step over a peak. Of the far look, a fifth of its blur.
@@ -99,7 +99,7 @@ def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
     """The most probable line (2,) by blurred pictures, up to off_px off, to _FAR_APART_PX."""
     window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), closely=False, apart_px=_FAR_APART_PX)
     seen = profiles(pieces, STRETCHES, off_px, 1.0)
-    under = [evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
+    under = [evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_every(_FAR_BLUR_PX))]
     lines, _, misfit, *_ = _over_lines(under, seen, window)
     return lines[np.argmin(misfit[:, 0, 0])]
 
@@ -122,7 +122,7 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
     rod = LitRod(seen)
-    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
+    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _every(_ROUGH_BLUR_PX), wider) for wider in np.exp(logs)]
     own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
     total = np.sum(_tempered(own - own.min(axis=(0, 2), keepdims=True)), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
@@ -137,8 +137,9 @@ def _look(pieces: Pieces, line, window: Window, gamma: float) -> Posterior:
     """Over lines within a window about one (2,)."""
     reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
     seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
-    rod, every = LitRod(seen), 1 if window.closely else _ROUGH_EVERY
-    under = [evidence(rod, reach_px, blur_px, window.positions, window.closely, every) for blur_px in window.blurs_px]
+    rod, closely = LitRod(seen), window.closely
+    under = [evidence(rod, reach_px, blur_px, window.positions, closely, 1 if closely else _every(blur_px))
+             for blur_px in window.blurs_px]
     lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()
@@ -170,6 +171,11 @@ def _tempered(against: np.ndarray) -> np.ndarray:
     return -2.0 * np.log(np.exp(-0.5 * against) + np.exp(-0.5 * _MOST))
 
 
+def _every(blur_px: float) -> int:
+    """Of how many steps of the grid one is looked at."""
+    return max(1, int(_APART_BLURS * blur_px / STEP_PX))
+
+
 def _best(under: Sequence[Evidence]) -> Evidence:
     """By the blur with the most evidence."""
     return min(under, key=lambda one: one.least.sum())
@@ -194,11 +200,14 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
     lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
     logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
     temper = _overstated(_best(under), seen)
-    own = np.stack([one.of_bar for one in under], axis=-1) / temper[:, None, None, None]
+    shift = under[0].shift_px  # of the narrowest blur
+    own = [one.of_bar if len(one.shift_px) == len(shift) else CubicSpline(one.shift_px, one.of_bar, axis=1)(shift)
+           for one in under]
+    own = np.stack(own, axis=-1) / temper[:, None, None, None]
     if len(logs) > 2 and np.max(np.diff(logs)) < _SPLINE:
         log_blurs = np.linspace(logs[0], logs[-1], _BLURS)
         own = CubicSpline(logs, own, axis=-1)(log_blurs)
-    shift, shape = under[0].shift_px, (len(lines), own.shape[2], len(log_blurs))
+    shape = len(lines), own.shape[2], len(log_blurs)
     own = own.reshape(len(seen), len(shift), -1)
     least = own.min(axis=1)
     there = np.clip(lines[:, 0] + seen.place_mm[:, None] / ARM_MM * lines[:, 1], shift[0], shift[-1])
