@@ -122,7 +122,8 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
     rod = LitRod(seen)
-    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _every(_ROUGH_BLUR_PX), wider) for wider in np.exp(logs)]
+    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _every(_ROUGH_BLUR_PX), wider)
+             for wider in np.exp(logs)]
     own = np.array([one.of_bar[..., 0] for one in under]) / _overstated(_best(under), seen)[:, None]
     total = np.sum(_tempered(own - own.min(axis=(0, 2), keepdims=True)), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
