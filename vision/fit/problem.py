@@ -21,6 +21,8 @@ BAR_PRIOR = np.array([50.0, 50.0, 1.0, 1.0])
 # set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
+# Friction along the whisker over the force across it: all of it where the contact does not slip along the bar.
+PULL_PRIOR = 0.2
 # How far a traced line may be off as a whole beyond what light and lens are said to move it by: shadows, reflections.
 # By the offset the true wires of 65 path-traced views are most probable, the tilt is the RMS of 72 (docs/proof.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.08, 0.09
@@ -68,12 +70,17 @@ class Problem:
     @property
     def size(self) -> int:
         """Number of parameters: bar, rest shape, reach, how each camera's lines are off as a whole, the bar's motion,
-        bends."""
+        friction along the whisker, bends."""
         return self.first_bend + 2 * int(np.sum(self.bent))
 
     @property
     def first_bend(self) -> int:
         """Index of the first bend."""
+        return self.pull + 1
+
+    @property
+    def pull(self) -> int:
+        """Index of the friction along the whisker over the force across it, the same in all frames."""
         return self.bar_moves.stop
 
     @property
@@ -156,10 +163,11 @@ def curves_of(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds:
     arcs = np.broadcast_to(arcs_mm, shape)
     motor = np.broadcast_to(problem.motor_rad, shape)
     rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
+    pull = np.broadcast_to(vector[..., problem.pull, None], shape)
     for _ in range(rounds):
-        curves = centrelines(rest, angles, arcs, motor, problem.wire)
+        curves = centrelines(rest, angles, arcs, motor, problem.wire, pull)
         arcs = np.clip(closest_arc(curves, axis, arcs), 1.0, problem.wire.length_mm)
-    return centrelines(rest, angles, arcs, motor, problem.wire), arcs
+    return centrelines(rest, angles, arcs, motor, problem.wire, pull), arcs
 
 
 def start(problem: Problem, contact_arc_mm: float) -> State:
