@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -88,6 +89,18 @@ class Problem:
         """Parameters of the bar's motion: none where it stands still."""
         first = BAR + REST + 1 + len(LIGHT_PX) * len(self.cameras)
         return slice(first, first + (0 if self.motion is None else len(self.motion)))
+
+    @cached_property
+    def light_px(self) -> np.ndarray:
+        """Sigmas (cameras, modes) of what each camera's lines are off by as a whole: LIGHT_PX, and as the wire turns before
+        the light: what moves a line by so much moves it by that over a radian more or less."""
+        half, sigma = 0.5 * float(np.ptp(self.motor_rad)), np.tile(LIGHT_PX, (len(self.cameras), 1))
+        for camera, own in enumerate(sigma):
+            shared = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame >= 0]
+            common = np.linalg.norm(np.mean(np.concatenate(shared), axis=0)) if shared else 0.0
+            still = np.hypot(own[:2], [common, 0.0])
+            own[2:4], own[4:6] = np.hypot(own[2:4], half * still), np.hypot(own[4:6], 0.5 * half**2 * still)
+        return sigma
 
     def bend_of(self, frame: int) -> slice:
         """Parameters of a frame's bend; the frame may bend."""
