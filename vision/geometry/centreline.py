@@ -35,7 +35,9 @@ def _turn(s, contact, taper_per_mm):
     return s / w**3 * (contact * (1.0 + w + w * w) / 3.0 - s * (w + 2.0) / 6.0)
 
 
-def bend_growth(turn_rad, pull, arc_mm: np.ndarray, contact_mm: np.ndarray, wire: Wire) -> np.ndarray:
+def bend_growth(
+    turn_rad: np.ndarray, pull: np.ndarray | float, arc_mm: np.ndarray, contact_mm: np.ndarray, wire: Wire
+) -> np.ndarray:
     """Share (…, m) of the final tangent angle turn_rad (…, 1) reached at the nodes of a curve, arc_mm (m,).
 
     The force at contact_mm (…, 1) is across the tangent there, and along it pull (…, 1) times as strong, towards the tip:
@@ -154,10 +156,12 @@ def rotation_z(angle_rad: float | np.ndarray) -> np.ndarray:
                      np.stack([zero, zero, one], -1)], -2)
 
 
-def one_curve(rest_mm: np.ndarray, bend_rad: np.ndarray, contact_mm: float, motor_rad: float, wire: Wire) -> Curves:
+def one_curve(
+    rest_mm: np.ndarray, bend_rad: np.ndarray, contact_mm: float, motor_rad: float, wire: Wire, pull: float = 0.0
+) -> Curves:
     """The centreline of one frame."""
     return centrelines(np.asarray(rest_mm), np.asarray(bend_rad), np.asarray(contact_mm), np.asarray(motor_rad),
-                       wire)
+                       wire, pull)
 
 
 def resting_lines(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> list[np.ndarray]:
