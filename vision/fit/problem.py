@@ -92,8 +92,8 @@ class Problem:
 
     @cached_property
     def light_px(self) -> np.ndarray:
-        """Sigmas (cameras, modes) of what each camera's lines are off by as a whole: LIGHT_PX, and as the wire turns before
-        the light: what moves a line by so much moves it by that over a radian more or less."""
+        """Sigmas (cameras, modes) of what each camera's lines are off by as a whole: LIGHT_PX, and as the wire turns
+        before the light: what moves a line by so much moves it by that over a radian more or less."""
         half, sigma = 0.5 * float(np.ptp(self.motor_rad)), np.tile(LIGHT_PX, (len(self.cameras), 1))
         for camera, own in enumerate(sigma):
             shared = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame >= 0]

@@ -3,8 +3,8 @@
 Hub frame: origin at the base, x along the clamped whisker, z the rotation axis; it turns with the motor. A
 round rod that is pushed at one point bends in the plane of its tangent and the force; its tangent angle grows as
 the integral of (contact - s)/EI(s) up to the contact and stays constant beyond. For a uniform rod that is
-2u - u², u = s/contact. The force stands across the whisker at the contact, so that a bent rod has shorter levers towards
-its base: the bend's square adds what `bend_growth` says, and so does friction along it.
+2u - u², u = s/contact. The force stands across the whisker at the contact, so that a bent rod has shorter levers
+towards its base: the bend's square adds what `bend_growth` says, and so does friction along it.
 """
 
 from dataclasses import dataclass
@@ -40,8 +40,8 @@ def bend_growth(
 ) -> np.ndarray:
     """Share (…, m) of the final tangent angle turn_rad (…, 1) reached at the nodes of a curve, arc_mm (m,).
 
-    The force at contact_mm (…, 1) is across the tangent there, and along it pull (…, 1) times as strong, towards the tip:
-    EI ψ'' = −F cos(ψ − B) − P sin(ψ − B), B = turn_rad. To the second order in bend and pull, with g the share by small
+    The force at contact_mm (…, 1) is across the tangent there, and along it pull (…, 1) times as strong, towards the
+    tip: EI ψ'' = −F cos(ψ − B) − P sin(ψ − B), B = turn_rad. To the second order in bend and pull, with g the share by small
     bends, the lever ∫ ds from s to the contact is shorter by ∫ B² (1 − g)²/2 − P/F B (1 − g) ds. Of a uniform rod the
     share grows by B² (w⁶ − w²)/30 and less so P/F B (w⁴ − w²)/6, w = 1 − u: to 1e-4 of it at B = 0.6.
     """

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
 
-from bench.rig.protocol import MotorTable, PicturesTable, WhiskerTable
+from bench.rig.protocol import MotorTable, PicturesTable, TrialTable, WhiskerTable
 from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit import problem as model
@@ -111,9 +111,10 @@ def test_a_tilt_that_is_held_is_held():
 
 
 def test_friction_along_the_whisker_is_what_a_fit_without_any_differs_by(monkeypatch):
-    """In a push of 16 degrees, which shows it."""
+    """In a push of 16 degrees that is held, which shows it."""
+    held = [TrialTable(beta_deg=0.0, friction=0.3, static_friction=0.3)]
     motor, pictures = MotorTable(after_deg=16.1), PicturesTable(after_deg=16.0, step_deg=2.0)
-    scene = draw_scene(3, whisker=WhiskerTable(**WHISKER), motor=motor, pictures=pictures)
+    scene = draw_scene(3, whisker=WhiskerTable(), trials=held, motor=motor, pictures=pictures)
     fit = fitted(as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene)))
     predicted = told(fit, "friction along the whisker")
     monkeypatch.setattr(solve, "PULL_PRIOR", 1e-6)
