@@ -32,6 +32,7 @@ WIRE_DRIFT_PX = 0.02
 WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
 # It also wanders with what is behind it, over this length of wire.
 WANDER_PX, WANDER_MM = 0.25, 12.0
+# The same of a bar whose line says nothing of its light.
 BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
 BAR_TILT_ARM_MM = 20.0
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
@@ -93,12 +94,16 @@ class Problem:
     @cached_property
     def light_px(self) -> np.ndarray:
         """Sigmas (cameras, modes) of what each camera's lines are off by as a whole: LIGHT_PX, and as the wire turns
-        before the light: what moves a line by so much moves it by that over a radian more or less."""
+        before the light: what moves a line by so much moves it by that over a radian more or less; of a bar what its
+        points share, where they say so."""
         half, sigma = 0.5 * float(np.ptp(self.motor_rad)), np.tile(LIGHT_PX, (len(self.cameras), 1))
         for camera, own in enumerate(sigma):
             shared = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame >= 0]
             common = np.linalg.norm(np.mean(np.concatenate(shared), axis=0)) if shared else 0.0
             still = np.hypot(own[:2], [common, 0.0])
+            bar = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame < 0]
+            if bar and np.any(bar):
+                own[-2:] = np.sqrt(np.mean(np.concatenate(bar)[:, :2] ** 2, axis=0))
             own[2:4], own[4:6] = np.hypot(own[2:4], half * still), np.hypot(own[4:6], 0.5 * half**2 * still)
         return sigma
 
