@@ -34,14 +34,13 @@ from bench.trials.of_session import judged, placed_units, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.seen import see_trial
 from bench.trials.unit import Unit, trial_result
+from estimator.uncertainty import Z_95
 
 COLUMNS = ("setting", "on_front", "whisks", "whisks_with_truth", "cpu_s_per_whisk", "wall_s_per_whisk",
            "cpu_share_of_standard", "d_x_error_rms_mm", "d_x_sigma_median_mm", "inside_95_percent")
 _CHANGES = {"rounds": (0, 2), "every_frame": (2, 3), "picture_scale": (2,), "wire_piece_px": (8, 24),
             "bar_piece_px": (8, 24), "check_beam": (False,)}
-_WITHIN_95 = 1.959964
 FIGURES = "with-figures"  # the standard; no key of a settings file
-
 _PLAIN = FormatStrFormatter("%.3g")  # a log axis of less than a decade
 
 _Made = TypeVar("_Made")
@@ -73,7 +72,7 @@ class Trade:
     def row(self, standard_cpu_s: float, on_front: bool) -> dict:
         """As the table has it."""
         finite = np.isfinite(self.errors_mm)
-        inside = np.abs(self.errors_mm[finite]) <= _WITHIN_95 * self.sigma_mm[finite]
+        inside = np.abs(self.errors_mm[finite]) <= Z_95 * self.sigma_mm[finite]
         sigma = float(np.median(self.sigma_mm[finite])) if np.any(finite) else np.nan
         values = (self.seeing.name, int(on_front), len(finite), len(finite) - self.missing, self.cpu_s, self.wall_s,
                   self.cpu_s / standard_cpu_s, self.rms_mm, sigma, 100.0 * np.mean(inside) if len(inside) else np.nan)

@@ -9,6 +9,7 @@ import numpy as np
 from bench.array.cloud import SEEN, Contact
 from bench.base.drawing import label_of
 from bench.base.tables import sigma_name, write_table
+from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
@@ -21,7 +22,6 @@ COLUMNS = (
     *("distance_mm", "distance_sigma_mm", "along_mm", "along_sigma_mm"),
     *("normal_off_deg", "normal_sigma_deg", "surface_from", "status"),
 )
-_WITHIN_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
 
 
@@ -94,5 +94,5 @@ def surface_lines(cloud: Sequence[Contact]) -> Iterator[str]:
 
 def _numbers(values: Iterable[Value]) -> str:
     errors, sigmas = np.array([(one.value, one.sigma) for one in values]).T
-    held = 100.0 * np.mean(np.abs(errors) <= _WITHIN_95 * sigmas)
+    held = 100.0 * np.mean(np.abs(errors) <= Z_95 * sigmas)
     return f"{errors.mean():>+9.2f}{_rms(errors):>8.2f}{held:>6.0f} %"

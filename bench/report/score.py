@@ -13,6 +13,7 @@ import numpy as np
 from bench.base.tables import sigma_name
 from bench.gauges.matrix import Gauges
 from bench.session.session import Session
+from estimator.uncertainty import Z_95
 
 # Column of whisks.csv and key of truth.toml.
 _AT_TOUCH = (
@@ -23,7 +24,6 @@ _AT_TOUCH = (
     ("psi_deg", "psi_deg"),
 )
 _SLIP_THETA_DEG = 3.0  # °: the pushing angle at which truth files give the slip (slip_at_3deg_mm)
-_WITHIN_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Score:
         """Bias, RMS, and how well the stated sigmas hold."""
         z = np.abs(self.errors) / self.sigmas
         finite = z[np.isfinite(z)]
-        held = f"{100 * np.mean(finite <= _WITHIN_95):5.0f} %   {finite.max():5.2f}" if len(finite) else "    -       -"
+        held = f"{100 * np.mean(finite <= Z_95):5.0f} %   {finite.max():5.2f}" if len(finite) else "    -       -"
         return (
             f"{self.name:<28}{len(self.errors):5d}  {np.mean(self.errors):+9.4f}  "
             f"{np.sqrt(np.mean(self.errors**2)):8.4f} {self.unit:<4}{held}"

@@ -63,7 +63,7 @@ def place_rig(
             doubts.notes += _elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
     if alone or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
-        _check_suffices(both)
+        _check_suffices(both, doubts)
     if both.alarm and not alone:
         doubts.note(both.alarm)
     return placed_here.with_notes(*(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays)
@@ -102,11 +102,13 @@ def _elsewhere(session: Session, calibration: SessionCalibration) -> list[str]:
     ]
 
 
-def _check_suffices(both: Placement) -> None:
+def _check_suffices(both: Placement, doubts: Doubts) -> None:
     try:
-        check_swing_suffices(both)
+        doubt = check_swing_suffices(both)
     except Refused as reason:
         raise BadInput(str(reason), file="trials") from None
+    if doubt:
+        doubts.note(doubt)
 
 
 def _settled(

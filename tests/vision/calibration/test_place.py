@@ -61,15 +61,20 @@ def test_alarm_names_the_encoder():
     assert abs(found - 0.5) < 0.012
 
 
-def test_a_narrow_swing_with_a_board_by_ruler_is_refused_with_the_width_that_would_do():
+def test_a_narrow_swing_with_a_board_by_ruler_is_doubted_with_the_width_that_would_do():
     ruler = by_board(np.eye(3, 4), 3.0, 0.05)
-    narrow = combine(ruler, by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4)))
-    with pytest.raises(Refused, match=r"along the whisker; 0\.05 mm is needed") as refusal:
-        check_swing_suffices(narrow)
-    needed = float(re.search(r"free strokes of about (\d+) degrees", str(refusal.value))[1])
+    doubt = check_swing_suffices(combine(ruler, by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4))))
+    assert re.search(r"to 0\.\d{3} mm along the whisker only", doubt)
+    needed = float(re.search(r"free strokes of about (\d+) degrees", doubt)[1])
     # A stroke that wide, with frames as close, does.
     wide = some_lines(needed, across_mm=0.01, turn_rad=5e-4, frames=round(30 * needed / 1.5))
-    check_swing_suffices(combine(ruler, by_swing(wide)))
+    assert check_swing_suffices(combine(ruler, by_swing(wide))) == ""
+
+
+def test_a_swing_that_tells_less_than_a_ruler_is_refused():
+    ruler = by_board(np.eye(3, 4), 3.0, 0.05)
+    with pytest.raises(Refused, match=r"along the whisker; 1 mm is needed: record free strokes of about \d+ degrees"):
+        check_swing_suffices(combine(ruler, by_swing(some_lines(0.6, across_mm=0.05, turn_rad=2e-3))))
 
 
 def test_too_few_frames_are_refused():
