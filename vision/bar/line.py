@@ -29,8 +29,9 @@ _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 # Of the area of lines that were possible: where nearly all of them still are, no edge is seen. Bars that are there
 # leave 0.13 at most, what is taken for one along a clamp or a shadow 0.2 to 1 (tests/ladder/bar_scenes.py).
 _MOST_UNRESOLVED = 1.0 / 6.0
-# What its light leaves beyond noise also moves the line as a whole and tilts it (over ARM_MM), px for the root of by how
-# much the evidence is overstated beyond 1: by the first the true lines of 79 path-traced views are most probable.
+# What its light leaves beyond noise also moves the line as a whole and tilts it (over ARM_MM), px for the root of by
+# how much the evidence is overstated beyond 1: by the first the true lines of 79 path-traced views are most probable
+# (tests/ladder/bar_starts.py), the second is half of it.
 OVERSTATED_PX = np.array([0.025, 0.0125])
 _LEAST_BEYOND = 0.01  # no light is so plain
 
