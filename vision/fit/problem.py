@@ -98,7 +98,8 @@ class Problem:
         points share, where they say so."""
         half, sigma = 0.5 * float(np.ptp(self.motor_rad)), np.tile(LIGHT_PX, (len(self.cameras), 1))
         for camera, own in enumerate(sigma):
-            shared = [row for one in self.seen if one.camera == camera and one.frame >= 0 for row in one.points.shared_px]
+            wire = [one.points for one in self.seen if one.camera == camera and one.frame >= 0]
+            shared = [row for points in wire for row in points.shared_px]
             common = np.linalg.norm(np.mean(shared, axis=0)) if shared else 0.0
             still = np.hypot(own[:2], [common, 0.0])
             bar = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame < 0]
