@@ -16,7 +16,7 @@ from vision.bar.profiles import FULL_SCALE
 from vision.geometry.contact import BarAxis
 from vision.geometry.settings import VisionSettings
 from vision.lines.bands import Pieces
-from vision.lines.points import LinePoints
+from vision.lines.points import SHARED, LinePoints
 from vision.pictures.view import SATURATED, View
 
 FAR_PX, NEAR_PX = 9.0, 3.0  # how far off an axis may be: found among the changes, and settled on coarse lines
@@ -30,6 +30,11 @@ _LEAST_EVIDENCE = 20.0  # for a bar and against none, tempered
 # Of the area of lines that were possible: where nearly all of them still are, no edge is seen. Bars that are there
 # leave 0.13 at most, what is taken for one along a clamp or a shadow 0.2 to 1 (tests/ladder/bar_scenes.py).
 _MOST_UNRESOLVED = 1.0 / 6.0
+# What its light leaves beyond noise also moves the line as a whole and tilts it (over ARM_MM), px for the root of by
+# how much the evidence is overstated beyond 1: by the first the true lines of 79 path-traced views are most probable
+# (tests/ladder/bar_starts.py), the second is half of it.
+OVERSTATED_PX = np.array([0.025, 0.0125])
+_LEAST_BEYOND = 0.01  # no light is so plain
 
 
 @dataclass(frozen=True)
@@ -153,7 +158,9 @@ def _bar_line(pieces: Pieces, looks: Mapping[float, Posterior], chances) -> BarL
     line = chances @ lines
     covariance = np.einsum("g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - line, lines - line))
     mixed = chances @ np.array([[one.for_bar, one.clearness, one.unresolved] for one in seen])
-    return BarLine(_two_points(pieces, line, covariance), *map(float, mixed), looks, line, pieces)
+    beyond = chances @ np.array([np.median(one.temper) for one in seen]) - 1.0
+    points = _two_points(pieces, line, covariance, np.sqrt(max(beyond, _LEAST_BEYOND)) * OVERSTATED_PX)
+    return BarLine(points, *map(float, mixed), looks, line, pieces)
 
 
 def _shows(pieces: Pieces) -> bool:
@@ -171,11 +178,12 @@ def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: Vis
                    slope=pieces.slope * scale, weight=pieces.weight / scale)
 
 
-def _two_points(pieces: Pieces, line, covariance) -> LinePoints:
-    """The line as two points at ± ARM_MM, each with its sigma."""
+def _two_points(pieces: Pieces, line, covariance, shared_px) -> LinePoints:
+    """The line as two points at ± ARM_MM, each with its sigma; shared_px (2,): sigma of a shift and a tilt besides."""
     place, foot, normal, _ = at_arms(pieces)
     lever = place / ARM_MM
     across = np.stack([np.ones(2), lever], axis=1)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", across, covariance, across))
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    return LinePoints(foot + (line[0] + line[1] * lever)[:, None] * normal, normal, sigma, place)
+    shared = np.hstack([across * shared_px, np.zeros((2, SHARED - 2))])
+    return LinePoints(foot + (line[0] + line[1] * lever)[:, None] * normal, normal, sigma, place, shared)

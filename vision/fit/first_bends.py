@@ -32,7 +32,7 @@ _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
 _BESIDE_BAR_PX = 8.0
 _REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)  # sigmas: of the Cauchy weights, round by round
-_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 0.5  # of a frame's points; no whisker bends farther in a stroke
+_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 1.2  # of a frame's points; pushed by 45 degrees a whisker bends so far
 
 
 @dataclass(frozen=True, eq=False)
