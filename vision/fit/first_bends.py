@@ -4,7 +4,7 @@ Coarse: to a pixel or two, enough for the bands that `trace` reads.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Sight:
 
     view: View
     rods: Rods
-    still: View
+    still: np.ndarray
     still_share: float
     bar_px: tuple[np.ndarray, np.ndarray]
 
@@ -50,15 +50,14 @@ class Sight:
            bar_mm: float) -> "Sight":
         """frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is."""
         frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))]
-        still = replace(view, background=median_of([view.frames[frame] for frame in frames]))
+        still = median_of([view.frames[frame] for frame in frames])
         return cls(view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, bar_mm))
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Where the wire may be beside predicted curves by frame, clear of hub and bar."""
-        pieces, still = (wire_pieces(view, curves, self.rods.wire, _PIECE_PX, reach_px - 3)
-                         for view in (self.view, self.still))
+        pieces = wire_pieces(self.view, curves, self.rods.wire, _PIECE_PX, reach_px - 3, self.still)
         clear = clear_of_bar(pieces, *self.bar_px, _BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM)
-        return votes(pieces.select(clear), still.background[clear], self.still_share, reach_px)
+        return votes(pieces.select(clear), self.still_share, reach_px)
 
 
 def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: BarAxis, motor_rad: Mapping[int, float]) -> np.ndarray:

@@ -73,17 +73,17 @@ def likely_curve(seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[n
     return mesh[best], bool(total[best] > expected + _SURE_SIGMAS * np.sqrt(len(share)) * np.std(share))
 
 
-def votes(pieces: Pieces, still: np.ndarray, still_share: float, reach_px: int) -> Votes:
-    """Votes of those pieces that have any, at shifts up to reach_px.
+def votes(pieces: Pieces, still_share: float, reach_px: int) -> Votes:
+    """Votes of those pieces, of bands with what stands still, that have any, at shifts up to reach_px.
 
-    still (s, p): the picture of what stands still at the same pixels; still_share: what part of one picture's
-    variance it has. That without rods is as noisy as a frame: in a noise that is no difference a dim rod would drown.
+    still_share: what part of one picture's variance what stands still has. That without rods is as noisy as a frame: in
+    a noise that is no difference a dim rod would drown.
     """
     wide = 2 * max(1, round(float(np.median(pieces.radius_px)))) + 1 if len(pieces) else 1
     place, count = _places(pieces, reach_px)
     pixels = np.maximum(sums((pieces.weight > 0).astype(float), place, count), 1.0)
     both = np.stack([sums(_unexplained(pieces, background, share), place, count) / pixels
-                     for background, share in ((pieces.background, 1.0), (still, still_share))])
+                     for background, share in ((pieces.background, 1.0), (pieces.still, still_share))])
     both -= uniform_filter1d(both, _SHADE_WIDTHS * wide, axis=2)
     alike = np.where(both[0] * both[1] > 0.0, np.min(both**2, axis=0), 0.0)
     share, changed = _share(alike * pixels - 1.0, wide), _share(both[0] ** 2 * pixels - 1.0, wide)

@@ -28,12 +28,14 @@ _WORST_SIGMA_PX = 0.5
 _WORST_MISFIT = 6.0
 
 
-def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:
-    """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame."""
+def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int,
+                still: np.ndarray | None = None) -> Pieces:
+    """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame. still (h, w): another
+    background, for a look that asks for no light."""
     outlines = [_outline(view.camera, curve, wire) for curve in curves.values()]
     # one width for all bands: a wire may pass from one whole pixel of radius to the next within a whisk
     half = int(np.ceil(max(np.nanmax(radius) for *_, radius in outlines))) + margin_px
-    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half, _hidden(view, frame))
+    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half, _hidden(view, frame), still)
              for frame, (arc, middle, radius) in zip(curves, outlines)]
     pieces = cut_pieces(bands, length_px, view.noise)
     return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
