@@ -19,6 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
 from vision.lines.common_shift import common_spread_px
+from vision.lines.gathered import Gathered
 from vision.lines.shading import LEAST_POWER, LONGEST_PX, Equations, Knots, Slopes, contrast_of, stiffness, wave_prior
 
 BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
@@ -127,19 +128,39 @@ def _start(task: Task) -> tuple[float, float]:
     if task.seen_blur_px is not None:
         return 0.0, float(np.log(task.seen_blur_px))
     task = task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered()
-    blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
-    begins = sorted((_begin(task, shift, blur) for shift in _SHIFTS_PX for blur in blurs), key=lambda one: one.doubt)
-    robust, chosen = begins[0].weighted().robust, []
+    log_blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
+    doubts = _doubts_of_starts(task, log_blurs)
+    ranked = np.unravel_index(np.argsort(doubts, axis=None), doubts.shape)
+    begins = list(zip(_SHIFTS_PX[ranked[0]].tolist(), log_blurs[ranked[1]].tolist()))
+    robust, chosen = _begin(task, *begins[0]).weighted().robust, []
     for one in begins:
-        if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
+        if all(abs(one[0] - other[0]) > _APART_PX for other in chosen):
             chosen.append(one)
-    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust), _ROUGHLY) for one in chosen[:_MOST_STARTS])
+    ends = (_descend(_begin(task, *one, robust), _ROUGHLY) for one in chosen[:_MOST_STARTS])
     best = min(ends, key=lambda one: one.doubt)
     return float(np.median(best.shift_px)), float(np.log(best.blur_px))
 
 
-def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
-    return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
+def _doubts_of_starts(task: Task, log_blurs: np.ndarray) -> np.ndarray:
+    """Minus twice the log evidence (m, b) of all pieces moved by each of _SHIFTS_PX, at these blurs; see
+    `_Point.doubt`."""
+    pieces, every = task.pieces, np.ones(len(task.pieces))
+    models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
+    left, right, power = Gathered(pieces, task.knots.weights(pieces), every).normal(_SHIFTS_PX, models, task.terms)
+    doubts = power + ((log_blurs - np.log(task.blur_px)) / task.blur_sigma) ** 2
+    for k, shift in enumerate(_SHIFTS_PX):
+        stiff = stiffness(wave_prior(pieces.moved(shift * every), task.terms), task.knots)
+        doubts[k] -= np.linalg.slogdet(stiff)[1]
+        for b in range(len(log_blurs)):
+            factor = cho_factor(left[k, b] + stiff, check_finite=False)
+            doubts[k, b] += 2.0 * np.sum(np.log(np.diag(factor[0])))
+            doubts[k, b] -= right[k, b] @ cho_solve(factor, right[k, b], check_finite=False)
+    return doubts
+
+
+def _begin(task: Task, shift_px: float, log_blur: float, robust: np.ndarray | None = None) -> "_Point":
+    every = np.ones(len(task.pieces))
+    return _Point.at(task, shift_px * every, log_blur, every if robust is None else robust)
 
 
 def _descend(here: "_Point", roughly: float = 1.0) -> Shared:

@@ -11,7 +11,7 @@ from vision.lines.bands import Pieces
 from vision.lines.cylinder import shading_basis, slopes_of
 
 LEAST_POWER = 1e-9  # 1/px², of a piece that does not tell where it is
-_WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
+WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
 # alike, moved all lines by half a pixel, and by a quarter of one from end to end.
 _LIT_ALIKE_RAD = np.radians(8.0)
@@ -121,7 +121,7 @@ class Equations:
         columns[..., -1] = pieces.grey * weight
         self._columns, normal = columns, columns.transpose(0, 2, 1) @ columns
         self._around = normal[:, -3:-1]
-        self._inverse = _inverse_of_two(self._around[:, :, -3:-1] + _WEAK * np.eye(2))
+        self._inverse = _inverse_of_two(self._around[:, :, -3:-1] + WEAK * np.eye(2))
         normal = normal - self._around.transpose(0, 2, 1) @ (self._inverse @ self._around)
         self.gram, self.moment, self.power = normal[:, :terms, :terms], normal[:, :terms, -1], normal[:, -1, -1]
 
