@@ -11,7 +11,7 @@ import numpy as np
 from vision.fit.problem import BAR, REST, REST_PRIOR_MM, Problem, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, one_curve
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines, one_curve
 from vision.geometry.contact import BarAxis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
 from vision.geometry.newton import cauchy_weights
@@ -121,15 +121,20 @@ class _Model:
     wire: Wire
 
     def px(self, bend, seen: Sequence[LinePoints]) -> np.ndarray:
-        """Distance (n,) in px from line points to the predicted line, all cameras."""
-        curve = one_curve(self.rest_mm, bend, self.arc_mm, self.motor_rad, self.wire)
-        return np.concatenate([np.sum(points.normal * (view.camera.project(curve.at(points.place)[0]) - points.px),
-                                      axis=1) for view, points in zip(self.views, seen)])
+        """Distances (…, n) in px from line points of all cameras to the predicted lines; bend (…, 2)."""
+        shape = np.shape(bend)[:-1]
+        curves = centrelines(np.broadcast_to(self.rest_mm, (*shape, 2, REST_POWERS)), bend,
+                             np.full(shape, self.arc_mm), np.full(shape, self.motor_rad), self.wire)
+        off = []
+        for view, points in zip(self.views, seen):
+            expected = view.camera.project(curves.at(points.place)[0].reshape(-1, 3)).reshape(*shape, -1, 2)
+            off.append(np.sum(points.normal * (expected - points.px), axis=-1))
+        return np.concatenate(off, axis=-1)
 
     def slopes(self, bend, seen: Sequence[LinePoints], step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
-        """The same, and its derivatives (n, 2) by the bend."""
-        left = self.px(bend, seen)
-        return left, np.stack([(self.px(bend + step * one, seen) - left) / step for one in np.eye(2)], axis=1)
+        """The same of one bend (2,), and its derivatives (n, 2) by the bend."""
+        left, *moved = self.px(bend + step * np.eye(3, 2, -1), seen)
+        return left, (np.stack(moved, axis=1) - left[:, None]) / step
 
 
 def _likely_bend(model: _Model, seen: Sequence[Votes], guess) -> tuple[np.ndarray, list[LinePoints]]:

@@ -24,6 +24,7 @@ _LEAST_VOTE = 1e-9
 _SURE_SIGMAS = 8.0  # the best of all curves through noise has 3.4, one in 100 has 6, one in ten less each sigma on
 _SHADE_WIDTHS = 3  # of the rod: shade on what is behind changes over more
 _PLAIN_GAIN = 0.5  # a background scaled by more than this from 1 is none: the piece shows something else
+_WEAK = 1e-3  # keeps a background that a piece cannot tell from making its two equations singular
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,11 @@ def _places(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, int]:
 def _unexplained(pieces: Pieces, background, share: float) -> np.ndarray:
     """What a background with a gain and an offset of each piece's own leaves (s, p), over its noise; share: of one
     picture's variance that the background has."""
-    columns = np.stack([background, np.ones_like(background)], axis=-1) * pieces.weight[..., None]
-    seen, turned = pieces.grey * pieces.weight, columns.transpose(0, 2, 1)
-    gain_offset = np.linalg.solve(turned @ columns + 1e-3 * np.eye(2), turned @ seen[..., None])[..., 0]
-    plain = np.abs(gain_offset[:, :1] - 1.0) < _PLAIN_GAIN
-    gain_offset = np.where(plain, gain_offset, [1.0, 0.0])
-    return (seen - (columns @ gain_offset[..., None])[..., 0]) / np.sqrt(1.0 + share * gain_offset[:, :1] ** 2)
+    columns = np.stack([background, np.ones_like(background), pieces.grey], axis=1) * pieces.weight[:, None]
+    normal = columns @ columns.transpose(0, 2, 1)
+    a, b, d = normal[:, 0, 0] + _WEAK, normal[:, 0, 1], normal[:, 1, 1] + _WEAK
+    by_a, by_d = normal[:, 0, 2], normal[:, 1, 2]
+    gain, offset = (np.array([d * by_a - b * by_d, a * by_d - b * by_a]) / (a * d - b * b))[..., None]
+    plain = np.abs(gain - 1.0) < _PLAIN_GAIN
+    gain, offset = np.where(plain, gain, 1.0), np.where(plain, offset, 0.0)
+    return (columns[:, 2] - gain * columns[:, 0] - offset * columns[:, 1]) / np.sqrt(1.0 + share * gain**2)
