@@ -148,30 +148,29 @@ def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
     Bands with another background, as all have or none, are for a look that asks for no light: their slopes and
     curvatures are 0.
     """
-    parts = [_cut(band, length_px, noise, number) for number, band in enumerate(bands)
-             if len(band.place) >= length_px]
-    if not parts:
+    counts = [len(band.place) // length_px for band in bands]
+    if not any(counts):
         return Pieces(*[np.zeros((0, 1))] * 6, np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)),
                       np.zeros(0, dtype=int), np.zeros((0, 1)))
-    return Pieces(*(np.concatenate(columns) for columns in zip(*parts)))
+    used = [(band, count * length_px) for band, count in zip(bands, counts) if count]
+    whole = Band(*(np.concatenate([getattr(band, name)[:end] for band, end in used])
+                   for name in Band.__dataclass_fields__))
+    return Pieces(*_cut(whole, length_px, noise, np.repeat(np.arange(len(bands)), counts)))
 
 
-def _cut(band: Band, length_px: int, noise: Noise, number: int):
-    count = len(band.place) // length_px
-    used = count * length_px
-    flat = [a[:used].reshape(count, -1)
-            for a in (band.offset_px, band.grey, band.background)]
-    still = band.still[:used].reshape(count, -1)
-    flat += [np.zeros(flat[0].shape)] * 2 if still.size else [a[:used].reshape(count, -1) for a in _changes(band)]
+def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray):
+    count = len(source)
+    flat = [a.reshape(count, -1) for a in (band.offset_px, band.grey, band.background)]
+    still = band.still.reshape(count, -1)
+    flat += [np.zeros(flat[0].shape)] * 2 if still.size else [a.reshape(count, -1) for a in _changes(band)]
     in_picture = np.isfinite(flat[1]) & np.isfinite(flat[2])
     weight = np.where(in_picture, 1.0 / noise.sigma(np.where(in_picture, flat[1], 0.0)), 0.0)
     flat[1:] = [np.where(in_picture, values, 0.0) for values in flat[1:]]
-    means = [a[:used].reshape(count, length_px, -1).mean(axis=1)
-             for a in (band.foot_px, band.normal)]
-    singles = [a[:used].reshape(count, length_px).mean(axis=1) for a in (band.place, band.radius_px)]
+    means = [a.reshape(count, length_px, -1).mean(axis=1) for a in (band.foot_px, band.normal)]
+    singles = [a.reshape(count, length_px).mean(axis=1) for a in (band.place, band.radius_px)]
     if still.size:
         still = np.where(in_picture, still, 0.0)
-    return (*flat, weight, singles[0], singles[1], *means, np.full(count, number), still)
+    return (*flat, weight, singles[0], singles[1], *means, source, still)
 
 
 def _changes(band: Band) -> list[np.ndarray]:

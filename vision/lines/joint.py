@@ -13,6 +13,7 @@ what is shared is found with pixels weighed by no more than that leaves them.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -28,7 +29,7 @@ BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 p
 # are larger, and larger still beside their sigma (tests/ladder/wire_scenes.py).
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
-_STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
+_STARTS_BY, _MOST_STARTS, _APART_PX = 120, 3, 0.3  # by so many pieces; so many are followed, no two so near
 _TOLD_BY = 120  # pieces that tell how probable a common shift is
 _MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
@@ -77,6 +78,11 @@ class Task:
     blur_px: float
     blur_sigma: float = BLUR_SIGMA
     seen_blur_px: float | None = None
+
+    @cached_property
+    def hats(self) -> np.ndarray:
+        """How much each knot has in the shading of each piece, (s, knots)."""
+        return self.knots.weights(self.pieces)
 
     def of(self, some: slice) -> "Task":
         """The same of some of the pieces."""
@@ -146,7 +152,7 @@ def _doubts_of_starts(task: Task, log_blurs: np.ndarray) -> np.ndarray:
     `_Point.doubt`."""
     pieces, every = task.pieces, np.ones(len(task.pieces))
     models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
-    left, right, power = Gathered(pieces, task.knots.weights(pieces), every).normal(_SHIFTS_PX, models, task.terms)
+    left, right, power = Gathered(pieces, task.hats, every).normal(_SHIFTS_PX, models, task.terms)
     doubts = power + ((log_blurs - np.log(task.blur_px)) / task.blur_sigma) ** 2
     for k, shift in enumerate(_SHIFTS_PX):
         stiff = stiffness(wave_prior(pieces.moved(shift * every), task.terms), task.knots)
@@ -209,7 +215,7 @@ class _Point:
             equations = Equations(task.pieces.moved(shift_px), float(np.exp(log_blur)), task.terms)
         if stiff is None:
             stiff = stiffness(wave_prior(equations.pieces, task.terms), task.knots)
-        hats = task.knots.weights(task.pieces)
+        hats = task.hats
         left, right = equations.shared(hats, robust)
         left += stiff
         shared = cho_solve(cho_factor(left, check_finite=False), right, check_finite=False)
@@ -248,7 +254,7 @@ class _Arrow:
     def __init__(self, point: _Point):
         task = point.task
         self.point, self.slopes = point, point.equations.linearised(point.waves)
-        hats, slopes, size = task.knots.weights(task.pieces), self.slopes, len(point.left)
+        hats, slopes, size = task.hats, self.slopes, len(point.left)
         self.power, self.right = slopes.power, slopes.gram[:, 0, 2]
         by_waves = (hats[:, :, None] * slopes.rod[:, None, 0]).reshape(len(hats), size)
         self.cross = np.concatenate([by_waves, slopes.gram[:, 0, 1:2]], axis=1)
