@@ -122,8 +122,8 @@ class Pieces:
         """The pieces where `keep` (s,) holds, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
-    def columns(self, keep: np.ndarray) -> "Pieces":
-        """The same pieces with those of their pixels where `keep` (p,) holds."""
+    def columns(self, keep: np.ndarray | slice) -> "Pieces":
+        """The same pieces with those of their pixels where `keep` (p,) holds, or of a slice."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
