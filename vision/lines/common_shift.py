@@ -13,7 +13,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.linalg.lapack import dtrtri
 
 from vision.lines.bands import Pieces
-from vision.lines.gathered import Gathered
+from vision.lines.gathered import Gathered, exactly_if_needed
 from vision.lines.shading import WAVE_SHARE, Knots, between_knots, contrast_of
 
 _PARTS = np.linspace(-1.0, 1.0, 15)
@@ -52,11 +52,16 @@ def doubts_of(pieces: Pieces, shifts_px: np.ndarray, blurs_px: np.ndarray, terms
     along = knots.place_mm[sorted({0, len(knots.place_mm) // 2, len(knots.place_mm) - 1})]
     knots = Knots(along, knots.turn_rad, knots.turns)
     own, turned = np.linalg.eigh(between_knots(knots))  # of knots so mixed each wave has a variance of its own
-    gathered = Gathered(pieces, knots.weights(pieces) @ turned, robust)
-    normal = gathered.normal(shifts_px, [(factor, blur) for factor in wider for blur in blurs_px], terms)
+    models = [(factor, blur) for factor in wider for blur in blurs_px]
     contrasts = [contrast_of(replace(pieces, radius_px=factor * pieces.radius_px)) for factor in wider]
     contrast = np.tile(np.repeat(contrasts, len(blurs_px)), len(shifts_px))
-    doubts = _doubts(*(part.reshape(-1, *part.shape[2:]) for part in normal), own, contrast, no_chance)
+
+    def asked(each_pixel: bool) -> np.ndarray:
+        normal = Gathered(pieces, knots.weights(pieces) @ turned, robust, each_pixel=each_pixel).normal(
+            shifts_px, models, terms)
+        return _doubts(*(part.reshape(-1, *part.shape[2:]) for part in normal), own, contrast, no_chance)
+
+    doubts = exactly_if_needed(asked)
     return doubts.reshape(len(shifts_px), len(wider), len(blurs_px)).transpose(1, 0, 2)
 
 

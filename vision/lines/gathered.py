@@ -8,17 +8,21 @@ shares each pixel's products are given to (the adjoint of interpolation). Pieces
 together, with distances stretched by as little as their half-widths differ (as in `cylinder.shading_basis`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from vision.lines.bands import Pieces
 from vision.lines.cylinder import alike, profiles
-from vision.lines.shading import WEAK
+from vision.lines.shading import WEAK, Equations
 
 # px from distance to distance: an edge blurred by 0.6 px is a cubic over it to some 1e-3 of its height
 _STEP_PX = 0.2
+_BESIDE_PX, _LEAST_BESIDE = 2.0, 0.2  # beyond the edges; of a piece's pixels, half where all are seen
+# What of the offset's own square the gain leaves, at least: by the cubics' error it may come out with less than nothing.
+_LEAST_ALONE = 1e-4
 _BEHIND = 3  # background, slope, curvature
 _PAIRS = [(i, j) for i in range(_BEHIND) for j in range(i, _BEHIND)]
 
@@ -26,8 +30,14 @@ _PAIRS = [(i, j) for i in range(_BEHIND) for j in range(i, _BEHIND)]
 class Gathered:
     """Pieces with weights hats (s, knots) of the knots of light in each, and robust (s,) of each."""
 
-    def __init__(self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray):
-        self._groups = [_Alike(pieces.select(some), hats[some], robust[some]) for some in alike(pieces.radius_px)]
+    def __init__(self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray, *, each_pixel: bool = False):
+        """each_pixel: nothing is gathered, so that normal matrices have no eigenvalue below 0 whatever is seen."""
+        gathers = _shows_enough(pieces) & (not each_pixel)
+        here, others = np.flatnonzero(gathers), np.flatnonzero(~gathers)
+        together = [here[some] for some in alike(pieces.radius_px[here])] if len(here) else []
+        self._groups = [_Alike(pieces.select(some), hats[some], robust[some]) for some in together]
+        if len(others):
+            self._groups.append(_EachPixel(pieces.select(others), hats[others], robust[others]))
 
     def normal(self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]],
                terms: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -40,6 +50,30 @@ class Gathered:
         parts = [group.normal(shifts_px, models, terms) for group in self._groups]
         left, right, power = (sum(part[1:], part[0]) for part in zip(*parts))
         return left, right, power
+
+
+def _shows_enough(pieces: Pieces) -> np.ndarray:
+    """Which pieces (s,) show so much of the background that what cubics are off by at the edges is nothing beside it."""
+    beside = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + _BESIDE_PX
+    return np.mean(beside & (pieces.weight > 0), axis=1) > _LEAST_BESIDE
+
+
+class _EachPixel:
+    """Pieces of which little of the background is seen, model by model."""
+
+    def __init__(self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray):
+        self.pieces, self.hats, self.robust = pieces, hats, robust
+
+    def normal(self, shifts_px, models, terms: int):
+        """See `Gathered.normal`."""
+        found = []
+        for shift in shifts_px:
+            moved = self.pieces.moved(np.full(len(self.pieces), shift))
+            for wider, blur_px in models:
+                equations = Equations(replace(moved, radius_px=wider * moved.radius_px), blur_px, terms)
+                found.append((*equations.shared(self.hats, self.robust), self.robust @ equations.power))
+        parts = (np.array(part) for part in zip(*found))
+        return tuple(part.reshape(len(shifts_px), len(models), *part.shape[1:]) for part in parts)
 
 
 class _Alike:
@@ -85,11 +119,12 @@ class _Alike:
         by_one = (self.one @ (left_open * told).reshape(len(told), -1)).reshape(size, count, -1)
         seen = (self.grey @ told.reshape(len(told), -1)).reshape(size, count, -1)
         # gain and offset of the background, eliminated by Cholesky's root of their own two equations
-        root = np.sqrt(self.behind_twice @ twice + WEAK)[..., None]
+        root = np.sqrt(np.maximum(self.behind_twice @ twice, 0.0) + WEAK)[..., None]
         gain = np.empty((size, count, terms + 1))
         gain[..., :terms], between = by_behind[..., :terms] / root, by_behind[..., terms:] / root
         gain[..., terms] = self.behind_grey @ ways.transpose(2, 0, 1).reshape(-1, count) / root[..., 0]
-        root = np.sqrt(by_one[..., terms:] + WEAK - between**2)
+        alone = np.maximum(by_one[..., terms:], 0.0)
+        root = np.sqrt(np.maximum(alone - between**2, _LEAST_ALONE * alone) + WEAK)
         offset = np.empty((size, count, terms + 1))
         offset[..., :terms], offset[..., terms:] = by_one[..., :terms], seen[..., terms:]
         offset = (offset - between * gain) / root
@@ -103,6 +138,14 @@ class _Alike:
         power = self.robust @ self.squares - np.sum(left_over**2, axis=(1, 2))
         return (left.reshape(count, knots * terms, -1) - taken[..., :-1],
                 right.reshape(count, -1) - taken[..., -1], power)
+
+
+def exactly_if_needed(asked: Callable[[bool], np.ndarray]) -> np.ndarray:
+    """What is asked of gathered pixels (False), or of each pixel (True) where these leave no positive definite matrix."""
+    try:
+        return asked(False)
+    except np.linalg.LinAlgError:
+        return asked(True)
 
 
 def _to_nearest(place: np.ndarray, count: int) -> csc_array:

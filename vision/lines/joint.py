@@ -20,7 +20,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
 from vision.lines.common_shift import common_spread_px
-from vision.lines.gathered import Gathered
+from vision.lines.gathered import Gathered, exactly_if_needed
 from vision.lines.shading import LEAST_POWER, LONGEST_PX, Equations, Knots, Slopes, contrast_of, stiffness, wave_prior
 
 BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
@@ -135,7 +135,7 @@ def _start(task: Task) -> tuple[float, float]:
         return 0.0, float(np.log(task.seen_blur_px))
     task = task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered()
     log_blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
-    doubts = _doubts_of_starts(task, log_blurs)
+    doubts = exactly_if_needed(lambda each_pixel: _doubts_of_starts(task, log_blurs, each_pixel))
     ranked = np.unravel_index(np.argsort(doubts, axis=None), doubts.shape)
     begins = list(zip(_SHIFTS_PX[ranked[0]].tolist(), log_blurs[ranked[1]].tolist()))
     robust, chosen = _begin(task, *begins[0]).weighted().robust, []
@@ -147,12 +147,13 @@ def _start(task: Task) -> tuple[float, float]:
     return float(np.median(best.shift_px)), float(np.log(best.blur_px))
 
 
-def _doubts_of_starts(task: Task, log_blurs: np.ndarray) -> np.ndarray:
+def _doubts_of_starts(task: Task, log_blurs: np.ndarray, each_pixel: bool) -> np.ndarray:
     """Minus twice the log evidence (m, b) of all pieces moved by each of _SHIFTS_PX, at these blurs; see
     `_Point.doubt`."""
     pieces, every = task.pieces, np.ones(len(task.pieces))
     models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
-    left, right, power = Gathered(pieces, task.hats, every).normal(_SHIFTS_PX, models, task.terms)
+    gathered = Gathered(pieces, task.hats, every, each_pixel=each_pixel)
+    left, right, power = gathered.normal(_SHIFTS_PX, models, task.terms)
     doubts = power + ((log_blurs - np.log(task.blur_px)) / task.blur_sigma) ** 2
     for k, shift in enumerate(_SHIFTS_PX):
         stiff = stiffness(wave_prior(pieces.moved(shift * every), task.terms), task.knots)
