@@ -29,7 +29,7 @@ BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 p
 # are larger, and larger still beside their sigma (tests/ladder/wire_scenes.py).
 _MODEL_SHARE, _ALIKE_PX = 0.006, 0.3
 _SHIFTS_PX, _BLUR_SIGMAS = np.linspace(-1.5, 1.5, 7), (-1.2, 0.2, 1.6)  # of all pieces, and of the blur: starts
-_STARTS_BY, _MOST_STARTS, _APART_PX = 120, 3, 0.3  # by so many pieces; so many are followed, no two so near
+_STARTS_BY, _MOST_STARTS, _APART_PX = 300, 3, 0.3  # by so many pieces; so many are followed, no two so near
 _TOLD_BY = 120  # pieces that tell how probable a common shift is
 _MOST_STEPS, _LONGEST_LOG = 40, 0.3
 _FARTHEST_PX = 4.0  # a piece that goes farther sees something else
