@@ -21,7 +21,8 @@ from vision.lines.shading import WEAK, Equations
 # px from distance to distance: an edge blurred by 0.6 px is a cubic over it to some 1e-3 of its height
 _STEP_PX = 0.2
 _BESIDE_PX, _LEAST_BESIDE = 2.0, 0.2  # beyond the edges; of a piece's pixels, half where all are seen
-# What of the offset's own square the gain leaves, at least: by the cubics' error it may come out with less than nothing.
+# What of the offset's own square the gain leaves, at least: by the cubics' error it may come out with less than
+# nothing.
 _LEAST_ALONE = 1e-4
 _BEHIND = 3  # background, slope, curvature
 _PAIRS = [(i, j) for i in range(_BEHIND) for j in range(i, _BEHIND)]
@@ -41,9 +42,9 @@ class Gathered:
 
     def normal(self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]],
                terms: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Normal matrices (m, g, size, size) and right sides (m, g, size) of all knots' coefficients, and squares (m, g)
-        that the background leaves, of pieces moved by each of m common shifts; models: of g rods how many times as thick
-        each is, and blur, px.
+        """Normal matrices (m, g, size, size) and right sides (m, g, size) of all knots' coefficients, and squares
+        (m, g) that the background leaves, of pieces moved by each of m common shifts; models: of g rods how many times
+        as thick each is, and blur, px.
 
         As `shading.Equations.shared`, and `power` by weight.
         """
@@ -53,7 +54,8 @@ class Gathered:
 
 
 def _shows_enough(pieces: Pieces) -> np.ndarray:
-    """Which pieces (s,) show so much of the background that what cubics are off by at the edges is nothing beside it."""
+    """Which pieces (s,) show so much of the background that what cubics are off by at the edges is nothing beside
+    it."""
     beside = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + _BESIDE_PX
     return np.mean(beside & (pieces.weight > 0), axis=1) > _LEAST_BESIDE
 
@@ -77,8 +79,8 @@ class _EachPixel:
 
 
 class _Alike:
-    """Pieces of nearly one half-width. Of each, at distances (j,) from the axis, sums of squared weights: one, with what
-    is seen, with backgrounds; and of products of backgrounds, with each other and with what is seen."""
+    """Pieces of nearly one half-width. Of each, at distances (j,) from the axis, sums of squared weights: one, with
+    what is seen, with backgrounds; and of products of backgrounds, with each other and with what is seen."""
 
     def __init__(self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray):
         self.radius_px = float(np.mean(pieces.radius_px))
@@ -141,7 +143,8 @@ class _Alike:
 
 
 def exactly_if_needed(asked: Callable[[bool], np.ndarray]) -> np.ndarray:
-    """What is asked of gathered pixels (False), or of each pixel (True) where these leave no positive definite matrix."""
+    """What is asked of gathered pixels (False), or of each pixel (True) where these leave no positive definite
+    matrix."""
     try:
         return asked(False)
     except np.linalg.LinAlgError:
@@ -149,8 +152,8 @@ def exactly_if_needed(asked: Callable[[bool], np.ndarray]) -> np.ndarray:
 
 
 def _to_nearest(place: np.ndarray, count: int) -> csc_array:
-    """The matrix (s count, s p) that gives each pixel's value at its place (s, p) to the nearest four of count rows of its
-    piece, by the shares that the cubic through their values has there."""
+    """The matrix (s count, s p) that gives each pixel's value at its place (s, p) to the nearest four of count rows
+    of its piece, by the shares that the cubic through their values has there."""
     before = place.astype(np.intp)
     t = (place - before).ravel()
     shares = np.stack([-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,

@@ -196,8 +196,8 @@ class Slopes:
 
 
 def _parted(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.ndarray]:
-    """The pieces without pixels at their two ends that no light of a rod reaches, and these pixels' products (s, 3, 3) of
-    background, 1 and what is seen with each other."""
+    """The pieces without pixels at their two ends that no light of a rod reaches, and these pixels' products
+    (s, 3, 3) of background, 1 and what is seen with each other."""
     near = np.abs(pieces.offset_px) < pieces.radius_px[:, None] + _REACH_BLURS * blur_px
     near &= pieces.weight > 0
     first, last = np.flatnonzero(np.any(near, axis=0))[[0, -1]] if np.any(near) else (0, -1)

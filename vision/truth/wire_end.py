@@ -77,7 +77,7 @@ def _seen_along(view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]) 
 
 
 def _evidence(pieces: Pieces) -> np.ndarray:
-    """By how much (s,) each piece's middle differs from both backgrounds more than what is beside it does: the logarithm
+    """By how much (s,) each piece's middle differs from both backgrounds more than what is beside it does: the log
     of their mean squares over the noise's. NaN where too little of it is in the picture."""
     there, away = pieces.weight > 0, np.abs(pieces.offset_px) - pieces.radius_px[:, None]
     middle, beside = there & (away < 0.0), there & (away > _GAP_PX)
