@@ -6,6 +6,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.rotation import cross
 from vision.geometry.silhouette import outline
 
 
@@ -72,7 +73,7 @@ def clearance(
     arc = closest_arc(curves, axis, near_mm)
     point, tangent = curves.at(arc[..., None])
     away = _from_axis(point, axis)[..., 0, :]
-    normal = np.cross(np.asarray(axis.direction), tangent[..., 0, :])
+    normal = cross(np.asarray(axis.direction), tangent[..., 0, :])
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     side = np.where(normal[..., 1] > 0, -1.0, 1.0)
     return np.sum(away * normal, axis=-1) * side, arc, point[..., 0, :]
@@ -80,9 +81,9 @@ def clearance(
 
 def axis_frame(direction: np.ndarray) -> np.ndarray:
     """Two unit vectors (2, 3) at right angles to a direction and to each other."""
-    e1 = np.cross(direction, [1.0, 0.0, 0.0])
+    e1 = cross(direction, np.array([1.0, 0.0, 0.0]))
     e1 = e1 / np.linalg.norm(e1)
-    return np.stack([e1, np.cross(direction, e1)])
+    return np.stack([e1, cross(direction, e1)])
 
 
 def shifted_axis(axis: BarAxis, across: np.ndarray, vector: np.ndarray) -> BarAxis:
