@@ -138,8 +138,9 @@ class Beam:
 
 def _inverse_sum(d, per_mm):
     """1 / (1/d + per_mm) for d > 0, infinite where the sum is zero or below, NaN elsewhere."""
-    if type(d) is not float:
+    if not isinstance(d, float):
         return _inverse_sums(d, per_mm)
+    d = float(d)
     below = 1 + d * per_mm  # of one number, which a whisk's estimates ask for a thousand times
     return (d / below if below > 0 else inf) if d > 0 else nan
 

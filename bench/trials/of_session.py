@@ -123,16 +123,21 @@ def session_gauges(
     """Gauges as brought along, without a certificate; else from the gauge trials, or from all where the settings say
     so; none, and a note on what is lacking, where these cannot fix them."""
     given, from_all = given_gauges(units[0].session), units[0].settings.gauges_from_all
-    volts = [unit for unit in units if read_signals(unit.trial).kind == "V"]
-    trials = [unit for unit in volts if from_all or unit.trial.purpose == "gauge"]
+    serves = [from_all or unit.trial.purpose == "gauge" for unit in units]
+    trials = [unit for unit, one in zip(units, serves) if one and _has_volts(unit)]
     if given is not None or not trials:
         return given, None
     try:
         made = certified(trials, rate, pool, doubts)
     except Undetermined as reason:
-        doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * (len(trials) < len(volts))]))
+        more = any(_has_volts(unit) for unit, one in zip(units, serves) if not one)
+        doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * more]))
         return None, None
     return (replace(made.gauges, source=FROM_ALL) if from_all else made.gauges), made
+
+
+def _has_volts(unit: Unit) -> bool:
+    return read_signals(unit.trial).kind == "V"
 
 
 def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Certificate:
