@@ -5,7 +5,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -48,15 +48,21 @@ def _hashable(value):
     return [_hashable(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
 
 
-def hash_of_files(paths: Iterable[Path]) -> str:
-    """Hash of names and contents of files and of all files below folders; truth files do not count."""
+def content_hash(file: Path) -> bytes:
+    """Hash of a file's content."""
+    with file.open("rb") as content:  # a video may be larger than the memory
+        return hashlib.file_digest(content, hashlib.blake2b).digest()
+
+
+def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = content_hash) -> str:
+    """Hash of names and contents of files and of all files below folders; truth files do not count. digest_of: gives
+    the hash of a content."""
     digest = hashlib.blake2b(digest_size=16)
     for path in sorted(set(paths)):
         for file in [path] if path.is_file() else sorted(_below(path)):
             if not _TRUTH_FILES.fullmatch(file.name) and not file.name.startswith("."):
                 digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
-                with file.open("rb") as content:  # a video may be larger than the memory
-                    digest.update(hashlib.file_digest(content, hashlib.blake2b).digest())
+                digest.update(digest_of(file))
     return digest.hexdigest()
 
 

@@ -25,9 +25,9 @@ def moment_at_clamp(
 ) -> np.ndarray:
     """Size (n,) of the moment at the clamp, N·mm, of rods whose contacts lie at along_mm, across_mm (n,).
 
-    rigidity_Nmm2: EI as a function of arc lengths (n, nodes) in mm. friction: friction over normal force along the rod at
-    the contact, one or (n,), positive where it pulls towards the clamp. Raises ValueError where the contact is not in front of the clamp
-    or the rod would have to bend by more than about 45°.
+    rigidity_Nmm2: EI as a function of arc lengths (n, nodes) in mm. friction: friction over normal force along the rod
+    at the contact, one or (n,), positive where it pulls towards the clamp. Raises ValueError where the contact is not
+    in front of the clamp or the rod would have to bend by more than about 45°.
     """
     x, w = np.atleast_1d(np.asarray(along_mm, dtype=float)), np.atleast_1d(np.asarray(across_mm, dtype=float))
     if not (np.all(x > 0) and np.all(np.abs(w) < 0.6 * x)):
