@@ -29,6 +29,8 @@ class Memory:
     def of(cls, x: np.ndarray, samples: np.ndarray, *stretches: np.ndarray) -> "Memory":
         """Memory of samples (n, k) about a line over x (n,) in each stretch, a mask (n,); stretches do not overlap."""
         used = np.logical_or.reduce(stretches)
+        held = _hull(used)  # what lies outside counts for nothing
+        x, samples, used, stretches = x[held], samples[held], used[held], [stretch[held] for stretch in stretches]
         residuals, bases = np.zeros_like(samples), []
         for stretch in stretches:
             bases += _line_basis(x, stretch)
@@ -45,12 +47,15 @@ class Memory:
 
     def of_sum(self, weights: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of Σ w_i x_i; gaps can leave a negative direction, which is taken as no scatter."""
+        weights = weights[_hull(weights)]
         own = self._overlap(Spectrum.of(weights, len(self.seen)))
         values, axes = np.linalg.eigh(np.tensordot(own, self.covariance, axes=1))
         return (axes * np.maximum(values, 0.0)) @ axes.T * self._missing(weights, own)
 
     def between_sums(self, weights: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of Σ w_i x_i with Σ v_i x_i."""
+        held = _hull((weights != 0) | (other != 0))
+        weights, other = weights[held], other[held]
         first, second = (Spectrum.of(w, len(self.seen)) for w in (weights, other))
         missing = (self._missing(w, self._overlap(s)) for w, s in ((weights, first), (other, second)))
         both = np.tensordot(self._overlap(first, second), self.covariance, axes=1)
@@ -87,6 +92,12 @@ class Spectrum:
         """Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1; of the series with itself where no other is given."""
         second = self if other is None else other
         return np.fft.irfft(np.conj(self.values) * second.values, self.size)[: self.lags]
+
+
+def _hull(series: np.ndarray) -> slice:
+    """From the first to the last that is not zero; of one that is nothing but zeros its first."""
+    there = np.flatnonzero(series)
+    return slice(there[0], there[-1] + 1) if len(there) else slice(0, 1)
 
 
 def _parzen(share):

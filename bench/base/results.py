@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from bench.base.atomic import write_whole
+from bench.base.threads import in_threads
 
 _TRUTH_FILES = re.compile(r"truth(@.+)?\.(csv|toml|json)")  # of one whisker, or of each of an array
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
@@ -58,11 +59,11 @@ def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = co
     """Hash of names and contents of files and of all files below folders; truth files do not count. digest_of: gives
     the hash of a content."""
     digest = hashlib.blake2b(digest_size=16)
-    for path in sorted(set(paths)):
-        for file in [path] if path.is_file() else sorted(_below(path)):
-            if not _TRUTH_FILES.fullmatch(file.name) and not file.name.startswith("."):
-                digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
-                digest.update(digest_of(file))
+    places = ([path] if path.is_file() else sorted(_below(path)) for path in sorted(set(paths)))
+    files = [file for place in places for file in place if not _TRUTH_FILES.fullmatch(file.name) and file.name[0] != "."]
+    for file, content in zip(files, in_threads(digest_of, files)):
+        digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
+        digest.update(content)
     return digest.hexdigest()
 
 
