@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ SEEING = (
 ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")
 DRAWING = ("bench/report", "bench/base/drawing.py")
 _ROOT = Path(__file__).resolve().parents[2]
+_FILES_AT_ONCE = 32  # of a thread: to hand over each would take as long as to look it up
 _MANY = 1000  # values; larger arrays are hashed by their bytes
 
 
@@ -61,7 +63,9 @@ def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = co
     digest = hashlib.blake2b(digest_size=16)
     places = ([path] if path.is_file() else sorted(_below(path)) for path in sorted(set(paths)))
     files = [file for place in places for file in place if not _TRUTH_FILES.fullmatch(file.name) and file.name[0] != "."]
-    for file, content in zip(files, in_threads(digest_of, files)):
+    some = [files[k : k + _FILES_AT_ONCE] for k in range(0, len(files), _FILES_AT_ONCE)]
+    contents = chain.from_iterable(in_threads(lambda batch: [digest_of(file) for file in batch], some))
+    for file, content in zip(files, contents):
         digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
         digest.update(content)
     return digest.hexdigest()
