@@ -62,13 +62,17 @@ def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = co
     the hash of a content."""
     digest = hashlib.blake2b(digest_size=16)
     places = ([path] if path.is_file() else sorted(_below(path)) for path in sorted(set(paths)))
-    files = [file for place in places for file in place if not _TRUTH_FILES.fullmatch(file.name) and file.name[0] != "."]
+    files = [file for place in places for file in place if _counts(file.name)]
     some = [files[k : k + _FILES_AT_ONCE] for k in range(0, len(files), _FILES_AT_ONCE)]
     contents = chain.from_iterable(in_threads(lambda batch: [digest_of(file) for file in batch], some))
     for file, content in zip(files, contents):
         digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
         digest.update(content)
     return digest.hexdigest()
+
+
+def _counts(name: str) -> bool:
+    return not _TRUTH_FILES.fullmatch(name) and not name.startswith(".")
 
 
 def _below(folder: Path) -> Iterator[Path]:
