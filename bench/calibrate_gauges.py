@@ -66,8 +66,8 @@ def calibrate_gauges(
     settings, names = Settings(), {trial.name for trial in trials}
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
         every = judged(session)
-        rate, _ = session_drift(every, settings, pool)
         _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
+        rate, _ = session_drift(units, pool)
         made = certified([unit for unit in units if unit.trial.name in names], rate, pool, doubts)
     return made.in_newtons_of(scale_by_weights(session.trials, made.gauges.all, *zeros(made.strokes)))
 

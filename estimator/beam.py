@@ -1,6 +1,7 @@
 """The whisker as a beam: section, flexural rigidity, and C = 3EI. Lengths in mm, rigidity in N·mm²."""
 
 from dataclasses import dataclass
+from math import inf, nan
 from typing import Self
 
 import numpy as np
@@ -135,8 +136,16 @@ class Beam:
         return np.where(np.asarray(of_cylinder) > -1, wrong / d_x_mm, 0.0)[()] - 1.0
 
 
-@elementwise
 def _inverse_sum(d, per_mm):
     """1 / (1/d + per_mm) for d > 0, infinite where the sum is zero or below, NaN elsewhere."""
+    if not isinstance(d, float):
+        return _inverse_sums(d, per_mm)
+    d = float(d)
+    below = 1 + d * per_mm  # of one number, which a whisk's estimates ask for a thousand times
+    return (d / below if below > 0 else inf) if d > 0 else nan
+
+
+@elementwise
+def _inverse_sums(d, per_mm):
     below = 1 + d * per_mm
     return np.where(d > 0, np.where(below > 0, d / np.maximum(below, 0.0), np.inf), np.nan)

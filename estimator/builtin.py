@@ -75,6 +75,7 @@ ESTIMATORS = {
     "frictionless": frictionless,
     "corrected": corrected,
 }
+WITHOUT_ALPHA = (no_slip, frictionless)  # say the same whatever friction angle they are told
 
 
 def _first_order(whisk, settings, d_x):

@@ -5,7 +5,8 @@ ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
 """
 
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import reduce, wraps
+from operator import and_
 from typing import TypeAlias
 
 import numpy as np
@@ -35,12 +36,16 @@ def elementwise(function: Callable) -> Callable:
 
 
 def _array(argument):
-    return argument if callable(argument) else np.asarray(argument, dtype=float)
+    if type(argument) is float or isinstance(argument, np.ndarray) or not callable(argument):
+        return np.asarray(argument, dtype=float)
+    return argument
 
 
 def _plain(result):
     if isinstance(result, tuple):
         return tuple(_plain(part) for part in result)
+    if isinstance(result, np.generic):
+        return result.item()
     return np.asarray(result).item() if np.ndim(result) == 0 else result
 
 
@@ -63,23 +68,26 @@ def quotient(
 
 def require_positive(name: str, value: ArrayLike, unit: str) -> None:
     """Raise ValueError unless every `value` is positive and finite."""
-    array = np.asarray(value, dtype=float)
-    if not np.all((array > 0) & np.isfinite(array)):
+    if not _all(value, lambda x: (x > 0) & (x < np.inf)):
         raise ValueError(f"{name} = {value} {unit}: must be positive and finite")
 
 
 def require_friction_angle(name: str, value: ArrayLike) -> None:
     """Raise ValueError unless every `value` [rad] lies in [0°, 90°)."""
-    array = np.asarray(value, dtype=float)
-    if not np.all((array >= 0) & (array < RIGHT_ANGLE)):
+    if not _all(value, lambda x: (x >= 0) & (x < RIGHT_ANGLE)):
         raise ValueError(f"{name} = {value} rad: must lie in [0, pi/2), that is from 0 to below 90 degrees")
 
 
 def require_sigma(name: str, value: ArrayLike) -> None:
     """Raise ValueError unless every `value` is a standard deviation: zero or positive, and finite."""
-    array = np.asarray(value, dtype=float)
-    if not np.all((array >= 0) & np.isfinite(array)):
+    if not _all(value, lambda x: (x >= 0) & (x < np.inf)):
         raise ValueError(f"{name} = {value}: a standard deviation must be zero or positive, and finite")
+
+
+def _all(value: ArrayLike, holds: Callable) -> bool:
+    """Whether `holds` is true of every value; of a single one without the cost of arrays."""
+    array = np.asarray(value, dtype=float)
+    return bool(holds(array.item())) if array.ndim == 0 else bool(np.all(holds(array)))
 
 
 def first_failure(conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int, ...]) -> str | np.ndarray:
@@ -96,5 +104,5 @@ def first_failure(conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int
 
 def where_all(conditions: Sequence[tuple[str, np.ndarray]], value: np.ndarray) -> np.ndarray:
     """`value` where all conditions hold, NaN elsewhere."""
-    holds = np.logical_and.reduce(np.broadcast_arrays(*(mask for _, mask in conditions)))
+    holds = reduce(and_, (mask for _, mask in conditions))
     return np.where(holds, value, np.nan)

@@ -4,6 +4,7 @@ Hum, vibration and stick–slip tie neighbouring samples together, so a mean ove
 Samples are rows, channels are columns; a sample that is left out of a sum has weight 0 in it.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,49 +29,75 @@ class Memory:
     def of(cls, x: np.ndarray, samples: np.ndarray, *stretches: np.ndarray) -> "Memory":
         """Memory of samples (n, k) about a line over x (n,) in each stretch, a mask (n,); stretches do not overlap."""
         used = np.logical_or.reduce(stretches)
+        held = _hull(used)  # what lies outside counts for nothing
+        x, samples, used, stretches = x[held], samples[held], used[held], [stretch[held] for stretch in stretches]
         residuals, bases = np.zeros_like(samples), []
         for stretch in stretches:
             bases += _line_basis(x, stretch)
             residuals[stretch] = line_residuals(x, samples, stretch)
         lags = max(1, int(np.count_nonzero(used) * LAGS_PER_SAMPLE))
-        pairs = np.maximum(1.0, np.round(_lagged(used, used, lags)))
+        pairs = np.maximum(1.0, np.round(Spectrum.of(used, lags).lagged()))
         taper = _parzen(np.arange(lags) / lags)
-        columns = residuals.T
-        products = np.array([[_lagged(a, b, lags) for b in columns] for a in columns])
+        columns = [Spectrum.of(column, lags) for column in residuals.T]
+        products = np.array([[a.lagged(b) for b in columns] for a in columns])
         products = (products + products.swapaxes(0, 1)) / 2
-        lost = sum(_lagged(basis, basis, lags) for basis in bases)
+        lost = sum(Spectrum.of(basis, lags).lagged() for basis in bases)
         kept = np.where(np.arange(lags) == 0, pairs, 0.0) - lost
         return cls(np.moveaxis(products * (taper / pairs), -1, 0), kept * taper / pairs)
 
     def of_sum(self, weights: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of Σ w_i x_i; gaps can leave a negative direction, which is taken as no scatter."""
-        values, axes = np.linalg.eigh(self._raw(weights, weights, self.covariance))
-        return (axes * np.maximum(values, 0.0)) @ axes.T * self._missing(weights)
+        weights = weights[_hull(weights)]
+        own = self._overlap(Spectrum.of(weights, len(self.seen)))
+        values, axes = np.linalg.eigh(np.tensordot(own, self.covariance, axes=1))
+        return (axes * np.maximum(values, 0.0)) @ axes.T * self._missing(weights, own)
 
     def between_sums(self, weights: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of Σ w_i x_i with Σ v_i x_i."""
-        raise_by = np.sqrt(self._missing(weights) * self._missing(other))
-        return self._raw(weights, other, self.covariance) * raise_by
+        held = _hull((weights != 0) | (other != 0))
+        weights, other = weights[held], other[held]
+        first, second = (Spectrum.of(w, len(self.seen)) for w in (weights, other))
+        missing = (self._missing(w, self._overlap(s)) for w, s in ((weights, first), (other, second)))
+        both = np.tensordot(self._overlap(first, second), self.covariance, axes=1)
+        return both * np.sqrt(math.prod(missing))
 
-    def _missing(self, weights):
-        seen = self._raw(weights, weights, self.seen)
+    def _missing(self, weights, own):
+        seen = np.tensordot(own, self.seen, axes=1)
         return (weights @ weights) / seen if seen > 0 else 1.0
 
     @staticmethod
-    def _raw(weights, other, covariance):
-        lags = len(covariance)
-        forward = _lagged(weights, other, lags)
-        overlap = forward + (forward if other is weights else _lagged(other, weights, lags))
+    def _overlap(one, other=None):
+        """What each lag (lags,) counts for in the product of two sums, or of one with itself."""
+        forward = one.lagged(other)
+        overlap = forward + (forward if other is None else other.lagged(one))
         overlap[0] /= 2
-        return np.tensordot(overlap, covariance, axes=1)
+        return overlap
 
 
-def _lagged(a, b, lags):
-    """Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1."""
-    size = next_fast_len(len(a) + lags, real=True)
-    first = np.fft.rfft(a, size)
-    second = first if b is a else np.fft.rfft(b, size)
-    return np.fft.irfft(np.conj(first) * second, size)[:lags]
+@dataclass(frozen=True)
+class Spectrum:
+    """Fourier transform of a series (n,), from which its products with others at several lags are made."""
+
+    values: np.ndarray
+    size: int
+    lags: int
+
+    @classmethod
+    def of(cls, series: np.ndarray, lags: int) -> "Spectrum":
+        """Padded, so that its end does not meet its beginning at any of the lags."""
+        size = next_fast_len(len(series) + lags, real=True)
+        return cls(np.fft.rfft(series, size), size, lags)
+
+    def lagged(self, other: "Spectrum | None" = None) -> np.ndarray:
+        """Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1; of the series with itself where no other is given."""
+        second = self if other is None else other
+        return np.fft.irfft(np.conj(self.values) * second.values, self.size)[: self.lags]
+
+
+def _hull(series: np.ndarray) -> slice:
+    """From the first to the last that is not zero; of one that is nothing but zeros its first."""
+    there = np.flatnonzero(series)
+    return slice(there[0], there[-1] + 1) if len(there) else slice(0, 1)
 
 
 def _parzen(share):

@@ -52,11 +52,13 @@ def moment_at(
     *,
     time_s: ArrayLike | None = None,
     half_window_rad: ArrayLike = HALF_WINDOW_RAD,
+    good: np.ndarray | None = None,
 ) -> MomentAt:
     """Moments at the pushing angle theta_rad past `touch`, from a line fitted to the samples around it.
 
     The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum, and never reaches
     back to the touch. The covariance holds the fit (with the noise's autocorrelation), the free stroke and drift.
+    good: mask (n,) of the `usable` samples, where that is known already.
     """
     motor, samples = columns(motor_rad, moments)
     if touch.status:
@@ -64,7 +66,7 @@ def moment_at(
     require_positive("theta_rad", theta_rad, "rad")
     at = touch.motor_rad + theta_rad
     half = min(max(half_window_rad, speed(motor, time_s) * HUM_PERIOD_S / 2), 0.9 * theta_rad)
-    good = usable(motor, samples)
+    good = usable(motor, samples) if good is None else good
     near = good & (np.abs(motor - at) <= half)
     if not good.any() or motor[good].max() < at or np.count_nonzero(near) < MIN_SAMPLES:
         return _nothing(theta_rad, samples.shape[1], NOT_REACHED)

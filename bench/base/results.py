@@ -5,15 +5,17 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bench.base.atomic import write_whole
+from bench.base.threads import in_threads
 
 _TRUTH_FILES = re.compile(r"truth(@.+)?\.(csv|toml|json)")  # of one whisker, or of each of an array
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
@@ -27,6 +29,7 @@ SEEING = (
 ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")
 DRAWING = ("bench/report", "bench/base/drawing.py")
 _ROOT = Path(__file__).resolve().parents[2]
+_FILES_AT_ONCE = 32  # of a thread: to hand over each would take as long as to look it up
 _MANY = 1000  # values; larger arrays are hashed by their bytes
 
 
@@ -48,16 +51,28 @@ def _hashable(value):
     return [_hashable(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
 
 
-def hash_of_files(paths: Iterable[Path]) -> str:
-    """Hash of names and contents of files and of all files below folders; truth files do not count."""
+def content_hash(file: Path) -> bytes:
+    """Hash of a file's content."""
+    with file.open("rb") as content:  # a video may be larger than the memory
+        return hashlib.file_digest(content, hashlib.blake2b).digest()
+
+
+def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = content_hash) -> str:
+    """Hash of names and contents of files and of all files below folders; truth files do not count. digest_of: gives
+    the hash of a content."""
     digest = hashlib.blake2b(digest_size=16)
-    for path in sorted(set(paths)):
-        for file in [path] if path.is_file() else sorted(_below(path)):
-            if not _TRUTH_FILES.fullmatch(file.name) and not file.name.startswith("."):
-                digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
-                with file.open("rb") as content:  # a video may be larger than the memory
-                    digest.update(hashlib.file_digest(content, hashlib.blake2b).digest())
+    places = ([path] if path.is_file() else sorted(_below(path)) for path in sorted(set(paths)))
+    files = [file for place in places for file in place if _counts(file.name)]
+    some = [files[k : k + _FILES_AT_ONCE] for k in range(0, len(files), _FILES_AT_ONCE)]
+    contents = chain.from_iterable(in_threads(lambda batch: [digest_of(file) for file in batch], some))
+    for file, content in zip(files, contents):
+        digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
+        digest.update(content)
     return digest.hexdigest()
+
+
+def _counts(name: str) -> bool:
+    return not _TRUTH_FILES.fullmatch(name) and not name.startswith(".")
 
 
 def _below(folder: Path) -> Iterator[Path]:

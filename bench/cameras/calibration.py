@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.digests import Digests
 from bench.base.errors import BadInput
 from bench.base.results import SEEING, hash_of, hash_of_code, hash_of_files, plain, read_result, write_result
 from bench.cameras.board_views import read_board_views
@@ -106,7 +107,9 @@ def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | Non
 def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
     """Cameras as kept in `folder`, or calibrated there, notes and where the board on the rig stands. What is used is
     what the file holds, in every run."""
-    key, kept = _key(session), read_result(folder / "cameras.json")
+    digests = Digests(folder.parent)
+    key, kept = _key(session, digests), read_result(folder / "cameras.json")
+    digests.keep()
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
         views = read_board_views(session)
         made = calibrate_from(session, views)
@@ -137,13 +140,14 @@ def on_the_rig(
     return placed(cameras, Placement(np.zeros(6), np.zeros((6, 6))), there), T_rig_board, note
 
 
-def _key(session: Session) -> str:
+def _key(session: Session, digests: Digests) -> str:
     """Hash of all that the cameras are made from: boards, their givens, and the trials' frames (the rig board is in
     them)."""
     by_strokes = session.T_rig_board is None  # then motor angles count too
     frames = [p for t in session.trials for p in ([t.folder] if by_strokes else t.camera_sources.values())]
     given = [session.board, session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad]
-    return hash_of(hash_of_code(SEEING), given, session.whisker, hash_of_files([session.path / "boards", *frames]))
+    files = hash_of_files([session.path / "boards", *frames], digests.of)
+    return hash_of(hash_of_code(SEEING), given, session.whisker, files)
 
 
 def _backgrounds(session: Session, cameras: Cameras) -> dict[str, np.ndarray | None]:

@@ -114,7 +114,9 @@ def _given(
     whisk, radii_mm = whisk_of(felt, theta_rad, beam), _radii_mm(result)
 
     def again(a: EstimateRow) -> EstimateRow:
-        return answer(a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, doubt.sigma_rad, radii_mm)
+        asked = a.estimator, ASSUMING[a.estimator], whisk, a.alpha_est_rad, doubt.sigma_rad, radii_mm
+        exact_mm = a.d_x_est_sigma_alpha_exact_mm
+        return answer(*asked, exact_sigma_mm=exact_mm if np.isfinite(exact_mm) else None)
 
     return tuple(again(a) if a.estimator in ASSUMING else _rescaled(a, doubt.part) for a in felt.estimates)
 

@@ -4,6 +4,7 @@ Everything is in the channels' own unit. Touch and zero need no gauge factors, a
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from bench.records.trial import FeltWhisk, SeenWhisk
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, back_stroke, forward_strokes, ways_back
 from bench.session.trial import Trial
+from estimator.onset import usable
 from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
 from vision.truth.records import FrameTruth
 from vision.truth.value import UNKNOWN, Value
@@ -89,12 +91,21 @@ class Stroke:
 
     def touch(self) -> Touch:
         """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
+        return self._touch
+
+    @cached_property
+    def _touch(self) -> Touch:
         return felt_touch(self.motor_rad, self.channels, self.time_s)
+
+    @cached_property
+    def _usable(self) -> np.ndarray:
+        return usable(self.motor_rad, self.channels)
 
     def at(self, theta_rad: float, touch: Touch, **window: float) -> MomentAt:
         """Channels above the free stroke's level, at a pushing angle past `touch`: a line through the samples as
         recorded, which averages as section V's low-pass does. That smears the onset, by 5 % of it at 0.5°."""
-        return moment_at(theta_rad, self.motor_rad, self.channels, touch, time_s=self.time_s, **window)
+        known = {"time_s": self.time_s, "good": self._usable}
+        return moment_at(theta_rad, self.motor_rad, self.channels, touch, **known, **window)
 
 
 def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: bool = True) -> list[Stroke]:

@@ -131,7 +131,7 @@ def _with_friction(along, across, share, whisker: Whisker) -> tuple[np.ndarray, 
         return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
 
     def moment(friction: float):
-        return np.concatenate([moment_at_clamp(x, w, rigidity, -friction * s) for x, w, s in zip(along, size, share)])
+        return moment_at_clamp(along, size, rigidity, -friction * share)
 
     rough, smooth = moment(_FRICTION), moment(0.0)
     return (rough / size)[:, None] * across, ((rough - smooth) / _FRICTION / size)[:, None] * across

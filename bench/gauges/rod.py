@@ -18,57 +18,72 @@ _SETTLED = 1e-12  # rad: the rounding of an angle near one
 
 
 def moment_at_clamp(
-    along_mm: float | np.ndarray, across_mm: float | np.ndarray, rigidity_Nmm2: Callable, friction: float = 0.0
+    along_mm: float | np.ndarray,
+    across_mm: float | np.ndarray,
+    rigidity_Nmm2: Callable,
+    friction: float | np.ndarray = 0.0,
 ) -> np.ndarray:
     """Size (n,) of the moment at the clamp, N·mm, of rods whose contacts lie at along_mm, across_mm (n,).
 
-    rigidity_Nmm2: EI as a function of the arc length in mm. friction: friction over normal force along the rod at the
-    contact, positive where it pulls towards the clamp. Raises ValueError where the contact is not in front of the clamp
-    or the rod would have to bend by more than about 45°.
+    rigidity_Nmm2: EI as a function of arc lengths (n, nodes) in mm. friction: friction over normal force along the rod
+    at the contact, one or (n,), positive where it pulls towards the clamp. Raises ValueError where the contact is not
+    in front of the clamp or the rod would have to bend by more than about 45°.
     """
     x, w = np.atleast_1d(np.asarray(along_mm, dtype=float)), np.atleast_1d(np.asarray(across_mm, dtype=float))
     if not (np.all(x > 0) and np.all(np.abs(w) < 0.6 * x)):
         raise ValueError("the contact must lie in front of the clamp, less than 0.6 of its distance aside")
-    return np.array([_one(*place, rigidity_Nmm2, friction) for place in zip(x, w)])
+    return _settled(x, w, rigidity_Nmm2, np.asarray(friction))
 
 
-def _one(x: float, w: float, rigidity_Nmm2: Callable, friction: float) -> float:
-    """Fixed point: shape → lever → force and arc length that put the contact where it is → shape."""
-    arc, force = np.hypot(x, w), 1.0
-    angle = np.zeros(_NODES)
+def _settled(x: np.ndarray, w: np.ndarray, rigidity_Nmm2: Callable, friction: np.ndarray) -> np.ndarray:
+    """Fixed point: shape → lever → force and arc length that put the contact where it is → shape, of all rods at once
+    until the last has settled."""
+    chord, aim = np.hypot(x, w), np.arctan2(w, x)
+    arc, force, angle = chord, np.ones(len(x)), np.zeros((len(x), _NODES))
     for _ in range(_ROUNDS):
-        s = 0.5 * arc * (1.0 + _POINTS)
-        points = 0.5 * arc * _RUNNING @ np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        direction = _force_direction(angle[-1], friction)
-        lever = _cross(points[-1] - points, direction)
-        bend = 0.5 * arc * _RUNNING @ (lever / rigidity_Nmm2(s))
-        force = _force_for(bend, arc, np.arctan2(w, x), force)
-        new = force * bend
-        reach = np.linalg.norm(0.5 * arc * _RUNNING[-1] @ np.stack([np.cos(new), np.sin(new)], axis=1))
-        arc, change = arc * np.hypot(x, w) / reach, np.max(np.abs(new - angle))
+        points = _along(arc, _unit(angle))
+        lever = _cross(points[..., -1:] - points, _force_direction(angle[:, -1], friction)[..., None])
+        bend = _along(arc, lever / rigidity_Nmm2(0.5 * arc[:, None] * (1.0 + _POINTS)))
+        force = _force_for(bend, arc, aim, force)
+        new = force[:, None] * bend
+        arc, change = arc * chord / np.hypot(*_end(arc, _unit(new))), np.max(np.abs(new - angle))
         angle = new
         if change < _SETTLED:
             break
-    return abs(force * _cross(np.array([x, w]), _force_direction(angle[-1], friction)))
+    return np.abs(force * _cross(np.stack([x, w]), _force_direction(angle[:, -1], friction)))
 
 
-def _force_for(bend, arc: float, aim: float, force: float) -> float:
-    """The force at which the end of a rod with tangent angles force · bend is seen under the angle `aim`."""
+def _force_for(bend, arc, aim, force):
+    """The forces (n,) at which the ends of rods with tangent angles force · bend (n, nodes) are seen under the angles
+    `aim`."""
     for _ in range(3):
-        end = 0.5 * arc * _RUNNING[-1] @ np.stack([np.cos(force * bend), np.sin(force * bend)], axis=1)
-        rate = 0.5 * arc * _RUNNING[-1] @ np.stack([-np.sin(force * bend) * bend, np.cos(force * bend) * bend], axis=1)
-        turning = (end[0] * rate[1] - end[1] * rate[0]) / (end @ end)
-        force += (aim - np.arctan2(end[1], end[0])) / turning
+        (c, s) = unit = _unit(force[:, None] * bend)
+        end, rate = _end(arc, unit), _end(arc, np.stack([-s * bend, c * bend]))
+        force = force + (aim - np.arctan2(end[1], end[0])) * np.sum(end**2, axis=0) / _cross(end, rate)
     return force
 
 
-def _force_direction(end_angle: float, friction: float) -> np.ndarray:
-    c, s = np.cos(end_angle), np.sin(end_angle)
-    return np.array([-s - friction * c, c - friction * s])
+def _unit(angle):
+    return np.stack([np.cos(angle), np.sin(angle)])
+
+
+def _along(arc, values):
+    """Integrals of values (..., n, nodes) along rods of these arc lengths (n,), from the clamp to each node."""
+    return 0.5 * arc[:, None] * (values @ _RUNNING.T)
+
+
+def _end(arc, values):
+    """The same to the end alone, (..., n)."""
+    return 0.5 * arc * (values @ _RUNNING[-1])
+
+
+def _force_direction(end_angle, friction):
+    c, s = _unit(end_angle)
+    return np.stack([-s - friction * c, c - friction * s])
 
 
 def _cross(a, b):
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return a[0] * b[1] - a[1] * b[0]
 
 
 def _integration() -> tuple[np.ndarray, np.ndarray]:

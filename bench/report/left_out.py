@@ -101,15 +101,7 @@ def of_truth(name: str, here: WhiskAtHand) -> LeftOut:
     if name not in here.seen.refinements:
         in_vision = name in NAMES[: NAMES.index("gauges' delay")] or name == "one-sided light"
         return LeftOut(NAN, NAN, NAN, "the fit does not tell") if in_vision else LeftOut()
-    found = here.seen.refinements[name]
-    if name != ALONG:
-        return found
-    share = here.dragged * float(np.tan(here.alpha_rad))
-    if not np.isfinite(share):
-        return LeftOut(NAN, NAN, NAN, "no friction angle is known")
-    why = "" if share else "the contact slips to the side, and friction acts there"
-    scaled = (share * effect + 0.0 for effect in (found.d_x_mm, found.touch_rad, found.slip_mm))  # no −0
-    return LeftOut(*scaled, why)
+    return here.seen.refinements[name]
 
 
 def _clock(here: WhiskAtHand) -> LeftOut:

@@ -31,7 +31,7 @@ def draw_overlays(trial: Trial, result: TrialResult, out: Path, stamp: str) -> l
         if whisk.overlay:
             names.append(f"overlays/{trial.name}_{whisk.whisk}.png")
             if not is_drawn(out / names[-1], stamp):
-                save_picture(overlay(trial, whisk), out / names[-1], stamp)
+                save_picture(np.asarray(overlay(trial, whisk)), out / names[-1], stamp)
     return names
 
 

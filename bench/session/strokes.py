@@ -38,7 +38,8 @@ def _forward_runs(angle: np.ndarray, turn: float) -> list[tuple[int, int]]:
     runs = []
     low = high = trough = 0
     rising = False
-    for i, value in enumerate(angle.tolist()):
+    for i in _extremes(angle).tolist():
+        value = angle[i]
         if value > angle[high]:
             high = i
         if value < angle[low]:
@@ -49,6 +50,14 @@ def _forward_runs(angle: np.ndarray, turn: float) -> list[tuple[int, int]]:
         elif not rising and value - angle[low] >= turn:
             rising, trough, high = True, low, i
     return [*runs, (trough, high)] if rising else runs
+
+
+def _extremes(angle: np.ndarray) -> np.ndarray:
+    """Indices (m,) of the first sample, of all that the angle turns round at, and of the last that it moves to; of one
+    that stands still its first."""
+    moved = np.concatenate([[0], np.flatnonzero(np.diff(angle)) + 1])
+    up = np.diff(angle[moved]) > 0
+    return np.concatenate([moved[:1], moved[1:-1][up[1:] != up[:-1]], moved[1:][-1:]])
 
 
 def _without_pauses(angle: np.ndarray, trough: int, crest: int, jitter: float) -> slice:

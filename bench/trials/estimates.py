@@ -15,7 +15,7 @@ from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
-from estimator.builtin import ESTIMATORS
+from estimator.builtin import ESTIMATORS, WITHOUT_ALPHA
 from estimator.contact import Contact, contact_of
 from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
@@ -198,22 +198,26 @@ def answer(
     alpha_est_rad: float,
     sigma_rad: float,
     radii_mm: tuple[float, float] = UNTOLD,
+    exact_sigma_mm: float | None = None,
 ) -> EstimateRow:
     """What one estimator says under a friction angle with its sigma; its own sigma as if that angle were right, too.
 
-    radii_mm: of the bar, NaN where nobody says, and of the whisker's base.
+    radii_mm: of the bar, NaN where nobody says, and of the whisker's base. exact_sigma_mm: the latter sigma, where it
+    is known from before.
     """
     reach_mm = OBJECT_REACH_MM if math.isnan(radii_mm[0]) else sum(radii_mm)
     told = EstimatorSettings(alpha_est_rad, float(sigma_rad), reach_mm, TILT_SIGMA_RAD, *radii_mm)
-    exact, doubted = (
-        _asked(name, estimator, whisk, one) for one in (replace(told, alpha_est_sigma_rad=0.0), told)
-    )
+    doubted = _asked(name, estimator, whisk, told)
+    if estimator in WITHOUT_ALPHA:
+        exact_sigma_mm = doubted.sigma_mm
+    elif exact_sigma_mm is None:
+        exact_sigma_mm = _asked(name, estimator, whisk, replace(told, alpha_est_sigma_rad=0.0)).sigma_mm
     ends = (doubted.low_mm, doubted.high_mm)
     if math.isnan(doubted.low_mm) and math.isnan(doubted.high_mm):
         ends = (doubted.d_x_mm - Z_95 * doubted.sigma_mm, doubted.d_x_mm + Z_95 * doubted.sigma_mm)
     d_x = Value(doubted.d_x_mm, doubted.sigma_mm)
     angles = doubted.alpha_est_rad, float(doubted.beta_rad)
-    row = EstimateRow(name, d_x, *angles, doubted.status, exact.sigma_mm, *map(float, ends))
+    row = EstimateRow(name, d_x, *angles, doubted.status, exact_sigma_mm, *map(float, ends))
     return _with_contact(row, contact_of(whisk, doubted, told.alpha_est_sigma_rad if angles[0] else 0.0))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.digests import Digests
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.results import hash_of_files
@@ -16,7 +17,7 @@ from bench.base.workers import Workers
 from bench.cameras.calibration import SessionCalibration, calibrate_session
 from bench.gauges.certificate import Certificate
 from bench.gauges.checks import Undetermined, check_alive
-from bench.gauges.drift import drift_rate, force_slope, free_slope
+from bench.gauges.drift import drift_rate
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauges_file import given_gauges
@@ -26,6 +27,7 @@ from bench.gauges.reversal import reversals
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
+from bench.trials.free_strokes import free_strokes
 from bench.trials.lost import seen_units
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, kept_seen
@@ -77,7 +79,10 @@ def first_units(
     """A unit of work for each trial, by the cameras where the board has them; calibration: where there is one already.
     Raises BadInput."""
     calibration = calibration or calibrate_session(session, out)
-    return [Unit(session, trial, hash_of_files([trial.folder]), calibration, settings, out) for trial in trials]
+    digests = Digests(out)
+    hashes = [hash_of_files([trial.folder], digests.of) for trial in trials]
+    digests.keep()
+    return [Unit(session, trial, files, calibration, settings, out) for trial, files in zip(trials, hashes)]
 
 
 def settled_units(
@@ -94,27 +99,18 @@ def with_gauges(
 ) -> tuple[Gauges | None, Certificate | None, list[Unit]]:
     """The session's gauges, their certificate where its own trials calibrated them, and the units with the gauges and
     with the drift of the channels."""
-    rate, of_forces = session_drift([unit.trial for unit in units], units[0].settings, pool)
+    rate, of_forces = session_drift(units, pool)
     gauges, made = session_gauges(units, rate, pool, doubts)
     return gauges, made, [unit.with_gauges(rate, gauges, of_forces) for unit in units]
 
 
-def session_drift(
-    trials: Sequence[Trial], settings: Settings, pool: Workers
-) -> tuple[np.ndarray, np.ndarray | None]:
+def session_drift(units: Sequence[Unit], pool: Workers) -> tuple[np.ndarray, np.ndarray | None]:
     """RMS drift per second, from free strokes all over the session: (2,) of the gauges' channels, and (3,) of the
     forces, None where no load cell was recorded."""
-    every = max(1, len(trials) // _MOST_DRIFT_STROKES)
-    tasks = [(trial, settings) for trial in trials[::every]]
-    pairs = [pair for pairs in pool.run(_free_slopes, tasks, "free strokes") for pair in pairs]
-    gauges, forces = ([slope for slope in column if slope is not None] for column in zip(*pairs or [(None, None)]))
+    every = max(1, len(units) // _MOST_DRIFT_STROKES)
+    found = pool.run(free_strokes, units[::every], "free strokes")
+    gauges, forces = ([one for of_trial in found for one in getattr(of_trial, kind)] for kind in ("channels", "forces"))
     return drift_rate(gauges), drift_rate(forces) if forces else None
-
-
-def _free_slopes(task: tuple[Trial, Settings]) -> list:
-    """(of the gauges' channels, of the forces) a stroke."""
-    trial, settings = task
-    return [(free_slope(stroke), force_slope(stroke)) for stroke in strokes_of(read_signals(trial), trial, settings)]
 
 
 def session_gauges(
@@ -123,16 +119,21 @@ def session_gauges(
     """Gauges as brought along, without a certificate; else from the gauge trials, or from all where the settings say
     so; none, and a note on what is lacking, where these cannot fix them."""
     given, from_all = given_gauges(units[0].session), units[0].settings.gauges_from_all
-    volts = [unit for unit in units if read_signals(unit.trial).kind == "V"]
-    trials = [unit for unit in volts if from_all or unit.trial.purpose == "gauge"]
+    serves = [from_all or unit.trial.purpose == "gauge" for unit in units]
+    trials = [unit for unit, one in zip(units, serves) if one and _has_volts(unit)]
     if given is not None or not trials:
         return given, None
     try:
         made = certified(trials, rate, pool, doubts)
     except Undetermined as reason:
-        doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * (len(trials) < len(volts))]))
+        more = any(_has_volts(unit) for unit, one in zip(units, serves) if not one)
+        doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * more]))
         return None, None
     return (replace(made.gauges, source=FROM_ALL) if from_all else made.gauges), made
+
+
+def _has_volts(unit: Unit) -> bool:
+    return read_signals(unit.trial).kind == "V"
 
 
 def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Certificate:

@@ -35,6 +35,7 @@ import numpy as np
 
 from bench import cli
 from bench.base import atomic, workers
+from bench.base.digests import KEPT
 from tests.faults.fuzz import GAUGES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +44,7 @@ _LOOK_S = 0.02
 _OF_WORKERS = 0.25  # of the kills
 _MOST_ENDED = 3  # times as many runs may have ended before they were to be killed
 ENDED_S = 2.0  # a worker notices within a second that its run was killed
-_OWN = (".lock",)  # holds the run's process id
+_OWN = (".lock", KEPT)  # the run's process id; which files of the session were as they were when
 
 
 def command(session: Path, out: Path) -> list[str]:

@@ -86,7 +86,7 @@ def main() -> None:
             continue
         worst.append(max(axis_off_px(camera, true, seen.axis, rods.bar.radius_mm) for camera in cameras))
         print(f"{folder.name:<6} axis off by {worst[-1]:.2f} px", flush=True)
-        looks = seen_over_given(views, seen, rods, motor, VisionSettings())
+        looks = seen_over_given(seen)
         for share, sigma in [in_all(looks)] if looks else []:
             widths.append(np.log(share) / (sigma / share))
             print(f"       looks {share:.3f} ± {sigma:.3f} times as wide as it is", flush=True)

@@ -108,7 +108,7 @@ def main() -> None:
     count = parser.parse_args().count
     print(f"{count} scenes; largest error (and RMS)")
     print("own model:              ", table(map(own_errors, scenes(count, whisker=WhiskerTable()))))
-    for pushed_deg in (4.0, 8.0, 12.0, 16.0):
+    for pushed_deg in (4.0, 8.0, 12.0, 16.0, 24.0):
         print(f"exact, pushed by {pushed_deg:2.0f} deg:", table(map(model_errors, scenes(count, pushed_deg))))
 
 

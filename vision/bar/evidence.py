@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
+from scipy.ndimage import maximum_filter1d
 from scipy.special import ndtr
 
 from vision.bar.profiles import OUTSIDE_PX, STEP_PX, Profiles, light_range
@@ -25,8 +25,9 @@ _STEP_SHARE, _RIM_SHARE = 0.3, 0.2
 _TURN_SHARES = (0.03, 0.1, 0.3)  # the same of second differences: matt bars are smooth, polished ones mirror borders
 _RIM_BLURRED_PX = 2.0
 _SLOPE_SHARE = 0.3  # of the contrast: by so much the background changes over OUTSIDE_PX
-_ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 241)
+_ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 171)
 _SIDES = 4  # columns of level and slope beyond both edges; the picture without rods has two more
+_TOLD = 1e-3  # of its prior variance: ways in which the light may differ that no pixel tells more of are left out
 
 
 @dataclass(frozen=True)
@@ -56,18 +57,39 @@ class LitRod:
         return np.array([*sides, *sides, 1.0, 1.0]) ** -2.0
 
     @cached_property
-    def priors(self) -> list[np.ndarray]:
-        """Inverse prior covariances (splines + 6, splines + 6) of the light on the rod and beyond both edges: of light
-        that turns as suddenly as it steps, and of ever smoother light."""
+    def _of_rod(self) -> list[np.ndarray]:
+        """Inverse prior covariances (splines, splines) of the light on the rod: of ever rougher light, the last that
+        which turns as suddenly as it steps."""
         varies = np.hypot(self._inside, _RIM_SHARE * self.profiles.contrast)
-        flat = np.diag(np.concatenate([np.full(_SPLINES, self._level**-2.0), self._of_outside]))
-        priors = []
-        for share in _TURN_SHARES:
-            changes = np.concatenate([np.diff(np.eye(_SPLINES), axis=0) / _STEP_SHARE,
-                                      np.diff(np.eye(_SPLINES), 2, axis=0) / share]) / varies
-            priors.append(flat.copy())
-            priors[-1][:_SPLINES, :_SPLINES] += changes.T @ changes
-        return priors
+        return [self._level**-2.0 * np.eye(_SPLINES) + one / varies**2 for one in _changes()]
+
+    @cached_property
+    def _root(self) -> np.ndarray:
+        """Of the roughest light's covariance (splines, splines)."""
+        return np.linalg.inv(np.linalg.cholesky(self._of_rod[-1])).T
+
+    @cached_property
+    def _smooth(self) -> list[np.ndarray]:
+        """Covariances (splines, splines) of the smoother kinds of light, in what that root multiplies."""
+        back = np.linalg.inv(self._root)
+        return [back @ np.linalg.inv(one) @ back.T for one in self._of_rod[:-1]]
+
+    def told(self, columns: np.ndarray, all_light: bool) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Ways (splines, r) in which the light on the rod may differ and pixels tell that it does, and inverse prior
+        covariances (r + 6, r + 6) of these and of the light beyond both edges: of each kind of light, or of the
+        roughest alone. columns (b, splines): weighted pictures of the splines.
+
+        In these ways the roughest light varies by one each. What no pixel tells is left as each kind of light has it:
+        it takes no part in the evidence."""
+        seen = columns @ self._root
+        size, ways = np.linalg.eigh(seen.T @ seen)
+        ways = ways[:, size > _TOLD]
+        rough = np.diag(np.concatenate([np.ones(ways.shape[1]), self._of_outside]))
+        smooth = []
+        for kind in self._smooth if all_light else ():
+            smooth.append(rough.copy())
+            smooth[-1][:ways.shape[1], :ways.shape[1]] = np.linalg.inv(ways.T @ kind @ ways)
+        return self._root @ ways, [*smooth, rough]
 
     @cached_property
     def of_none(self) -> tuple[np.ndarray, np.ndarray]:
@@ -142,71 +164,96 @@ class Evidence:
 def evidence(rod: LitRod, reach_px: float, blur_px: float, positions: int = 1, all_light: bool = True,
              every: int = 1, wider: float = 1.0) -> Evidence:
     """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, or at every so
-    many steps, in each stretch; under all of `priors`, or the roughest only. wider: times the bar's width."""
-    seen = rod.profiles
+    many steps, in each stretch; under all kinds of light, or the roughest only. wider: times the bar's width."""
+    seen, radius_px = rod.profiles, wider * rod.profiles.radius_px
     most = int(np.ceil(reach_px / (every * STEP_PX)))
-    whole = every * np.arange(-most, most + 1)
-    more_px = STEP_PX / positions * np.arange(positions)
-    shift = (STEP_PX * whole[:, None] + more_px).ravel()
-    normal = np.stack([_normal(seen, whole, more, blur_px, wider * seen.radius_px) for more in more_px], axis=2)
-    normal = normal.reshape(len(seen), len(shift), *normal.shape[-2:])
-    under = [rod.marginal(normal, prior) for prior in (rod.priors if all_light else rod.priors[-1:])]
+    shifts = every * np.arange(-most, most + 1)
+    steps, more_px = _within(seen, every * most), STEP_PX / positions * np.arange(positions)
+    pictures = [_on_rod(STEP_PX * steps - more, radius_px, blur_px) for more in more_px]
+    light, priors = rod.told(_best_seen(seen, steps, every * most)[:, None] * pictures[0], all_light)
+    normal = [_normal(seen, shifts, _columns(STEP_PX * steps - more, one @ light, radius_px, blur_px), steps)
+              for more, one in zip(more_px, pictures)]
+    normal = np.stack(normal, axis=2).reshape(len(seen), -1, *normal[0].shape[-2:])
+    shift_px = (STEP_PX * shifts[:, None] + more_px).ravel()
+    under = [rod.marginal(normal, prior) for prior in priors]
     value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
     best = np.argmin(value.reshape(len(seen), -1), axis=1)
     misfit = misfit.reshape(len(seen), -1)[np.arange(len(seen)), best]
-    return Evidence(blur_px, shift, value, misfit, rod.of_none[0])
+    return Evidence(blur_px, shift_px, value, misfit, rod.of_none[0])
 
 
-def _normal(seen: Profiles, shifts, more_px: float, blur_px: float, radius_px: float) -> np.ndarray:
+def _within(seen: Profiles, most: int) -> np.ndarray:
+    """The places (b,) of a bar that are seen somewhere when it is looked for so many steps aside, in steps from its
+    middle."""
+    used = np.flatnonzero(np.convolve(np.any(seen.seen, axis=0), np.ones(2 * most + 1)) > 0)
+    return used - (len(seen.offset_px) // 2 + most)
+
+
+def _best_seen(seen: Profiles, steps: np.ndarray, most: int) -> np.ndarray:
+    """One over sigma (b,) of what a model leaves at such places of the bar, where and in the stretch it is least."""
+    weight = maximum_filter1d(np.pad(np.max(seen.weight, axis=0), most), 2 * most + 1)
+    return np.sqrt(weight[steps + len(weight) // 2])
+
+
+def _normal(seen: Profiles, shifts, columns, steps) -> np.ndarray:
     """Products (k, g, n, n) of the weighted columns of what the light is made of, and of the light, for middles at
-    these whole steps (g,) of the grid and so much more, of a bar so thick. Not to be used above the diagonal."""
-    most = int(np.max(np.abs(shifts)))
-    size = len(seen.offset_px) + 2 * most
-    offset = STEP_PX * (np.arange(size) - 0.5 * (size - 1)) - more_px
-    used = np.convolve(np.any(seen.seen, axis=0), np.ones(2 * most + 1)) > 0
-    own, cover, leak = _columns(offset[used], radius_px, blur_px)
-    row, column = np.tril_indices(own.shape[1])
+    these whole steps (g,) of the grid. columns: see `_columns`, at such steps (b,) from the middle. Not to be used
+    above the diagonal."""
+    own, cover, leak = columns
+    most, middle = int(np.max(np.abs(shifts))), len(seen.offset_px) // 2
+    row, column, place = _layout(own.shape[1])
     one, other = [0, 0, 1], [0, 1, 1]
     mixed = ((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak))
     tables = (own[:, row] * own[:, column], *mixed,
               cover[:, one] * cover[:, other], cover[:, one] * leak[:, other] + leak[:, one] * cover[:, other],
               leak[:, one] * leak[:, other], own, cover, leak)
-    windows = sliding_window_view(np.pad(seen.moments, ((0, 0), (0, 0), (2 * most, 2 * most))), size, axis=2)
-    windows = windows[:, :, most + shifts][..., used].reshape(len(tables), -1, len(own))
+    padded = np.pad(seen.moments, ((0, 0), (0, 0), (2 * most, 2 * most)))
+    windows = padded.take(2 * most + middle + shifts[:, None] + steps, axis=2).reshape(len(tables), -1, len(own))
     power = np.repeat(np.sum(seen.weight * seen.light**2, axis=1), len(shifts))[:, None]
     alone, *parts = map(np.matmul, windows, tables)
     sums = [alone, parts[0] + parts[1], parts[2] + parts[3] + parts[4], parts[5], parts[6] + parts[7], power]
     sums = np.concatenate(sums, axis=1)
-    return sums[:, _layout()].reshape(len(seen), len(shifts), _SPLINES + 7, _SPLINES + 7)
+    return sums.take(place.ravel(), axis=1).reshape(len(seen), len(shifts), *place.shape)
 
 
-@lru_cache(maxsize=1)
-def _layout() -> np.ndarray:
-    """Where (n, n) each product is among the sums of `_normal`; above the diagonal the first."""
-    own = _SPLINES + _SIDES
-    place = np.zeros((own + 3, own + 3), dtype=np.intp)
-    pairs = own * (own + 1) // 2
-    place[np.tril_indices(own)] = np.arange(pairs)
+@lru_cache(maxsize=_SPLINES)
+def _layout(own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of so many own columns, which two (n (n + 1) / 2,) each of their products is of, and where (n + 3, n + 3) each
+    product is among the sums of `_normal`; above the diagonal the first."""
+    place, (row, column) = np.zeros((own + 3, own + 3), dtype=np.intp), np.tril_indices(own)
+    pairs = len(row)
+    place[row, column] = np.arange(pairs)
     place[own:-1, :own] = pairs + np.arange(2 * own).reshape(2, own)
     place[[-3, -2, -2], [-3, -3, -2]] = pairs + 2 * own + np.arange(3)
     place[-1] = pairs + 2 * own + 3 + np.arange(own + 3)
-    return place
+    return row, column, place
 
 
-def _columns(offset_px, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Blurred pictures of a rod whose radiance is each spline of the angle round it, and of level and slope beyond each
-    edge (n, splines + 4); how much of the background each side shows (n, 2); and what to take of its slope besides
+def _columns(offset_px, on_rod, radius_px: float, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Those of the light on the rod, (n, r), and blurred pictures of level and slope beyond each edge (n, r + 4); how
+    much of the background each side shows (n, 2); and what to take of its slope besides
     (n, 2), for the picture without rods was blurred whole: a product of two pictures, blurred, is that of the blurred
     ones and blur² times that of their slopes.
     """
-    z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
-    area = radius_px * np.cos(_ANGLES) * (_ANGLES[1] - _ANGLES[0]) / (blur_px * np.sqrt(2.0 * np.pi))
-    rod = (np.exp(-0.5 * z * z) * area) @ _splines()
     beyond = np.stack([-offset_px, offset_px], axis=1) - radius_px
     cover = ndtr(beyond / blur_px)
     bell = np.exp(-0.5 * (beyond / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
     sides = np.stack([cover, cover * beyond / OUTSIDE_PX], axis=2).reshape(len(offset_px), _SIDES)
-    return np.concatenate([rod, sides], axis=1), cover, blur_px * np.array([-1.0, 1.0]) * bell
+    return np.concatenate([on_rod, sides], axis=1), cover, blur_px * np.array([-1.0, 1.0]) * bell
+
+
+def _on_rod(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
+    """Blurred pictures (n, splines) of a rod whose radiance is each spline of the angle round it."""
+    z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
+    area = radius_px * np.cos(_ANGLES) * (_ANGLES[1] - _ANGLES[0]) / (blur_px * np.sqrt(2.0 * np.pi))
+    return (np.exp(-0.5 * z * z) * area) @ _splines()
+
+
+@lru_cache(maxsize=1)
+def _changes() -> list[np.ndarray]:
+    """What light changes by from spline to spline (splines, splines), squared and over what it may, of each kind."""
+    steps, turns = (np.diff(np.eye(_SPLINES), order, axis=0) for order in (1, 2))
+    return [steps.T @ steps / _STEP_SHARE**2 + turns.T @ turns / share**2 for share in _TURN_SHARES]
 
 
 @lru_cache(maxsize=1)

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import gaussian_filter
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
@@ -38,7 +38,7 @@ _AT_ONCE = 1000  # hypotheses: arrays that stay in the processor's cache
 
 @dataclass(frozen=True)
 class Clear:
-    """What one camera shows of edges, at every HALF-th pixel: field (3, h, w), see `edges_px`; and half the width, in
+    """What one camera shows of edges, at every HALF-th pixel: field (h, w, 3), see `edges_px`; and half the width, in
     these pixels, of the bar in the middle of the whisker."""
 
     camera: Camera
@@ -87,8 +87,9 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
 
 def spread_out(seen: Clear, blur_px: float) -> Clear:
     """The same, blurred; with no edges at the picture's border, where lines end that leave it."""
-    field = gaussian_filter(seen.field, (0.0, blur_px, blur_px))
-    field[:, [0, -1]] = field[:, :, [0, -1]] = 0.0
+    bell, _ = _kernels(blur_px)
+    field = _filtered(seen.field, bell, bell)
+    field[[0, -1]] = field[:, [0, -1]] = 0.0
     return replace(seen, field=field)
 
 
@@ -99,30 +100,43 @@ def _clear_in_all(seen: Sequence[Clear], axis_of: Callable, radius_mm: float, co
 
 def apart_from_others(each: np.ndarray, score: np.ndarray, apart: np.ndarray, most: int) -> np.ndarray:
     """At most so many of the hypotheses (n, k), the best, of which no two lie within so much of each other (k,)."""
-    chosen: list[np.ndarray] = []
-    for one in each[np.argsort(score)[::-1]]:
-        if all(np.any(np.abs(one - other) > apart) for other in chosen):
-            chosen.append(one)
-        if len(chosen) == most:
-            break
+    left, chosen = each[np.argsort(score)[::-1]], []
+    while len(left) and len(chosen) < most:
+        chosen.append(left[0])
+        left = left[np.any(np.abs(left - left[0]) > apart, axis=1)]
     return np.array(chosen)
 
 
 def edges_px(grey: np.ndarray, background: np.ndarray, blur_px: float) -> np.ndarray:
-    """Edges (3, h, w) of a picture that its background does not have: how clear, by direction across (xx, xy, yy).
+    """Edges (h, w, 3) of a picture that its background does not have: how clear, by direction across (xx, xy, yy).
 
     From 0 to 1: beside the noise, and more than the light changes a little aside.
     """
     pictures = (np.asarray(picture, dtype=np.float32) for picture in (grey, background))
-    seen, behind = (np.stack([gaussian_filter(picture, blur_px, order=order) for order in ((0, 1), (1, 0))])
+    bell, slope = _kernels(blur_px)
+    seen, behind = (np.stack([_filtered(picture, *by) for by in ((slope, bell), (bell, slope))])
                    for picture in pictures)
     light = np.sum(seen * behind, axis=0) / np.maximum(np.sum(behind**2, axis=0), 1e-12)
     left = seen - np.clip(light, 0.0, _MOST_LIGHT) * behind
-    size = np.linalg.norm(left, axis=0)
-    clear = np.maximum(size - gaussian_filter(size, _ASIDE_BLURS * blur_px), 0.0)
+    size = np.hypot(*left)
+    aside, _ = _kernels(_ASIDE_BLURS * blur_px)
+    clear = np.maximum(size - _filtered(size, aside, aside), 0.0)
     x, y = left / np.maximum(size, 1e-12)
     share = clear**2 / (clear**2 + (_OVER_NOISE * np.median(size)) ** 2 + 1e-12)
-    return share * np.stack([x * x, x * y, y * y])
+    return share[..., None] * np.stack([x * x, x * y, y * y], axis=-1)
+
+
+def _kernels(blur_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """A Gaussian (n,) out to four blurs, and what takes the slope of a picture that it blurs."""
+    reach = int(4.0 * blur_px + 0.5)
+    place = np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (place / blur_px) ** 2)
+    bell /= np.sum(bell)
+    return bell, place / blur_px**2 * bell
+
+
+def _filtered(picture, along_rows, along_columns) -> np.ndarray:
+    return cv2.sepFilter2D(picture, -1, along_rows, along_columns, borderType=cv2.BORDER_REFLECT)
 
 
 def axis_from_angles(x_mm: ArrayLike, touch_rad: ArrayLike, beta_rad: ArrayLike, psi_rad: ArrayLike,
@@ -158,20 +172,21 @@ def _both_edges(axis: BarAxis, seen: Clear, radius_mm: float, counts, along_mm) 
     px = camera.project(np.stack([along, along + sideways[:, None]]).reshape(-1, 3)).reshape(2, *along.shape[:2], 2)
     middle, aside = np.stack([px[0], px[1] - px[0]]).transpose(0, 3, 1, 2).astype(np.float32) / HALF  # by x and y
     x, y = np.gradient(middle, axis=-1)  # both edges run nearly as the middle does
-    shares = np.stack([y * y, -2.0 * x * y, x * x]) / (x * x + y * y)
-    across = np.stack([_across(seen.field, middle + at * aside, shares) for at in np.concatenate([_AT, -_AT])])
-    sides = across.reshape(2, len(_AT), -1) * counts[:, None]
-    best = np.max(sides, axis=1) + np.min(sides, axis=1)
+    shares = np.stack([y * y, -2.0 * x * y, x * x], axis=-1) / (x * x + y * y)[..., None]
+    at, counts = _AT[counts != 0.0].astype(np.float32), counts[counts != 0.0]
+    px = middle + np.concatenate([at, -at])[:, None, None, None] * aside
+    sides = _across(seen.field, px, shares).reshape(2, len(at), -1) * counts[:, None]
+    best = np.max(sides, axis=1) + np.min(sides, axis=1, initial=0.0)
     return np.sqrt(np.prod(np.maximum(best, 0.0), axis=0))
 
 
 def _across(field, px, shares) -> np.ndarray:
-    """Mean (n,) of the edges along lines of pixels (2, n, t), by x and y. shares (3, n, t): of the field's three parts
-    across the line. Outside the picture, and at its very border, there is none."""
-    height, width = field.shape[1:]
-    column, row = (np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5 for one, size in zip(px, (width, height)))
-    seen = field.reshape(3, -1).take(row.astype(np.intp) * width + column.astype(np.intp), axis=1)
-    return np.einsum("knt,knt->n", seen, shares) / px.shape[-1]
+    """Mean (a, n) of the edges along lines of pixels (a, 2, n, t), by x and y. shares (n, t, 3): of the field's three
+    parts across the line. Outside the picture, and at its very border, there is none."""
+    height, width = field.shape[:2]
+    column, row = (np.fmin(np.fmax(px[:, k], 0.0), size - 1.0) + 0.5 for k, size in enumerate((width, height)))
+    seen = field.reshape(-1, 3).take(row.astype(np.intp) * width + column.astype(np.intp), axis=0)
+    return np.einsum("antk,ntk->an", seen, shares) / px.shape[-1]
 
 
 def climb(starts: np.ndarray, first_step: np.ndarray, score: Callable) -> tuple[np.ndarray, np.ndarray]:

@@ -21,14 +21,15 @@ _WITHIN_SIGMAS = 4.0  # a next look reaches as far
 _LINE_PX, _LOG_BLUR = (0.25, 2.0), (0.1, 0.5)
 _BLURS_PX = 0.6, 0.85, 1.2, 1.7  # of a first look
 _ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
-_ROUGH_EVERY, _FAR_EVERY = 2, 3  # steps of the grid, about half a blur
+_APART_BLURS = 0.5  # between positions of a look that is not close: a cubic spline between
 _SPLINE = 0.25  # blurs nearer to each other than this, in their logarithm, have a spline between
-_LINES, _BLURS = 33, 13  # of the grid, at least, by shift and by tilt; and by blur
-_APART_PX = 0.1  # lines of a wide window: farther apart they step over a peak
+_LINES, _BLURS = 25, 9  # of the grid, at least, by shift and by tilt; and by blur
+# Lines of a wide window: farther apart they step over a peak. Of the far look, a fifth of its blur.
+_APART_PX, _FAR_APART_PX = 0.1, 0.3
 _NEXT_BLURS = 4  # of a next look
 _LONGEST_PX = 3.0
 _ASIDE_PX = 2.0  # the middle of a bar whose width is another, from where it is expected
-_LOG_WIDTHS, _NEAR_WIDTHS = np.linspace(-0.48, 0.48, 25), slice(6, -6)  # a bar of 4 mm for 6 is 0.41 off
+_LOG_WIDTHS, _NEAR_WIDTHS = np.linspace(-0.48, 0.48, 25), slice(8, -8)  # a bar of 4 mm for 6 is 0.41 off
 _STRETCH_ARM = 1.5  # the outermost stretch's place, over ARM_MM
 _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hole in the bench says anything
 
@@ -36,23 +37,26 @@ _MOST = 40.0  # chi²: what one stretch may say against a line; a clamp or a hol
 @dataclass(frozen=True)
 class Window:
     """Where a line is looked for: up to so far off (2,), px, in the middle and over ARM_MM; under lens blurs (n,), px;
-    and whether all kinds of light are looked at, or the roughest only."""
+    whether closely: under all kinds of light and at each step of the grid, or roughly, under the roughest alone; and at
+    how many positions for each step."""
 
     most_px: np.ndarray
     blurs_px: np.ndarray
-    all_light: bool = True
+    closely: bool = True
+    positions: int = 1
+    apart_px: float = _APART_PX
 
     @property
     def lines(self) -> int:
         """How many lines are tried, by shift and by tilt."""
-        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / _APART_PX)))
+        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.apart_px)))
 
     @classmethod
-    def after(cls, one: "Posterior") -> "Window":
-        """The next, about a posterior."""
+    def after(cls, one: "Posterior", positions: int) -> "Window":
+        """The next, about a posterior, at so many positions for each step across."""
         most = np.clip(_WITHIN_SIGMAS * np.sqrt(np.diag(one.covariance)), *_LINE_PX)
         wide = np.clip(np.hypot(_WITHIN_SIGMAS * one.log_blur_sigma, one.log_blur_step), *_LOG_BLUR)
-        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)))
+        return cls(most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)), positions=positions)
 
 
 @dataclass(frozen=True)
@@ -78,24 +82,24 @@ class Posterior:
 
 def first_look(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
     """The posterior about a line (2,) that may be reach_px off, under coarse blurs."""
-    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), all_light=False), gamma, 1)
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), closely=False), gamma)
 
 
 def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
     """The posterior about another one, at so many positions for each step across."""
-    return _look(pieces, before.line, Window.after(before), gamma, positions)
+    return _look(pieces, before.line, Window.after(before, positions), gamma)
 
 
 def roughly(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
     """The posterior of one quick look, good enough to tell a bar from what is none."""
-    return _look(pieces, line, Window(np.full(2, reach_px), np.array([_ROUGH_BLUR_PX]), all_light=False), 1.0, 1)
+    return _look(pieces, line, Window(np.full(2, reach_px), np.array([_ROUGH_BLUR_PX]), closely=False), 1.0)
 
 
 def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
-    """The most probable line (2,) by blurred pictures, up to off_px off."""
-    window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), all_light=False)
+    """The most probable line (2,) by blurred pictures, up to off_px off, to _FAR_APART_PX."""
+    window = Window(np.full(2, off_px), np.array([_FAR_BLUR_PX]), closely=False, apart_px=_FAR_APART_PX)
     seen = profiles(pieces, STRETCHES, off_px, 1.0)
-    under = [evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_FAR_EVERY)]
+    under = [evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_every(_FAR_BLUR_PX))]
     lines, _, misfit, *_ = _over_lines(under, seen, window)
     return lines[np.argmin(misfit[:, 0, 0])]
 
@@ -118,9 +122,10 @@ def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
     reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
     seen = profiles(pieces, STRETCHES, reach_px, 1.0)
     rod = LitRod(seen)
-    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _ROUGH_EVERY, wider) for wider in np.exp(logs)]
+    under = [evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _every(_ROUGH_BLUR_PX), wider)
+             for wider in np.exp(logs)]
     own = np.array([one.of_bar[..., 0] for one in under]) / overstated(_best(under), seen)[:, None]
-    total = np.sum(-2.0 * np.logaddexp(-0.5 * (own - own.min(axis=(0, 2), keepdims=True)), -0.5 * _MOST), axis=1)
+    total = np.sum(_tempered(own - own.min(axis=(0, 2), keepdims=True)), axis=1)
     return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
 
 
@@ -129,13 +134,13 @@ def moved(pieces: Pieces, line: np.ndarray) -> Pieces:
     return pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
 
 
-def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) -> Posterior:
+def _look(pieces: Pieces, line, window: Window, gamma: float) -> Posterior:
     """Over lines within a window about one (2,)."""
     reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
     seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
-    every = 1 if window.all_light or len(window.blurs_px) > 1 else _ROUGH_EVERY
-    rod = LitRod(seen)
-    under = [evidence(rod, reach_px, blur_px, positions, window.all_light, every) for blur_px in window.blurs_px]
+    rod, closely = LitRod(seen), window.closely
+    under = [evidence(rod, reach_px, blur_px, window.positions, closely, 1 if closely else _every(blur_px))
+             for blur_px in window.blurs_px]
     lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
     chance = np.exp(-0.5 * (misfit - misfit.min()))
     total = chance.sum()
@@ -148,6 +153,28 @@ def _look(pieces: Pieces, line, window: Window, gamma: float, positions: int) ->
     return Posterior(line + mean, covariance, least, temper, -2.0 * np.log(total * cell),
                      float(np.sum((best.of_none - best.least) / temper)), rod.clearness(best), unresolved,
                      np.exp(log_blur), float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)), step)
+
+
+def _between(places: np.ndarray, curves: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Curves (k, g, m), given at places (g,), at others (k, n) for each: cubic splines, (k, n, m)."""
+    parts = CubicSpline(places, curves, axis=1).c
+    cell = np.clip(np.searchsorted(places, there, side="right") - 1, 0, len(places) - 2)
+    beyond, each = (there - places[cell])[..., None], np.arange(len(curves))[:, None]
+    value = parts[0][cell, each]
+    for part in parts[1:]:
+        value *= beyond
+        value += part[cell, each]
+    return value
+
+
+def _tempered(against: np.ndarray) -> np.ndarray:
+    """What stretches say against lines, as chi², where one may say anything with a chance of exp(-_MOST / 2)."""
+    return -2.0 * np.log(np.exp(-0.5 * against) + np.exp(-0.5 * _MOST))
+
+
+def _every(blur_px: float) -> int:
+    """Of how many steps of the grid one is looked at."""
+    return max(1, int(_APART_BLURS * blur_px / STEP_PX))
 
 
 def _best(under: Sequence[Evidence]) -> Evidence:
@@ -174,17 +201,19 @@ def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
     lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
     logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
     temper = overstated(_best(under), seen)
-    own = np.stack([one.of_bar for one in under], axis=-1) / temper[:, None, None, None]
+    shift = under[0].shift_px  # of the narrowest blur
+    own = [one.of_bar if len(one.shift_px) == len(shift) else CubicSpline(one.shift_px, one.of_bar, axis=1)(shift)
+           for one in under]
+    own = np.stack(own, axis=-1) / temper[:, None, None, None]
     if len(logs) > 2 and np.max(np.diff(logs)) < _SPLINE:
         log_blurs = np.linspace(logs[0], logs[-1], _BLURS)
         own = CubicSpline(logs, own, axis=-1)(log_blurs)
-    shift, shape = under[0].shift_px, (len(lines), own.shape[2], len(log_blurs))
+    shape = len(lines), own.shape[2], len(log_blurs)
     own = own.reshape(len(seen), len(shift), -1)
-    least, against = own.min(axis=1), np.empty((len(seen), len(lines), own.shape[-1]))
-    for each, place_mm, curve, low in zip(against, seen.place_mm, own, least):
-        there = np.clip(lines @ [1.0, place_mm / ARM_MM], shift[0], shift[-1])
-        each[:] = np.maximum(CubicSpline(shift, curve - low)(there), 0.0)
-    against = -2.0 * np.logaddexp(-0.5 * against, -0.5 * _MOST)
+    least = own.min(axis=1)
+    there = np.clip(lines[:, 0] + seen.place_mm[:, None] / ARM_MM * lines[:, 1], shift[0], shift[-1])
+    against = np.maximum(_between(shift, own - least[:, None], there), 0.0)
+    against = _tempered(against)
     total = against.sum(axis=0)
     total = least.sum(axis=0) + total / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
     line, other = np.unravel_index(np.argmin(total), total.shape)

@@ -178,4 +178,7 @@ def _alike(left) -> float:
 
 def light_range(light: np.ndarray) -> float:
     """From dark to bright of light (n,), but for the outermost twentieths; a grey level at least."""
-    return max(float(np.ptp(np.quantile(light, [0.05, 0.95]))) if len(light) else 0.0, 1.0 / FULL_SCALE)
+    if len(light) == 0:
+        return 1.0 / FULL_SCALE
+    low, high = np.interp([0.05 * (len(light) - 1), 0.95 * (len(light) - 1)], np.arange(len(light)), np.sort(light))
+    return max(float(high - low), 1.0 / FULL_SCALE)

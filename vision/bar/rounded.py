@@ -220,10 +220,10 @@ def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float, shown: bool) ->
     normal = beyond - px
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     x, y = np.nan_to_num(normal).T
-    height, width = seen.field.shape[1:]
+    height, width = seen.field.shape[:2]
     column, row = ((np.fmin(np.fmax(one, 0.0), size - 1.0) + 0.5).astype(np.intp) for one, size in
                    zip(np.nan_to_num(px.T), (width, height)))
-    there = seen.field.reshape(3, -1).take(row * width + column, axis=1)
+    there = seen.field.reshape(-1, 3).take(row * width + column, axis=0).T
     edge = (x * x * there[0] + 2.0 * x * y * there[1] + y * y * there[2]).reshape(*limb.shape[:-1])
     edge[~np.isfinite(limb[..., 0])] = np.nan
     if not shown or axis.form.shape != "ring":

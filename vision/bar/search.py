@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.bar.axis import settle_axis
 from vision.bar.find import Clear, clear_edges, find_bars
-from vision.bar.line import FAR_PX, NEAR_PX, BarLine, find_lines, measure_bars
+from vision.bar.line import BarLine, find_lines, look_farther, measure_bars
 from vision.bar.one_view import find_bars_alone, see_bar_alone, seen_from_one_side, widest_angle_rad
 from vision.bar.rounded import see_rounded
 from vision.geometry.camera import Cameras
@@ -23,6 +23,7 @@ from vision.pictures.view import View, median_of
 # Planes through the bar nearer to each other than this have it at another slope as soon as one line is a little off.
 _NARROW_RAD = np.radians(8.0)
 _NO_EDGES = 3.0  # as clearness: a bar is 5 to 9 clear
+_STOOD_PX = 0.5  # half of a quick look's blur: from so far away it sees the same
 _CLEARER = 1.0  # by so much one camera's axis must be clearer than one that the edges in all cameras led to
 _WIRES = 8  # over the stroke: where pieces of the bar may show the wire, too
 _NO_BAR = "no bar of diameter {:g} mm is seen near the whisker; record with the bar in view of every camera"
@@ -47,6 +48,11 @@ class SeenBar:
         one along something bright in one camera has more evidence there than the bar has in both. A camera that shows
         the place and no edge there speaks against it."""
         return sum(max(line.clearness, 0.0) if line.has_edges else -_NO_EDGES for line in self.lines.values())
+
+    @property
+    def stood(self) -> bool:
+        """Whether the lines lie where they were looked for: another look from there would see the same."""
+        return all(np.all(np.abs(line.line) < _STOOD_PX) for line in self.lines.values())
 
     @property
     def at_best(self) -> float:
@@ -75,19 +81,20 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return settle_axis(axis, cameras, bars, rods.bar.radius_mm)
 
-    def settled(axis: BarAxis, off_px: float) -> SeenBar:
-        lines = find_lines(views, axis, rods.bar.radius_mm, wires, settings, off_px)
+    def settled(axis: BarAxis) -> SeenBar:
+        lines = find_lines(views, axis, rods.bar.radius_mm, wires, settings)
         return SeenBar(by_lines(axis, lines), lines)
 
-    likely = _likeliest((settled(axis, NEAR_PX) for axis in find_bars(clear, rods, span)), settled)
-    farther = settled(likely.axis, FAR_PX)  # a bar whose rims are dark, found by its highlight
-    best = settled(max(likely, farther, key=lambda one: one.clearness).axis, NEAR_PX)
+    likely = _likeliest((settled(axis) for axis in find_bars(clear, rods, span)), settled)
+    lines = look_farther(likely.lines)  # a bar whose rims are dark, found by its highlight
+    best = max(likely, SeenBar(by_lines(likely.axis, lines), lines), key=lambda one: one.clearness)
+    best = best if best.stood else settled(best.axis)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
         return best
     found = [best] if best.seen_by else []
     for view, one in zip(views, clear):
         with suppress(Refused):
-            seen = settled(_alone(view, one, rods, motor_rad, settings), NEAR_PX)
+            seen = settled(_alone(view, one, rods, motor_rad, settings))
             found += [seen] if view.camera.name in seen.seen_by else []
     if not found:
         raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm))
@@ -99,12 +106,14 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
     return replace(chosen, axis=by_lines(chosen.axis, lines))
 
 
-def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis, float], SeenBar]) -> SeenBar:
-    """The clearest when settled once more; what was less clear before, its edges taken for seen, is not asked again."""
+def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis], SeenBar]) -> SeenBar:
+    """The clearest when settled once more, where its lines lay elsewhere; what was less clear before, its edges taken
+    for seen, is not asked again."""
     best = None
     for one in sorted(found, key=lambda one: one.at_best, reverse=True):
         if best is None or one.at_best > best.clearness:
-            best = max(filter(None, [best, settled(one.axis, NEAR_PX)]), key=lambda one: one.clearness)
+            again = one if one.stood else settled(one.axis)
+            best = max(filter(None, [best, again]), key=lambda one: one.clearness)
     return best
 
 

@@ -8,11 +8,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vision.bar.line import clear_pieces
-from vision.bar.posterior import log_width
+from vision.bar.posterior import log_width, moved
 from vision.bar.search import SeenBar, see_bar
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import resting_lines
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.settings import VisionSettings
 from vision.pictures.pixel_noise import measure_noise
@@ -43,19 +41,15 @@ def bar_diameter_mm(
     used, settings, rods = cameras.subset(names), VisionSettings(), Rods(wire, bar)
     views = [View(camera, dict(enumerate(pictures[camera.name])), np.asarray(background[camera.name], dtype=float),
                   measure_noise(*pictures[camera.name][:2])) for camera in used]
-    found = seen_over_given(views, see_bar(views, used, rods, np.array(motor_rad), settings), rods, motor_rad, settings)
+    found = seen_over_given(see_bar(views, used, rods, np.array(motor_rad), settings))
     return bar.diameter_mm * in_all(found)[0] if found else np.nan
 
 
-def seen_over_given(views: Sequence[View], seen: SeenBar, rods: Rods, motor_rad: Sequence[float],
-                    settings: VisionSettings) -> dict[str, tuple[float, float]]:
-    """How wide the bar looks over how wide it should, and sigma, by camera, of those that show it. motor_rad (n,): at
-    each frame."""
-    angles = np.linspace(np.min(motor_rad), np.max(motor_rad), 8)
-    asked = [view for view in views if view.camera.name in seen.seen_by]
-    wires = {view.camera.name: resting_lines(view.camera, rods.wire, angles) for view in asked}
-    pieces = clear_pieces(asked, seen.axis, rods.bar.radius_mm, wires, settings)
-    return {name: _share(*log_width(some)) for name, some in pieces.items()}
+def seen_over_given(seen: SeenBar) -> dict[str, tuple[float, float]]:
+    """How wide the bar looks over how wide it should, and sigma, by camera, of those that show it: in what was looked
+    at for it."""
+    lines = {name: seen.lines[name] for name in seen.seen_by}
+    return {name: _share(*log_width(moved(one.pieces, one.line))) for name, one in lines.items()}
 
 
 def _share(log: float, sigma: float) -> tuple[float, float]:

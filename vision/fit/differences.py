@@ -6,14 +6,14 @@ import numpy as np
 
 from vision.fit.problem import BAR, REACH, REST, Problem
 
-_SHIFT_MM, _TILT_RAD, _BEND_RAD = 1e-4, 1e-6, 1e-5  # about 1e-5 of what they move
+_SHIFT_MM, _TILT_RAD, _BEND_RAD, _PULL = 1e-4, 1e-6, 1e-5, 1e-3  # about 1e-5 of what they move
 
 
 def steps(problem: Problem) -> np.ndarray:
     """Step (size,) of each parameter."""
     step = np.full(problem.size, _BEND_RAD)
     step[0:2], step[2:4], step[BAR:BAR + REST], step[REACH] = _SHIFT_MM, _TILT_RAD, _SHIFT_MM, _SHIFT_MM
-    step[problem.bar_moves] = _SHIFT_MM
+    step[problem.bar_moves], step[problem.pull] = _SHIFT_MM, _PULL
     return step
 
 
@@ -22,7 +22,7 @@ def perturbed(problem: Problem, vector: np.ndarray, *, reach: bool = False) -> t
     (f,), -1 where none did. reach: move the reach's error, too."""
     step, frames = steps(problem), len(problem.motor_rad)
     rows, columns = [vector], []
-    for k in [*range(REACH + reach), *range(problem.size)[problem.bar_moves]]:
+    for k in [*range(REACH + reach), *range(problem.size)[problem.bar_moves], problem.pull]:
         rows.append(vector + step[k] * (np.arange(problem.size) == k))
         columns.append((step[k], np.full(frames, k)))
     order = np.cumsum(problem.bent) - 1

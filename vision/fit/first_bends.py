@@ -4,14 +4,14 @@ Coarse: to a pixel or two, enough for the bands that `trace` reads.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from vision.fit.problem import BAR, REST, REST_PRIOR_MM, Problem, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, one_curve
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines, one_curve
 from vision.geometry.contact import Axis, closest_arc, outline_of_bar
 from vision.geometry.errors import Refused
 from vision.geometry.newton import cauchy_weights
@@ -32,7 +32,7 @@ _STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
 _BESIDE_BAR_PX = 8.0
 _REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)  # sigmas: of the Cauchy weights, round by round
-_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 0.5  # of a frame's points; no whisker bends farther in a stroke
+_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 1.2  # of a frame's points; pushed by 45 degrees a whisker bends so far
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Sight:
 
     view: View
     rods: Rods
-    still: View
+    still: np.ndarray
     still_share: float
     bar_px: tuple[np.ndarray, np.ndarray]
 
@@ -50,15 +50,14 @@ class Sight:
            bar_mm: float) -> "Sight":
         """frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is."""
         frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))]
-        still = replace(view, background=median_of([view.frames[frame] for frame in frames]))
+        still = median_of([view.frames[frame] for frame in frames])
         return cls(view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, bar_mm))
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Where the wire may be beside predicted curves by frame, clear of hub and bar."""
-        pieces, still = (wire_pieces(view, curves, self.rods.wire, _PIECE_PX, reach_px - 3)
-                         for view in (self.view, self.still))
+        pieces = wire_pieces(self.view, curves, self.rods.wire, _PIECE_PX, reach_px - 3, self.still)
         clear = clear_of_bar(pieces, *self.bar_px, _BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM)
-        return votes(pieces.select(clear), still.background[clear], self.still_share, reach_px)
+        return votes(pieces.select(clear), self.still_share, reach_px)
 
 
 def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: Axis, motor_rad: Mapping[int, float]) -> np.ndarray:
@@ -122,15 +121,20 @@ class _Model:
     wire: Wire
 
     def px(self, bend, seen: Sequence[LinePoints]) -> np.ndarray:
-        """Distance (n,) in px from line points to the predicted line, all cameras."""
-        curve = one_curve(self.rest_mm, bend, self.arc_mm, self.motor_rad, self.wire)
-        return np.concatenate([np.sum(points.normal * (view.camera.project(curve.at(points.place)[0]) - points.px),
-                                      axis=1) for view, points in zip(self.views, seen)])
+        """Distances (…, n) in px from line points of all cameras to the predicted lines; bend (…, 2)."""
+        shape = np.shape(bend)[:-1]
+        curves = centrelines(np.broadcast_to(self.rest_mm, (*shape, 2, REST_POWERS)), bend,
+                             np.full(shape, self.arc_mm), np.full(shape, self.motor_rad), self.wire)
+        off = []
+        for view, points in zip(self.views, seen):
+            expected = view.camera.project(curves.at(points.place)[0].reshape(-1, 3)).reshape(*shape, -1, 2)
+            off.append(np.sum(points.normal * (expected - points.px), axis=-1))
+        return np.concatenate(off, axis=-1)
 
     def slopes(self, bend, seen: Sequence[LinePoints], step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
-        """The same, and its derivatives (n, 2) by the bend."""
-        left = self.px(bend, seen)
-        return left, np.stack([(self.px(bend + step * one, seen) - left) / step for one in np.eye(2)], axis=1)
+        """The same of one bend (2,), and its derivatives (n, 2) by the bend."""
+        left, *moved = self.px(bend + step * np.eye(3, 2, -1), seen)
+        return left, (np.stack(moved, axis=1) - left[:, None]) / step
 
 
 def _likely_bend(model: _Model, seen: Sequence[Votes], guess) -> tuple[np.ndarray, list[LinePoints]]:

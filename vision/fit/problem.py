@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,8 @@ BAR_PRIOR = np.array([50.0, 50.0, 1.0, 1.0])
 # set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
 BEND_PRIOR_RAD = 0.3
+# Friction along the whisker over the force across it: all of it where the contact does not slip along the bar.
+PULL_PRIOR = 0.2
 # How far a traced line may be off as a whole beyond what light and lens are said to move it by: shadows, reflections.
 # By the offset the true wires of 65 path-traced views are most probable, the tilt is the RMS of 72 (docs/proof.md).
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.08, 0.09
@@ -29,6 +32,7 @@ WIRE_DRIFT_PX = 0.02
 WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
 # It also wanders with what is behind it, over this length of wire.
 WANDER_PX, WANDER_MM = 0.25, 12.0
+# The same of a bar whose line says nothing of its light.
 BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
 BAR_TILT_ARM_MM = 20.0
 # By so much an outline is read too far out, or in, as a whole: by the wrong transfer curve some 0.5 px, else hardly.
@@ -71,12 +75,17 @@ class Problem:
     @property
     def size(self) -> int:
         """Number of parameters: bar, rest shape, reach, how each camera's lines are off as a whole, the bar's motion,
-        bends."""
+        friction along the whisker, bends."""
         return self.first_bend + 2 * int(np.sum(self.bent))
 
     @property
     def first_bend(self) -> int:
         """Index of the first bend."""
+        return self.pull + 1
+
+    @property
+    def pull(self) -> int:
+        """Index of the friction along the whisker over the force across it, the same in all frames."""
         return self.bar_moves.stop
 
     @property
@@ -96,6 +105,23 @@ class Problem:
     def is_rounded(self) -> bool:
         """Whether what is touched is no straight bar; it stands still then."""
         return self.rods.bar.form is not None
+
+    @cached_property
+    def light_px(self) -> np.ndarray:
+        """Sigmas (cameras, modes) of what each camera's lines are off by as a whole: LIGHT_PX, and as the wire turns
+        before the light: what moves a line by so much moves it by that over a radian more or less; of a bar what its
+        points share, where they say so."""
+        half, sigma = 0.5 * float(np.ptp(self.motor_rad)), np.tile(LIGHT_PX, (len(self.cameras), 1))
+        for camera, own in enumerate(sigma):
+            wire = [one.points for one in self.seen if one.camera == camera and one.frame >= 0]
+            shared = [row for points in wire for row in points.shared_px]
+            common = np.linalg.norm(np.mean(shared, axis=0)) if shared else 0.0
+            still = np.hypot(own[:2], [common, 0.0])
+            bar = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame < 0]
+            if bar and np.any(bar):
+                own[-2:] = np.sqrt(np.mean(np.concatenate(bar)[:, :2] ** 2, axis=0))
+            own[2:4], own[4:6] = np.hypot(own[2:4], half * still), np.hypot(own[4:6], 0.5 * half**2 * still)
+        return sigma
 
     def bend_of(self, frame: int) -> slice:
         """Parameters of a frame's bend; the frame may bend."""
@@ -175,10 +201,11 @@ def curves_of(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds:
     arcs = np.broadcast_to(arcs_mm, shape)
     motor = np.broadcast_to(problem.motor_rad, shape)
     rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
+    pull = np.broadcast_to(vector[..., problem.pull, None], shape)
     for _ in range(rounds):
-        curves = centrelines(rest, angles, arcs, motor, problem.wire)
+        curves = centrelines(rest, angles, arcs, motor, problem.wire, pull)
         arcs = np.clip(closest_arc(curves, axis, arcs), 1.0, problem.wire.length_mm)
-    return centrelines(rest, angles, arcs, motor, problem.wire), arcs
+    return centrelines(rest, angles, arcs, motor, problem.wire, pull), arcs
 
 
 def start(problem: Problem, contact_arc_mm: float) -> State:

@@ -21,7 +21,7 @@ from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
 from vision.fit.uncertainty import by_lens
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
-from vision.geometry.centreline import REST_POWERS, Curves, rotation_z, simpson, tangent_growth
+from vision.geometry.centreline import REST_POWERS, Curves, bend_growth, rotation_z, simpson, tangent_growth
 from vision.geometry.contact import closest_arc
 from vision.geometry.rods import Wire
 from vision.lines.one_sided import WireAppearance
@@ -77,17 +77,13 @@ class Fit:
 
 
 def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
-    """Each refinement of the truth by name. light: how each camera sees the wire.
-
-    That of `ALONG` is for friction along the whisker that is as strong as the force across it.
-    """
-    small, along = _reshaped(fit)
+    """Each refinement of the truth by name. light: how each camera sees the wire."""
     eye, vector = np.eye(fit.problem.size), fit.state.vector
     return {
-        "large bending": small,
+        "large bending": _large_bending(fit),
         "bar radius": fit.held(eye[[REACH]], np.array([-fit.problem.rods.bar.radius_mm - vector[REACH]])),
         "psi": fit.held(fit.by.whisk["psi"][None], -np.atleast_1d(fit.measured.whisk["psi"])),
-        ALONG: along,
+        ALONG: fit.held(eye[[fit.problem.pull]], -vector[[fit.problem.pull]]),
         "taper": _taper(fit),
         "sag and set": fit.held(eye[_CURVED], -vector[_CURVED]),
         **{name: _lens(fit, terms) for name, terms in LENS_TERMS.items()},
@@ -95,21 +91,21 @@ def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut
     }
 
 
-def _reshaped(fit: Fit) -> list[LeftOut]:
-    """Without large bending, and with a unit of friction along the whisker."""
+def _large_bending(fit: Fit) -> LeftOut:
+    """As a beam of small angles, with no more pull than it has."""
     problem, state = fit.problem, fit.state
     curves, arcs = curves_of(problem, state.vector, state.arcs_mm)
     plain = _small_angles(problem, state, curves, _contacts_of_small_angles(problem, state, curves, arcs))
-    moves = _in_rig(problem, curves, [plain, _tension(problem, state, curves, arcs)])
+    moves = _in_rig(problem, curves, plain)
     contacts, slip = by_contacts(problem, state, curves, moves, fit.last)
     rows = np.concatenate([by_lines(problem, curves, moves), contacts])
-    return [fit.after(fit.step(row), moved) for row, moved in zip(rows.T, slip.tolist())]
+    return fit.after(fit.step(rows[:, 0]), float(slip[0]))
 
 
-def _in_rig(problem: Problem, curves: Curves, of_tangents: Sequence[np.ndarray]) -> Curves:
-    """Moves of the centrelines by those of their tangents in the hub's frame (f, m, 3) each."""
+def _in_rig(problem: Problem, curves: Curves, of_tangents: np.ndarray) -> Curves:
+    """The move of the centrelines by that of their tangents in the hub's frame (f, m, 3)."""
     turned = np.swapaxes(rotation_z(problem.motor_rad), -1, -2)
-    tangents = np.stack(of_tangents) @ turned
+    tangents = of_tangents[None] @ turned
     return Curves(curves.arc_mm, simpson() @ tangents * curves.arc_mm[1], tangents)
 
 
@@ -118,7 +114,8 @@ def _small_angles(problem: Problem, state: State, curves: Curves, arcs_mm: np.nd
     and distance for arc."""
     along = curves.tangents @ rotation_z(problem.motor_rad)
     turn = np.linalg.norm(bends(problem, state.vector), axis=-1)[:, None]
-    here, there = (tangent_growth(curves.arc_mm, at[:, None], problem.wire) for at in (state.arcs_mm, arcs_mm))
+    here = bend_growth(turn, state.vector[problem.pull], curves.arc_mm, state.arcs_mm[:, None], problem.wire)
+    there = tangent_growth(curves.arc_mm, arcs_mm[:, None], problem.wire)
     slope = there - np.sinc(turn * here / np.pi) * here
     aside = slope[..., None] * bends(problem, state.vector)[:, None]
     return np.concatenate([1.0 - along[..., :1], aside], axis=-1)
@@ -126,32 +123,12 @@ def _small_angles(problem: Problem, state: State, curves: Curves, arcs_mm: np.nd
 
 def _contacts_of_small_angles(problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray) -> np.ndarray:
     """Where (f,) along itself such a beam touches: distances along it are shorter than arcs."""
-    moves = _in_rig(problem, curves, [_small_angles(problem, state, curves, arcs_mm)])
+    moves = _in_rig(problem, curves, _small_angles(problem, state, curves, arcs_mm))
     moved = Curves(curves.arc_mm, curves.points_mm + moves.points_mm[0], curves.tangents + moves.tangents[0])
     axis = bar_axes(problem, state.vector)
     point, direction = (np.broadcast_to(part, (len(arcs_mm), 3)) for part in (axis.point_mm, axis.direction))
     each = replace(axis, point_mm=point, direction=direction)
     return closest_arc(moved, each, arcs_mm)
-
-
-def _tension(problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray) -> np.ndarray:
-    """What the tangents (f, m, 3) gain by a pull along the whisker as strong as the force across it, to first order.
-
-    EI ψ' = F (a − s) − P (y_a − y): with ψ = B g(s) and F/EI = B g'/(a − s), P = F adds −∫ B g'/(a − s) (y_a − y) ds.
-    Of a uniform rod at a: −5/6 B².
-    """
-    arc, bend = curves.arc_mm, bends(problem, state.vector)
-    turn = np.linalg.norm(bend, axis=-1)[:, None]
-    contact, taper = arcs_mm[:, None], problem.wire.taper_per_mm
-    growth = tangent_growth(arc, contact, problem.wire)
-    softness = np.where(arc < contact, np.maximum(1.0 - taper * arc, 1e-3) ** -4.0, 0.0)
-    integral = simpson().T * arc[1]
-    per_force = (softness * (contact - arc) @ integral)[:, -1:]
-    across = turn * (growth @ integral)
-    at_contact = np.array([np.interp(a, arc, row) for a, row in zip(arcs_mm, across)])[:, None]
-    gained = -turn / per_force * (softness * (at_contact - across) @ integral)
-    way = bend / np.maximum(turn, 1e-12)
-    return np.concatenate([np.zeros((*gained.shape, 1)), gained[..., None] * way[:, None]], axis=-1)
 
 
 def _taper(fit: Fit) -> LeftOut:

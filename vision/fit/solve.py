@@ -23,7 +23,7 @@ from vision.fit.problem import (
     BAR_TILT_ARM_MM,
     BEND_PRIOR_RAD,
     CONTACT_SIGMA_MM,
-    LIGHT_PX,
+    PULL_PRIOR,
     REACH,
     REST,
     REST_PRIOR_MM,
@@ -212,8 +212,8 @@ def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
 
 def _prior_block(problem: Problem, vector):
     sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
-                            [max(problem.rods.reach_sigma_mm, 1e-6)], np.tile(LIGHT_PX, len(problem.cameras)),
-                            [] if problem.motion is None else problem.motion.sigma, problem.outline_prior,
+                            [max(problem.rods.reach_sigma_mm, 1e-6)], problem.light_px.ravel(),
+                            [] if problem.motion is None else problem.motion.sigma, problem.outline_prior, [PULL_PRIOR],
                             np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
     return vector / sigma, np.diag(1.0 / sigma)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.rotation import cross
 from vision.geometry.rounded import Rounded, nearer_by
 from vision.geometry.silhouette import outline
 
@@ -107,7 +108,7 @@ def clearance(
     if isinstance(axis, Rounded):
         return axis.outside_mm(point)[0][..., 0], arc, point[..., 0, :]
     away = _from_axis(point, axis)[..., 0, :]
-    normal = np.cross(np.asarray(axis.direction), tangent[..., 0, :])
+    normal = cross(np.asarray(axis.direction), tangent[..., 0, :])
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     side = np.where(normal[..., 1] > 0, -1.0, 1.0)
     return np.sum(away * normal, axis=-1) * side, arc, point[..., 0, :]
@@ -118,9 +119,9 @@ _ALONG_X = 0.9  # of a direction: no bar's, but that of the plane of a ring
 
 def axis_frame(direction: np.ndarray) -> np.ndarray:
     """Two unit vectors (2, 3) at right angles to a direction and to each other."""
-    e1 = np.cross(direction, [1.0, 0.0, 0.0] if abs(direction[0]) < _ALONG_X else [0.0, 0.0, 1.0])
+    e1 = cross(direction, np.array([1.0, 0.0, 0.0] if abs(direction[0]) < _ALONG_X else [0.0, 0.0, 1.0]))
     e1 = e1 / np.linalg.norm(e1)
-    return np.stack([e1, np.cross(direction, e1)])
+    return np.stack([e1, cross(direction, e1)])
 
 
 def shifted_axis(axis: Axis, across: np.ndarray, vector: np.ndarray) -> Axis:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.geometry.rotation import cross
 
 
 def outline(
@@ -38,16 +39,16 @@ def grazed(
     sight = points - camera.centre_mm
     sight = sight - np.sum(sight * directions, axis=1, keepdims=True) * directions
     distance = np.linalg.norm(sight, axis=1, keepdims=True)
-    sideways = np.cross(directions, sight / distance)
+    sideways = cross(directions, sight / distance)
     near = points - radius**2 / distance**2 * sight
     aside = radius * np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0)) * sideways
     return near + aside, near - aside
 
 
 def normals(curve_px: np.ndarray) -> np.ndarray:
-    """Unit normals (n, 2) of a curve (n, 2) given point by point."""
-    if len(curve_px) < 2:
-        return np.tile([0.0, 1.0], (len(curve_px), 1))
-    tangent = np.gradient(curve_px, axis=0)
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    """Unit normals (…, n, 2) of curves (…, n, 2) given point by point."""
+    if curve_px.shape[-2] < 2:
+        return np.broadcast_to([0.0, 1.0], curve_px.shape)
+    tangent = np.gradient(curve_px, axis=-2)
+    normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
+    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import correlate1d
 
 from vision.pictures.pixel_noise import Noise
 
@@ -23,8 +22,8 @@ class Band:
 
     offset_px (n, k): signed distance of each pixel from the curve along its normal; grey, background (n, k);
     foot_px (n, 2): the curve; normal (n, 2): its unit normal; place (n,): the curve's own parameter (mm);
-    radius_px (n,): half the width that the rod has in the picture. Pixels outside the picture, or
-    hidden, are NaN.
+    radius_px (n,): half the width that the rod has in the picture. still (n, k), or (n, 0) where it was not asked for:
+    another background, of what stands still. Pixels outside the picture, or hidden, are NaN.
     """
 
     offset_px: np.ndarray
@@ -34,12 +33,17 @@ class Band:
     normal: np.ndarray
     place: np.ndarray
     radius_px: np.ndarray
+    still: np.ndarray | None = None
+
+    def __post_init__(self):
+        if self.still is None:
+            object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
 
 
 def read_band(grey: np.ndarray, background: np.ndarray, curve_px: np.ndarray, place: np.ndarray, radius_px: np.ndarray,
-              half_width_px: int, hidden: np.ndarray | None = None) -> Band:
+              half_width_px: int, hidden: np.ndarray | None = None, still: np.ndarray | None = None) -> Band:
     """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along. hidden (h, w):
-    those that show something else, bool.
+    those that show something else, bool; still (h, w): another background.
 
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals point to the same
     hand of the way along which `place` grows, whichever way that is in the picture.
@@ -57,21 +61,26 @@ def read_band(grey: np.ndarray, background: np.ndarray, curve_px: np.ndarray, pl
     foot, normal = np.empty((len(step), 2)), np.empty((len(step), 2))
     foot[:, along], foot[:, 1 - along] = step, across
     normal[:, along], normal[:, 1 - along] = -slope * cosine, cosine
-    pixels = [_pick(picture, step, line, along) for picture in (grey, background)]
+    pictures = [picture for picture in (grey, background, still) if picture is not None]
+    pixels = _pick(pictures, step, line, along)
     if hidden is not None:
-        pixels[0][_pick(hidden, step, line, along) > 0] = np.nan
+        pixels[0][_pick([hidden], step, line, along)[0] > 0] = np.nan
     at = [np.interp(step, curve[:, along], values) for values in (place, radius)]
     left = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
-    return Band(left * offset, *pixels, foot, left * normal, *at)
+    return Band(left * offset, *pixels[:2], foot, left * normal, *at, *pixels[2:])
 
 
-def _pick(picture, step, line, along):
-    """Values (n, k) of a picture at the band's pixels; NaN outside it."""
-    size = picture.shape[along]
-    inside = (line >= 0) & (line < size)
+def _pick(pictures, step, line, along) -> list[np.ndarray]:
+    """Values (n, k) of pictures of one size at the band's pixels; NaN outside them."""
+    size = pictures[0].shape[along]
+    outside = (line < 0) | (line >= size)
     line = np.clip(line, 0, size - 1)
-    values = picture[line, step[:, None]] if along == 0 else picture[step[:, None], line]
-    return np.where(inside, values, np.nan).astype(float)
+    at = (line, step[:, None]) if along == 0 else (step[:, None], line)
+    values = [picture[at].astype(float) for picture in pictures]
+    if np.any(outside):
+        for one in values:
+            one[outside] = np.nan
+    return values
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,8 @@ class Pieces:
 
     offset_px, grey, background, weight (s, p): weight is one over the noise's sigma, 0 where there is no pixel;
     slope, curvature (s, p): of the background across the rod, per px and px²;
-    place, radius_px (s,); foot_px, normal (s, 2) at the middle; source (s,) which band.
+    place, radius_px (s,); foot_px, normal (s, 2) at the middle; source (s,) which band; still (s, p) or
+    (s, 0): another background, of bands that have one.
     """
 
     offset_px: np.ndarray
@@ -94,6 +104,11 @@ class Pieces:
     foot_px: np.ndarray
     normal: np.ndarray
     source: np.ndarray
+    still: np.ndarray | None = None
+
+    def __post_init__(self):
+        if self.still is None:
+            object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
 
     def __len__(self) -> int:
         return len(self.place)
@@ -107,8 +122,8 @@ class Pieces:
         """The pieces where `keep` (s,) holds, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
-    def columns(self, keep: np.ndarray) -> "Pieces":
-        """The same pieces with those of their pixels where `keep` (p,) holds."""
+    def columns(self, keep: np.ndarray | slice) -> "Pieces":
+        """The same pieces with those of their pixels where `keep` (p,) holds, or of a slice."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
@@ -128,37 +143,44 @@ class Pieces:
 
 
 def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
-    """All bands cut into pieces of `length_px` steps; what is left over at the end is not used."""
-    parts = [_cut(band, length_px, noise, number) for number, band in enumerate(bands)
-             if len(band.place) >= length_px]
-    if not parts:
+    """All bands cut into pieces of `length_px` steps; what is left over at the end is not used.
+
+    Bands with another background, as all have or none, are for a look that asks for no light: their slopes and
+    curvatures are 0.
+    """
+    counts = [len(band.place) // length_px for band in bands]
+    if not any(counts):
         return Pieces(*[np.zeros((0, 1))] * 6, np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)),
-                      np.zeros(0, dtype=int))
-    return Pieces(*(np.concatenate(columns) for columns in zip(*parts)))
+                      np.zeros(0, dtype=int), np.zeros((0, 1)))
+    used = [(band, count * length_px) for band, count in zip(bands, counts) if count]
+    whole = Band(*(np.concatenate([getattr(band, name)[:end] for band, end in used])
+                   for name in Band.__dataclass_fields__))
+    return Pieces(*_cut(whole, length_px, noise, np.repeat(np.arange(len(bands)), counts)))
 
 
-def _cut(band: Band, length_px: int, noise: Noise, number: int):
-    count = len(band.place) // length_px
-    used = count * length_px
-    flat = [a[:used].reshape(count, -1)
-            for a in (band.offset_px, band.grey, band.background, *_changes(band))]
+def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray):
+    count = len(source)
+    flat = [a.reshape(count, -1) for a in (band.offset_px, band.grey, band.background)]
+    still = band.still.reshape(count, -1)
+    flat += [np.zeros(flat[0].shape)] * 2 if still.size else [a.reshape(count, -1) for a in _changes(band)]
     in_picture = np.isfinite(flat[1]) & np.isfinite(flat[2])
     weight = np.where(in_picture, 1.0 / noise.sigma(np.where(in_picture, flat[1], 0.0)), 0.0)
     flat[1:] = [np.where(in_picture, values, 0.0) for values in flat[1:]]
-    means = [a[:used].reshape(count, length_px, -1).mean(axis=1)
-             for a in (band.foot_px, band.normal)]
-    singles = [a[:used].reshape(count, length_px).mean(axis=1) for a in (band.place, band.radius_px)]
-    return (*flat, weight, singles[0], singles[1], *means, np.full(count, number))
-
-
-# Derivatives by five points: three would lose a sixth of the slope of an edge blurred by a pixel.
-_FIRST = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
-_SECOND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0
+    means = [a.reshape(count, length_px, -1).mean(axis=1) for a in (band.foot_px, band.normal)]
+    singles = [a.reshape(count, length_px).mean(axis=1) for a in (band.place, band.radius_px)]
+    if still.size:
+        still = np.where(in_picture, still, 0.0)
+    return (*flat, weight, singles[0], singles[1], *means, source, still)
 
 
 def _changes(band: Band) -> list[np.ndarray]:
-    """Slope and curvature (n, k) each of the background across the rod, per px and per px²; 0 at the band's rims."""
+    """Slope and curvature (n, k) each of the background across the rod, per px and per px²; 0 at the band's rims.
+
+    By five points: three would lose a sixth of the slope of an edge blurred by a pixel.
+    """
     pitch = (band.offset_px[:, 1:2] - band.offset_px[:, :1])
-    background = np.where(np.isfinite(band.background), band.background, 0.0)
-    return [correlate1d(background, share, axis=1, mode="nearest") / pitch**order
-            for order, share in ((1, _FIRST), (2, _SECOND))]
+    behind, width = np.nan_to_num(band.background), band.background.shape[1]
+    wide = np.concatenate([behind[:, :1]] * 2 + [behind] + [behind[:, -1:]] * 2, axis=1)
+    two_before, before, after, two_after = (wide[:, k:k + width] for k in (0, 1, 3, 4))
+    return [(8.0 * (after - before) - (two_after - two_before)) / (12.0 * pitch),
+            (16.0 * (after + before) - (two_after + two_before) - 30.0 * behind) / (12.0 * pitch**2)]

@@ -24,6 +24,7 @@ _LEAST_VOTE = 1e-9
 _SURE_SIGMAS = 8.0  # the best of all curves through noise has 3.4, one in 100 has 6, one in ten less each sigma on
 _SHADE_WIDTHS = 3  # of the rod: shade on what is behind changes over more
 _PLAIN_GAIN = 0.5  # a background scaled by more than this from 1 is none: the piece shows something else
+_WEAK = 1e-3  # keeps a background that a piece cannot tell from making its two equations singular
 
 
 @dataclass(frozen=True)
@@ -73,17 +74,17 @@ def likely_curve(seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[n
     return mesh[best], bool(total[best] > expected + _SURE_SIGMAS * np.sqrt(len(share)) * np.std(share))
 
 
-def votes(pieces: Pieces, still: np.ndarray, still_share: float, reach_px: int) -> Votes:
-    """Votes of those pieces that have any, at shifts up to reach_px.
+def votes(pieces: Pieces, still_share: float, reach_px: int) -> Votes:
+    """Votes of those pieces, of bands with what stands still, that have any, at shifts up to reach_px.
 
-    still (s, p): the picture of what stands still at the same pixels; still_share: what part of one picture's
-    variance it has. That without rods is as noisy as a frame: in a noise that is no difference a dim rod would drown.
+    still_share: what part of one picture's variance what stands still has. That without rods is as noisy as a frame: in
+    a noise that is no difference a dim rod would drown.
     """
     wide = 2 * max(1, round(float(np.median(pieces.radius_px)))) + 1 if len(pieces) else 1
     place, count = _places(pieces, reach_px)
     pixels = np.maximum(sums((pieces.weight > 0).astype(float), place, count), 1.0)
     both = np.stack([sums(_unexplained(pieces, background, share), place, count) / pixels
-                     for background, share in ((pieces.background, 1.0), (still, still_share))])
+                     for background, share in ((pieces.background, 1.0), (pieces.still, still_share))])
     both -= uniform_filter1d(both, _SHADE_WIDTHS * wide, axis=2)
     alike = np.where(both[0] * both[1] > 0.0, np.min(both**2, axis=0), 0.0)
     share, changed = _share(alike * pixels - 1.0, wide), _share(both[0] ** 2 * pixels - 1.0, wide)
@@ -108,9 +109,11 @@ def _places(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, int]:
 def _unexplained(pieces: Pieces, background, share: float) -> np.ndarray:
     """What a background with a gain and an offset of each piece's own leaves (s, p), over its noise; share: of one
     picture's variance that the background has."""
-    columns = np.stack([background, np.ones_like(background)], axis=-1) * pieces.weight[..., None]
-    seen, turned = pieces.grey * pieces.weight, columns.transpose(0, 2, 1)
-    gain_offset = np.linalg.solve(turned @ columns + 1e-3 * np.eye(2), turned @ seen[..., None])[..., 0]
-    plain = np.abs(gain_offset[:, :1] - 1.0) < _PLAIN_GAIN
-    gain_offset = np.where(plain, gain_offset, [1.0, 0.0])
-    return (seen - (columns @ gain_offset[..., None])[..., 0]) / np.sqrt(1.0 + share * gain_offset[:, :1] ** 2)
+    columns = np.stack([background, np.ones_like(background), pieces.grey], axis=1) * pieces.weight[:, None]
+    normal = columns @ columns.transpose(0, 2, 1)
+    a, b, d = normal[:, 0, 0] + _WEAK, normal[:, 0, 1], normal[:, 1, 1] + _WEAK
+    by_a, by_d = normal[:, 0, 2], normal[:, 1, 2]
+    gain, offset = (np.array([d * by_a - b * by_d, a * by_d - b * by_a]) / (a * d - b * b))[..., None]
+    plain = np.abs(gain - 1.0) < _PLAIN_GAIN
+    gain, offset = np.where(plain, gain, 1.0), np.where(plain, offset, 0.0)
+    return (columns[:, 2] - gain * columns[:, 0] - offset * columns[:, 1]) / np.sqrt(1.0 + share * gain**2)

@@ -5,12 +5,16 @@ strong each wave of it is nobody knows beforehand. Here each has the strength th
 (empirical Bayes, MacKay 1992). How probable each shift is then is looked up on a grid, for it often is no Gauss curve.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.linalg.lapack import dtrtri
 
 from vision.lines.bands import Pieces
-from vision.lines.shading import WAVE_SHARE, Equations, Knots, between_knots, contrast_of
+from vision.lines.gathered import Gathered, exactly_if_needed
+from vision.lines.shading import WAVE_SHARE, Knots, between_knots, contrast_of
 
 _PARTS = np.linspace(-1.0, 1.0, 15)
 _SHIFTS_PX = 1.5 * _PARTS * np.sqrt(np.abs(_PARTS))  # denser in the middle
@@ -18,7 +22,7 @@ _LOG_BLURS = np.linspace(-0.3, 0.3, 5)
 _FINE = 301
 _STRENGTHS = 0.05, 1.0  # of the contrast: less does not show, more is more than the rod itself
 _ROUNDS, _FIRST_ROUNDS = 12, 2
-_NO_CHANCE = 200.0  # minus twice the log of how much less probable a shift is that after these need not be asked on
+NO_CHANCE = 200.0  # minus twice the log of how much less probable a shift is that after these need not be asked on
 # What the evidence counts: strengths are fitted to the pixels that they explain, and what the model lacks of the light
 # is alike in all pieces. In 65 views the true shift is most probable so (tests/ladder/wire_scenes.py).
 EVIDENCE_COUNTS = 0.5
@@ -31,7 +35,7 @@ def common_spread_px(pieces: Pieces, blur_px: float, terms: int, knots: Knots, r
     terms, robust: see `doubts_of`; blur_px: found where they lie; blur_prior: blur, px, and sigma of its logarithm.
     """
     doubts = EVIDENCE_COUNTS * doubts_of(pieces, _SHIFTS_PX, blur_px * np.exp(_LOG_BLURS), terms, knots, robust,
-                                         _NO_CHANCE)
+                                         NO_CHANCE)[0]
     doubts += ((_LOG_BLURS + np.log(blur_px / blur_prior[0])) / blur_prior[1]) ** 2
     shift, log_blur = (np.linspace(grid[0], grid[-1], _FINE) for grid in (_SHIFTS_PX, _LOG_BLURS))
     fine = RectBivariateSpline(_SHIFTS_PX, _LOG_BLURS, doubts)(shift, log_blur)
@@ -40,42 +44,40 @@ def common_spread_px(pieces: Pieces, blur_px: float, terms: int, knots: Knots, r
 
 
 def doubts_of(pieces: Pieces, shifts_px: np.ndarray, blurs_px: np.ndarray, terms: int, knots: Knots,
-              robust: np.ndarray, no_chance: float = np.inf) -> np.ndarray:
-    """Minus twice the log evidence (m, b) of common shifts, shifts_px (m,), and blurs, blurs_px (b,), by so many waves
-    at the first, middle and last of the knots along the rod, each wave as strong as is most probable. robust (s,):
-    weight of each piece. no_chance: those above the least by so much need not be the most probable."""
+              robust: np.ndarray, no_chance: float = np.inf, wider: Sequence[float] = (1.0,)) -> np.ndarray:
+    """Minus twice the log evidence (w, m, b) of rods so many times as thick, wider (w,), at common shifts, shifts_px
+    (m,), and blurs, blurs_px (b,), by so many waves at the first, middle and last of the knots along the rod, each wave
+    as strong as is most probable. robust (s,): weight of each piece. no_chance: those above the least by so much need
+    not be the most probable."""
     along = knots.place_mm[sorted({0, len(knots.place_mm) // 2, len(knots.place_mm) - 1})]
     knots = Knots(along, knots.turn_rad, knots.turns)
     own, turned = np.linalg.eigh(between_knots(knots))  # of knots so mixed each wave has a variance of its own
-    normal = _normal_equations(pieces, shifts_px, blurs_px, terms, knots.weights(pieces) @ turned, robust)
-    return _doubts(*normal, own, contrast_of(pieces), no_chance).reshape(len(shifts_px), len(blurs_px))
+    models = [(factor, blur) for factor in wider for blur in blurs_px]
+    contrasts = [contrast_of(replace(pieces, radius_px=factor * pieces.radius_px)) for factor in wider]
+    contrast = np.tile(np.repeat(contrasts, len(blurs_px)), len(shifts_px))
+
+    def asked(each_pixel: bool) -> np.ndarray:
+        normal = Gathered(pieces, knots.weights(pieces) @ turned, robust, each_pixel=each_pixel).normal(
+            shifts_px, models, terms)
+        return _doubts(*(part.reshape(-1, *part.shape[2:]) for part in normal), own, contrast, no_chance)
+
+    doubts = exactly_if_needed(asked)
+    return doubts.reshape(len(shifts_px), len(wider), len(blurs_px)).transpose(1, 0, 2)
 
 
-def _normal_equations(pieces: Pieces, shifts_px, blurs_px, terms: int, hats, robust):
-    """Normal matrices (g, size, size), right sides (g, size) and squares (g,) at each shift and blur."""
-    normal = []
-    for shift in shifts_px:
-        moved = pieces.moved(np.full(len(pieces), shift))
-        for blur in blurs_px:
-            equations = Equations(moved, blur, terms)
-            normal.append((*equations.shared(hats, robust), robust @ equations.power))
-    left, right, power = (np.array(column) for column in zip(*normal))
-    return left, right, power
-
-
-def _doubts(left, right, power, own, contrast: float, no_chance: float) -> np.ndarray:
+def _doubts(left, right, power, own, contrast, no_chance: float) -> np.ndarray:
     """Minus twice the log evidence (g,) of such normal equations, each wave as strong as is most probable; see
-    `doubts_of`. own (knots,): inverse variances of a wave's coefficients over its strength's."""
+    `doubts_of`. own (knots,): inverse variances of a wave's coefficients over its strength's; contrast (g,)."""
     count, terms = len(own), left.shape[1] // len(own)
-    strength = np.tile(contrast * WAVE_SHARE[:terms], (len(left), 1))
-    low, high = contrast * np.array(_STRENGTHS)
+    strength = contrast[:, None] * WAVE_SHARE[:terms]
+    low, high = (contrast[:, None] * share for share in _STRENGTHS)
     doubts, some = np.empty(len(left)), np.arange(len(left))
     for number in range(_ROUNDS + 1):
         stiff = (own[:, None] * strength[some, None] ** -2.0).reshape(len(some), -1)
         waves, variances, log_det = _most_probable(left[some], right[some], stiff)
         doubts[some] = power[some] - np.sum(right[some] * waves, axis=1) + log_det - np.sum(np.log(stiff), axis=1)
         asked = own @ (waves**2 + variances).reshape(-1, count, terms)
-        strength[some, 1:] = np.clip(np.sqrt(asked / count), low, high)[:, 1:]
+        strength[some, 1:] = np.clip(np.sqrt(asked / count), low[some], high[some])[:, 1:]
         if number >= _FIRST_ROUNDS:
             some = some[doubts[some] < doubts.min() + no_chance]
     return doubts

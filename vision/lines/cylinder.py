@@ -26,7 +26,7 @@ def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, 
     ratio = _one_ratio(radius_px, blur_px)
     if ratio is None:
         values = np.empty((*offset_px.shape, terms + 2 + room))
-        for some in _alike(radius_px[:, 0]):
+        for some in alike(radius_px[:, 0]):
             values[some] = shading_basis(offset_px[some], radius_px[some], blur_px, terms, weight[some], room)
         return values
     rows, table = _table(ratio, terms)
@@ -42,6 +42,14 @@ def shading_basis(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float, 
     return (between @ wide).reshape(*before.shape, wide.shape[1])
 
 
+def profiles(offset_px: np.ndarray, radius_px: float, blur_px: float, terms: int) -> np.ndarray:
+    """As `shading_basis`, of a few distances (...) from one cylinder's axis."""
+    rows, table = _table(max(radius_px, _LEAST_RADIUS_PX) / blur_px, terms)
+    before, part = _places(offset_px / max(radius_px, _LEAST_RADIUS_PX), rows, len(table))
+    here = table[before]
+    return here + part[..., None] * (table[before + 1] - here)
+
+
 def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,
               waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and second derivatives (2, s, p) each, by offset, per px and per px², of what s cylinders add to the light
@@ -52,7 +60,7 @@ def slopes_of(offset_px: np.ndarray, radius_px: np.ndarray, blur_px: float,
     ratio = _one_ratio(radius_px, blur_px)
     slopes, curvatures = np.empty((2, 2, *offset_px.shape))
     if ratio is None:
-        for some in _alike(radius_px):
+        for some in alike(radius_px):
             slopes[:, some], curvatures[:, some] = slopes_of(offset_px[some], radius_px[some], blur_px, waves[some])
         return slopes, curvatures
     radius_px, terms = radius_px[:, None], waves.shape[1]
@@ -87,8 +95,10 @@ def _one_ratio(radius_px, blur_px: float) -> float | None:
     return 0.5 * (least + most) / blur_px if same else None
 
 
-def _alike(radius_px) -> list[np.ndarray]:
+def alike(radius_px: np.ndarray) -> list[np.ndarray]:
     """Of radii (s,) the places of those that are nearly the same, group by group."""
+    if _one_ratio(radius_px, 1.0) is not None:
+        return [np.arange(len(radius_px))]
     group = np.floor(np.log(np.maximum(radius_px, _LEAST_RADIUS_PX)) / np.log1p(_SAME_RADIUS))
     return [np.flatnonzero(group == one) for one in np.unique(group)]
 

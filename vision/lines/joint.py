@@ -13,12 +13,14 @@ what is shared is found with pixels weighed by no more than that leaves them.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from vision.lines.bands import Pieces
 from vision.lines.common_shift import common_spread_px
+from vision.lines.gathered import Gathered, exactly_if_needed
 from vision.lines.shading import LEAST_POWER, LONGEST_PX, Equations, Knots, Slopes, contrast_of, stiffness, wave_prior
 
 BLUR_SIGMA = 0.25  # of the logarithm of the blur: a lens in focus, 0.5 to 1.3 px with the pixel's own width
@@ -77,6 +79,11 @@ class Task:
     blur_sigma: float = BLUR_SIGMA
     seen_blur_px: float | None = None
 
+    @cached_property
+    def hats(self) -> np.ndarray:
+        """How much each knot has in the shading of each piece, (s, knots)."""
+        return self.knots.weights(self.pieces)
+
     def of(self, some: slice) -> "Task":
         """The same of some of the pieces."""
         return replace(self, pieces=self.pieces.select(some))
@@ -127,19 +134,40 @@ def _start(task: Task) -> tuple[float, float]:
     if task.seen_blur_px is not None:
         return 0.0, float(np.log(task.seen_blur_px))
     task = task.of(slice(None, None, 1 + len(task.pieces) // _STARTS_BY)).tempered()
-    blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
-    begins = sorted((_begin(task, shift, blur) for shift in _SHIFTS_PX for blur in blurs), key=lambda one: one.doubt)
-    robust, chosen = begins[0].weighted().robust, []
+    log_blurs = np.log(task.blur_px) + task.blur_sigma * np.array(_BLUR_SIGMAS)
+    doubts = exactly_if_needed(lambda each_pixel: _doubts_of_starts(task, log_blurs, each_pixel))
+    ranked = np.unravel_index(np.argsort(doubts, axis=None), doubts.shape)
+    begins = list(zip(_SHIFTS_PX[ranked[0]].tolist(), log_blurs[ranked[1]].tolist()))
+    robust, chosen = _begin(task, *begins[0]).weighted().robust, []
     for one in begins:
-        if all(abs(one.shift_px[0] - other.shift_px[0]) > _APART_PX for other in chosen):
+        if all(abs(one[0] - other[0]) > _APART_PX for other in chosen):
             chosen.append(one)
-    ends = (_descend(_Point.at(task, one.shift_px, one.log_blur, robust), _ROUGHLY) for one in chosen[:_MOST_STARTS])
+    ends = (_descend(_begin(task, *one, robust), _ROUGHLY) for one in chosen[:_MOST_STARTS])
     best = min(ends, key=lambda one: one.doubt)
     return float(np.median(best.shift_px)), float(np.log(best.blur_px))
 
 
-def _begin(task: Task, shift_px: float, log_blur: float) -> "_Point":
-    return _Point.at(task, np.full(len(task.pieces), shift_px), log_blur, np.ones(len(task.pieces)))
+def _doubts_of_starts(task: Task, log_blurs: np.ndarray, each_pixel: bool) -> np.ndarray:
+    """Minus twice the log evidence (m, b) of all pieces moved by each of _SHIFTS_PX, at these blurs; see
+    `_Point.doubt`."""
+    pieces, every = task.pieces, np.ones(len(task.pieces))
+    models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
+    gathered = Gathered(pieces, task.hats, every, each_pixel=each_pixel)
+    left, right, power = gathered.normal(_SHIFTS_PX, models, task.terms)
+    doubts = power + ((log_blurs - np.log(task.blur_px)) / task.blur_sigma) ** 2
+    for k, shift in enumerate(_SHIFTS_PX):
+        stiff = stiffness(wave_prior(pieces.moved(shift * every), task.terms), task.knots)
+        doubts[k] -= np.linalg.slogdet(stiff)[1]
+        for b in range(len(log_blurs)):
+            factor = cho_factor(left[k, b] + stiff, check_finite=False)
+            doubts[k, b] += 2.0 * np.sum(np.log(np.diag(factor[0])))
+            doubts[k, b] -= right[k, b] @ cho_solve(factor, right[k, b], check_finite=False)
+    return doubts
+
+
+def _begin(task: Task, shift_px: float, log_blur: float, robust: np.ndarray | None = None) -> "_Point":
+    every = np.ones(len(task.pieces))
+    return _Point.at(task, shift_px * every, log_blur, every if robust is None else robust)
 
 
 def _descend(here: "_Point", roughly: float = 1.0) -> Shared:
@@ -188,7 +216,7 @@ class _Point:
             equations = Equations(task.pieces.moved(shift_px), float(np.exp(log_blur)), task.terms)
         if stiff is None:
             stiff = stiffness(wave_prior(equations.pieces, task.terms), task.knots)
-        hats = task.knots.weights(task.pieces)
+        hats = task.hats
         left, right = equations.shared(hats, robust)
         left += stiff
         shared = cho_solve(cho_factor(left, check_finite=False), right, check_finite=False)
@@ -227,7 +255,7 @@ class _Arrow:
     def __init__(self, point: _Point):
         task = point.task
         self.point, self.slopes = point, point.equations.linearised(point.waves)
-        hats, slopes, size = task.knots.weights(task.pieces), self.slopes, len(point.left)
+        hats, slopes, size = task.hats, self.slopes, len(point.left)
         self.power, self.right = slopes.power, slopes.gram[:, 0, 2]
         by_waves = (hats[:, :, None] * slopes.rod[:, None, 0]).reshape(len(hats), size)
         self.cross = np.concatenate([by_waves, slopes.gram[:, 0, 1:2]], axis=1)

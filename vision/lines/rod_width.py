@@ -5,14 +5,12 @@ no width. But light that the lens leaves outside the edges has the background be
 the most probable light is taken, with each common shift of the line and each blur that may go with it.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from vision.lines.bands import Pieces
 from vision.lines.binned import binned
-from vision.lines.common_shift import EVIDENCE_COUNTS, doubts_of
+from vision.lines.common_shift import EVIDENCE_COUNTS, NO_CHANCE, doubts_of
 from vision.lines.joint import BLUR_SIGMA, Task
 from vision.lines.shading import Knots
 from vision.lines.trace import BIN_PX, WIRE_WAVES
@@ -33,14 +31,14 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     """
     some = pieces.select(slice(None, None, 1 + len(pieces) // _TOLD_BY))
     pieces = Task(binned(some, BIN_PX)[0], WIRE_WAVES, knots, blur_px).tempered().pieces
-    rough = [_against(pieces, log, np.zeros(1), blur_px, knots) for log in _LOG_WIDTHS]
+    rough = _against(pieces, _LOG_WIDTHS, np.zeros(1), blur_px, knots, NO_CHANCE)
     best = float(_LOG_WIDTHS[np.argmin(rough)])
     if best in _LOG_WIDTHS[[0, -1]]:
         return None
     if best == 0.0:
         return 0.0, 0.5 * _STEP
     logs = best + _NEAR
-    against = np.array([_against(pieces, log, _LOG_BLURS, blur_px, knots) for log in logs])
+    against = _against(pieces, logs, _LOG_BLURS, blur_px, knots, np.inf)
     overstated = max(1.0, against.min() / max(int(np.sum(pieces.weight > 0)), 1))
     fine = np.linspace(logs[0], logs[-1], _FINE)
     left = CubicSpline(logs, EVIDENCE_COUNTS / overstated * (against - against.min()))(fine)
@@ -49,10 +47,11 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     return mean, float(np.sqrt(np.average((fine - mean) ** 2, weights=chance)))
 
 
-def _against(pieces: Pieces, log: float, log_blurs: np.ndarray, blur_px: float, knots: Knots) -> float:
-    """Minus twice the log evidence of pieces so much thicker, at the best common shift and blur."""
-    wider = replace(pieces, radius_px=np.exp(log) * pieces.radius_px)
-    doubts = doubts_of(wider, _SHIFTS_PX, blur_px * np.exp(log_blurs), WIRE_WAVES, knots, np.ones(len(pieces)))
+def _against(pieces: Pieces, logs: np.ndarray, log_blurs: np.ndarray, blur_px: float, knots: Knots,
+             no_chance: float) -> np.ndarray:
+    """Minus twice the log evidence (w,) of pieces so much thicker, at the best common shift and blur."""
+    doubts = doubts_of(pieces, _SHIFTS_PX, blur_px * np.exp(log_blurs), WIRE_WAVES, knots, np.ones(len(pieces)),
+                       no_chance, np.exp(logs))
     doubts += (log_blurs / BLUR_SIGMA) ** 2
     fine = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
-    return float(np.min(CubicSpline(_SHIFTS_PX, doubts)(fine)))
+    return np.min(CubicSpline(_SHIFTS_PX, doubts, axis=1)(fine), axis=(1, 2))

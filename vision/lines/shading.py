@@ -11,10 +11,11 @@ from vision.lines.bands import Pieces
 from vision.lines.cylinder import shading_basis, slopes_of
 
 LEAST_POWER = 1e-9  # 1/px², of a piece that does not tell where it is
-_WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
+WEAK = 1e-6  # keeps a background that a piece cannot tell from making its equations singular
 # Light on a rod that turned by more is another light: before a lamp's highlight a fan of 24 degrees, taken as lit
 # alike, moved all lines by half a pixel, and by a quarter of one from end to end.
 _LIT_ALIKE_RAD = np.radians(8.0)
+_REACH_BLURS = 4.5  # beyond its edge, where a blurred rod has 3e-6 of its light
 LONGEST_PX = 0.7  # a step: beyond, a thin rod's edge is another's
 
 
@@ -112,7 +113,9 @@ class Equations:
     """
 
     def __init__(self, pieces: Pieces, blur_px: float, terms: int):
-        self.pieces, self.blur_px, weight = pieces, blur_px, pieces.weight
+        self.pieces, self.blur_px = pieces, blur_px
+        self._near, self._far = _parted(pieces, blur_px)
+        pieces, weight = self._near, self._near.weight
         # of each pixel the light, the background by gain and offset, what is seen
         columns = shading_basis(pieces.offset_px, pieces.radius_px[:, None], blur_px, terms, weight, 1)
         leaked, open_share = _not_leaked(pieces, columns[..., -3:-1], blur_px), weight - columns[..., 0]
@@ -120,8 +123,9 @@ class Equations:
         columns[..., -2] = open_share
         columns[..., -1] = pieces.grey * weight
         self._columns, normal = columns, columns.transpose(0, 2, 1) @ columns
+        normal[:, -3:, -3:] += self._far
         self._around = normal[:, -3:-1]
-        self._inverse = _inverse_of_two(self._around[:, :, -3:-1] + _WEAK * np.eye(2))
+        self._inverse = _inverse_of_two(self._around[:, :, -3:-1] + WEAK * np.eye(2))
         normal = normal - self._around.transpose(0, 2, 1) @ (self._inverse @ self._around)
         self.gram, self.moment, self.power = normal[:, :terms, :terms], normal[:, :terms, -1], normal[:, -1, -1]
 
@@ -143,10 +147,11 @@ class Equations:
 
     def linearised(self, waves: np.ndarray) -> "Slopes":
         """How pieces of this shading, waves (s, terms), change with position and blur; what leaks is taken to stay."""
-        pieces, pixels, terms = self.pieces, self._columns, waves.shape[1]
+        pieces, pixels, terms = self._near, self._columns, waves.shape[1]
         seen, behind = pixels[..., -1], pixels[..., -3:-1]
         left = seen - (pixels[..., :terms] @ waves[..., None])[..., 0]
-        explained = self._inverse @ (behind.transpose(0, 2, 1) @ left[..., None])  # gain and constant
+        beyond = self._far[:, :2, 2:]  # where nothing is lit, so that all that is seen is left
+        explained = self._inverse @ (behind.transpose(0, 2, 1) @ left[..., None] + beyond)  # gain and constant
         by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
         slopes, curvatures = slopes_of(pieces.offset_px, pieces.radius_px, self.blur_px, waves)
         columns = np.empty((len(pieces), 3, left.shape[1]))
@@ -155,9 +160,11 @@ class Equations:
         columns[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
         columns[:, :2] *= pieces.weight[:, None]
         columns[:, 2] = left
-        mixed = columns @ pixels
+        mixed, gram = columns @ pixels, columns @ columns.transpose(0, 2, 1)
+        mixed[:, 2, -3:] += self._far[:, 2]
+        gram[:, 2, 2] += self._far[:, 2, 2]
         reduced = mixed[..., -3:-1] @ self._inverse
-        gram = columns @ columns.transpose(0, 2, 1) - reduced @ mixed[..., -3:-1].transpose(0, 2, 1)
+        gram -= reduced @ mixed[..., -3:-1].transpose(0, 2, 1)
         rod = (mixed - reduced @ self._around)[:, :2, :terms]
         covered = left - seen - pixels[..., 0] * by_cover
         return Slopes(rod, gram, np.sqrt(np.sum(covered**2, axis=1)))
@@ -186,6 +193,19 @@ class Slopes:
     def own_sigma_px(self, chi2: np.ndarray) -> np.ndarray:
         """Sigma of each piece's position by itself (s,), where it leaves chi2 (s,) per pixel."""
         return np.sqrt(np.maximum(chi2, 1.0) / self.power)
+
+
+def _parted(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.ndarray]:
+    """The pieces without pixels at their two ends that no light of a rod reaches, and these pixels' products
+    (s, 3, 3) of background, 1 and what is seen with each other."""
+    near = np.abs(pieces.offset_px) < pieces.radius_px[:, None] + _REACH_BLURS * blur_px
+    near &= pieces.weight > 0
+    first, last = np.flatnonzero(np.any(near, axis=0))[[0, -1]] if np.any(near) else (0, -1)
+    ends = (slice(None, first), slice(last + 1, None))
+    background, seen, weight = (np.concatenate([part[:, end] for end in ends], axis=1)
+                                for part in (pieces.background, pieces.grey, pieces.weight))
+    far = np.stack([background * weight, weight, seen * weight], axis=1)
+    return pieces.columns(slice(first, last + 1)), far @ far.transpose(0, 2, 1)
 
 
 def _inverse_of_two(matrices) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.rods import Wire
-from vision.geometry.silhouette import outline
+from vision.geometry.silhouette import edges, normals
 from vision.lines.bands import Pieces, cut_pieces, read_band
 from vision.lines.binned import binned, without
 from vision.lines.joint import BLUR_SIGMA, Task, settled, solve_jointly
@@ -28,22 +28,23 @@ _WORST_SIGMA_PX = 0.5
 _WORST_MISFIT = 6.0
 
 
-def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int) -> Pieces:
-    """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame."""
-    outlines = [_outline(view.camera, curve, wire) for curve in curves.values()]
+def wire_pieces(view: View, curves: Mapping[int, Curves], wire: Wire, length_px: int, margin_px: int,
+                still: np.ndarray | None = None) -> Pieces:
+    """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame. still (h, w): another
+    background, for a look that asks for no light."""
+    arc, middles, radii = _outlines(view.camera, curves, wire)
     # one width for all bands: a wire may pass from one whole pixel of radius to the next within a whisk
-    half = int(np.ceil(max(np.nanmax(radius) for *_, radius in outlines))) + margin_px
-    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half, _hidden(view, frame))
-             for frame, (arc, middle, radius) in zip(curves, outlines)]
+    half = int(np.ceil(np.nanmax(radii))) + margin_px
+    bands = [read_band(view.frames[frame], view.background, middle, arc, radius, half, _hidden(view, frame), still)
+             for frame, middle, radius in zip(curves, middles, radii)]
     pieces = cut_pieces(bands, length_px, view.noise)
     return replace(pieces, source=np.array(list(curves))[pieces.source])  # the frame's index, not the band's number
 
 
 def lines_of(camera: Camera, wire: Wire, curves: Mapping[int, Curves]) -> RodLines:
     """What a wire of these centrelines, by frame, is in a camera's pictures."""
-    outlines = [_outline(camera, curve, wire) for curve in curves.values()]
-    half_px = np.array([np.max(radius) for *_, radius in outlines])
-    return RodLines(np.array(list(curves), dtype=int), np.array([middle for _, middle, _ in outlines]), half_px)
+    _, middles, radii = _outlines(camera, curves, wire)
+    return RodLines(np.array(list(curves), dtype=int), middles, np.max(radii, axis=1))
 
 
 def _hidden(view: View, frame: int) -> np.ndarray | None:
@@ -51,12 +52,19 @@ def _hidden(view: View, frame: int) -> np.ndarray | None:
     return covered(view.others, frame, view.frames[frame].shape)
 
 
-def _outline(camera: Camera, curve: Curves, wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Arc (n,) in mm, middle (n, 2) and half-width (n,) in px of the wire."""
+def _outlines(camera: Camera, curves: Mapping[int, Curves],
+              wire: Wire) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Arc (n,) in mm, middle (f, n, 2) and half-width (f, n) in px of the wire in each of f frames."""
+    every = list(curves.values())
     arc = np.linspace(2.0, wire.length_mm - 1.0, _NODES)
-    points, tangents = curve.at(arc)
-    directions = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
-    return arc, *outline(camera, points, directions, wire.radius_mm(arc))
+    points, tangents = Curves(every[0].arc_mm, *(np.stack(part) for part in zip(
+        *((curve.points_mm, curve.tangents) for curve in every)))).at(arc)
+    directions = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
+    one, other = (edge.reshape(len(every), _NODES, 2) for edge in edges(
+        camera, points.reshape(-1, 3), directions.reshape(-1, 3), np.tile(wire.radius_mm(arc), len(every))))
+    middle = 0.5 * (one + other)
+    half_px = 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=-1))
+    return arc, middle, half_px
 
 
 def clear_of_bar(pieces: Pieces, middle_px: np.ndarray, radius_px: np.ndarray, margin_px: float) -> np.ndarray:

@@ -72,7 +72,8 @@ def _gain(grey: np.ndarray, first: np.ndarray) -> float:
     """Of still pixels (n,) over the same of the first picture: sums of those near the median, which whole grey levels
     would make coarse."""
     ratio = grey / first
-    still = np.abs(ratio - np.median(ratio)) < _STILL * np.median(ratio)
+    middle = np.median(ratio)
+    still = np.abs(ratio - middle) < _STILL * middle
     return float(grey[still].sum() / first[still].sum()) if still.any() else 0.0
 
 

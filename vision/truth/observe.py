@@ -56,13 +56,12 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
     Refused only for input that no trial could be seen with.
     """
     try:
-        seen, bar_seen, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
+        seen, bar_seen, _ = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
         return _nothing(whisks, str(reason))
     rows = tuple(_see_whisk(whisk) for whisk in seen)
-    motor_rad = np.asarray(pictures.motor_rad, dtype=float)
     axis, light = drawn_as_bar(bar_seen.axis), [whisk.light for whisk in seen]
-    looks = seen_over_given(stands, bar_seen, rods, motor_rad, settings)
+    looks = seen_over_given(bar_seen)
     bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 

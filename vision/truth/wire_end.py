@@ -69,19 +69,19 @@ def _seen_along(view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]) 
     """Places (b,) along the wire, mm, clear of hub and bar, and the evidence of it in one camera there."""
     length_mm = whisk.rods.wire.length_mm
     wire = replace(whisk.rods.wire, length_mm=max(length_mm, _in_picture_mm(view.camera, curves, length_mm)))
-    still = replace(view, background=median_of([view.frames[frame] for frame in curves]))
-    pieces, standing = (wire_pieces(one, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX) for one in (view, still))
+    still = median_of([view.frames[frame] for frame in curves])
+    pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, still)
     outline = outline_of_bar(view.camera, whisk.bar.axis, whisk.bar_swept_mm)
     clear = clear_of_bar(pieces, *outline, _BESIDE_BAR_PX)
-    return _binned(pieces.place[clear], _evidence(pieces.select(clear), standing.select(clear)))
+    return _binned(pieces.place[clear], _evidence(pieces.select(clear)))
 
 
-def _evidence(pieces: Pieces, still: Pieces) -> np.ndarray:
-    """By how much (s,) each piece's middle differs from both pictures more than what is beside it does: the logarithm
+def _evidence(pieces: Pieces) -> np.ndarray:
+    """By how much (s,) each piece's middle differs from both backgrounds more than what is beside it does: the log
     of their mean squares over the noise's. NaN where too little of it is in the picture."""
     there, away = pieces.weight > 0, np.abs(pieces.offset_px) - pieces.radius_px[:, None]
     middle, beside = there & (away < 0.0), there & (away > _GAP_PX)
-    left = [(one.grey - one.background) * one.weight for one in (pieces, still)]
+    left = [(pieces.grey - behind) * pieces.weight for behind in (pieces.background, pieces.still)]
     left = [one - _mean(one, beside)[:, None] for one in left]
     both = np.where(left[0] * left[1] > 0.0, np.minimum(left[0] ** 2, left[1] ** 2), 0.0)
     return np.log1p(_mean(both, middle)) - np.log1p(_mean(both, beside))

@@ -67,5 +67,9 @@ def test_a_line_breaks_where_a_point_is_missing():
 
 
 def test_a_painted_picture_carries_its_hash(tmp_path):
-    save_picture(Image.fromarray(np.zeros((4, 4, 3), np.uint8)), tmp_path / "a.png", "x")
+    painted = np.arange(4 * 5 * 3, dtype=np.uint8).reshape(4, 5, 3)
+    save_picture(painted, tmp_path / "a.png", "x")
     assert is_drawn(tmp_path / "a.png", "x") and not is_drawn(tmp_path / "a.png", "y")
+    with Image.open(tmp_path / "a.png") as picture:
+        picture.verify()  # the checksums of all parts
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")), painted)

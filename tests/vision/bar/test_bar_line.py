@@ -98,6 +98,6 @@ def test_what_lies_beside_a_bar_is_less_clearly_one(rng):
     view = noisy_view(*SCENES["painted, flat background"], angle, 0.4, rng)
     there, beside = (BarAxis((0.4 + aside) * across, np.array([np.cos(angle), np.sin(angle), 0.0]))
                      for aside in (0.0, 2.0 * RADIUS_MM))
-    clear = [find_lines([view], axis, RADIUS_MM, {}, VisionSettings(), 3.0)[view.camera.name].clearness
+    clear = [find_lines([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name].clearness
              for axis in (there, beside)]
     assert clear[1] < 0.25 * clear[0]

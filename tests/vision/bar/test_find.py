@@ -25,7 +25,7 @@ def test_squares_of_the_board_in_a_soft_shadow_are_no_edges(rng):
     seen = np.where(np.abs(x - 140.0) < 8.0, 100.0, board * shadow)
     noisy = [picture + rng.standard_normal(board.shape) for picture in (seen, board)]
     edges = edges_of(*noisy, 1.0)
-    across = edges[0, 20:-20]
+    across = edges[20:-20, :, 0]
     assert np.mean(np.max(across[:, 131:135], axis=1)) > 0.5
     assert np.mean(across[:, [24, 25, 49, 50, 74, 75, 99, 100]]) < 0.1
 

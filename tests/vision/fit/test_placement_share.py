@@ -68,8 +68,8 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     assert sum(told.values()) == pytest.approx(whole, rel=1e-6)
     assert told["cameras"] == pytest.approx(without["cameras"], rel=1e-6)
     assert np.isnan(untold["placement"]) and untold["cameras"] == pytest.approx(told["cameras"] + told["placement"])
-    # all cameras moved together move bar and whisker alike: when they touch stays, to a hundredth of the board's 0.1°
+    # all cameras moved together move bar and whisker alike: when they touch stays, to a fiftieth of the board's 0.1°
     touch = variance_by_cause(problem, state, uncertainty(problem, state, answer), by.whisk["touch"])["placement"]
-    assert np.sqrt(touch) < 0.01 * np.radians(0.1)
+    assert np.sqrt(touch) < 0.02 * np.radians(0.1)
     # a board known to 0.1 mm shifts d_x by about as much, its turns on top
     assert 0.05 < np.sqrt(told["placement"]) < 0.3

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
 
-from bench.rig.protocol import WhiskerTable
+from bench.rig.protocol import MotorTable, PicturesTable, TrialTable, WhiskerTable
 from tests.ladder.coverage import SCALES
 from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit import problem as model
-from vision.fit import refinements, solve
+from vision.fit import solve
 from vision.fit.problem import Problem
 from vision.fit.quantities import jacobians
 from vision.fit.refinements import Fit, left_out
@@ -56,7 +56,7 @@ def sigmas(fit: Fit) -> np.ndarray:
     return np.array([np.sqrt(row @ fit.answer @ row) for row in rows])
 
 
-def small_angles(rest_mm, bend_rad, contact_mm, motor_rad, wire) -> Curves:
+def small_angles(rest_mm, bend_rad, contact_mm, motor_rad, wire, _pull=0.0) -> Curves:
     """Centrelines whose slopes are no sines and whose arcs are distances."""
     true, straight = (centreline.centrelines(rest_mm, bend, contact_mm, motor_rad, wire)
                       for bend in (bend_rad, np.zeros_like(bend_rad)))  # fmt: skip
@@ -110,13 +110,17 @@ def test_a_tilt_that_is_held_is_held():
     assert found.d_x_mm == pytest.approx(fit.by.whisk["d_x"] @ step)
 
 
-def test_a_pull_along_the_whisker_turns_a_uniform_rod_by_five_sixths_of_its_bend_squared():
-    """To what 41 nodes of a contact between two of them leave, 2 %."""
-    fit = drawn(3)
-    curves, arcs = model.curves_of(fit.problem, fit.state.vector, fit.state.arcs_mm)
-    gained = refinements._tension(fit.problem, fit.state, curves, arcs)[fit.last, -1, 1:]
-    bend = model.bends(fit.problem, fit.state.vector)[fit.last]
-    np.testing.assert_allclose(gained, -5 / 6 * np.linalg.norm(bend) * bend, rtol=0.02)
+def test_friction_along_the_whisker_is_what_a_fit_without_any_differs_by(monkeypatch):
+    """In a push of 16 degrees that is held, which shows it."""
+    held = [TrialTable(beta_deg=0.0, friction=0.3, static_friction=0.3)]
+    motor, pictures = MotorTable(after_deg=16.1), PicturesTable(after_deg=16.0, step_deg=2.0)
+    scene = draw_scene(3, whisker=WhiskerTable(), trials=held, motor=motor, pictures=pictures)
+    fit = fitted(as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene)))
+    predicted = told(fit, "friction along the whisker")
+    monkeypatch.setattr(solve, "PULL_PRIOR", 1e-6)
+    true = moved(fit, fitted(fit.problem))
+    assert np.all(np.abs(predicted - true) < 0.2 * np.abs(true) + 0.01 * sigmas(fit))
+    assert np.max(np.abs(true) / sigmas(fit)) > 0.1
 
 
 def test_light_from_one_side_moves_the_wire_in_its_camera_alone():

@@ -21,10 +21,10 @@ def noisy(rng, grey):
 
 def found(frame, background, still):
     """Places (s,) of the likeliest of straight lines at each piece, px, and whether it is sure."""
-    bands = [Band(np.tile(ACROSS, (ROWS, 1)), frame, known, np.zeros((ROWS, 2)), np.tile([0.0, 1.0], (ROWS, 1)),
-                  ALONG[:, 0], np.full(ROWS, 2.0)) for known in (background, still)]
-    pieces, others = (cut_pieces([band], PIECE_PX, Noise(NOISE**2, 0.0)) for band in bands)
-    best, sure = likely_curve([votes(pieces, others.background, 0.15, REACH_PX)], SHAPES, GRIDS)
+    band = Band(np.tile(ACROSS, (ROWS, 1)), frame, background, np.zeros((ROWS, 2)), np.tile([0.0, 1.0], (ROWS, 1)),
+                ALONG[:, 0], np.full(ROWS, 2.0), still)
+    pieces = cut_pieces([band], PIECE_PX, Noise(NOISE**2, 0.0))
+    best, sure = likely_curve([votes(pieces, 0.15, REACH_PX)], SHAPES, GRIDS)
     return SHAPES @ best, sure
 
 

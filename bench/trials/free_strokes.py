@@ -1,0 +1,37 @@
+"""How the channels drift over each free stroke of a trial, kept beside the calibration: a session of many trials asks
+for all of them at each run."""
+
+from dataclasses import dataclass
+
+from bench.base.results import hash_of, hash_of_code, read_result, write_result
+from bench.gauges.drift import FreeSlope, force_slope, free_slope
+from bench.gauges.felt import strokes_of
+from bench.records.plain import from_plain, to_plain
+from bench.session.signals import read_signals
+from bench.trials.unit import Unit
+
+_CODE = ("estimator", "bench/gauges", "bench/session", "bench/records", "bench/trials/free_strokes.py")
+
+
+@dataclass(frozen=True)
+class FreeStrokes:
+    """Of each stroke that has a touch: of the gauges' channels, and of the load cell's forces, where there is one."""
+
+    channels: tuple[FreeSlope, ...]
+    forces: tuple[FreeSlope, ...]
+
+
+def free_strokes(unit: Unit) -> FreeStrokes:
+    """A trial's, as kept, or found and kept."""
+    path = unit.out / "calibration" / "free" / f"{unit.trial.name}.json"
+    key, kept = hash_of(hash_of_code(_CODE), unit.files, unit.trial), read_result(path)
+    if not kept or kept.get("hash") != key:
+        kept = {"hash": key, "free": to_plain(_found(unit))}
+        write_result(path, kept)
+    return from_plain(FreeStrokes, kept["free"])
+
+
+def _found(unit: Unit) -> FreeStrokes:
+    strokes = strokes_of(read_signals(unit.trial), unit.trial, unit.settings)
+    found = [[slope(stroke) for stroke in strokes] for slope in (free_slope, force_slope)]
+    return FreeStrokes(*(tuple(slope for slope in some if slope is not None) for some in found))
