@@ -3,13 +3,14 @@
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/ladder/one_camera_less.py SCENES [PATTERN]
 
 SCENES as for path_traced.py. A row a scene: the least of the chances by which cameras that agree differ so; then the
-same with all lines of one camera shifted by SHIFT_PX, as of one that was knocked: by how many stated sigmas d_x is off,
-before and after these hold the contradiction, where one is told.
+same with lines of one camera shifted by SHIFT_PX, all as of one that was knocked, or of wire or bar alone as light may
+do: by how many stated sigmas d_x is off, before and after these hold the contradiction, where one is told.
 """
 
 import sys
 import tomllib
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -35,9 +36,10 @@ def fitted(folder: Path) -> tuple[Problem, State] | None:
     return found.problem, found.state
 
 
-def shifted(problem: Problem, camera: int) -> Problem:
-    """With all lines of a camera shifted."""
-    seen = [one if one.camera != camera else
+def shifted(problem: Problem, camera: int, which: str) -> Problem:
+    """With lines of a camera shifted: all, or those of wire or bar."""
+    spared = {"all": (), "wire": (True,), "bar": (False,)}[which]  # whether of the bar
+    seen = [one if one.camera != camera or (one.frame < 0) in spared else
             replace(one, points=replace(one.points, px=one.points.px + SHIFT_PX * one.points.normal))
             for one in problem.seen]  # fmt: skip
     return replace(problem, seen=seen)
@@ -62,10 +64,11 @@ def main() -> None:
         d_x_mm = tomllib.loads((folder / "trials/w/truth.toml").read_text())["d_x_mm"]
         chance, said, z = asked(*fit, d_x_mm)
         print(f"{folder.name:<6} chance {chance:.2g}  z of d_x {z[0]:+.1f}  {said}")
-        for camera in range(len(fit[0].cameras)):
-            chance, said, z = asked(shifted(fit[0], camera), fit[1], d_x_mm)
+        for which, camera in product(("all", "wire", "bar"), range(len(fit[0].cameras))):
+            chance, said, z = asked(shifted(fit[0], camera, which), fit[1], d_x_mm)
             told = "told" if said else "silent"
-            print(f"       {camera} off: chance {chance:.0e}, z {z[0]:+.1f} → {z[1]:+.1f}, {told}", flush=True)
+            print(f"       {which} of {camera} off: chance {chance:.0e}, z {z[0]:+.1f} → {z[1]:+.1f}, {told}",
+                  flush=True)
 
 
 if __name__ == "__main__":

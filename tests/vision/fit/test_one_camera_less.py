@@ -14,6 +14,8 @@ from vision.fit.uncertainty import uncertainty
 from vision.geometry.camera import Cameras
 
 THREE = Cameras((*CAMERAS.cameras, camera("three", (-80, -250, 200))))
+# The first two stand so near to each other that by themselves they hardly know how far away wire and bar are.
+NEAR = Cameras((CAMERAS.cameras[0], camera("near", (60, -190, 330)), camera("three", (-80, -250, 200))))
 
 
 def left_out(rng, cameras=THREE, off_px=0.0):
@@ -66,9 +68,28 @@ def test_a_camera_that_is_off_widens_the_sigmas_and_is_told(rng):
     """Two pixels of all lines, as of a camera that was knocked: the truth lies within three of the wider sigmas."""
     problem, _, fitted, measured, by, found = left_out(rng, off_px=2.0)
     said = contradiction(found)
-    assert said.startswith("the cameras see different whisks: without ") and "elsewhere (chance" in said
+    assert said.startswith("the cameras see different whisks: without ")
+    assert "px beside where the others have them (chance" in said
     whole = fitted.covariance + covariance_of(found, problem.size)
     gradient, error = by.whisk["d_x"], measured.whisk["d_x"] - 60.0
     before, after = (float(np.sqrt(gradient @ one @ gradient)) for one in (fitted.covariance, whole))
     assert abs(error) > 3.0 * before
     assert abs(error) < 3.0 * after
+
+
+def test_a_camera_off_is_told_where_the_others_hardly_know_the_bar(rng):
+    """What leaving it out moves is within what the others know; its lines are not where they have them."""
+    problem, _, fitted, measured, by, found = left_out(rng, NEAR, off_px=2.0)
+    third = found[2]
+    assert np.all(np.abs(third.moved) < 2.0 * third.moved_sigma)
+    assert third.contradicts
+    assert abs(third.beside) == pytest.approx(2.0, abs=4.0 * third.beside_sigma)
+    whole, gradient = fitted.covariance + covariance_of(found, problem.size), by.whisk["d_x"]
+    assert abs(measured.whisk["d_x"] - 60.0) < 3.0 * np.sqrt(gradient @ whole @ gradient)
+
+
+def test_cameras_that_hardly_know_the_bar_agree_with_a_third(rng):
+    problem, *_, found = left_out(rng, NEAR)
+    assert found[2].moved_sigma[0] > 3.0 * found[2].sigma[0]
+    assert contradiction(found) == ""
+    assert not covariance_of(found, problem.size).any()
