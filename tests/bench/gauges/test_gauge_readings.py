@@ -108,7 +108,7 @@ def test_no_touch_no_pairs(session, exactly_seen):
 
 
 def test_volts_are_read_as_late_as_the_gauges_filter_has_them(session, exactly_seen):
-    """A recording whose channels come 20 samples later, of which the trial says so by its filter, has the same volts."""
+    """A recording whose channels come 20 samples later, as the trial says by its filter, has the same volts."""
     trial = session.trial("gauge_roll0")
     stroke, late = strokes_of(read_signals(trial), trial, Settings())[0], 20
     later = {name: np.concatenate([np.repeat(every[:1], late, axis=0), every[:-late]])
