@@ -4,12 +4,12 @@ Where a session has no pictures the deflection is that of a nominal bar held sti
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import Stroke, gauge_delay
 from bench.gauges.matrix import to_follicle
 from bench.gauges.rod import moment_at_clamp
 from bench.records.trial import SeenWhisk
@@ -17,6 +17,7 @@ from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.beam import rigidity_at
 from estimator.signal import Touch
+from vision.truth.value import Value
 
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
@@ -64,11 +65,15 @@ class Pairs:
         return np.hypot(np.sqrt(np.diag(self.moments_covariance)).reshape(-1, 2), self.scale_sigma * self.moments)
 
 
+ON_TIME = Value(0.0, 0.0)  # rad
+
+
 @dataclass(frozen=True)
 class ReferenceMoments:
     """Moments (n, 2) in the hub's axes at motor angles motor_rad (n,), with covariance (2n, 2n); touch and distance.
 
-    scale_sigma: share by which all moments may be wrong together; not in the covariance.
+    scale_sigma: share by which all moments may be wrong together; not in the covariance. late_rad: by what the motor is
+    ahead of the volts of a moment.
     """
 
     touch_rad: float
@@ -78,6 +83,7 @@ class ReferenceMoments:
     moments: np.ndarray
     covariance: np.ndarray
     scale_sigma: float
+    late_rad: Value = ON_TIME
 
 
 def pairs_of(
@@ -91,6 +97,9 @@ def pairs_of(
     reference = reference_from_pictures(seen, whisker) if is_seen else reference_from_nominal(trial, touch, whisker)
     if reference is None:
         return None
+    if is_seen:  # a nominal one counts from felt touch, which is as late as the volts
+        delay_s, speed = gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s
+        reference = replace(reference, late_rad=Value(delay_s.value * speed, delay_s.sigma * speed))
     rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
     return _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
 
@@ -176,14 +185,15 @@ def _paired(
     rigid_Nmm: float,
     theta_rad: float,
 ) -> Pairs | None:
-    """Volts at the same motor angles, each from a short line through the samples around it. None where the wanted
-    pushing angle, as seen, is reached before a touch is felt."""
-    theta = reference.motor_rad - touch.motor_rad
+    """Volts at the same motor angles, but as late as the gauges' filter has them, each from a short line through the
+    samples around it. None where the wanted pushing angle, as seen, is reached before a touch is felt."""
+    late = reference.late_rad
+    theta = reference.motor_rad + late.value - touch.motor_rad
     half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(reference.motor_rad), initial=np.inf))
     after = theta > 0.5 * _LEAST_THETA_RAD
     read = [stroke.at(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)]
     kept = np.array([r is not None and not r.status for r in read], dtype=bool)
-    wanted = reference.touch_rad + theta_rad - touch.motor_rad
+    wanted = reference.touch_rad + theta_rad + late.value - touch.motor_rad
     if not kept.any() or wanted <= 0.0:
         return None
     read, rows = [r for r, keep in zip(read, kept) if keep], np.repeat(kept, 2)
@@ -196,8 +206,8 @@ def _paired(
         reference.theta_rad[kept],
         moments,
         covariance,
-        np.array([r.values for r in read]),
-        _volts_covariance(read, theta[kept], touch),
+        volts := np.array([r.values for r in read]),
+        _volts_covariance(read, theta[kept], touch) + _shared(volts / theta[kept, None] * late.sigma),
         to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
         at.values,
         reference.scale_sigma,
