@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces
+from vision.bar.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
 from vision.bar.posterior import Posterior, closer_look, first_look, most_probable, roughly
 from vision.bar.profiles import FULL_SCALE
 from vision.geometry.contact import BarAxis
@@ -171,7 +171,10 @@ def _shows(pieces: Pieces) -> bool:
 def _pieces(view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings) -> Pieces:
     """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit; saturated pixels weigh
     nothing."""
-    pieces = bar_pieces(view, view.noise.times(view.mean_share), axis, radius_mm, wires_px, settings)
+    noise = view.noise.times(view.mean_share)
+    pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
+    if len(pieces) < FEWEST_PIECES and view.itself is None:
+        pieces = beside_wires(bar_pieces(view, noise, axis, radius_mm, (), settings), wires_px)
     pieces = pieces.below(SATURATED * view.full_scale)
     scale = FULL_SCALE / view.full_scale
     return replace(pieces, grey=pieces.grey * scale, background=pieces.background * scale,

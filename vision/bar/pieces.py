@@ -20,6 +20,8 @@ _INNER_SHARE = 0.72
 _LEAST_IN_PICTURE = 0.5  # of a piece's pixels
 FEWEST_PIECES = 4
 _WORST_MISFIT = 3.0  # of the median piece's, or of what noise alone gives, if that is more
+_WIRE_PX = 6.0  # to either side of a wire's middle its pixels, and those that the lens spreads it to
+_LEAST_BESIDE = 0.3  # of a piece's pixels
 _KNOT_MM = 14.0
 NO_BAR = 3.5  # chi² per pixel: a bar before its background leaves 0.1 to 2
 
@@ -65,6 +67,18 @@ def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: flo
         across = np.abs(np.einsum("smi,si->sm", away, pieces.normal))
         clear &= ~np.any((along < margin_px) & (across < pieces.radius_px[:, None] + margin_px), axis=1)
     return clear
+
+
+def beside_wires(pieces: Pieces, wires_px: Sequence[np.ndarray]) -> Pieces:
+    """Pieces whose pixels near a wire weigh nothing, of those that have enough others: of a bar that a wire sweeps
+    along, where hardly a piece is clear of it."""
+    px = pieces.foot_px[:, None] + pieces.offset_px[..., None] * pieces.normal[:, None]
+    hidden = np.zeros(pieces.weight.shape, dtype=bool)
+    for line in wires_px:
+        for row, there in zip(hidden, px):
+            row |= np.min(np.linalg.norm(there[:, None] - line, axis=-1), axis=1, initial=np.inf) < _WIRE_PX
+    pieces = replace(pieces, weight=np.where(hidden, 0.0, pieces.weight))
+    return pieces.select(np.mean(pieces.weight > 0, axis=1) > _LEAST_BESIDE)
 
 
 def of_bar_alone(pieces: Pieces, placed: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
