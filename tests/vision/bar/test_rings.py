@@ -58,10 +58,10 @@ def find(views):
 
 
 def test_a_ring_is_found_where_it_is():
-    """So near that the fit, which has the wire too, does the rest."""
+    """So near that the fit does the rest: another ring along its rims is 15 mm off."""
     found = find(views_of((True, True)))
-    np.testing.assert_allclose(found.point_mm, STANDS.point_mm[0], atol=1.5)
-    assert abs(found.direction @ STANDS.direction[0]) > np.cos(np.radians(2.0))
+    np.testing.assert_allclose(found.point_mm, STANDS.point_mm[0], atol=2.5)
+    assert abs(found.direction @ STANDS.direction[0]) > np.cos(np.radians(3.0))
 
 
 def test_a_ring_in_one_camera_alone_is_refused():
