@@ -35,7 +35,7 @@ _AT_ONCE = 4000
 _REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)  # round by round, as the object is settled
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera tells as it was
 # Of a ring, which is also settled so near: with its edge to a camera, a tube has many edges.
-_NEAR = {"reaches_px": (5.0, 4.0, 4.0), "prior": np.array([1.5, 1.5, 0.02, 0.02, 1.5])}
+_NEAR_PX, _NEAR_PRIOR = (5.0, 4.0, 4.0), np.array([1.5, 1.5, 0.02, 0.02, 1.5])
 _LEAST_FILLED, _AS_FILLED, _APART_MM = 0.3, 0.95, 5.0
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 _ROUNDS = 6
@@ -81,9 +81,10 @@ def _see_ring(seen: Sequence[Differs], views, cameras: Cameras, rods: Rods, span
     """Of the places where a ring fills what differs, settled by its edges, that which fills it the best. Raises Refused
     where none does, or another as well."""
     places, radius_mm = likely_rings(seen, rods, span, partial(placed, rods.bar.form, rods)), rods.bar.radius_mm
-    looks = [(place, {}) for place in places]
-    looks += [(place, _NEAR) for place in sorted(places, key=lambda one: -filled(seen, one, radius_mm))[:_POLISHED]]
-    found = [settled(place, views, cameras, rods, wires, settings, **how)[0] for place, how in looks]
+    looks = [(place, ()) for place in places]
+    fullest = sorted(places, key=lambda one: -filled(seen, one, radius_mm))[:_POLISHED]
+    looks += [(place, (_NEAR_PX, _NEAR_PRIOR)) for place in fullest]
+    found = [settled(place, views, cameras, rods, wires, settings, *how)[0] for place, how in looks]
     shares = np.array([filled(seen, one, radius_mm) for one in found])
     best = found[int(np.argmax(shares))]
     if np.max(shares) < _LEAST_FILLED:
