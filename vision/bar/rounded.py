@@ -8,6 +8,7 @@ import numpy as np
 
 from vision.bar.find import Clear, apart_from_others, clear_edges, climb, spread_out
 from vision.bar.limb import STRETCHES, Limb, measure_limbs
+from vision.bar.rings import Differs, filled, likely_rings
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import axis_frame, shifted_axis
@@ -25,15 +26,17 @@ _EDGE_MM = 3.0  # half the width of a bar whose edges are as sharp as what is lo
 _SPREADS, _KEPT = (0.5, 0.2, 0.08), (24, 20, 12)
 _STARTS = 32
 # Of each side of an outline that a place is judged by; up to so far from where it is touched: cones end.
-_STATIONS, _OUTLINE_MM = 8, {"ring": 30.0, "sphere": 30.0, "cone": 20.0}
-_BETA_RAD, _PSI_RAD = np.radians(np.arange(-78.0, 79.0, 6.0)), np.radians([-8.0, 0.0, 8.0])
+_STATIONS, _OUTLINE_MM = 8, {"sphere": 30.0, "cone": 20.0}
+_BETA_RAD = np.radians(np.arange(-78.0, 79.0, 6.0))
 _CONE_RADII_MM, _ABOUT = np.array([3.0, 6.0, 12.0, 24.0]), np.array([0.6, 1.0, 1.7])  # mm; of what is told of it
 _WAY = 4  # index of the number that says on which side a cone's tip is
 _X_MM, _TOUCH_MM = 2.4, 2.4
 _AT_ONCE = 4000
-_BESIDE_MM, _FEWEST_SHOWN = 0.8, 3  # beside an edge; stations of a side that are not hidden
 _REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)  # round by round, as the object is settled
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])  # mm and rad: keeps what no camera tells as it was
+# Of a ring, which is also settled so near: with its edge to a camera, a tube has many edges.
+_NEAR_PX, _NEAR_PRIOR = (5.0, 4.0, 4.0), np.array([1.5, 1.5, 0.02, 0.02, 1.5])
+_LEAST_FILLED, _AS_FILLED, _APART_MM = 0.3, 0.95, 5.0
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 _ROUNDS = 6
 _MOST_SAID = 3.0  # by one stretch: a logarithm of probabilities
@@ -49,10 +52,12 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
     """Where it stands, by the pictures of all frames. still: a view's picture of what stands still, at every HALF-th
     pixel. Raises Refused where none is seen."""
     span = float(np.min(motor_rad)), float(np.max(motor_rad))
+    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
+    if rods.bar.form.shape == "ring":
+        return _see_ring([Differs.of(view, still(view)) for view in views], views, cameras, rods, span, wires, settings)
     small = Rods(rods.wire, Bar(2.0 * _EDGE_MM))
     clear = [clear_edges(view.camera, still(view), view.background[::HALF, ::HALF], small, sum(span) / 2)
              for view in views]
-    wires = {view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES)) for view in views}
     found: list[tuple[Rounded, float]] = []
     for axis in likely_places(clear, rods, span):
         found.append(settled(axis, views, cameras, rods, wires, settings))
@@ -62,11 +67,32 @@ def see_rounded(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: 
     axis, clearness = max((polished(axis, views, cameras, rods, wires, settings) for axis, _ in best),
                           key=lambda one: one[1])
     if clearness < _LEAST_CLEAR:
-        form = rods.bar.form
-        name = _NAMES[form.shape].format(ring=form.ring_diameter_mm, thick=rods.bar.diameter_mm,
-                                         angle=np.degrees(form.half_angle_rad))
-        raise Refused(f"no {name} is seen near the whisker; record with it in view of every camera")
+        raise Refused(f"no {_name(rods)} is seen near the whisker; record with it in view of every camera")
     return axis
+
+
+def _name(rods: Rods) -> str:
+    form = rods.bar.form
+    return _NAMES[form.shape].format(ring=form.ring_diameter_mm, thick=rods.bar.diameter_mm,
+                                     angle=np.degrees(form.half_angle_rad))
+
+
+def _see_ring(seen: Sequence[Differs], views, cameras: Cameras, rods: Rods, span, wires, settings) -> Rounded:
+    """Of the places where a ring fills what differs, settled by its edges, that which fills it the best. Raises Refused
+    where none does, or another as well."""
+    places, radius_mm = likely_rings(seen, rods, span, partial(placed, rods.bar.form, rods)), rods.bar.radius_mm
+    looks = [(place, ()) for place in places]
+    fullest = sorted(places, key=lambda one: -filled(seen, one, radius_mm))[:_POLISHED]
+    looks += [(place, (_NEAR_PX, _NEAR_PRIOR)) for place in fullest]
+    found = [settled(place, views, cameras, rods, wires, settings, *how)[0] for place, how in looks]
+    shares = np.array([filled(seen, one, radius_mm) for one in found])
+    best = found[int(np.argmax(shares))]
+    if np.max(shares) < _LEAST_FILLED:
+        raise Refused(f"no {_name(rods)} is seen near the whisker; record with it in view of every camera")
+    apart = np.array([np.linalg.norm(one.point_mm - best.point_mm) for one in found]) > _APART_MM
+    if np.max(shares[apart], initial=0.0) > _AS_FILLED * np.max(shares):
+        raise Refused(f"a {_name(rods)} may be in either of two places; record with all of it in view of every camera")
+    return best
 
 
 def polished(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods,
@@ -83,17 +109,19 @@ def polished(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods,
 
 
 def settled(axis: Rounded, views: Sequence[View], cameras: Cameras, rods: Rods,
-            wires: Mapping[str, Sequence[np.ndarray]], settings: VisionSettings) -> tuple[Rounded, float]:
+            wires: Mapping[str, Sequence[np.ndarray]], settings: VisionSettings,
+            reaches_px: Sequence[float] = _REACHES_PX, prior: np.ndarray = _PRIOR) -> tuple[Rounded, float]:
     """The object whose outline passes through the edges near that of a first one, and how clearly it is there, from
     -1 to 1: see `_clearness`, mean of the cameras."""
     radius_mm = rods.bar.radius_mm
-    for reach_px in _REACHES_PX:
+    for reach_px in reaches_px:
         limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px, rough=True)
         limbs = {name: limb for name, limb in limbs.items() if limb.asked}
         if not any(len(limb.points) for limb in limbs.values()):
             return axis, 0.0
         before = axis
-        axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm)
+        axis = settle_by_limbs(axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm,
+                               prior)
         if reach_px == _REACHES_PX[-1] and np.linalg.norm(axis.point_mm - before.point_mm) < _SETTLED_MM:
             break
     return axis, sum(_clearness(axis, cameras[name], limb, radius_mm) for name, limb in limbs.items()) / len(views)
@@ -107,13 +135,14 @@ def _clearness(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> f
     return float(np.sum(np.clip(there, -_MOST_SAID, _MOST_SAID))) / (2 * STRETCHES * _MOST_SAID)
 
 
-def settle_by_limbs(axis: Rounded, cameras: Cameras, limbs: Mapping[str, LinePoints], radius_mm: float) -> Rounded:
+def settle_by_limbs(axis: Rounded, cameras: Cameras, limbs: Mapping[str, LinePoints], radius_mm: float,
+                    prior: np.ndarray = _PRIOR) -> Rounded:
     """The object whose outline passes through edges in each camera; what they cannot tell stays as it was."""
     across, vector = axis_frame(axis.direction), np.zeros(5)
     for _ in range(_ROUNDS):
         here = moved(axis, across, vector)
         rows = [_rows(here, across, cameras[name], points, radius_mm) for name, points in limbs.items() if len(points)]
-        rows.append((-vector / _PRIOR, np.diag(1.0 / _PRIOR)))
+        rows.append((-vector / prior, np.diag(1.0 / prior)))
         left, jacobian = (np.concatenate(part) for part in zip(*rows))
         step = np.linalg.lstsq(jacobian, left, rcond=None)[0]
         vector = vector + step
@@ -139,7 +168,7 @@ def _rows(axis: Rounded, across, camera: Camera, points: LinePoints, radius_mm: 
 
 
 def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, float]) -> list[Rounded]:
-    """Objects whose outlines stand out the most in all cameras, of those that the whisker would touch."""
+    """Spheres or cones whose outlines stand out the most in all cameras, of those that the whisker would touch."""
     values, axis_of = hypotheses(rods, motor_rad)
     grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
     steps = np.array([0.5 * (one[1] - one[0]) for one in values])
@@ -147,7 +176,7 @@ def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, fl
     best = grid
     for spread, kept in zip(_SPREADS, _KEPT):
         near = [spread_out(one, spread * one.half_px) for one in clear]
-        score = partial(_clear_in_all, near, axis_of, rods.bar.radius_mm, spread == _SPREADS[-1])
+        score = partial(_clear_in_all, near, axis_of, rods.bar.radius_mm)
         if best is grid:
             best = apart_from_others(grid, score(grid), 4.0 * steps, _STARTS)
         best = apart_from_others(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
@@ -158,11 +187,12 @@ def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, fl
 
 def hypotheses(rods: Rods, motor_rad: tuple[float, float]) -> tuple[list[np.ndarray], Callable]:
     """Values of the numbers that say where the object is, and the objects (n, 3) that these (n, k) mean: where along
-    the whisker it is first touched, mm; at which motor angle; the slope there; and what its shape leaves free."""
+    the whisker it is first touched, mm; at which motor angle; the slope there; and of a cone what
+    its shape leaves free."""
     length, form = rods.wire.length_mm, rods.bar.form
     x = np.arange(10.0, length, _X_MM)
     touch = np.linspace(*motor_rad, max(3, int(np.ceil(np.ptp(motor_rad) * 0.5 * length / _TOUCH_MM))))
-    more = {"sphere": [], "ring": [_PSI_RAD, np.radians([-20.0, 0.0, 20.0])],
+    more = {"sphere": [],
             "cone": [np.log(0.5 * form.about_mm * _ABOUT if form.about_mm else _CONE_RADII_MM), np.array([-1.0, 1.0])],
             }[form.shape]
     return [x, touch, _BETA_RAD, *more], partial(placed, form, rods)
@@ -194,14 +224,13 @@ def placed(form: Form, rods: Rods, each: np.ndarray) -> Rounded:
     return Rounded(point, direction, form, spot)
 
 
-def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, shown: bool, each: np.ndarray
-                  ) -> np.ndarray:
+def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, each: np.ndarray) -> np.ndarray:
     """How clear both sides of the outlines of hypotheses (n, k) are, mean (n,) over the cameras, up to 1, geometric
-    where some see no outline; shown: of what an object does not hide of itself."""
+    where some see no outline."""
     groups = np.array_split(each, -(-len(each) // _AT_ONCE))
     found = []
     for some in groups:
-        each_sees = np.array([_outline_clear(axis_of(some), one, radius_mm, shown) for one in clear])
+        each_sees = np.array([_outline_clear(axis_of(some), one, radius_mm) for one in clear])
         seen = np.isfinite(each_sees)
         if np.all(seen):
             found.append(np.mean(each_sees, axis=0))
@@ -212,7 +241,7 @@ def _clear_in_all(clear: Sequence[Clear], axis_of: Callable, radius_mm: float, s
     return np.concatenate(found)
 
 
-def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float, shown: bool) -> np.ndarray:
+def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float) -> np.ndarray:
     camera = seen.camera
     limb, normals = axis.limb(camera.centre_mm, radius_mm, _OUTLINE_MM[axis.form.shape], _STATIONS)
     px = camera.project(np.concatenate([limb.reshape(-1, 3), (limb + 0.2 * normals).reshape(-1, 3)]))
@@ -226,10 +255,4 @@ def _outline_clear(axis: Rounded, seen: Clear, radius_mm: float, shown: bool) ->
     there = seen.field.reshape(-1, 3).take(row * width + column, axis=0).T
     edge = (x * x * there[0] + 2.0 * x * y * there[1] + y * y * there[2]).reshape(*limb.shape[:-1])
     edge[~np.isfinite(limb[..., 0])] = np.nan
-    if not shown or axis.form.shape != "ring":
-        return np.sqrt(np.prod(np.mean(edge, axis=-1), axis=-1))
-    hidden = axis.hides_itself(camera.centre_mm, limb + _BESIDE_MM * normals, radius_mm)
-    count = np.sum(~hidden, axis=-1)
-    sides = np.sum(np.where(hidden, 0.0, edge), axis=-1) / np.maximum(count, 1)
-    sides = np.where(count >= _FEWEST_SHOWN, sides, sides[..., ::-1])
-    return np.sqrt(np.prod(sides, axis=-1)) * np.where(np.max(count, axis=-1) >= _FEWEST_SHOWN, 1.0, 0.0)
+    return np.sqrt(np.prod(np.mean(edge, axis=-1), axis=-1))

@@ -68,8 +68,6 @@ def see_bar(views: Sequence[View], cameras: Cameras, rods: Rods, motor_rad: np.n
     sights of all cameras are nearly the same, or not all see it, each is asked alone, too: by its two edges one camera
     tells roughly how far away a bar is, and finds no other for it.
     """
-    if rods.bar.form is not None and rods.bar.form.shape == "ring":
-        raise Refused("pictures of a ring are not looked at: what is felt has no truth beside it")
     if rods.bar.form is not None:
         return SeenBar(see_rounded(views, cameras, rods, motor_rad, settings, _median_picture), {})
     span = float(np.min(motor_rad)), float(np.max(motor_rad))

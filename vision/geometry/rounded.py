@@ -126,7 +126,8 @@ class Rounded:
              ) -> tuple[np.ndarray, np.ndarray]:
         """Points (…, 2, m, 3) of the surface that sights from a camera (3,) graze, to both sides, and the normals
         (…, 2, m, 3) there, NaN where none does: before its tip a cone has no outline but that of its base; of
-        ring and cone up to reach_mm of the middle from where it is touched."""
+        ring and cone up to reach_mm of the middle from where it is touched, of a ring all round it if that is
+        infinite."""
         if self.form.shape == "sphere":
             return self._round_limb(centre_mm, radius_mm, stations)
         middle, ahead, radius, grows = self._stations(radius_mm, reach_mm, stations)
@@ -162,7 +163,7 @@ class Rounded:
         foot = self.near(np.broadcast_to(self.spot_mm, self.point_mm.shape)[..., None, :]).foot_mm
         if self.form.shape == "ring":
             across = 0.5 * self.form.ring_diameter_mm
-            most = min(reach_mm / across, _MOST_TURN_RAD)
+            most = min(reach_mm / across, _MOST_TURN_RAD) if np.isfinite(reach_mm) else np.pi
             turn = np.linspace(-most, most, stations)[:, None]
             out = _unit(foot - point)
             ahead = np.cross(axis, out)
