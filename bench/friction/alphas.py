@@ -86,10 +86,13 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     """α from the slope of d_z against d_y over the frames of a slipping whisk, and β. NaN where it hardly slips.
 
     A line's slope is free of what offsets all deflections alike. What friction along the whisker and large angles
-    (`bench.friction.direction`) bend that line by is taken out of d_z first.
+    (`bench.friction.direction`) bend that line by is taken out of d_z first. Along a sphere or a ring the slope turns
+    with the slip, and no line is straight: there α is that at θ, by the normal at the contact.
     """
     if not slips(seen):
         return UNKNOWN
+    if _turns_with_slip(seen):
+        return UNKNOWN if seen.at is None else (seen.at.alpha_rad.value, seen.at.alpha_rad.sigma)
     d, beta = _near_touch(seen.deflection), abs(seen.beta_rad.value)
     weights = (d.across_y_mm - d.across_y_mm.mean()) / np.sum((d.across_y_mm - d.across_y_mm.mean()) ** 2)
     slope, alpha = float(weights @ d.across_z_mm), np.nan
@@ -109,13 +112,18 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[float, float]:
     """α by |β| − |φ|, the slope as seen and the slip angle from the moments at θ, of a whisk that was seen to slip;
-    unknown where the moments are not those of the seen shape."""
+    unknown where the moments are not those of the seen shape, or the slope at θ is not that at touch."""
     beta, phi = seen.beta_rad, felt.phi_felt_rad
-    if not (slips(seen) and np.isfinite(phi.value)) or felt.apart:
+    if not (slips(seen) and np.isfinite(phi.value)) or felt.apart or _turns_with_slip(seen):
         return UNKNOWN
     across = abs(beta.value) - abs(phi.value)
     alpha = np.arctan(np.tan(across) / np.cos(_heading(seen.deflection, theta_rad)))
     return float(alpha), float(np.hypot(beta.sigma, phi.sigma))
+
+
+def _turns_with_slip(seen: SeenWhisk) -> bool:
+    """Whether the object is curved along itself: a cone is straight there."""
+    return seen.rounded is not None and seen.rounded.shape != "cone"
 
 
 def _near_touch(d: Deflection) -> Deflection:

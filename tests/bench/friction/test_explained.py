@@ -8,13 +8,17 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.evaluate import evaluate
-from bench.friction.alphas import seen_friction
+from bench.friction.alphas import felt_friction, seen_friction
 from bench.friction.explained import by_10
+from bench.records.trial import FeltWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk
+from vision.truth.at_angle import TruthAtAngle
+from vision.truth.records import SeenObject
+from vision.truth.value import Value
 
 
 @pytest.mark.parametrize("trial", ["b30_3", "b60_4"])
@@ -31,6 +35,20 @@ def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signa
     before = seen_friction(record)[0]
     raised = replace(record.deflection, across_z_mm=record.deflection.across_z_mm + 0.2)
     assert seen_friction(replace(record, deflection=raised))[0] == pytest.approx(before, abs=1e-9)
+
+
+def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_slope(exact_record, steel_signals):
+    """What slides on a sphere comes to another slope: the normal there tells α, and none is felt."""
+    record = exact_record(load_session(steel_signals).trial("b60_4"))
+    at = TruthAtAngle(theta_rad=0.05, alpha_rad=Value(0.2, 0.01))
+    of = {shape: replace(record, at=at, rounded=SeenObject(shape, np.zeros(3), np.ones(3), 20.0, 0.0, 0.3))
+          for shape in ("sphere", "ring", "cone")}  # fmt: skip
+    assert seen_friction(of["sphere"]) == seen_friction(of["ring"]) == (0.2, 0.01)
+    assert seen_friction(of["cone"]) == seen_friction(record)
+    felt = FeltWhisk(0, phi_felt_rad=Value(0.85, 0.01))
+    assert np.isnan(felt_friction(of["sphere"], felt, 0.05)).all()
+    assert felt_friction(of["cone"], felt, 0.05) == felt_friction(record, felt, 0.05)
+    assert np.isfinite(felt_friction(record, felt, 0.05)).all()
 
 
 def test_no_slip_no_friction_angle(exact_record, steel_signals):
