@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_args, get_type_hints
 
 import msgspec
 
@@ -70,7 +70,7 @@ def as_keys(
     try:
         keys = msgspec.convert(_only_keys_of(tables, kind), kind, strict=True)
     except msgspec.ValidationError as problem:
-        raise BadInput(_in_plain_words(str(problem)), file=shown) from None
+        raise BadInput(_in_plain_words(str(problem), kind), file=shown) from None
     doubts.each(_value_checks(keys, "", shown))
     return keys
 
@@ -151,19 +151,27 @@ def _meant(key: str, kind: type[Keys], top: type[Keys]) -> str:
     return f"allowed are {', '.join(name for name in allowed if '_sigma_' not in name)}."
 
 
-def _in_plain_words(problem: str) -> str:
-    """msgspec's message with the key's path as in the file."""
+def _in_plain_words(problem: str, kind: type[Keys]) -> str:
+    """msgspec's message with the key's path as in the file; kind: of the whole file."""
     what, _, place = problem.partition(" - at `$")
     path = [part for part in re.split(r"[.`]", place) if part]
     if missing := re.match(r"Object missing required field `(.*)`", what):
         return f"{_key_path([*path, missing.group(1)])} is missing"
+    if choice := re.match(r"Invalid enum value (.*)", what):
+        return f"{_key_path(path)}: {choice.group(1)} is none of its values; allowed are {_choices(path, kind)}"
     return f"{_key_path(path)}: {_what_is_wrong(what)}"
+
+
+def _choices(path: list[str], kind: type[Keys]) -> str:
+    """The values of a key that has a few."""
+    *tables, key = path
+    for table in tables:
+        kind = kind.tables[re.sub(r"\[.*", "", table)]
+    return ", ".join(map(repr, get_args(get_type_hints(kind)[key])))
 
 
 def _what_is_wrong(what: str) -> str:
     """msgspec's "Expected `float | null`, got `str`" in the words of a person who writes TOML."""
-    if choice := re.match(r"Invalid enum value (.*)", what):
-        return f"{choice.group(1)} is none of its values"
     words = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "null": "nothing"}
     found = re.sub(r"`([^`]*)`", lambda m: words.get(m.group(1).removesuffix(" | null"), m.group(1)), what)
     return found.replace("Expected", "expected").replace("got", "found")
