@@ -96,7 +96,7 @@ def test_fault_in_session_toml(session, old, new, expected):
         ("beta_deg = 30.0", "beta_deg = 0.5236", r"beta_deg is 0.5236. Is it in radians\? Then write 30"),
         ("beta_deg = 30.0", "beta_deg = 130.0", r"beta_deg is 130; from -90 to 90"),
         ("beta_deg = 30.0", "d_x_mm = 0.055", r"d_x_mm is 0.055;.*metres.*write 55"),
-        ('"measure"', '"mesure"', r"trial.toml: purpose: 'mesure' is none of its values; allowed are 'measure', 'gauge', 'weight'"),
+        ('"measure"', '"mesure"', r"'mesure' is none of its values; allowed are 'measure', 'gauge', 'weight'"),
         ('"measure"', '"weight"', r'purpose = "weight" needs force_N and at_mm'),
         ("speed_deg_s = 10.0", "speed_deg_s = 0.174533", r"speed_deg_s is 0.174533.*rad/s.*write 10"),
         ("speed_deg_s = 10.0", "speed_deg_s = true", r"speed_deg_s: expected a number, found true or false"),
