@@ -44,4 +44,3 @@ class Digests:
 def _known_by(file: Path) -> list[int]:
     found = os.stat(file)
     return [found.st_size, found.st_ino, found.st_mtime_ns, found.st_ctime_ns]
-

@@ -35,6 +35,11 @@ def gauge_delay(filter_Hz: float | None) -> Value:
     return Value(float(mean_s / filter_Hz) if filter_Hz else 0.0, 0.0)
 
 
+def late_by(delay_s: Value, speed_rad_s: float) -> Value:
+    """By what a motor of that speed is ahead of what comes so late, rad."""
+    return Value(delay_s.value * speed_rad_s, delay_s.sigma * speed_rad_s)
+
+
 def lateness(seen: SeenWhisk, felt: FeltWhisk) -> Value:
     """Felt less seen touch of a whisk, rad."""
     sigma = float(np.hypot(seen.touch_rad.sigma, felt.touch_felt_rad.sigma))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke, gauge_delay
+from bench.gauges.felt import Stroke, gauge_delay, late_by
 from bench.gauges.matrix import to_follicle
 from bench.gauges.rod import moment_at_clamp
 from bench.records.trial import SeenWhisk
@@ -98,8 +98,8 @@ def pairs_of(
     if reference is None:
         return None
     if is_seen:  # a nominal one counts from felt touch, which is as late as the volts
-        delay_s, speed = gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s
-        reference = replace(reference, late_rad=Value(delay_s.value * speed, delay_s.sigma * speed))
+        late = late_by(gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s)
+        reference = replace(reference, late_rad=late)
     rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
     return _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
 

@@ -10,7 +10,7 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import Stroke, late_by
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.records.trial import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
@@ -132,8 +132,8 @@ def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float, 
     The gauges' own filter makes all that is felt late by `delay_s`. That is taken out of the touch, and is in its
     sigma; θ has neither, since touch and moments are late alike.
     """
-    late = delay_s.value * speed_rad_s, delay_s.sigma * speed_rad_s
-    on_time = Value(touch.motor_rad - late[0], math.hypot(touch.sigma_rad, late[1]))
+    late = late_by(delay_s, speed_rad_s)
+    on_time = Value(touch.motor_rad - late.value, math.hypot(touch.sigma_rad, late.sigma))
     felt = FeltWhisk(number, on_time, theta_sigma_rad=touch.sigma_rad, delay_s=delay_s)
     if whisk is None:
         return felt

@@ -6,7 +6,7 @@ import numpy as np
 
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
-from vision.geometry.newton import cauchy_weights
+from vision.geometry.newton import cauchy_weights, settle
 from vision.geometry.silhouette import edges
 from vision.lines.points import LinePoints
 
@@ -20,17 +20,13 @@ def settle_axis(axis: BarAxis, cameras: Cameras, lines: Mapping[str, LinePoints]
 
     Where the cameras see the bar from nearly the same side, what they cannot tell stays as it was.
     """
-    across, vector = axis_frame(axis.direction), np.zeros(4)
-    for _ in range(rounds):
-        rows = [_axis_rows(axis, across, vector, cameras[name], points, radius_mm)
+    across = axis_frame(axis.direction)
+
+    def rows_of(vector):
+        return [_axis_rows(axis, across, vector, cameras[name], points, radius_mm)
                 for name, points in lines.items() if len(points)]
-        rows.append((-vector / _PRIOR, np.diag(1.0 / _PRIOR)))
-        left, jacobian = (np.concatenate(part) for part in zip(*rows))
-        step = np.linalg.lstsq(jacobian, left, rcond=None)[0]
-        vector = vector + step
-        if np.all(np.abs(step) < _STEPS):
-            break
-    return upward(shifted_axis(axis, across, vector))
+
+    return upward(shifted_axis(axis, across, settle(rows_of, _PRIOR, _STEPS, rounds)))
 
 
 def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm):

@@ -6,7 +6,7 @@ under other light, such as a square of the board in shadow, does not count. Whic
 lines tell (see `vision.bar.search`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -72,17 +72,34 @@ def likely(seen: Sequence[Clear], values: Sequence[np.ndarray], axis_of: Callabl
 
     values: of each of their numbers; axis_of: the axes (n, 3) of hypotheses (n, k).
     """
-    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
-    steps, best = 0.5 * np.array([one[1] - one[0] for one in values]), grid
-    for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)):
+    def score(spread: float) -> Callable:
         near = [spread_out(one, spread * one.half_px) for one in seen]
         last = spread == _SPREADS[-1]
         counts, along_mm = (_COUNTS, _ALONG_MM) if last else (np.maximum(_COUNTS, 0.0), _ALONG_MM[::2])
-        score = partial(_clear_in_all, near, axis_of, radius_mm, counts, along_mm)
-        if best is grid:
-            best = apart_from_others(grid, score(grid), 4.0 * steps, _STARTS)
-        best = apart_from_others(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
+        return partial(_clear_in_all, near, axis_of, radius_mm, counts, along_mm)
+
+    looks = ((score(spread), spread / _SPREADS[0], 1.0, kept) for spread, kept in zip(_SPREADS, (_LESS, _LESS, _KEPT)))
+    best = coarse_to_fine(values, half_steps(values), looks, 4.0, _STARTS)
     return [upward(BarAxis(point, along)) for point, along in zip(*vars(axis_of(best)).values())]
+
+
+def half_steps(values: Sequence[np.ndarray]) -> np.ndarray:
+    """Half of what each number's values (k,) are apart."""
+    return 0.5 * np.array([one[1] - one[0] for one in values])
+
+
+def coarse_to_fine(values: Sequence[np.ndarray], steps: np.ndarray, looks: Iterable[tuple[Callable, float, float, int]],
+                   apart: float, starts: int) -> np.ndarray:
+    """The best hypotheses (n, k) by the last look, climbed to from so many of the grid of all values that are so many
+    steps (k,) apart. looks: of each the score, what share of the steps it climbs by and may end apart, and how many it
+    keeps."""
+    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    best = grid
+    for score, share, ends, kept in looks:
+        if best is grid:
+            best = apart_from_others(grid, score(grid), apart * steps, starts)
+        best = apart_from_others(*climb(best, steps * share, score), ends * steps, kept)
+    return best
 
 
 def spread_out(seen: Clear, blur_px: float) -> Clear:

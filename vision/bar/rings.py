@@ -13,7 +13,7 @@ from functools import partial
 import cv2
 import numpy as np
 
-from vision.bar.find import apart_from_others, climb
+from vision.bar.find import coarse_to_fine, half_steps
 from vision.geometry.camera import Camera
 from vision.geometry.rods import Rods
 from vision.geometry.rounded import Rounded
@@ -58,15 +58,13 @@ def likely_rings(seen: Sequence[Differs], rods: Rods, motor_rad: tuple[float, fl
     length = rods.wire.length_mm
     touch = np.linspace(*motor_rad, max(3, int(np.ceil(np.ptp(motor_rad) * 0.5 * length / _TOUCH_MM))))
     values = [np.arange(10.0, length, _X_MM), touch, _BETA_RAD, _PSI_RAD, _TURN_RAD]
-    best = grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
-    steps = np.array([0.5 * (one[1] - one[0]) for one in values])
-    for blur_px, kept, stations in zip(_BLURS_PX, _KEPT, _STATIONS):
-        near, finer = [one.blurred(blur_px) for one in seen], steps * blur_px / _BLURS_PX[0]
-        score = partial(_of_each, near, placed, rods.bar.radius_mm, stations)
-        if best is grid:
-            best = apart_from_others(grid, score(grid), 2.0 * steps, _STARTS)
-        best = apart_from_others(*climb(best, finer, score), finer, kept)
-    found = placed(best)
+
+    def score(blur_px: float, stations: int) -> Callable:
+        return partial(_of_each, [one.blurred(blur_px) for one in seen], placed, rods.bar.radius_mm, stations)
+
+    looks = ((score(blur_px, stations), share, share, kept) for blur_px, share, kept, stations in
+             zip(_BLURS_PX, np.divide(_BLURS_PX, _BLURS_PX[0]), _KEPT, _STATIONS))
+    found = placed(coarse_to_fine(values, half_steps(values), looks, 2.0, _STARTS))
     return [Rounded(*where, found.form, spot) for *where, spot in zip(found.point_mm, found.direction, found.spot_mm)]
 
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from vision.bar.find import Clear, apart_from_others, clear_edges, climb, spread_out
+from vision.bar.find import Clear, clear_edges, coarse_to_fine, half_steps, spread_out
 from vision.bar.limb import STRETCHES, Limb, measure_limbs
 from vision.bar.rings import Differs, filled, likely_rings
 from vision.geometry.camera import Camera, Cameras
@@ -14,7 +14,7 @@ from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import axis_frame, shifted_axis
 from vision.geometry.errors import Refused
 from vision.geometry.grazing import sights_beside
-from vision.geometry.newton import cauchy_weights
+from vision.geometry.newton import cauchy_weights, settle
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rounded import Form, Rounded
 from vision.geometry.settings import VisionSettings
@@ -138,17 +138,13 @@ def _clearness(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> f
 def settle_by_limbs(axis: Rounded, cameras: Cameras, limbs: Mapping[str, LinePoints], radius_mm: float,
                     prior: np.ndarray = _PRIOR) -> Rounded:
     """The object whose outline passes through edges in each camera; what they cannot tell stays as it was."""
-    across, vector = axis_frame(axis.direction), np.zeros(5)
-    for _ in range(_ROUNDS):
+    across = axis_frame(axis.direction)
+
+    def rows_of(vector):
         here = moved(axis, across, vector)
-        rows = [_rows(here, across, cameras[name], points, radius_mm) for name, points in limbs.items() if len(points)]
-        rows.append((-vector / prior, np.diag(1.0 / prior)))
-        left, jacobian = (np.concatenate(part) for part in zip(*rows))
-        step = np.linalg.lstsq(jacobian, left, rcond=None)[0]
-        vector = vector + step
-        if np.all(np.abs(step) < _STEPS):
-            break
-    return moved(axis, across, vector)
+        return [_rows(here, across, cameras[name], points, radius_mm) for name, points in limbs.items() if len(points)]
+
+    return moved(axis, across, settle(rows_of, prior, _STEPS, _ROUNDS))
 
 
 def moved(axis: Rounded, across: np.ndarray, vector: np.ndarray) -> Rounded:
@@ -170,19 +166,17 @@ def _rows(axis: Rounded, across, camera: Camera, points: LinePoints, radius_mm: 
 def likely_places(clear: Sequence[Clear], rods: Rods, motor_rad: tuple[float, float]) -> list[Rounded]:
     """Spheres or cones whose outlines stand out the most in all cameras, of those that the whisker would touch."""
     values, axis_of = hypotheses(rods, motor_rad)
-    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
-    steps = np.array([0.5 * (one[1] - one[0]) for one in values])
+    steps = half_steps(values)
     steps[_WAY:] = 0.0  # a tip is above or below, and nowhere between
-    best = grid
-    for spread, kept in zip(_SPREADS, _KEPT):
-        near = [spread_out(one, spread * one.half_px) for one in clear]
-        score = partial(_clear_in_all, near, axis_of, rods.bar.radius_mm)
-        if best is grid:
-            best = apart_from_others(grid, score(grid), 4.0 * steps, _STARTS)
-        best = apart_from_others(*climb(best, steps * (spread / _SPREADS[0]), score), steps, kept)
-    found = axis_of(best)
+
+    def score(spread: float) -> Callable:
+        return partial(_clear_in_all, [spread_out(one, spread * one.half_px) for one in clear], axis_of,
+                       rods.bar.radius_mm)
+
+    looks = ((score(spread), spread / _SPREADS[0], 1.0, kept) for spread, kept in zip(_SPREADS, _KEPT))
+    found = axis_of(coarse_to_fine(values, steps, looks, 4.0, _STARTS))
     return [replace(found, point_mm=found.point_mm[k], direction=found.direction[k], spot_mm=found.spot_mm[k])
-            for k in range(len(best))]
+            for k in range(len(found.point_mm))]
 
 
 def hypotheses(rods: Rods, motor_rad: tuple[float, float]) -> tuple[list[np.ndarray], Callable]:

@@ -58,3 +58,17 @@ def _downhill(slope, curvature, longest) -> np.ndarray:
 def cauchy_weights(residual: np.ndarray, scale: float) -> np.ndarray:
     """Weights of least squares by which a residual counts as under a Cauchy distribution of this scale."""
     return 1.0 / (1.0 + (residual / scale) ** 2)
+
+
+def settle(rows_of: Callable, prior: np.ndarray, steps: np.ndarray, rounds: int) -> np.ndarray:
+    """The parameters (k,) that leave the least, by Gauss–Newton from 0: rows_of gives at such parameters what is left
+    (n,) and its columns (n, k), in pieces. prior (k,): their sigmas about 0. Ends with a step below `steps` (k,)."""
+    vector = np.zeros(len(prior))
+    for _ in range(rounds):
+        rows = [*rows_of(vector), (-vector / prior, np.diag(1.0 / prior))]
+        left, jacobian = (np.concatenate(part) for part in zip(*rows))
+        step = np.linalg.lstsq(jacobian, left, rcond=None)[0]
+        vector = vector + step
+        if np.all(np.abs(step) < steps):
+            break
+    return vector
