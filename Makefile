@@ -36,16 +36,18 @@ test-browser: $(VENV)/ready-for-tests
 
 test-lowest: $(VENV)/ready $(VENV)-lowest/ready
 	@rm -rf versions-out
-	@$(BIN)/python tests/ladder/versions.py versions-out $(BIN)/python $(VENV)-lowest/bin/python
+	@$(BIN)/python tests/studies/accuracy/versions.py versions-out $(BIN)/python $(VENV)-lowest/bin/python
 
 test-versions: $(VENV)/ready $(SETS:=/ready)
 	@rm -rf versions-out
-	@$(BIN)/python tests/ladder/versions.py versions-out $(BIN)/python $(SETS:=/bin/python)
+	@$(BIN)/python tests/studies/accuracy/versions.py versions-out $(BIN)/python $(SETS:=/bin/python)
 
 lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 
 docs: $(VENV)/ready-for-docs
+	$(BIN)/python docs/thresholds.py > docs/thresholds.md
 	$(BIN)/mkdocs build --strict
 
 clean:

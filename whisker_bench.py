@@ -9,11 +9,13 @@ _BAD_INPUT = 2
 
 def main() -> int:
     """Run the command line. Returns its exit code, 2 where a package is another's."""
-    packages = runpy.run_path(str(Path(__file__).resolve().parent / "bench" / "base" / "packages.py"))
+    packages = runpy.run_path(
+        str(Path(__file__).resolve().parent / "bench" / "base" / "packages.py")
+    )
     found = packages["foreign_package"]()
     if found:
         print(f"whisker-bench: {found}", file=sys.stderr)
         return _BAD_INPUT
-    from bench.cli import main as run
+    from bench.commands.cli import main as run
 
     return run()

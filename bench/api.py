@@ -15,7 +15,7 @@ Examples:
     ['fig8']
 
 `session` and `out` are folders, as on the command line, which is made of these functions. Bad input raises
-`bench.base.errors.BadInput` or `vision.geometry.errors.Refused`, whose text is the line that the command line shows.
+`bench.base.errors.BadInput` or `vision.geometry.refusals.Refused`, whose text is the line that the command line shows.
 """
 
 import logging
@@ -26,18 +26,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.array.together import TABLES as ARRAY_TABLES
-from bench.array.together import folder_of, is_array, read_array_record, write_array
+from bench.array.array_results import TABLES as ARRAY_TABLES
+from bench.array.array_results import folder_of, is_array, read_array_record, write_array
 from bench.base.atomic import lock_output
 from bench.base.drawing import style
 from bench.base.settings import Settings
 from bench.base.tables import TABLES, read_table
-from bench.evaluate import evaluate as _evaluate
+from bench.commands.evaluate import evaluate as _evaluate
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
 from bench.report.pooled import read_run
 from bench.report.record import read_record
-from bench.report.run import RunRecord
+from bench.report.run_facts import RunRecord
 from bench.trials.seeing import STANDARD, by_preset
 
 if TYPE_CHECKING:
@@ -90,11 +90,13 @@ class Run:
     def track(self, trial: str) -> np.ndarray:
         """A row a frame of a trial. Raises KeyError where there is no such trial."""
         if trial not in self.record.recordings:
-            raise KeyError(f"there is no trial {trial!r}; there are {', '.join(self.record.recordings)}")
+            raise KeyError(
+                f"there is no trial {trial!r}; there are {', '.join(self.record.recordings)}"
+            )
         return read_table(self.out / "track" / f"{trial}.csv")
 
     def results(self) -> Finished:
-        """Everything of every whisk as typed records (`bench.records.trial`), and the friction of each surface."""
+        """Everything of every whisk as typed records (`bench.records.trial_result`), and the friction of each surface."""
         return finished(read_run(self.out), self.record.whisker, self.record.settings)
 
     def figures(self) -> dict[str, "Figure"]:
@@ -103,7 +105,9 @@ class Run:
 
         whole = self.results()
         with style():
-            return session_figures(whole.results, whole.friction, self.record.whisker, self.record.settings)
+            return session_figures(
+                whole.results, whole.friction, self.record.whisker, self.record.settings
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,12 +176,19 @@ def evaluate(
 
 
 def evaluate_with(
-    session: Path, out: Path, settings: Settings, workers: int = 1, figure_formats: Sequence[str] = (), **shown: Any
+    session: Path,
+    out: Path,
+    settings: Settings,
+    workers: int = 1,
+    figure_formats: Sequence[str] = (),
+    **shown: Any,
 ) -> Run | ArrayRun:
     """The same with the options in one object. shown: progress, announce and dask of
-    `bench.evaluate.evaluate`."""
+    `bench.commands.evaluate.evaluate`."""
     quiet = {"announce": logging.getLogger(__name__).info}
-    _evaluate(session, out, settings, workers=workers, figure_formats=figure_formats, **quiet | shown)
+    _evaluate(
+        session, out, settings, workers=workers, figure_formats=figure_formats, **quiet | shown
+    )
     return read(out)
 
 
@@ -203,9 +214,14 @@ def plan(
 ) -> "Plan":
     """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does: a row a trial, with expected
     sigmas, limits and changes. workers: as of `evaluate`. Raises BadInput."""
-    from bench.plan import run as planning  # with the rig and all that paints: other verbs do without
+    from bench.plan import (
+        run_plan as planning,
+    )  # with the rig and all that paints: other verbs do without
 
-    quiet, options = logging.getLogger(__name__).info, planning.Options(theta_deg, changes, follow_links)
+    quiet, options = (
+        logging.getLogger(__name__).info,
+        planning.Options(theta_deg, changes, follow_links),
+    )
     return planning.plan(Path(what), Path(out), options, workers=workers, announce=quiet)
 
 
@@ -216,7 +232,9 @@ def report(out: Folder, figure_formats: Sequence[str] = ()) -> list[Path]:
     if not is_array(out):
         return report_again(out, figure_formats)
     names = [base.name for base in read_array_record(out).bases]
-    written = [path for name in names for path in report_again(folder_of(out, name), figure_formats)]
+    written = [
+        path for name in names for path in report_again(folder_of(out, name), figure_formats)
+    ]
     with lock_output(out):
         write_array(out)
     return [*written, out / "report.html"]

@@ -31,7 +31,9 @@ def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike) -> 
     return NMM2_PER_GPA_MM4 * youngs_modulus_GPa * second_moment_of_area(diameter_mm)
 
 
-def diameter_at(arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike) -> Numbers:
+def diameter_at(
+    arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike
+) -> Numbers:
     """Diameter in mm at the arc length `arc_mm` from the base.
 
     `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a cone.
@@ -39,7 +41,9 @@ def diameter_at(arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: Array
     return base_diameter_mm * (1 - taper * arc_mm / length_mm)
 
 
-def rigidity_at(arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike) -> Numbers:
+def rigidity_at(
+    arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike
+) -> Numbers:
     """EI in N·mm² at the arc length `arc_mm`; it goes with the fourth power of the diameter."""
     return base_rigidity_Nmm2 * (1 - taper * arc_mm / length_mm) ** 4
 
@@ -65,7 +69,9 @@ def taper_of(shape: str, tip_share: float | None = None) -> float:
         raise ValueError(f"a tapered whisker, and no other, has a tip diameter: shape is {shape!r}")
     if shape == "tapered":
         if not 0 < tip_share < 1:
-            raise ValueError(f"tip diameter over base diameter = {tip_share}: must lie between 0 and 1")
+            raise ValueError(
+                f"tip diameter over base diameter = {tip_share}: must lie between 0 and 1"
+            )
         return 1.0 - tip_share
     return float(shape == "cone")
 
@@ -93,11 +99,15 @@ class Beam:
         taper_of(self.shape, self.tip_share)
 
     @classmethod
-    def from_modulus(cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, *shape: str | float) -> Self:
+    def from_modulus(
+        cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, *shape: str | float
+    ) -> Self:
         """Beam of a round wire from Young's modulus and the diameter at the base."""
         require_positive("youngs_modulus_GPa", youngs_modulus_GPa, "GPa")
         require_positive("diameter_mm", diameter_mm, "mm")
-        return cls.from_rigidity(flexural_rigidity(youngs_modulus_GPa, diameter_mm), length_mm, *shape)
+        return cls.from_rigidity(
+            flexural_rigidity(youngs_modulus_GPa, diameter_mm), length_mm, *shape
+        )
 
     @classmethod
     def from_rigidity(cls, rigidity_Nmm2: float, length_mm: float, *shape: str | float) -> Self:

@@ -56,7 +56,10 @@ def slope(there: np.ndarray, back: np.ndarray) -> float:
 
 
 def there_and_back(
-    there: Whisk, back: Whisk, settings: EstimatorSettings, shared: tuple[np.ndarray, np.ndarray] | None = None
+    there: Whisk,
+    back: Whisk,
+    settings: EstimatorSettings,
+    shared: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> ThereAndBack:
     """Both ways at one pushing angle. shared: of each way, what its moments change by at one sigma of each cause that
     both have in common, (k, 2). Thickness and lean of the object enter as in (10)."""
@@ -71,7 +74,9 @@ def there_and_back(
     covariance += _dragged(felt, abs(float(values[2])), float(beam.left(values[0])))
     if not _differs(felt, covariance):
         return ThereAndBack(nan, status=ALIKE)
-    gradient = np.array([(_solved(felt + h, beam) - _solved(felt - h, beam)) / (2 * h.max()) for h in _steps(felt)])
+    gradient = np.array(
+        [(_solved(felt + h, beam) - _solved(felt - h, beam)) / (2 * h.max()) for h in _steps(felt)]
+    )
     sigmas = np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
     d_x, beta, alpha = values.tolist()
     sigma = hypot(sigmas[0], d_x * _model_share(there, settings, d_x, beta, abs(alpha)))
@@ -104,8 +109,10 @@ def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:
     whole = np.zeros((6, 6))
     for first, whisk in ((0, there), (3, back)):
         whole[first, first] = whisk.theta_sigma_rad**2
-        whole[first + 1:first + 3, first + 1:first + 3] = whisk.covariance_at
-        whole[first, first + 1:first + 3] = whole[first + 1:first + 3, first] = whisk.theta_moment_covariance_at
+        whole[first + 1 : first + 3, first + 1 : first + 3] = whisk.covariance_at
+        whole[first, first + 1 : first + 3] = whole[first + 1 : first + 3, first] = (
+            whisk.theta_moment_covariance_at
+        )
     if shared is not None:
         whole[1:3, 4:6] = shared[0].T @ shared[1]
         whole[4:6, 1:3] = whole[1:3, 4:6].T
@@ -126,11 +133,15 @@ def _differs(felt: np.ndarray, covariance: np.ndarray) -> bool:
     """Is the moments' difference more than noise, also that of both angles?"""
     along = felt[1:3] - felt[4:6]
     size = hypot(*along)
-    by = np.array([felt[1:3] @ along / felt[0], *along, -felt[4:6] @ along / felt[3], *-along]) / max(size, 1e-12)
+    by = np.array(
+        [felt[1:3] @ along / felt[0], *along, -felt[4:6] @ along / felt[3], *-along]
+    ) / max(size, 1e-12)
     return size > _SURE_SIGMAS * float(by @ covariance @ by) ** 0.5
 
 
-def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float, beta: float, alpha: float) -> float:
+def _model_share(
+    whisk: Whisk, settings: EstimatorSettings, d_x: float, beta: float, alpha: float
+) -> float:
     """As of (10), the slope being known: thickness and lean of the object, large angles."""
     theta, left = whisk.theta_at_rad, whisk.beam.left(d_x)
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)

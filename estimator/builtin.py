@@ -24,7 +24,9 @@ def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equation (2): as if the whisker did not slip sideways."""
     felt = (whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
     d_x, gradient = distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt)
-    return _estimate(whisk, _without_friction(settings), d_x, gradient, _model_share, m_y=0.0, clamp=False)
+    return _estimate(
+        whisk, _without_friction(settings), d_x, gradient, _model_share, m_y=0.0, clamp=False
+    )
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -45,7 +47,9 @@ def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     if not 0 < estimate.d_x_mm < length:
         return _with_friction(whisk, settings, _model_share)
     longer = 1 - _first_order(whisk, settings, estimate.d_x_mm)
-    d_x, low, high = (min(end * longer, length) for end in (estimate.d_x_mm, estimate.low_mm, estimate.high_mm))
+    d_x, low, high = (
+        min(end * longer, length) for end in (estimate.d_x_mm, estimate.low_mm, estimate.high_mm)
+    )
     return replace(estimate, d_x_mm=d_x, low_mm=low, high_mm=high)
 
 
@@ -60,7 +64,9 @@ def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Equations (16), (17) as printed, ν(θ, |m|) cos φ with the whisker's own ν: far off where a tapered whisker slips,
     for the slip takes its share of the angle and not of the distance. Not among ESTIMATORS; to be asked for by name."""
     felt, beam = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm), whisk.beam
-    d_x = distance.general_printed(*felt, lambda theta, m: beam.distance_mm(beam.C_Nmm2 * theta / m))
+    d_x = distance.general_printed(
+        *felt, lambda theta, m: beam.distance_mm(beam.C_Nmm2 * theta / m)
+    )
     if d_x != d_x:
         return Estimate(nan, nan, distance.why_not(*felt))
     noise = {"theta_sigma": whisk.theta_sigma_rad, "covariance": whisk.covariance_at}
@@ -84,9 +90,17 @@ def _first_order(whisk, settings, d_x):
     phi = 0.0 if is_held(whisk) else distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     left = beam.left(d_x)
     told = settings.object_radius_mm == settings.object_radius_mm
-    reach = settings.object_radius_mm + settings.whisker_radius_mm * left if told else settings.object_reach_mm
+    reach = (
+        settings.object_radius_mm + settings.whisker_radius_mm * left
+        if told
+        else settings.object_reach_mm
+    )
     rolling = first_order.rolling(whisk.theta_at_rad, reach, phi, alpha, d_x, left)
-    return rolling + (first_order.HELD_SHARE * first_order.dragging(whisk.theta_at_rad, alpha) if phi == 0 else 0.0)
+    return rolling + (
+        first_order.HELD_SHARE * first_order.dragging(whisk.theta_at_rad, alpha)
+        if phi == 0
+        else 0.0
+    )
 
 
 def is_held(whisk: Whisk) -> bool:
@@ -96,7 +110,13 @@ def is_held(whisk: Whisk) -> bool:
 
 def _with_friction(whisk, settings, model):
     """(10); model: what it may be off by itself, see `_model_share`."""
-    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad, whisk.beam.C_Nmm2)
+    felt = (
+        whisk.theta_at_rad,
+        whisk.m_y_at_Nmm,
+        whisk.m_z_at_Nmm,
+        settings.alpha_est_rad,
+        whisk.beam.C_Nmm2,
+    )
     d_x, gradient = distance.with_friction(*felt), uncertainty.gradient_with_friction(*felt)
     return _assuming(whisk, settings, d_x, gradient, model)
 
@@ -127,15 +147,26 @@ def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
         "theta_moment_covariance": whisk.theta_moment_covariance_at,
     }
     tapered = beam.distance_mm(d_x)
-    left = tapered / d_x  # of the base's diameter at the contact; of a relative error on the base's cylinder, too
+    left = (
+        tapered / d_x
+    )  # of the base's diameter at the contact; of a relative error on the base's cylinder, too
     model = share(whisk, settings, tapered, left)
     ends = uncertainty.interval_with_friction(
-        theta, m_y, m_z, settings.alpha_est_rad, beam.C_Nmm2, model_sigma=model / left if model else 0.0, **knows
+        theta,
+        m_y,
+        m_z,
+        settings.alpha_est_rad,
+        beam.C_Nmm2,
+        model_sigma=model / left if model else 0.0,
+        **knows,
     )
     low, high = (min(beam.distance_mm(end), beam.length_mm) if end > 0 else end for end in ends)
     if d_x != d_x:
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
-    sigma, gradient = hypot(uncertainty.sigma(gradient, **knows) * left**2, model * tapered), gradient * left**2
+    sigma, gradient = (
+        hypot(uncertainty.sigma(gradient, **knows) * left**2, model * tapered),
+        gradient * left**2,
+    )
     if beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
         sigma = max(sigma, hypot(tapered - low, high - tapered) / (sqrt(2) * uncertainty.Z_95))
     clamped, at_tip = distance.clamp_to_length(tapered, beam.length_mm)
@@ -143,7 +174,9 @@ def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
         return Estimate(tapered, sigma, BEYOND, gradient=gradient)
     if at_tip:
         return Estimate(clamped, sigma, TIP.format(tapered, low), low, high)
-    return Estimate(clamped, sigma, NEARER.format(high) if low == 0 else "", low, high, gradient=gradient)
+    return Estimate(
+        clamped, sigma, NEARER.format(high) if low == 0 else "", low, high, gradient=gradient
+    )
 
 
 def _model_share(whisk, settings, d_x, left):
@@ -163,7 +196,9 @@ def _share_left(whisk, settings, d_x, left):
     known = {"tilt_sigma": settings.tilt_sigma_rad, "left": left}
     known["held_spread"] = first_order.HELD_SPREAD if is_held(whisk) else 1.0
     reach = settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
-    return uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, reach=reach, **known)
+    return uncertainty.model_share(
+        whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, reach=reach, **known
+    )
 
 
 def _reason(whisk, alpha_est, high):

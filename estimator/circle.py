@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, where_all
 
 
-def conditions(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> tuple[tuple[str, np.ndarray], ...]:
+def conditions(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike
+) -> tuple[tuple[str, np.ndarray], ...]:
     """What a push against the circle must fulfil: pairs (what is wrong, mask of what must hold)."""
     known = ~np.isnan(r_n) & np.isfinite(theta) & np.isfinite(beta_0)
     return (
@@ -19,11 +21,16 @@ def conditions(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> tuple[tup
         ("the pushing angle is negative", theta >= 0),
         ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
         ("the slope beta_0 is 90 degrees or more", np.abs(beta_0) < RIGHT_ANGLE),
-        ("the whisker has passed the object: theta is 2 y_c or more", theta / r_n < 2 * np.cos(beta_0)),
+        (
+            "the whisker has passed the object: theta is 2 y_c or more",
+            theta / r_n < 2 * np.cos(beta_0),
+        ),
     )
 
 
-def inside(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, *values: ArrayLike) -> tuple[np.ndarray, ...]:
+def inside(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, *values: ArrayLike
+) -> tuple[np.ndarray, ...]:
     """The values where `conditions` hold, NaN elsewhere."""
     return tuple(where_all(conditions(r_n, theta, beta_0), value) for value in values)
 
@@ -39,7 +46,9 @@ def relative_virtual_radius(q: ArrayLike, beta_0: ArrayLike) -> np.ndarray:
 
 
 @elementwise
-def exact(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> tuple[Numbers, Numbers]:
+def exact(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(φ, d) with the friction cone at the contact point.
 
     Where the contact slides, the surface there is steeper than at first touch by δ, φ = β_0 − α + δ, and
@@ -55,17 +64,25 @@ def exact(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike)
     half_turn = np.where(along >= 0, push / (along + root), (root - along) / steep)
     phi = flat_phi + 2 * np.arctan(half_turn)
     slid = theta * (2 * np.cos(slope) - q) / (np.cos(alpha) + root)
-    return _checked(r_n, theta, beta_0, np.where(slope > alpha, phi, 0.0), np.where(slope > alpha, slid, theta))
+    return _checked(
+        r_n, theta, beta_0, np.where(slope > alpha, phi, 0.0), np.where(slope > alpha, slid, theta)
+    )
 
 
 @elementwise
-def printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> tuple[Numbers, Numbers]:
+def printed(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(φ, d) of (24) and (31), as printed."""
     slope, q = np.abs(beta_0), theta / r_n
     phi = np.maximum(0.0, slope - alpha + turn(q, slope))
     room = q * (2 * np.cos(slope) - q)
     inner = np.hypot(np.cos(alpha), np.sin(alpha) * np.sqrt(room))
-    slid = theta * (2 * np.cos(slope) - q) / (inner + relative_virtual_radius(q, slope) * np.cos(alpha))
+    slid = (
+        theta
+        * (2 * np.cos(slope) - q)
+        / (inner + relative_virtual_radius(q, slope) * np.cos(alpha))
+    )
     return _checked(r_n, theta, beta_0, phi, np.where(phi > 0, slid, theta))
 
 

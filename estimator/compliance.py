@@ -26,7 +26,11 @@ def compliance_on_soft_object(
 
 @elementwise
 def two_distances(
-    compliance_near: ArrayLike, compliance_far: ArrayLike, shift: ArrayLike, C: ArrayLike, taper_per_mm: ArrayLike = 0.0
+    compliance_near: ArrayLike,
+    compliance_far: ArrayLike,
+    shift: ArrayLike,
+    C: ArrayLike,
+    taper_per_mm: ArrayLike = 0.0,
 ) -> tuple[Numbers, Numbers]:
     """(d_x, k): distance of the nearer whisk in mm, stiffness of the object in N/mm.
 
@@ -80,7 +84,9 @@ def _positive_root(square, linear, constant):
 
 
 @elementwise
-def give(d_x: ArrayLike, compliance: ArrayLike, C: ArrayLike, taper_per_mm: ArrayLike = 0.0) -> Numbers:
+def give(
+    d_x: ArrayLike, compliance: ArrayLike, C: ArrayLike, taper_per_mm: ArrayLike = 0.0
+) -> Numbers:
     """1/k, mm/N, of an object at d_x whose compliance k_θ was felt: d_x² (k_θ − d/C); below zero by noise.
 
     >>> round(give(50.0, compliance_on_soft_object(50.0, 0.5, 9000.0), 9000.0), 9)
@@ -142,7 +148,12 @@ def two_distances_spread(
 
 
 def two_distances_sigma(
-    d_x: ArrayLike, stiffness: ArrayLike, shift: ArrayLike, C: ArrayLike, near_sigma: ArrayLike, far_sigma: ArrayLike
+    d_x: ArrayLike,
+    stiffness: ArrayLike,
+    shift: ArrayLike,
+    C: ArrayLike,
+    near_sigma: ArrayLike,
+    far_sigma: ArrayLike,
 ) -> tuple[Numbers, Numbers]:
     """(sigma of d_x in mm, sigma of k in N/mm) of `two_distances`, see `two_distances_spread`."""
     stiffness = np.asarray(stiffness, dtype=float)

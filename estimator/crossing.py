@@ -24,10 +24,14 @@ def zero_phase_lowpass(x: ArrayLike, rate_Hz: float, cutoff_Hz: float) -> np.nda
     """
     x = np.asarray(x, dtype=float)
     if not 0 < cutoff_Hz < rate_Hz / 2:
-        raise ValueError(f"cutoff_Hz = {cutoff_Hz}: must lie between 0 and half the rate of {rate_Hz} Hz")
+        raise ValueError(
+            f"cutoff_Hz = {cutoff_Hz}: must lie between 0 and half the rate of {rate_Hz} Hz"
+        )
     each_way = cutoff_Hz / (np.sqrt(2) - 1) ** (1 / (2 * FILTER_ORDER))
     padding = min(len(x) - 1, int(3 * rate_Hz / cutoff_Hz))
-    filtered = _there_and_back(np.apply_along_axis(_bridged, 0, x), min(each_way / rate_Hz, 0.499), padding)
+    filtered = _there_and_back(
+        np.apply_along_axis(_bridged, 0, x), min(each_way / rate_Hz, 0.499), padding
+    )
     return np.where(np.isfinite(x), filtered, np.nan)
 
 
@@ -63,7 +67,12 @@ def _bridged(x):
 
 
 def threshold_touch(
-    motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float, *, threshold: float | None = None
+    motor_rad: ArrayLike,
+    moments: ArrayLike,
+    time_s: ArrayLike,
+    cutoff_Hz: float,
+    *,
+    threshold: float | None = None,
 ) -> Touch:
     """Touch as the paper finds it: where the filtered moment above its level crosses a threshold for good.
 
@@ -86,7 +95,9 @@ def threshold_touch(
     return _touch(found, np.sqrt(scatter) / steepness, ideal, felt)
 
 
-def touch_on_rate(motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float) -> Touch:
+def touch_on_rate(
+    motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float
+) -> Touch:
     """Touch where the filtered moment's rate over the motor angle reaches half of its rate in the fitted rise."""
     felt = felt_touch(motor_rad, moments, time_s)
     if felt.status:
@@ -108,7 +119,9 @@ class _Stroke:
         motor, samples = columns(motor_rad, moments)
         time = np.asarray(time_s, dtype=float)
         good = usable(motor, samples)
-        above = np.stack([np.interp(time, time[good], c[good]) for c in (samples - felt.offset).T], axis=1)
+        above = np.stack(
+            [np.interp(time, time[good], c[good]) for c in (samples - felt.offset).T], axis=1
+        )
         motor = np.interp(time, time[good], motor[good])
         ideal = np.maximum(0.0, motor - felt.motor_rad)[:, None] * felt.rise.slope
         self._rate_Hz, self._cutoff_Hz, self._felt = 1 / np.median(np.diff(time)), cutoff_Hz, felt

@@ -20,7 +20,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import circle
-from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, first_failure, require_friction_angle
+from estimator.domain import (
+    RIGHT_ANGLE,
+    Numbers,
+    elementwise,
+    first_failure,
+    require_friction_angle,
+)
 from estimator.threshold import distance_error, slope_threshold
 
 __all__ = [
@@ -72,7 +78,9 @@ def virtual_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Number
 @elementwise
 def virtual_radius(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Numbers:
     """p of (32): distance of the virtual point from the centre, over d_x."""
-    return circle.inside(r_n, theta, beta_0, r_n * circle.relative_virtual_radius(theta / r_n, beta_0))[0]
+    return circle.inside(
+        r_n, theta, beta_0, r_n * circle.relative_virtual_radius(theta / r_n, beta_0)
+    )[0]
 
 
 def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
@@ -81,7 +89,9 @@ def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: Array
     return circle.exact(r_n, theta, beta_0, alpha)[0]
 
 
-def slip_angle_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
+def slip_angle_printed(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
+) -> Numbers:
     """φ of (24) as printed, in rad: max(0, ζ − α) with ζ at the virtual point."""
     require_friction_angle("alpha", alpha)
     return circle.printed(r_n, theta, beta_0, alpha)[0]
@@ -93,19 +103,25 @@ def deflection(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: Array
     return circle.exact(r_n, theta, beta_0, alpha)[1]
 
 
-def deflection_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
+def deflection_printed(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
+) -> Numbers:
     """d of (31) with φ of (24) as printed, over d_x."""
     require_friction_angle("alpha", alpha)
     return circle.printed(r_n, theta, beta_0, alpha)[1]
 
 
-def moments(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> tuple[Numbers, Numbers]:
+def moments(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(m_y, m_z) of (22) with the exact φ, over C/d_x: d sin φ, d cos φ."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.exact(r_n, theta, beta_0, alpha))
 
 
-def moments_printed(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> tuple[Numbers, Numbers]:
+def moments_printed(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.printed(r_n, theta, beta_0, alpha))
@@ -130,13 +146,18 @@ def curvature_of_slip_printed(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLik
     return np.where(slipping, rate / np.sin(phi_0 + np.copysign(alpha, phi_0)), np.nan)
 
 
-def why_not(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0) -> str | np.ndarray:
+def why_not(
+    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0
+) -> str | np.ndarray:
     """Why this module's functions give NaN for these arguments: a sentence, empty inside the domain."""
     require_friction_angle("alpha", alpha)
     arguments = (np.asarray(a, dtype=float) for a in (r_n, theta, beta_0, alpha))
     r_n, theta, beta_0, alpha = np.broadcast_arrays(*arguments)
     with np.errstate(all="ignore"):
-        passed = ("the slip angle reaches 90 degrees", np.isfinite(circle.exact(r_n, theta, beta_0, alpha)[0]))
+        passed = (
+            "the slip angle reaches 90 degrees",
+            np.isfinite(circle.exact(r_n, theta, beta_0, alpha)[0]),
+        )
         return first_failure((*circle.conditions(r_n, theta, beta_0), passed), r_n.shape)
 
 

@@ -24,7 +24,9 @@ from estimator.domain import (
 )
 from estimator.double_range import across_slope, by_friction, by_slope, friction_share, harmonic
 
-NoSlip: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # d_x of θ and |m| where nothing slips, mm
+NoSlip: TypeAlias = Callable[
+    [np.ndarray, np.ndarray], np.ndarray
+]  # d_x of θ and |m| where nothing slips, mm
 
 
 @elementwise
@@ -50,7 +52,9 @@ def rotational_compliance(theta: ArrayLike, m_z: ArrayLike) -> Numbers:
 def from_compliance(compliance: ArrayLike, C: ArrayLike) -> Numbers:
     """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
-    return _distance(quotient((C, compliance), ()), (("the compliance is missing", np.isfinite(compliance)),))
+    return _distance(
+        quotient((C, compliance), ()), (("the compliance is missing", np.isfinite(compliance)),)
+    )
 
 
 @elementwise
@@ -65,7 +69,9 @@ def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
 
 
 @elementwise
-def known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike) -> Numbers:
+def known_slope(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike
+) -> Numbers:
     """d_x of (6), in mm, for a surface of known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
     require_positive("C", C, "N·mm²")
     return _distance(by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
@@ -95,14 +101,18 @@ def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike) -> Num
 
 
 @elementwise
-def with_friction(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike) -> Numbers:
+def with_friction(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike
+) -> Numbers:
     """d_x of (10), in mm, for an assumed friction cone angle: Cθ (m_z − μ |m_y|) / (m_z² + m_y²), μ = tan
     α_est.
 
     The printed form with β_est = φ + α_est is the same number; this one is exact to the last digit.
     """
     _require_settings(alpha_est, C)
-    return _distance(by_friction(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est))
+    return _distance(
+        by_friction(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est)
+    )
 
 
 @elementwise
@@ -129,7 +139,9 @@ def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: NoSlip
 
 
 @elementwise
-def general(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: NoSlip) -> Numbers:
+def general(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: NoSlip
+) -> Numbers:
     """d_x of (16) with the angle scaled in place of the distance, in mm; for any no-slip extraction ν.
 
     ν(θ cos(φ + α_est) / cos α_est, |m|): slip takes its share from the deflection, hence from the angle.
@@ -150,7 +162,9 @@ def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike
 
 
 @elementwise
-def cone_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike) -> Numbers:
+def cone_printed(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike
+) -> Numbers:
     """d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ. Far off under slip; use `cone`."""
     _require_settings(0.0, C, length)
     magnitude = np.hypot(m_y, m_z)
@@ -160,7 +174,12 @@ def cone_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike,
 
 @elementwise
 def cone(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    alpha_est: ArrayLike,
+    C: ArrayLike,
+    length: ArrayLike,
 ) -> Numbers:
     """d_x of a cone, in mm, by (17) at the scaled angle: 1 / (1/L + 1/d) with d from (10) for the base's
     cylinder.
@@ -190,7 +209,9 @@ def clamp_to_length(d_x: ArrayLike, length: ArrayLike) -> tuple[Numbers, bool | 
 
 
 @elementwise
-def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0) -> tuple[Numbers, Numbers, Numbers]:
+def contact_point(
+    d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0
+) -> tuple[Numbers, Numbers, Numbers]:
     """(r_c, θ_c, z_c) of section II: cylindrical coordinates of the contact, in mm, rad, mm.
 
     `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All
@@ -201,7 +222,9 @@ def contact_point(d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0) -> tup
 
 
 @elementwise
-def cartesian(r_c: ArrayLike, theta_c: ArrayLike, z_c: ArrayLike) -> tuple[Numbers, Numbers, Numbers]:
+def cartesian(
+    r_c: ArrayLike, theta_c: ArrayLike, z_c: ArrayLike
+) -> tuple[Numbers, Numbers, Numbers]:
     """(x, y, z) in mm of a contact in cylindrical coordinates, as of `contact_point`."""
     return r_c * np.cos(theta_c), r_c * np.sin(theta_c), z_c + 0 * r_c
 

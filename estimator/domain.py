@@ -50,7 +50,9 @@ def _plain(result):
 
 
 def quotient(
-    numerator: Sequence[np.ndarray], denominator: Sequence[np.ndarray], exponent: int | np.ndarray = 0
+    numerator: Sequence[np.ndarray],
+    denominator: Sequence[np.ndarray],
+    exponent: int | np.ndarray = 0,
 ) -> np.ndarray:
     """2^exponent times `numerator`'s factors over `denominator`'s, without overflow or underflow on the way.
 
@@ -75,13 +77,17 @@ def require_positive(name: str, value: ArrayLike, unit: str) -> None:
 def require_friction_angle(name: str, value: ArrayLike) -> None:
     """Raise ValueError unless every `value` [rad] lies in [0°, 90°)."""
     if not _all(value, lambda x: (x >= 0) & (x < RIGHT_ANGLE)):
-        raise ValueError(f"{name} = {value} rad: must lie in [0, pi/2), that is from 0 to below 90 degrees")
+        raise ValueError(
+            f"{name} = {value} rad: must lie in [0, pi/2), that is from 0 to below 90 degrees"
+        )
 
 
 def require_sigma(name: str, value: ArrayLike) -> None:
     """Raise ValueError unless every `value` is a standard deviation: zero or positive, and finite."""
     if not _all(value, lambda x: (x >= 0) & (x < np.inf)):
-        raise ValueError(f"{name} = {value}: a standard deviation must be zero or positive, and finite")
+        raise ValueError(
+            f"{name} = {value}: a standard deviation must be zero or positive, and finite"
+        )
 
 
 def _all(value: ArrayLike, holds: Callable) -> bool:
@@ -90,7 +96,9 @@ def _all(value: ArrayLike, holds: Callable) -> bool:
     return bool(holds(array.item())) if array.ndim == 0 else bool(np.all(holds(array)))
 
 
-def first_failure(conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int, ...]) -> str | np.ndarray:
+def first_failure(
+    conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int, ...]
+) -> str | np.ndarray:
     """Text of the first condition that does not hold, element by element; empty where all do.
 
     `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else an array of str.

@@ -15,27 +15,37 @@ def _exponent(x):
     return np.where(x == 0, -9999, np.frexp(x)[1])
 
 
-def over_common_power(m_y: np.ndarray, m_z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def over_common_power(
+    m_y: np.ndarray, m_z: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """m_y, m_z over a common power of two that brings the larger near one, and its exponent."""
     exponent = np.maximum(_exponent(m_y), _exponent(m_z))
     return np.ldexp(m_y, -exponent), np.ldexp(m_z, -exponent), exponent
 
 
-def friction_share(m_y: np.ndarray, m_z: np.ndarray, alpha_est: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def friction_share(
+    m_y: np.ndarray, m_z: np.ndarray, alpha_est: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """(m_z − μ|m_y|) as a number near one and an exponent of two."""
     (across, across_power), (along, along_power) = np.frexp(m_z), np.frexp(np.abs(m_y))
     drag = np.tan(alpha_est) * along
     exponent = np.where(drag == 0, across_power, np.maximum(across_power, along_power))
-    return np.ldexp(across, across_power - exponent) - np.ldexp(drag, along_power - exponent), exponent
+    return np.ldexp(across, across_power - exponent) - np.ldexp(
+        drag, along_power - exponent
+    ), exponent
 
 
-def across_slope(m_y: np.ndarray, m_z: np.ndarray, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def across_slope(
+    m_y: np.ndarray, m_z: np.ndarray, beta: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """(m_z cos β + m_y sin β) as a number near one and an exponent of two."""
     m_y, m_z, exponent = over_common_power(m_y, m_z)
     return m_z * np.cos(beta) + m_y * np.sin(beta), exponent
 
 
-def by_slope(theta: np.ndarray, m_y: np.ndarray, m_z: np.ndarray, beta: np.ndarray, C: np.ndarray) -> np.ndarray:
+def by_slope(
+    theta: np.ndarray, m_y: np.ndarray, m_z: np.ndarray, beta: np.ndarray, C: np.ndarray
+) -> np.ndarray:
     """Cθ cos β / (m_z cos β + m_y sin β), (6)."""
     across, exponent = across_slope(m_y, m_z, beta)
     return quotient((C, theta, np.cos(beta)), (across,), -exponent)

@@ -27,7 +27,12 @@ def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike) 
 
 @elementwise
 def rolling(
-    theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, alpha: ArrayLike, d_x: ArrayLike, left: ArrayLike
+    theta: ArrayLike,
+    reach: ArrayLike,
+    phi: ArrayLike,
+    alpha: ArrayLike,
+    d_x: ArrayLike,
+    left: ArrayLike,
 ) -> Numbers:
     """−θ (R/d_x) cos β (½/w − ⅛), β = φ + α: the contact rolls over a round object towards the base.
 
@@ -37,11 +42,19 @@ def rolling(
     >>> round(rolling(0.05, 3.0, 0.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
     """
-    return rolling_at(theta, reach, np.where(phi == 0, 0.0, np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE)), d_x, left)
+    return rolling_at(
+        theta,
+        reach,
+        np.where(phi == 0, 0.0, np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE)),
+        d_x,
+        left,
+    )
 
 
 @elementwise
-def rolling_at(theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, left: ArrayLike) -> Numbers:
+def rolling_at(
+    theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, left: ArrayLike
+) -> Numbers:
     """The same where the slope β is known, held or not.
 
     >>> round(rolling_at(0.05, 3.0, 0.0, 60.0, 1.0), 8)

@@ -11,14 +11,22 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from estimator import slip
-from estimator.domain import Numbers, elementwise, require_friction_angle, require_positive, require_sigma
+from estimator.domain import (
+    Numbers,
+    elementwise,
+    require_friction_angle,
+    require_positive,
+    require_sigma,
+)
 
 READINGS = ("moments", "magnitude")
 GRID = np.radians(np.arange(0.0, 89.95, 0.25))
 GOLDEN = (np.sqrt(5) - 1) / 2
 SHRINKINGS = 45
 ROUNDING = 1e-14  # share of the data's squares that a sum of squares does not tell apart
-NEVER_SLIPPED = "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
+NEVER_SLIPPED = (
+    "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
+)
 VAGUE = "the data hardly hold the friction angle: its sigma is above 1 rad"
 AT_ZERO = "at the bound: the best friction angle is 0"
 
@@ -87,7 +95,13 @@ def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
         sigma, freedom = _sigma_of_residuals(residuals, slopes, pushes.recording)
     else:
         sigma, freedom = _sigma_of_data(pushes, slopes, reading), np.inf
-    return _fit(alpha, sigma, freedom, residuals, _fits_as_well_without_slip(residuals, beta, data, scale, reading))
+    return _fit(
+        alpha,
+        sigma,
+        freedom,
+        residuals,
+        _fits_as_well_without_slip(residuals, beta, data, scale, reading),
+    )
 
 
 def curves(
@@ -99,12 +113,16 @@ def curves(
 
 def _observations(pushes, reading):
     """Slopes (n,), data (..., n) or (..., 2n) and Cθ/d_x (n,)."""
-    m_y, m_z = np.broadcast_arrays(np.asarray(pushes.m_y, dtype=float), np.asarray(pushes.m_z, dtype=float))
+    m_y, m_z = np.broadcast_arrays(
+        np.asarray(pushes.m_y, dtype=float), np.asarray(pushes.m_z, dtype=float)
+    )
     beta, scale = np.broadcast_arrays(
         np.asarray(pushes.beta, dtype=float), pushes.C * np.divide(pushes.theta, pushes.d_x)
     )
     if m_y.shape[-1:] != beta.shape or beta.size < 2:
-        raise ValueError(f"slopes {beta.shape} and moments {m_y.shape}: need one slope a moment, two at least")
+        raise ValueError(
+            f"slopes {beta.shape} and moments {m_y.shape}: need one slope a moment, two at least"
+        )
     if not (np.isfinite(m_y).all() and np.isfinite(m_z).all() and np.isfinite(beta).all()):
         raise ValueError("a moment or slope is missing or infinite: leave such points out")
     both = np.concatenate([m_y, m_z], axis=-1)
@@ -164,13 +182,17 @@ def _sigma_of_residuals(residuals, slopes, recording):
     with np.errstate(all="ignore"):
         total = (slopes**2).sum(axis=-1)
         leverage = slopes**2 @ together / total[..., None]
-        sigma = np.sqrt((((slopes * residuals) @ together) ** 2 / (1 - leverage)).sum(axis=-1)) / total
+        sigma = (
+            np.sqrt((((slopes * residuals) @ together) ** 2 / (1 - leverage)).sum(axis=-1)) / total
+        )
     return sigma, n - 1 if recording is None else (leverage > 0).sum(axis=-1) - 1
 
 
 def _sigma_of_data(pushes, slopes, reading):
     """Sigma of α from the moments' own: √(Σ J² σ²) / Σ J²."""
-    sigma_y, sigma_z, m_y, m_z = np.broadcast_arrays(pushes.sigma_y, pushes.sigma_z, pushes.m_y, pushes.m_z)
+    sigma_y, sigma_z, m_y, m_z = np.broadcast_arrays(
+        pushes.sigma_y, pushes.sigma_z, pushes.m_y, pushes.m_z
+    )
     if reading == "magnitude":
         sigmas = 2 * np.hypot(m_y * sigma_y, m_z * sigma_z)
     else:
@@ -194,7 +216,9 @@ def _fit(alpha, sigma, freedom, residuals, unseen):
     rms = np.sqrt((residuals**2).mean(axis=-1))
     numbers = (alpha, sigma, np.maximum(alpha - reach, 0.0), alpha + reach, rms)
     status = status if status.ndim else str(status)
-    return FrictionFit(*(_float_or_array(value) for value in numbers), status, _float_or_array(freedom))
+    return FrictionFit(
+        *(_float_or_array(value) for value in numbers), status, _float_or_array(freedom)
+    )
 
 
 def _float_or_array(value):
@@ -220,7 +244,9 @@ def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 
     outside = np.maximum(np.abs(tilt - middle) - alpha, 0.0) * np.sign(tilt - middle)
     rms = float(np.sqrt(((phi - outside) ** 2).mean()))
     slipping = sides[0] | sides[1]
-    freedom = np.inf if phi_sigma > 0 else float(np.count_nonzero(slipping) - 2)  # less the middle, and α
+    freedom = (
+        np.inf if phi_sigma > 0 else float(np.count_nonzero(slipping) - 2)
+    )  # less the middle, and α
     scatter = phi_sigma
     if not phi_sigma > 0:
         scatter = np.sqrt(np.sum((phi - outside)[slipping] ** 2) / freedom) if freedom else np.nan
@@ -246,7 +272,10 @@ def _dead_band(tilt, phi, phi_sigma):
 
 @elementwise
 def confidence(
-    phi: ArrayLike, alpha_est: ArrayLike, alpha_est_sigma: ArrayLike, relative_sigma: ArrayLike = 0.01
+    phi: ArrayLike,
+    alpha_est: ArrayLike,
+    alpha_est_sigma: ArrayLike,
+    relative_sigma: ArrayLike = 0.01,
 ) -> Numbers:
     """Weight in (0, 1] of a contact whose slip angle is φ (section VII, way 3): less where α matters more.
 

@@ -17,7 +17,9 @@ _ROUNDS = 3  # of the contact's deflection by its distance: each brings two orde
 
 
 @elementwise
-def lever(m_y: ArrayLike, m_z: ArrayLike, f_x: ArrayLike, f_y: ArrayLike, f_z: ArrayLike) -> Numbers:
+def lever(
+    m_y: ArrayLike, m_z: ArrayLike, f_x: ArrayLike, f_y: ArrayLike, f_z: ArrayLike
+) -> Numbers:
     """|m|/|f|, mm: how far the line of action passes the base. As d_x it is short by what acts along the whisker.
 
     >>> lever(0.0, 3.0, 0.0, 0.06, 0.0)
@@ -34,7 +36,13 @@ def across(m_y: ArrayLike, m_z: ArrayLike, f_y: ArrayLike, f_z: ArrayLike) -> Nu
 
 
 def distance(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, f_x: ArrayLike, f_y: ArrayLike, f_z: ArrayLike, beam: Beam
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    f_x: ArrayLike,
+    f_y: ArrayLike,
+    f_z: ArrayLike,
+    beam: Beam,
 ) -> Numbers:
     """d_x, mm: where the line of action meets the bent whisker, turned from the hub's axes to those at touch.
 
@@ -59,11 +67,21 @@ def distance(
 def relative_gradient(m_y: float, m_z: float, f_y: float, f_z: float) -> np.ndarray:
     """∂ln d_x/∂(m_y, m_z, f_x, f_y, f_z), (5,), of |m|² / (f_y m_z − f_z m_y): f_x and θ enter to second order."""
     square, power = m_y**2 + m_z**2, f_y * m_z - f_z * m_y
-    return np.array([2 * m_y / square + f_z / power, 2 * m_z / square - f_y / power, 0.0, -m_z / power, m_y / power])
+    return np.array(
+        [
+            2 * m_y / square + f_z / power,
+            2 * m_z / square - f_y / power,
+            0.0,
+            -m_z / power,
+            m_y / power,
+        ]
+    )
 
 
 @elementwise
-def rolling(theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, d_x: ArrayLike, left: ArrayLike) -> Numbers:
+def rolling(
+    theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, d_x: ArrayLike, left: ArrayLike
+) -> Numbers:
     """−½ θ (R/d_x) cos β / w, at most, as a share of d_x: the contact rolls over a round object towards the base.
 
     reach: R, radii of object and whisker together; left: w, share of the base's diameter at d_x. β is at least φ.
@@ -81,17 +99,26 @@ def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike) 
     return 2 * first_order.leaning(theta, psi, phi, alpha)
 
 
-def why_not(m_y: ArrayLike, m_z: ArrayLike, f_x: ArrayLike, f_y: ArrayLike, f_z: ArrayLike) -> str | np.ndarray:
+def why_not(
+    m_y: ArrayLike, m_z: ArrayLike, f_x: ArrayLike, f_y: ArrayLike, f_z: ArrayLike
+) -> str | np.ndarray:
     """Why there is no distance for these arguments, a sentence; empty where there is one."""
-    arrays = np.broadcast_arrays(*(np.asarray(number, dtype=float) for number in (m_y, m_z, f_x, f_y, f_z)))
+    arrays = np.broadcast_arrays(
+        *(np.asarray(number, dtype=float) for number in (m_y, m_z, f_x, f_y, f_z))
+    )
     with np.errstate(all="ignore"):
         return first_failure(_conditions(*arrays), arrays[0].shape)
 
 
 def _conditions(m_y, m_z, f_x, f_y, f_z):
-    finite = np.logical_and.reduce(np.broadcast_arrays(*(np.isfinite(n) for n in (m_y, m_z, f_x, f_y, f_z))))
+    finite = np.logical_and.reduce(
+        np.broadcast_arrays(*(np.isfinite(n) for n in (m_y, m_z, f_x, f_y, f_z)))
+    )
     return (
         ("a measured value is missing or infinite", finite),
         ("m_z is not positive: the whisker does not push towards the object", m_z > 0),
-        ("the force at the base is not the one that its moment asks for", f_y * m_z - f_z * m_y > 0),
+        (
+            "the force at the base is not the one that its moment asks for",
+            f_y * m_z - f_z * m_y > 0,
+        ),
     )

@@ -26,7 +26,9 @@ RUNS_AWAY = "an object that moves as told would be touched nowhere on the whiske
 AMBIGUOUS = "or {:.1f} mm: an object that runs away is felt alike at both"
 _BESIDE = 0.1  # of the distance: at one as near the object would run at nine tenths of the whisker's own speed
 _HELD_SIGMAS = 2.0  # of m_y, as in `estimator.builtin.is_held`
-_STEPS = np.array([1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5])  # of differences: θ, m_y, m_z, α in parts of 1, u in mm
+_STEPS = np.array(
+    [1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5]
+)  # of differences: θ, m_y, m_z, α in parts of 1, u in mm
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,9 @@ def held(theta: float, m_y: float, m_z: float, u: np.ndarray, beam: Beam) -> Con
     return Contact(x - u[0] * theta, nan, other)
 
 
-def sliding(theta: float, m_y: float, m_z: float, alpha: float, u: np.ndarray, beam: Beam) -> Contact:
+def sliding(
+    theta: float, m_y: float, m_z: float, alpha: float, u: np.ndarray, beam: Beam
+) -> Contact:
     """Contact that slides over the object: up or down along it, whichever agrees with where it has come to.
 
     >>> beam = Beam.from_rigidity(3000.0, 100.0)
@@ -72,7 +76,9 @@ def sliding(theta: float, m_y: float, m_z: float, alpha: float, u: np.ndarray, b
 def _one_way(way, theta, m_y, m_z, alpha, u, beam) -> tuple[Contact, float]:
     """The contact where the whisker slides to one side (1: up the z of the object), and how far it has slid, mm."""
     phi, m, share, drawn = atan2(m_y, m_z), hypot(m_y, m_z), 1.0, 0.0
-    for _ in range(4):  # of the share of friction along the object, by the direction of the motion over it
+    for _ in range(
+        4
+    ):  # of the share of friction along the object, by the direction of the motion over it
         across = way * atan(share * tan(alpha))
         beta = phi + across
         towards, along = -u[1] * cos(beta) + u[2] * sin(beta), u[1] * sin(beta) + u[2] * cos(beta)
@@ -95,7 +101,11 @@ def _distances(standing_mm: float, gains_mm: float, beam: Beam) -> tuple[float, 
     with which the whisker follows, at the nearer at more. The farther is taken, but where the whisker is not as long.
     """
     tau = beam.taper / beam.length_mm
-    square, linear, constant = 1 + standing_mm * tau, standing_mm * (1 - tau * gains_mm), standing_mm * gains_mm
+    square, linear, constant = (
+        1 + standing_mm * tau,
+        standing_mm * (1 - tau * gains_mm),
+        standing_mm * gains_mm,
+    )
     root = linear**2 + 4 * square * constant
     if not root >= 0:
         return nan, nan
@@ -122,11 +132,21 @@ def known_motion(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
         return Estimate(nan, nan, RUNS_AWAY)
     gradient = _gradient(solve, felt, beam)
     noise = gradient @ _covariance(whisk) @ gradient
-    rest = float(np.sqrt(noise + (_model_share(whisk, settings, contact.d_x_mm) * contact.d_x_mm) ** 2))
-    low, high = _ends(solve, felt, beam, contact.d_x_mm, Z_95 * settings.alpha_est_sigma_rad, Z_95 * rest)
+    rest = float(
+        np.sqrt(noise + (_model_share(whisk, settings, contact.d_x_mm) * contact.d_x_mm) ** 2)
+    )
+    low, high = _ends(
+        solve, felt, beam, contact.d_x_mm, Z_95 * settings.alpha_est_sigma_rad, Z_95 * rest
+    )
     sigma = hypot(rest, gradient[3] * settings.alpha_est_sigma_rad)
-    status = AMBIGUOUS.format(contact.other_mm) if contact.other_mm > _BESIDE * contact.d_x_mm else ""
-    told = {} if solve is _held_at else {"alpha_est_rad": settings.alpha_est_rad, "beta_rad": contact.beta_rad}
+    status = (
+        AMBIGUOUS.format(contact.other_mm) if contact.other_mm > _BESIDE * contact.d_x_mm else ""
+    )
+    told = (
+        {}
+        if solve is _held_at
+        else {"alpha_est_rad": settings.alpha_est_rad, "beta_rad": contact.beta_rad}
+    )
     return Estimate(contact.d_x_mm, sigma, status, low, high, **told, gradient=gradient[:4])
 
 
@@ -151,7 +171,9 @@ def _is_held(whisk: Whisk, contact: Contact) -> bool:
 def _gradient(solve, felt: np.ndarray, beam: Beam) -> np.ndarray:
     """Of d_x by θ, m_y, m_z, α and u, (7,), by differences on both sides."""
     changes = np.diag(_STEPS)
-    ends = [[solve(felt + side * change, beam).d_x_mm for side in (1.0, -1.0)] for change in changes]
+    ends = [
+        [solve(felt + side * change, beam).d_x_mm for side in (1.0, -1.0)] for change in changes
+    ]
     return np.nan_to_num(-np.diff(ends, axis=1)[:, 0] / (2 * _STEPS))
 
 
@@ -172,12 +194,21 @@ def _ends(solve, felt, beam, d_x, half_alpha, rest) -> tuple[float, float]:
         other[3] = min(max(felt[3] + side * half_alpha, 0.0), 1.55)
         there = solve(other, beam).d_x_mm
         ends.append(there if there > 0 else 0.0 if side > 0 else beam.length_mm)
-    low, high = d_x - hypot(max(d_x - min(ends), 0.0), rest), d_x + hypot(max(max(ends) - d_x, 0.0), rest)
+    low, high = (
+        d_x - hypot(max(d_x - min(ends), 0.0), rest),
+        d_x + hypot(max(max(ends) - d_x, 0.0), rest),
+    )
     return max(low, 0.0), min(high, beam.length_mm)
 
 
 def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
     """As of (10): thickness and lean of the object, friction along the whisker, large angles."""
-    known = {"reach": settings.object_reach_mm, "tilt_sigma": settings.tilt_sigma_rad, "left": whisk.beam.left(d_x)}
+    known = {
+        "reach": settings.object_reach_mm,
+        "tilt_sigma": settings.tilt_sigma_rad,
+        "left": whisk.beam.left(d_x),
+    }
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    return float(uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, **known))
+    return float(
+        uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, **known)
+    )

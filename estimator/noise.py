@@ -30,7 +30,12 @@ class Memory:
         """Memory of samples (n, k) about a line over x (n,) in each stretch, a mask (n,); stretches do not overlap."""
         used = np.logical_or.reduce(stretches)
         held = _hull(used)  # what lies outside counts for nothing
-        x, samples, used, stretches = x[held], samples[held], used[held], [stretch[held] for stretch in stretches]
+        x, samples, used, stretches = (
+            x[held],
+            samples[held],
+            used[held],
+            [stretch[held] for stretch in stretches],
+        )
         residuals, bases = np.zeros_like(samples), []
         for stretch in stretches:
             bases += _line_basis(x, stretch)
@@ -57,7 +62,9 @@ class Memory:
         held = _hull((weights != 0) | (other != 0))
         weights, other = weights[held], other[held]
         first, second = (Spectrum.of(w, len(self.seen)) for w in (weights, other))
-        missing = (self._missing(w, self._overlap(s)) for w, s in ((weights, first), (other, second)))
+        missing = (
+            self._missing(w, self._overlap(s)) for w, s in ((weights, first), (other, second))
+        )
         both = np.tensordot(self._overlap(first, second), self.covariance, axes=1)
         return both * np.sqrt(math.prod(missing))
 
@@ -142,4 +149,6 @@ def line_slope(x: np.ndarray, samples: np.ndarray, used: np.ndarray) -> np.ndarr
 def line_residuals(x: np.ndarray, samples: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Residuals (m, k) of the marked samples from their least-squares line."""
     spread = x[used] - x[used].mean()
-    return samples[used] - samples[used].mean(axis=0) - np.outer(spread, line_slope(x, samples, used))
+    return (
+        samples[used] - samples[used].mean(axis=0) - np.outer(spread, line_slope(x, samples, used))
+    )

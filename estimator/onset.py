@@ -42,7 +42,9 @@ class Level:
 
     def covariance_between(self, one_rad: float, other_rad: float) -> np.ndarray:
         """Covariance (k, k) of the level's errors at two motor angles."""
-        return self.covariance + np.diag(self.drift**2) * (one_rad - self.centre_rad) * (other_rad - self.centre_rad)
+        return self.covariance + np.diag(self.drift**2) * (one_rad - self.centre_rad) * (
+            other_rad - self.centre_rad
+        )
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,9 @@ def columns(motor_rad: ArrayLike, moments: ArrayLike) -> tuple[np.ndarray, np.nd
     samples = np.asarray(moments, dtype=float)
     samples = samples[:, None] if samples.ndim == 1 else samples
     if motor.ndim != 1 or samples.ndim != 2 or samples.shape[0] != motor.size:
-        raise ValueError(f"motor angles {motor.shape} and moments {samples.shape} must have the same samples")
+        raise ValueError(
+            f"motor angles {motor.shape} and moments {samples.shape} must have the same samples"
+        )
     return motor, samples
 
 
@@ -142,7 +146,9 @@ def speed(motor: np.ndarray, time_s: ArrayLike | None) -> float:
     """Usual speed of the motor in rad/s; 0 where there are no times."""
     if time_s is None or len(motor) < 2:
         return 0.0
-    return float(np.nanmedian(np.diff(motor)) / np.nanmedian(np.diff(np.asarray(time_s, dtype=float))))
+    return float(
+        np.nanmedian(np.diff(motor)) / np.nanmedian(np.diff(np.asarray(time_s, dtype=float)))
+    )
 
 
 def _moving(motor):
@@ -220,7 +226,9 @@ def _extrapolate(motor, samples, used, touch, window, guard):
     level = free_level(motor, samples, free)
     weights = noise.line_weights(motor, rising, touch)
     memory = noise.Memory.of(motor, samples, free, rising)
-    scatter = noise.wider(memory.of_sum(weights), noise.Memory.of(motor, samples, rising).of_sum(weights))
+    scatter = noise.wider(
+        memory.of_sum(weights), noise.Memory.of(motor, samples, rising).of_sum(weights)
+    )
     slope = noise.line_slope(motor, samples, rising)
     gap = noise.weighted_sum(weights, samples, rising) - level.offset
     pull = np.linalg.pinv(scatter + level.covariance_between(touch, touch), hermitian=True) @ slope
@@ -241,4 +249,6 @@ def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Leve
     per_rad = noise.line_weights(motor, free, centre + 1.0) - weights
     doubt = np.diag(memory.of_sum(per_rad))
     drift = np.sqrt(np.maximum(0.0, noise.line_slope(motor, samples, free) ** 2 - doubt))
-    return Level(noise.weighted_sum(weights, samples, free), memory.of_sum(weights), drift, float(centre))
+    return Level(
+        noise.weighted_sum(weights, samples, free), memory.of_sum(weights), drift, float(centre)
+    )

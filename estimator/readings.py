@@ -33,11 +33,15 @@ def force_at(
         nothing = np.zeros(samples.shape[1])
         untold = Rise(nothing, nothing, np.zeros(len(motor)), noise.Memory.of(motor, samples, free))
         level = free_level(motor, samples, free)
-        touch = replace(touch, level=level if drift is None else replace(level, drift=drift), rise=untold)
+        touch = replace(
+            touch, level=level if drift is None else replace(level, drift=drift), rise=untold
+        )
     return moment_at(theta_rad, motor, samples, touch, time_s=time_s)
 
 
-def rate_at(theta_rad: float, motor_rad: ArrayLike, moments: ArrayLike, touch: Touch) -> tuple[np.ndarray, np.ndarray]:
+def rate_at(
+    theta_rad: float, motor_rad: ArrayLike, moments: ArrayLike, touch: Touch
+) -> tuple[np.ndarray, np.ndarray]:
     """(slope (k,) per rad, covariance (k, k)) of moments over the motor angle, from touch to theta_rad past it.
 
     It is what a sensor of the moment's rate has, divided by the motor's speed; no zero enters, and the touch only as
@@ -47,7 +51,11 @@ def rate_at(theta_rad: float, motor_rad: ArrayLike, moments: ArrayLike, touch: T
     width = samples.shape[1]
     if touch.status:
         return np.full(width, np.nan), np.full((width, width), np.nan)
-    used = usable(motor, samples) & (motor > touch.motor_rad + GUARD_RAD) & (motor <= touch.motor_rad + theta_rad)
+    used = (
+        usable(motor, samples)
+        & (motor > touch.motor_rad + GUARD_RAD)
+        & (motor <= touch.motor_rad + theta_rad)
+    )
     if np.count_nonzero(used) < MIN_SAMPLES:
         return np.full(width, np.nan), np.full((width, width), np.nan)
     weights = noise.line_weights(motor, used, motor[used].mean() + 1.0) - noise.mean_weights(used)

@@ -32,7 +32,8 @@ _FEWEST_FRAMES, _FEWEST_POINTS = 4, 30
 # One sigma of the force, a share per rad pushed: what friction along the whisker, which is not modelled, adds to the
 # moment is tan α times w/d, that is θ at most, over that of the force across; α is taken as 0 ± 14°.
 _DRAG = 0.25
-_MOST_BY_PLANE = 0.1  # share of the force by what tan φ may be: its square, a hundredth, is left out
+# share of the force by what tan φ may be: its square, a hundredth, is left out
+_MOST_BY_PLANE = 0.1
 _LEAST_LEFT = 1e-3  # of the base's diameter: a cone's point bends without end
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _TOUCH, _BEND, _BEND_2, _TAN, _ARC, _ALONG, _OWN = 8, 9, 10, 11, 12, 13, 14
@@ -60,14 +61,18 @@ class SeenShape:
         count = len(self.frame)
         shapes = [np.shape(a) for a in (self.eye_mm, self.sight, self.across, self.sigma_rad)]
         if shapes != [(3,), (count, 3), (count, 3), (count,)] or len(self.shared_rad) != count:
-            raise ValueError("frame (n,), eye_mm (3,), sight and across (n, 3), sigma_rad (n,), shared_rad (n, k)")
+            raise ValueError(
+                "frame (n,), eye_mm (3,), sight and across (n, 3), sigma_rad (n,), shared_rad (n, k)"
+            )
         if not (np.asarray(self.sigma_rad) > 0).all():
             raise ValueError("sigma_rad must be positive")
 
     def until(self, motor_rad: float) -> "SeenShape":
         """The frames up to a motor angle."""
         keep = self.motor_rad[self.frame] <= motor_rad
-        rows = (getattr(self, name)[keep] for name in ("sight", "across", "sigma_rad", "shared_rad"))
+        rows = (
+            getattr(self, name)[keep] for name in ("sight", "across", "sigma_rad", "shared_rad")
+        )
         return SeenShape(self.motor_rad, self.frame[keep], self.eye_mm, *rows)
 
     @property
@@ -126,13 +131,18 @@ def contact_of_shape(
     by = _slopes(fit.told, vector)
     of_told = by @ covariance @ by.T
     by_plane = abs(by[2] @ covariance[:, _TAN]) / covariance[_TAN, _TAN] ** 0.5 / max(told[2], 1e-9)
-    answer = _answer(told, of_told, vector, theta_rad, beam, (reach_mm, tilt_sigma_rad, rigidity_share))
+    answer = _answer(
+        told, of_told, vector, theta_rad, beam, (reach_mm, tilt_sigma_rad, rigidity_share)
+    )
     return answer if answer.status or by_plane < _MOST_BY_PLANE else _without_force(answer)
 
 
 def _without_force(answer: ShapeContact) -> ShapeContact:
     """Touch and distance alone."""
-    known = {name: getattr(answer, name) for name in ("touch_rad", "touch_sigma_rad", "d_x_mm", "d_x_sigma_mm")}
+    known = {
+        name: getattr(answer, name)
+        for name in ("touch_rad", "touch_sigma_rad", "d_x_mm", "d_x_sigma_mm")
+    }
     return ShapeContact(**known, status=ASIDE)
 
 
@@ -143,9 +153,16 @@ def _answer(told, covariance, vector, theta, beam, doubts) -> ShapeContact:
     if not (0 < d_x <= beam.length_mm and sigmas[1] < 0.25 * beam.length_mm and force > 0):
         return ShapeContact(status=UNTOLD)
     phi, left = atan(abs(vector[_TAN])), beam.left(d_x)
-    share = hypot(load_cell.rolling(theta, reach, 0.0, d_x, left), load_cell.leaning(theta, tilt, phi, 0.0))
+    share = hypot(
+        load_cell.rolling(theta, reach, 0.0, d_x, left), load_cell.leaning(theta, tilt, phi, 0.0)
+    )
     of_force = hypot(rigidity_share, _DRAG * theta) * force
-    spread = float(sigmas[0]), hypot(sigmas[1], share * d_x), hypot(sigmas[2], of_force), float(sigmas[3])
+    spread = (
+        float(sigmas[0]),
+        hypot(sigmas[1], share * d_x),
+        hypot(sigmas[2], of_force),
+        float(sigmas[3]),
+    )
     pairs = [number for pair in zip((touch, d_x, force, moved), spread) for number in pair]
     return ShapeContact(*pairs, *_stiffness(force, spread[2], moved, spread[3], covariance[2, 3]))
 
@@ -156,7 +173,9 @@ def _stiffness(force, force_sigma, moved, moved_sigma, together) -> tuple[float,
     if moved <= Z_95 * moved_sigma:
         return nan, nan, low
     k = force / moved
-    variance = (force_sigma / force) ** 2 + (moved_sigma / moved) ** 2 - 2 * together / (force * moved)
+    variance = (
+        (force_sigma / force) ** 2 + (moved_sigma / moved) ** 2 - 2 * together / (force * moved)
+    )
     return k, k * max(variance, 0.0) ** 0.5, low
 
 
@@ -198,13 +217,23 @@ class _Fit:
         along = np.cross(self.seen.across, self.seen.sight)
         return (along @ self.seen.eye_mm) / (along[:, 0] * c + along[:, 1] * s)
 
-    def points(self, vector: np.ndarray, arc: np.ndarray, pushed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def points(
+        self, vector: np.ndarray, arc: np.ndarray, pushed: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Centreline points and tangents (n, 3), hub frame, at arcs (n,) of shapes pushed (n,) past touch."""
-        contact = np.clip(vector[_ARC] + vector[_ALONG] * (pushed - self.theta_rad), 1.0, self.beam.length_mm)
+        contact = np.clip(
+            vector[_ARC] + vector[_ALONG] * (pushed - self.theta_rad), 1.0, self.beam.length_mm
+        )
         size = (vector[_BEND] + vector[_BEND_2] * pushed) * pushed
-        per_force, ends = size / bend(contact, contact, self._taper_per_mm), np.minimum(arc, contact)
+        per_force, ends = (
+            size / bend(contact, contact, self._taper_per_mm),
+            np.minimum(arc, contact),
+        )
         points = np.zeros((len(arc), 3))
-        for first, last in ((0.0 * arc, ends), (ends, arc)):  # the third derivative jumps at the contact
+        for first, last in (
+            (0.0 * arc, ends),
+            (ends, arc),
+        ):  # the third derivative jumps at the contact
             half = 0.5 * (last - first)[:, None]
             places = first[:, None] + half * (1.0 + _NODES)
             tangents = self._slope(vector, places, contact[:, None], per_force[:, None])
@@ -233,7 +262,9 @@ class _Fit:
         along = _turned(np.cross(seen.across, seen.sight), -motor)
         step = np.einsum("ni,ni->n", along, eye - points) / np.einsum("ni,ni->n", along, tangents)
         off = points + step[:, None] * tangents - eye  # straight over a step of a fraction of a mm
-        sideways = np.einsum("ni,ni->n", _turned(seen.across, -motor), off) / np.linalg.norm(off, axis=1)
+        sideways = np.einsum("ni,ni->n", _turned(seen.across, -motor), off) / np.linalg.norm(
+            off, axis=1
+        )
         sideways = sideways - seen.shared_rad @ vector[_OWN:]
         return np.concatenate([sideways / seen.sigma_rad, vector / self.prior])
 
@@ -278,13 +309,20 @@ def _begun(seen: SeenShape, theta: float, beam: Beam) -> tuple[float, np.ndarray
     a finer one about that."""
     line = _Line(_Fit(seen, theta, beam))
     low, high = line.motor.min(), line.motor.max()
-    touches, contacts = np.linspace(low, high, 26)[2:-2], np.linspace(0.1, 0.98, 19) * beam.length_mm
+    touches, contacts = (
+        np.linspace(low, high, 26)[2:-2],
+        np.linspace(0.1, 0.98, 19) * beam.length_mm,
+    )
     for _ in range(3):
-        grid = [(line.fit(touch, contact), touch, contact) for touch in touches for contact in contacts]
+        grid = [
+            (line.fit(touch, contact), touch, contact) for touch in touches for contact in contacts
+        ]
         (_, values), touch, contact = min(grid, key=lambda one: one[0][0])
         steps = touches[1] - touches[0], contacts[1] - contacts[0]
         touches = touch + np.linspace(-1.0, 1.0, 7) * steps[0]
-        contacts = np.clip(contact + np.linspace(-1.0, 1.0, 7) * steps[1], 1.0, 0.999 * beam.length_mm)
+        contacts = np.clip(
+            contact + np.linspace(-1.0, 1.0, 7) * steps[1], 1.0, 0.999 * beam.length_mm
+        )
     vector = np.zeros(len(line.of.prior))
     vector[:4], vector[_TOUCH], vector[_BEND], vector[_ARC] = values[:4], touch, values[4], contact
     return float(touch), vector
@@ -311,9 +349,13 @@ class _Line:
         reach = np.full(len(self.arc), contact)
         shape = _deflection(self.arc, reach, self._taper) / bend(reach, reach, self._taper)
         column = self._side * shape * np.maximum(self.motor - touch, 0.0)
-        design = np.vstack([np.column_stack([self._rest, column]), np.diag([*1.0 / _REST_MM, 0.0])[:4]])
+        design = np.vstack(
+            [np.column_stack([self._rest, column]), np.diag([*1.0 / _REST_MM, 0.0])[:4]]
+        )
         values = np.linalg.lstsq(design, self._aim, rcond=None)[0]
-        return (float(np.sum((design @ values - self._aim) ** 2)) if values[4] < 0 else np.inf), values
+        return (
+            float(np.sum((design @ values - self._aim) ** 2)) if values[4] < 0 else np.inf
+        ), values
 
 
 def _deflection(arc, contact, taper):
@@ -326,4 +368,6 @@ def _deflection(arc, contact, taper):
 def _slopes(of, vector: np.ndarray) -> np.ndarray:
     """Derivatives (4, parameters) by central differences."""
     steps = 1e-5 * np.maximum(np.abs(vector), 1e-2)
-    return np.stack([(of(vector + d) - of(vector - d)) / (2 * d.sum()) for d in np.diag(steps)], axis=1)
+    return np.stack(
+        [(of(vector + d) - of(vector - d)) / (2 * d.sum()) for d in np.diag(steps)], axis=1
+    )

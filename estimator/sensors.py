@@ -36,7 +36,11 @@ def moment_rate(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
         return Estimate(nan, nan, NO_RATE)
     m_y, m_z = (theta * others.rate_Nmm).tolist()
     known = {"theta_sigma_rad": 0.0, "theta_moment_covariance_at": np.zeros(2)}
-    moments = {"m_y_at_Nmm": m_y, "m_z_at_Nmm": m_z, "covariance_at": theta**2 * others.rate_covariance}
+    moments = {
+        "m_y_at_Nmm": m_y,
+        "m_z_at_Nmm": m_z,
+        "covariance_at": theta**2 * others.rate_covariance,
+    }
     return with_friction(replace(whisk, **moments, **known), settings)
 
 
@@ -63,12 +67,19 @@ def force_and_moment(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     return Estimate(clamped, d_x * share, status, low, high, gradient=gradient)
 
 
-SENSORS = {"touch_alone": touch_alone, "moment_rate": moment_rate, "force_and_moment": force_and_moment}
+SENSORS = {
+    "touch_alone": touch_alone,
+    "moment_rate": moment_rate,
+    "force_and_moment": force_and_moment,
+}
 
 
 def _noise_share(whisk: Whisk, by: np.ndarray) -> float:
     """Relative sigma of the distance by noise of moments and forces, which are read by sensors of their own."""
-    moments, forces = by[:2] @ whisk.covariance_at @ by[:2], by[2:] @ whisk.others.force_covariance @ by[2:]
+    moments, forces = (
+        by[:2] @ whisk.covariance_at @ by[:2],
+        by[2:] @ whisk.others.force_covariance @ by[2:],
+    )
     return sqrt(max(moments + forces, 0.0))
 
 
@@ -77,4 +88,7 @@ def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     left = whisk.beam.left(d_x)
     rolled = load_cell.rolling(whisk.theta_at_rad, settings.object_reach_mm, phi, d_x, left)
-    return hypot(rolled, load_cell.leaning(whisk.theta_at_rad, settings.tilt_sigma_rad, phi, settings.alpha_est_rad))
+    return hypot(
+        rolled,
+        load_cell.leaning(whisk.theta_at_rad, settings.tilt_sigma_rad, phi, settings.alpha_est_rad),
+    )

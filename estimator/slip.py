@@ -58,7 +58,9 @@ def moments(
 
 
 @elementwise
-def moment_magnitude(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike) -> Numbers:
+def moment_magnitude(
+    d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike
+) -> Numbers:
     """|m| of (13) and (14), in N·mm: (Cθ/d_x) cos β / cos(β − φ)."""
     _require_settings(alpha, C)
     magnitude = quotient((C, theta, np.cos(beta)), (d_x, np.cos(_held_angle(beta, alpha))))
@@ -69,12 +71,16 @@ def moment_magnitude(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: A
 def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike) -> Numbers:
     """σ of (5), in mm: how far the contact has slid along the surface. σ = d_x θ sin φ / cos(β − φ)."""
     require_friction_angle("alpha", alpha)
-    slip = quotient((d_x, theta, np.sin(slip_angle(beta, alpha))), (np.cos(_held_angle(beta, alpha)),))
+    slip = quotient(
+        (d_x, theta, np.sin(slip_angle(beta, alpha))), (np.cos(_held_angle(beta, alpha)),)
+    )
     return _inside(d_x, theta, beta, slip)
 
 
 @elementwise
-def moment_from_deflection(d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: ArrayLike) -> tuple[Numbers, Numbers]:
+def moment_from_deflection(
+    d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(m_y, m_z) of (19) and (18), in N·mm, from the deflections d_y, d_z in mm.
 
     m_z = C d_y / d_x², m_y = C d_z / d_x²; the paper prints d_z² under (19), a slip of the pen.
@@ -89,14 +95,23 @@ def moment_from_deflection(d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: Ar
 
 
 @elementwise
-def slope_from_deflection(d_x: ArrayLike, theta: ArrayLike, d_y: ArrayLike, d_z: ArrayLike) -> tuple[Numbers, Numbers]:
+def slope_from_deflection(
+    d_x: ArrayLike, theta: ArrayLike, d_y: ArrayLike, d_z: ArrayLike
+) -> tuple[Numbers, Numbers]:
     """(β, φ) of (20) and (21), in rad, from the deflections d_y, d_z in mm.
 
     tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no trace: β is
     NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
     """
     obstructed = d_x * theta - d_y
-    possible = (d_x > 0) & (theta >= 0) & (theta < RIGHT_ANGLE) & (d_y > 0) & (obstructed >= 0) & np.isfinite(d_z)
+    possible = (
+        (d_x > 0)
+        & (theta >= 0)
+        & (theta < RIGHT_ANGLE)
+        & (d_y > 0)
+        & (obstructed >= 0)
+        & np.isfinite(d_z)
+    )
     beta = np.copysign(np.arctan2(obstructed, np.abs(d_z)), d_z)
     phi = np.where(possible, np.arctan2(d_z, d_y), np.nan)
     return np.where(possible & (d_z != 0), beta, np.nan), phi
@@ -125,7 +140,9 @@ def _require_settings(alpha, C):
 
 
 def _inside(d_x, theta, beta, value):
-    return where_all((*_conditions(d_x, theta, beta), ("beyond the range of a float", np.isfinite(value))), value)
+    return where_all(
+        (*_conditions(d_x, theta, beta), ("beyond the range of a float", np.isfinite(value))), value
+    )
 
 
 def _held_angle(beta, alpha):

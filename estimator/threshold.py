@@ -7,7 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import circle
-from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, require_friction_angle, require_positive
+from estimator.domain import (
+    RIGHT_ANGLE,
+    Numbers,
+    elementwise,
+    require_friction_angle,
+    require_positive,
+)
 
 EQUATIONS = ("no_slip", "with_friction")
 SEARCH_STEP = np.radians(0.25)
@@ -33,7 +39,9 @@ def distance_error(
     _require(alpha, alpha_est, equation)
     if np.all(np.isinf(r_n)):
         return _flat_error(beta_0, alpha, alpha_est, equation == "no_slip")
-    return _curved_error(beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed))
+    return _curved_error(
+        beta_0, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed)
+    )
 
 
 def slope_threshold(
@@ -58,7 +66,9 @@ def slope_threshold(
     if np.all(np.isinf(r_n)):
         return _flat_threshold(error, alpha, alpha_est, equation == "no_slip")
     require_positive("theta", theta, "rad")
-    return _curved_threshold(error, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed))
+    return _curved_threshold(
+        error, alpha, alpha_est, r_n, theta, equation == "no_slip", _form(printed)
+    )
 
 
 def _require(alpha, alpha_est, equation):

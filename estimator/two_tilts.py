@@ -25,7 +25,7 @@ from estimator.whisk import EstimatorSettings, Whisk
 _ROUNDS = 8  # of weights and e by the solution; after four nothing changes that matters
 _DRAWN = 0.6  # of θ d: how far a cantilever's end is drawn along itself as it bends, its arc's excess over its chord
 # Of large bending's second order and of friction along the whisker that slips, what is left unknown when they are taken
-# out: as much as exact mechanics differ from them (tests/ladder/two_tilts.py).
+# out: as much as exact mechanics differ from them (tests/studies/accuracy/two_tilts.py).
 _LARGE_LEFT, _DRAGGING_LEFT = 1 / 3, 1 / 3
 ALIKE = "the whisks slip alike: no two of them tell friction from distance"
 NO_PUSH = "a whisk does not push: its m_z is not positive"
@@ -66,7 +66,10 @@ def shared_contact(
     if not (felt[:, 2] > 0).all() or not np.isfinite(felt).all():
         return _none(NO_PUSH)
     scale, m_z = _per_distance(whisks), felt[:, 2]
-    solution, covariance = _start(np.column_stack([scale, np.abs(felt[:, 1])]), m_z), np.full((2, 2), np.nan)
+    solution, covariance = (
+        _start(np.column_stack([scale, np.abs(felt[:, 1])]), m_z),
+        np.full((2, 2), np.nan),
+    )
     for _ in range(_ROUNDS):
         models = [_model(whisk, solution, settings) for whisk in whisks]
         across = [0.0 if model.held else abs(w.m_y_at_Nmm) for w, model in zip(whisks, models)]
@@ -91,7 +94,9 @@ def _start(rows: np.ndarray, m_z: np.ndarray) -> np.ndarray:
     return np.array([d, mu]) if d > 0 else np.array([(m_z / rows[:, 0]).mean(), 0.0])
 
 
-def _weighted(rows: np.ndarray, m_z: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _weighted(
+    rows: np.ndarray, m_z: np.ndarray, spread: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """(d, μ) with covariance, by generalized least squares; NaN where the rows do not tell the two apart."""
     try:
         pull = np.linalg.solve(spread, rows)
@@ -117,10 +122,18 @@ def _spread(whisks, models, solution, apart_mm, shared_Nmm) -> np.ndarray:
     common = np.zeros((len(whisks), 0))
     if len(shared_Nmm):
         common = np.array([shared @ gradient[1:] for shared, gradient in zip(shared_Nmm, by)])
-    causes = [common, per_mm[:, None] * apart_mm, solution[0] * per_mm[:, None] * [model.shared for model in models]]
+    causes = [
+        common,
+        per_mm[:, None] * apart_mm,
+        solution[0] * per_mm[:, None] * [model.shared for model in models],
+    ]
     causes = np.concatenate(causes, axis=1)
-    own = np.array([gradient @ _covariance(whisk) @ gradient for whisk, gradient in zip(whisks, by)])
-    own = np.maximum(own - (common**2).sum(axis=1), 0.0)  # the moments' covariance holds their shared causes, too
+    own = np.array(
+        [gradient @ _covariance(whisk) @ gradient for whisk, gradient in zip(whisks, by)]
+    )
+    own = np.maximum(
+        own - (common**2).sum(axis=1), 0.0
+    )  # the moments' covariance holds their shared causes, too
     left = solution[0] * per_mm * [model.own for model in models]
     return np.diag(own + left**2) + causes @ causes.T
 
@@ -130,7 +143,9 @@ def _by_felt(whisk: Whisk, held: bool, solution: np.ndarray) -> np.ndarray:
     (d, mu), theta, m_y, m_z = solution, whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
     stiff = d / (whisk.beam.C_Nmm2 * theta)
     of_friction = 0.0 if held else np.copysign(mu, m_y)
-    return np.array([stiff * (m_y**2 + m_z**2) / theta, -2 * stiff * m_y - of_friction, 1 - 2 * stiff * m_z])
+    return np.array(
+        [stiff * (m_y**2 + m_z**2) / theta, -2 * stiff * m_y - of_friction, 1 - 2 * stiff * m_z]
+    )
 
 
 def _covariance(whisk: Whisk) -> np.ndarray:
@@ -155,7 +170,11 @@ class _Model:
 def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _Model:
     """By docs/maps.md, at the friction and the distance found so far. Of an object whose radius nobody tells all from
     nothing to what is allowed for is as likely. A share of d_x is 1/w of that of d, w of the diameter being left."""
-    theta, alpha, d_x = whisk.theta_at_rad, max(atan(solution[1]), 0.0), whisk.beam.distance_mm(solution[0])
+    theta, alpha, d_x = (
+        whisk.theta_at_rad,
+        max(atan(solution[1]), 0.0),
+        whisk.beam.distance_mm(solution[0]),
+    )
     left, held = d_x / solution[0], is_held(whisk)
     phi = 0.0 if held else abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
     bent = theta if held else theta * max(cos(phi + alpha), 0.0) / cos(alpha)
@@ -163,7 +182,11 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
     along = first_order.HELD_SHARE if held else drawn / hypot(drawn, slipped)
     dragging, large = first_order.dragging(theta, alpha), bent**2 / (6 * left)
     told = not isnan(settings.object_radius_mm)
-    reach = settings.object_radius_mm + settings.whisker_radius_mm * left if told else settings.object_reach_mm
+    reach = (
+        settings.object_radius_mm + settings.whisker_radius_mm * left
+        if told
+        else settings.object_reach_mm
+    )
     rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
     error = along * dragging + large + (rolling if told else 0.5 * rolling)

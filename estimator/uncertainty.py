@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import distance, first_order
-from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, require_friction_angle, require_positive, require_sigma
+from estimator.domain import (
+    RIGHT_ANGLE,
+    Numbers,
+    elementwise,
+    require_friction_angle,
+    require_positive,
+    require_sigma,
+)
 
 Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
 _STEEPEST_RAD = RIGHT_ANGLE - 1e-9  # of a friction angle: at 90° its tangent has no number
@@ -22,7 +29,9 @@ def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarr
     return _stack(d_x, _inverse(theta), 0.0, -_inverse(m_z), 0.0)
 
 
-def gradient_known_slope(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike) -> np.ndarray:
+def gradient_known_slope(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike
+) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (6), the slope taken as exact."""
     d_x = distance.known_slope(theta, m_y, m_z, beta, C)
     share = _inverse(np.multiply(m_z, np.cos(beta)) + np.multiply(m_y, np.sin(beta)))
@@ -41,14 +50,21 @@ def gradient_with_friction(
     return _stack(d_x, *_log_gradient(theta, m_y, m_z, alpha_est))
 
 
-def gradient_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarray:
+def gradient_frictionless(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike
+) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of (11) and (12); the last one is 0."""
     d_x = distance.frictionless(theta, m_y, m_z, C)
     return _stack(d_x, *_log_gradient(theta, m_y, m_z, 0.0)[:3], 0.0)
 
 
 def gradient_cone(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    alpha_est: ArrayLike,
+    C: ArrayLike,
+    length: ArrayLike,
 ) -> np.ndarray:
     """∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's d_x)²."""
     cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
@@ -94,9 +110,16 @@ def sigma(
     ):
         require_sigma(name, value)
     covariance = np.zeros((2, 2)) if covariance is None else np.asarray(covariance, dtype=float)
-    mixed = np.zeros(2) if theta_moment_covariance is None else np.asarray(theta_moment_covariance, dtype=float)
+    mixed = (
+        np.zeros(2)
+        if theta_moment_covariance is None
+        else np.asarray(theta_moment_covariance, dtype=float)
+    )
     theta, moment, alpha = gradient[..., 0], gradient[..., 1:3], gradient[..., 3]
-    variance = theta**2 * (np.square(theta_sigma) + np.square(touch_sigma)) + (alpha * alpha_est_sigma) ** 2
+    variance = (
+        theta**2 * (np.square(theta_sigma) + np.square(touch_sigma))
+        + (alpha * alpha_est_sigma) ** 2
+    )
     variance = variance + np.einsum("...i,...ij,...j->...", moment, covariance, moment)
     variance = variance + 2 * theta * np.einsum("...i,...i->...", moment, mixed)
     return _root(variance)
@@ -108,26 +131,43 @@ def sigma_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: Arra
 
 
 def sigma_known_slope(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    beta: ArrayLike,
+    C: ArrayLike,
+    **sigmas: ArrayLike,
 ) -> Numbers:
     """Standard deviation of (6), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_known_slope(theta, m_y, m_z, beta, C), **sigmas)
 
 
 def sigma_with_friction(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    alpha_est: ArrayLike,
+    C: ArrayLike,
+    **sigmas: ArrayLike,
 ) -> Numbers:
     """Standard deviation of (10), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_with_friction(theta, m_y, m_z, alpha_est, C), **sigmas)
 
 
-def sigma_frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike) -> Numbers:
+def sigma_frictionless(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
+) -> Numbers:
     """Standard deviation of (11) and (12), in mm; `sigmas` as of `sigma`."""
     return sigma(gradient_frictionless(theta, m_y, m_z, C), **sigmas)
 
 
 def sigma_cone(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, length: ArrayLike,
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    alpha_est: ArrayLike,
+    C: ArrayLike,
+    length: ArrayLike,
     **sigmas: ArrayLike,
 ) -> Numbers:
     """Standard deviation of the cone's distance, in mm; `sigmas` as of `sigma`."""
@@ -135,8 +175,15 @@ def sigma_cone(
 
 
 def interval_with_friction(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike, *,
-    alpha_est_sigma: ArrayLike = 0.0, model_sigma: ArrayLike = 0.0, **sigmas: ArrayLike,
+    theta: ArrayLike,
+    m_y: ArrayLike,
+    m_z: ArrayLike,
+    alpha_est: ArrayLike,
+    C: ArrayLike,
+    *,
+    alpha_est_sigma: ArrayLike = 0.0,
+    model_sigma: ArrayLike = 0.0,
+    **sigmas: ArrayLike,
 ) -> tuple[Numbers, Numbers]:
     """(low, high), mm: the 95 % interval of (10), beyond a φ + α_est of 90° too; NaN where m_z or θ is no push.
 
@@ -152,16 +199,27 @@ def interval_with_friction(
     middle, gradient = _through_zero(theta, m_y, m_z, alpha_est, C)
     rest = Z_95 * np.hypot(sigma(gradient, **sigmas), model_sigma * middle)
     ends = (alpha_est + side * Z_95 * alpha_est_sigma for side in (1.0, -1.0))
-    least, most = (_through_zero(theta, m_y, m_z, np.clip(a, 0.0, _STEEPEST_RAD), C)[0] for a in ends)
+    least, most = (
+        _through_zero(theta, m_y, m_z, np.clip(a, 0.0, _STEEPEST_RAD), C)[0] for a in ends
+    )
     high = middle + _side(most - middle, rest, alpha_est, Z_95 * np.asarray(alpha_est_sigma))
     low = middle - np.hypot(middle - least, rest)
     push = (np.asarray(theta) > 0) & (np.asarray(m_z) > 0) & np.isfinite(middle)
-    return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(push, np.maximum(high, 0.0), np.nan)[()]
+    return np.where(push, np.maximum(low, 0.0), np.nan)[()], np.where(
+        push, np.maximum(high, 0.0), np.nan
+    )[()]
 
 
 def model_share(
-    theta: ArrayLike, phi: ArrayLike, alpha: ArrayLike, d_x: ArrayLike, *,
-    reach: ArrayLike = 0.0, tilt_sigma: ArrayLike = 0.0, left: ArrayLike = 1.0, held_spread: ArrayLike = 1.0,
+    theta: ArrayLike,
+    phi: ArrayLike,
+    alpha: ArrayLike,
+    d_x: ArrayLike,
+    *,
+    reach: ArrayLike = 0.0,
+    tilt_sigma: ArrayLike = 0.0,
+    left: ArrayLike = 1.0,
+    held_spread: ArrayLike = 1.0,
 ) -> Numbers:
     """How far (10) may be off by itself, as a share of d_x: leading terms in θ, derived in docs/maps.md.
 

@@ -8,7 +8,14 @@ import numpy as np
 from estimator.beam import Beam
 from estimator.domain import require_friction_angle, require_sigma
 
-_ARRAYS = ("time_s", "theta_rad", "m_y_Nmm", "m_z_Nmm", "covariance_at", "theta_moment_covariance_at")
+_ARRAYS = (
+    "time_s",
+    "theta_rad",
+    "m_y_Nmm",
+    "m_z_Nmm",
+    "covariance_at",
+    "theta_moment_covariance_at",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +74,13 @@ class Whisk:
     def __post_init__(self):
         shapes = {np.shape(a) for a in (self.time_s, self.theta_rad, self.m_y_Nmm, self.m_z_Nmm)}
         if len(shapes) != 1 or len(shapes.pop()) != 1:
-            raise ValueError("time_s, theta_rad, m_y_Nmm and m_z_Nmm must be arrays (n,) of one length")
+            raise ValueError(
+                "time_s, theta_rad, m_y_Nmm and m_z_Nmm must be arrays (n,) of one length"
+            )
         if np.shape(self.covariance_at) != (2, 2):
-            raise ValueError(f"covariance_at has shape {np.shape(self.covariance_at)}: must be (2, 2)")
+            raise ValueError(
+                f"covariance_at has shape {np.shape(self.covariance_at)}: must be (2, 2)"
+            )
         if np.shape(self.theta_moment_covariance_at) != (2,):
             raise ValueError("theta_moment_covariance_at must have shape (2,)")
         require_sigma("theta_sigma_rad", self.theta_sigma_rad)

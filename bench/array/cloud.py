@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.array.surface import Surface, seen_surface
 from bench.base.doubts import in_one_status
-from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
 from estimator.distance import cartesian, contact_point
@@ -72,7 +72,9 @@ class Mount:
     alpha_est_sigma_rad: float
 
 
-def contacts(mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, Surface]) -> Iterator[Contact]:
+def contacts(
+    mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, Surface]
+) -> Iterator[Contact]:
     """Every whisk's contact, as seen where it is and by each estimator that gives a distance.
 
     surfaces: by trial, as stated. Where none is, a contact felt is beside the bar as this whisker's own cameras see it:
@@ -89,7 +91,10 @@ def contacts(mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, S
 
 
 def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Iterator[Contact]:
-    of_whisk, whisker = (mount.base.name, trial, seen.whisk), (mount.base.T_rig_base[:, 3], mount.wire)
+    of_whisk, whisker = (
+        (mount.base.name, trial, seen.whisk),
+        (mount.base.T_rig_base[:, 3], mount.wire),
+    )
     if seen.has_truth and seen.point_covariance_mm2 is not None:
         normal = _normal(seen.touch_rad.value, seen.beta_rad.value)
         placed = _placed(mount.base, seen.point_mm.value, seen.point_covariance_mm2, normal)
@@ -97,7 +102,13 @@ def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Ite
     for answer in (*felt.estimates, *felt.sensors):
         if math.isfinite(answer.d_x_est_mm.value) and math.isfinite(felt.touch_felt_rad.value):
             status = in_one_status(felt.status, answer.status)
-            found = *_felt(mount, felt, answer), status, *whisker, _by_alpha_mm(answer), not felt.status
+            found = (
+                *_felt(mount, felt, answer),
+                status,
+                *whisker,
+                _by_alpha_mm(answer),
+                not felt.status,
+            )
             yield Contact(*of_whisk, answer.estimator, *found)
 
 
@@ -107,15 +118,21 @@ def _by_alpha_mm(answer: EstimateRow) -> float:
     return -math.sqrt(max(answer.d_x_est_mm.sigma**2 - own**2, 0.0)) if math.isfinite(own) else 0.0
 
 
-def _felt(mount: Mount, felt: FeltWhisk, answer: EstimateRow) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _felt(
+    mount: Mount, felt: FeltWhisk, answer: EstimateRow
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Point, covariance and normal of the contact (r_c, θ_c, z_c) that an estimator gives, and the normal's sigma."""
     touch, r_c = felt.touch_felt_rad, answer.d_x_est_mm
     point = np.array(cartesian(*contact_point(r_c.value, touch.value, Z_C_MM.value)))
     both = answer.touch_covariance_mm_rad
     both = both if math.isfinite(both) else 0.0
-    polar = np.array([[r_c.sigma**2, both, 0.0], [both, touch.sigma**2, 0.0], [0.0, 0.0, Z_C_MM.sigma**2]])
+    polar = np.array(
+        [[r_c.sigma**2, both, 0.0], [both, touch.sigma**2, 0.0], [0.0, 0.0, Z_C_MM.sigma**2]]
+    )
     cos, sin = math.cos(touch.value), math.sin(touch.value)
-    by_polar = np.array([[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]])
+    by_polar = np.array(
+        [[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]]
+    )
     assumed = answer.alpha_est_rad == mount.alpha_est_rad
     sigma = math.hypot(felt.phi_felt_rad.sigma, mount.alpha_est_sigma_rad) if assumed else NAN
     normal = _normal(touch.value, answer.beta_est_rad)
@@ -144,9 +161,12 @@ def _beside(contact: Contact, surface: Surface) -> Contact:
     """
     start, arc, towards, wire = contact.base_mm, contact.arc_mm, contact.towards, contact.wire
     nearest = surface.nearest_arc_mm(start, towards, wire.length_mm)
-    (outside, _), (normal, own) = surface.distance_mm(np.array([contact.point_mm, start + nearest * towards]))
+    (outside, _), (normal, own) = surface.distance_mm(
+        np.array([contact.point_mm, start + nearest * towards])
+    )
     across, along = (
-        float(np.sqrt(way @ (contact.covariance_mm2 + surface.covariance_mm2) @ way)) for way in (normal, towards)
+        float(np.sqrt(way @ (contact.covariance_mm2 + surface.covariance_mm2) @ way))
+        for way in (normal, towards)
     )
     cosine = np.clip(contact.normal @ own, -1.0, 1.0)
     return replace(

@@ -26,7 +26,9 @@ def write_figures(out: Path, cloud: Sequence[Contact], surfaces: dict[str, Surfa
     for trial in dict.fromkeys(contact.trial for contact in cloud):
         mine = [c for c in cloud if c.trial == trial and c.estimator in (SEEN, _FELT)]
         name, surface = f"surface/{trial}.png", surfaces.get(trial)
-        stamp = hash_of(hash_of_code((*DRAWING, "bench/array")), to_plain(mine), surface and to_plain(surface))
+        stamp = hash_of(
+            hash_of_code((*DRAWING, "bench/array")), to_plain(mine), surface and to_plain(surface)
+        )
         if not is_drawn(out / name, stamp):
             with style():
                 save(figure(trial, mine, surface), out / name, stamp)
@@ -46,11 +48,19 @@ def figure(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Fig
             _draw_object(axes, surface, points, x, y)
         for contact in cloud:
             _draw_contact(axes, contact, x, y, colours[contact.whisker])
-        axes.set(xlabel=x_name, ylabel=y_name, aspect="equal", xlim=_span(points[:, x]), ylim=_span(points[:, y]))
+        axes.set(
+            xlabel=x_name,
+            ylabel=y_name,
+            aspect="equal",
+            xlim=_span(points[:, x]),
+            ylim=_span(points[:, y]),
+        )
     for name, colour in colours.items():
         axes.plot([], [], "o", color=colour, label=name)
     drawn.legend(*axes.get_legend_handles_labels(), loc="outside right center", title="whisker")
-    drawn.suptitle(f"{trial}: contacts felt (ellipses: one sigma), seen (crosses), and the object", fontsize=9)
+    drawn.suptitle(
+        f"{trial}: contacts felt (ellipses: one sigma), seen (crosses), and the object", fontsize=9
+    )
     return drawn
 
 
@@ -74,7 +84,9 @@ def _draw_object(axes, surface: Surface, points: np.ndarray, x: int, y: int) -> 
     """As the discs of its radius about its centreline: together they are what is seen of it."""
     centreline = _centreline(surface, points)
     down = (surface.point_mm - centreline) @ surface.axis
-    radii = surface.radius_mm + np.sin(surface.half_angle_rad) * down  # of balls that just fit in, of a cone
+    radii = (
+        surface.radius_mm + np.sin(surface.half_angle_rad) * down
+    )  # of balls that just fit in, of a cone
     for centre, radius in zip(centreline[:, [x, y]], radii):
         axes.add_patch(Ellipse(centre, 2 * radius, 2 * radius, facecolor="0.85", edgecolor="none"))
 

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bench.array.cloud import Contact
+from bench.array.shape_verdict import FELT
 from bench.array.surface import STATED, Surface
-from bench.array.verdict import FELT
 from bench.base.doubts import in_one_status
 from bench.base.tables import sigma_name, write_table
 from estimator.uncertainty import Z_95
@@ -24,12 +24,26 @@ from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
 COLUMNS = (
-    *("trial", "shape", "contacts", "distances", "radius_mm", "radius_sigma_mm", "stated_radius_mm"),
+    *(
+        "trial",
+        "shape",
+        "contacts",
+        "distances",
+        "radius_mm",
+        "radius_sigma_mm",
+        "stated_radius_mm",
+    ),
     *("half_angle_deg", "half_angle_sigma_deg", "stated_half_angle_deg", "chance", "status"),
 )
-_SIZES = {"bar": "radius_mm", "sphere": "radius_mm", "ring": "ring_radius_mm", "cone": "half_angle_rad"}
+_SIZES = {
+    "bar": "radius_mm",
+    "sphere": "radius_mm",
+    "ring": "ring_radius_mm",
+    "cone": "half_angle_rad",
+}
 _STEP = 1e-3  # mm, rad: of differences
-_LEAST_CHANCE = 1e-3  # that contacts on such a surface lie as far off it: one sound object in a thousand
+# that contacts on such a surface lie as far off it: one sound object in a thousand
+_LEAST_CHANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,7 +83,9 @@ def felt_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[F
 
 def felt_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> Felt:
     """Gauss and Newton's method from where and how large the object is said to be."""
-    from scipy.optimize import least_squares  # not before it is needed: it takes longer than an evaluation's tables
+    from scipy.optimize import (
+        least_squares,
+    )  # not before it is needed: it takes longer than an evaluation's tables
 
     free, distances = _free(surface), sum(not contact.status for contact in contacts)
     served = trial, surface, len(contacts), distances
@@ -89,8 +105,10 @@ def felt_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> Felt
     information = found.jac.T @ found.jac
     if not np.isfinite(information).all() or np.linalg.cond(information) > 1e12:
         return Felt(*served, status="contacts leave the size open")
-    size = Value(getattr(surface, _SIZES[surface.shape]) + float(found.x[-1]),
-                 float(np.sqrt(np.linalg.inv(information)[-1, -1])))  # fmt: skip
+    size = Value(
+        getattr(surface, _SIZES[surface.shape]) + float(found.x[-1]),
+        float(np.sqrt(np.linalg.inv(information)[-1, -1])),
+    )
     chance = float(chdtrc(freedom, 2 * found.cost))
     return Felt(*served, size, chance, _status(size, chance))
 
@@ -119,10 +137,14 @@ def _off(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
     nearest = _nearest(contacts, surface)
     outside, _ = _beside(contacts, surface, nearest)
     radii = [contact.wire.radius_mm(arc) for contact, arc in zip(contacts, nearest)]
-    return np.stack([outside - radii, [contact.arc_mm for contact in contacts] - nearest], -1).ravel()
+    return np.stack(
+        [outside - radii, [contact.arc_mm for contact in contacts] - nearest], -1
+    ).ravel()
 
 
-def _slopes(contacts: Sequence[Contact], surface: Surface, free: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+def _slopes(
+    contacts: Sequence[Contact], surface: Surface, free: np.ndarray, numbers: np.ndarray
+) -> np.ndarray:
     """(2 n, k): their derivatives. Where the whisker comes nearest its distance does not change along it, and the place
     moves so that the normal stays across it."""
     here = _placed(surface, free, numbers)
@@ -130,7 +152,10 @@ def _slopes(contacts: Sequence[Contact], surface: Surface, free: np.ndarray, num
     by_arc = _difference(lambda step: _beside(contacts, here, nearest + step)[1])
     columns = []
     for axis in np.eye(len(numbers)):
-        moved = (_beside(contacts, _placed(surface, free, numbers + step * axis), nearest) for step in (_STEP, -_STEP))
+        moved = (
+            _beside(contacts, _placed(surface, free, numbers + step * axis), nearest)
+            for step in (_STEP, -_STEP)
+        )
         outside, leaning = (np.subtract(*pair) / (2 * _STEP) for pair in zip(*moved))
         columns.append(np.stack([outside, leaning / by_arc], -1).ravel())
     return np.stack(columns, -1)
@@ -146,7 +171,9 @@ def _nearest(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
     return np.array([surface.nearest_arc_mm(*line) for line in lines])
 
 
-def _beside(contacts: Sequence[Contact], surface: Surface, arc_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _beside(
+    contacts: Sequence[Contact], surface: Surface, arc_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """How far each whisker is off the surface there (n,), mm, and the cosine (n,) between it and the normal."""
     towards = np.array([contact.towards for contact in contacts])
     points = np.array([contact.base_mm for contact in contacts]) + arc_mm[:, None] * towards
@@ -157,7 +184,10 @@ def _beside(contacts: Sequence[Contact], surface: Surface, arc_mm: np.ndarray) -
 def _covariance(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
     """(2 n, 2 n) mm² of what they are off by: each contact's own, and the friction angle's, which is one for all."""
     towards = np.array([contact.towards for contact in contacts])
-    places = np.array([contact.base_mm for contact in contacts]) + _nearest(contacts, surface)[:, None] * towards
+    places = (
+        np.array([contact.base_mm for contact in contacts])
+        + _nearest(contacts, surface)[:, None] * towards
+    )
     whole, shared = np.zeros((2 * len(contacts),) * 2), []
     for number, (contact, normal) in enumerate(zip(contacts, surface.distance_mm(places)[1])):
         axes, by_alpha = np.stack([normal, contact.towards]), contact.by_alpha_mm * contact.towards
@@ -179,13 +209,19 @@ def _row(felt: Felt) -> dict:
     row = {"trial": felt.trial, "shape": felt.surface.shape, "chance": felt.chance}
     row |= {"contacts": felt.contacts, "distances": felt.distances}
     name, to_shown = _shown(felt)
-    sizes = {name: felt.size.value, sigma_name(name): felt.size.sigma, f"stated_{name}": felt.stated}
+    sizes = {
+        name: felt.size.value,
+        sigma_name(name): felt.size.sigma,
+        f"stated_{name}": felt.stated,
+    }
     return row | {"status": felt.status} | {key: to_shown * value for key, value in sizes.items()}
 
 
 def _shown(felt: Felt) -> tuple[str, float]:
     """Column and factor to its unit. A ring's radius is its circle's."""
-    return ("half_angle_deg", np.degrees(1.0)) if felt.surface.shape == "cone" else ("radius_mm", 1.0)
+    return (
+        ("half_angle_deg", np.degrees(1.0)) if felt.surface.shape == "cone" else ("radius_mm", 1.0)
+    )
 
 
 def size_lines(found: Iterable[Felt]) -> Iterator[str]:
@@ -193,7 +229,9 @@ def size_lines(found: Iterable[Felt]) -> Iterator[str]:
     for felt in found:
         name, to_shown = _shown(felt)
         unit = "mm" if name.endswith("mm") else "deg"
-        value, sigma, stated = (to_shown * number for number in (felt.size.value, felt.size.sigma, felt.stated))
+        value, sigma, stated = (
+            to_shown * number for number in (felt.size.value, felt.size.sigma, felt.stated)
+        )
         what = f"{felt.trial}: {felt.surface.shape}, {counted(felt.contacts, 'contact')}"
         if not np.isfinite(value):
             yield f"{what}: no size; {felt.status}"

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bench.records.trial import SeenWhisk
+from bench.records.trial_result import SeenWhisk
 from bench.session.session import Base
 from bench.session.trial import Trial
-from vision.bar.find import axis_from_angles
 from vision.geometry.rods import Wire
+from vision.touched.find import axis_from_angles
 
 STATED, SEEN = "manifest", "pictures"
 _ARC_MM = 1e-6  # mm: as near as an arc is looked for
@@ -42,7 +42,9 @@ class Surface:
         if self.shape == "sphere":
             return np.broadcast_to(self.point_mm, points_mm.shape)
         flat = apart - along
-        return self.point_mm + self.ring_radius_mm * flat / np.linalg.norm(flat, axis=1, keepdims=True)
+        return self.point_mm + self.ring_radius_mm * flat / np.linalg.norm(
+            flat, axis=1, keepdims=True
+        )
 
     def distance_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far points (n, 3) are outside of the surface, (n,), negative within; its normals there, (n, 3)."""
@@ -79,7 +81,11 @@ class Surface:
 def stated_surface(trial: Trial) -> Surface | None:
     """The object as the manifest states it; None where it does not, or does not say how thick it is."""
     given = trial.object
-    if given is None or given.point_mm is None or (trial.bar_diameter_mm is None and given.shape != "cone"):
+    if (
+        given is None
+        or given.point_mm is None
+        or (trial.bar_diameter_mm is None and given.shape != "cone")
+    ):
         return None
     point, axis = np.array(given.point_mm, dtype=float), np.array(given.axis, dtype=float)
     thick = 0.0 if given.shape == "cone" else trial.bar_diameter_mm
@@ -99,7 +105,12 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
         return None
     turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
     if (there := seen.rounded) is not None:
-        place = turn @ there.point_mm + shift, turn @ there.axis, there.radius_mm, there.ring_radius_mm
+        place = (
+            turn @ there.point_mm + shift,
+            turn @ there.axis,
+            there.radius_mm,
+            there.ring_radius_mm,
+        )
         covariance = turn @ seen.point_covariance_mm2 @ turn.T
         return Surface(there.shape, *place, covariance, SEEN, there.half_angle_rad)
     if not np.isfinite(bar_radius_mm):
@@ -107,6 +118,9 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
     reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
     angles = seen.touch_rad.value, seen.beta_rad.value, seen.psi_rad.value
     from_contact = axis_from_angles(0.0, *angles, reach_mm)
-    point, axis = turn @ (seen.point_mm.value + from_contact.point_mm) + shift, turn @ from_contact.direction
+    point, axis = (
+        turn @ (seen.point_mm.value + from_contact.point_mm) + shift,
+        turn @ from_contact.direction,
+    )
     covariance = turn @ seen.point_covariance_mm2 @ turn.T
     return Surface("bar", point, axis, bar_radius_mm, covariance_mm2=covariance, source=SEEN)

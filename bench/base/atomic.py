@@ -40,7 +40,10 @@ def whole_file(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
     except BaseException as problem:
         temporary.unlink(missing_ok=True)
-        if isinstance(problem, OSError) and problem.filename in (None, name):  # a full disk names no file
+        if isinstance(problem, OSError) and problem.filename in (
+            None,
+            name,
+        ):  # a full disk names no file
             problem.filename, problem.filename2 = str(path), None
         raise
 
@@ -76,4 +79,6 @@ def _hold(lock, folder: Path) -> None:
     except BlockingIOError:
         lock.seek(0)
         pid = lock.read().strip() or "unknown"
-        raise BadInput(f"another run (process {pid}) writes to this folder; wait for it", file=folder) from None
+        raise BadInput(
+            f"another run (process {pid}) writes to this folder; wait for it", file=folder
+        ) from None

@@ -21,9 +21,15 @@ from bench.base.results import hash_of_code
 from bench.base.workers import DIED, Workers, has_one_thread, pictures_by_one_thread
 
 _CODE = ("bench", "vision", "estimator")
-_LIBRARIES = ("numpy", "scipy", "scikit-image", "opencv-contrib-python-headless")  # what results are computed by
+_LIBRARIES = (
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "opencv-contrib-python-headless",
+)  # what results are computed by
 _LONG_ENOUGH_S = 10.0  # s, for a scheduler to answer. Set by eye
-_LARGE = "1GB"  # of one task; Dask warns from 10 MB on, and a task holds the rig pictures of all cameras
+# of one task; Dask warns from 10 MB on, and a task holds the rig pictures of all cameras
+_LARGE = "1GB"
 _ONE_AT_A_TIME = threading.Lock()
 
 
@@ -42,7 +48,9 @@ class Cluster(Workers):
         try:
             from distributed import Client
         except ImportError:
-            raise BadInput("--dask needs distributed: pip install 'whisker-bench[cluster]'") from None
+            raise BadInput(
+                "--dask needs distributed: pip install 'whisker-bench[cluster]'"
+            ) from None
         try:
             self._client = Client(self.address, timeout=_LONG_ENOUGH_S, set_as_default=False)
         except (OSError, ValueError):
@@ -66,7 +74,9 @@ class Cluster(Workers):
         given = partial(_job, job, here=facts(), lock=(lock, lock.read_text()))
         waiting, busy, done = deque(enumerate(tasks)), {}, as_completed(loop=self._client.loop)
         while waiting or busy:
-            while waiting and len(busy) < max(len(self._client.nthreads()), 1):  # one each, few at the scheduler
+            while waiting and len(busy) < max(
+                len(self._client.nthreads()), 1
+            ):  # one each, few at the scheduler
                 place, task = waiting.popleft()
                 with dask.config.set({"distributed.admin.large-graph-warning-threshold": _LARGE}):
                     future = self._client.submit(given, task, pure=False)
@@ -101,7 +111,9 @@ def _job(job: Callable, task: Any, here: dict[str, str], lock: tuple[Path, str])
     _check_code(tuple(here.items()))
     file, said = lock
     if not file.is_file() or file.read_text() != said:
-        raise BadInput(f"{_worker()} does not see {file.parent}: session and output must be there under the same paths")
+        raise BadInput(
+            f"{_worker()} does not see {file.parent}: session and output must be there under the same paths"
+        )
     with _ONE_AT_A_TIME, pictures_by_one_thread():
         return job(task)
 
@@ -111,10 +123,14 @@ def _check_code(here: tuple[tuple[str, str], ...]) -> None:
     there = facts()
     for name, wanted in here:
         if there[name] != wanted:
-            raise BadInput(f"{_worker()} has {name} {there[name]}, here it is {wanted}: install the same on both")
+            raise BadInput(
+                f"{_worker()} has {name} {there[name]}, here it is {wanted}: install the same on both"
+            )
     if not has_one_thread():
-        raise BadInput(f"{_worker()} computes with several threads: start it with OMP_NUM_THREADS=1 "
-                       "OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1")
+        raise BadInput(
+            f"{_worker()} computes with several threads: start it with OMP_NUM_THREADS=1 "
+            "OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1"
+        )
 
 
 def _worker() -> str:

@@ -32,8 +32,7 @@ class Doubts:
             self.refusals.append(str(bad))
 
     def each(self, loaders: Iterable[Callable[[], Any]]) -> list:
-        """What each loader gives. Raises the first one's BadInput when all have been run, and what they refuse is kept.
-        """
+        """What each loader gives. Raises the first one's BadInput when all have been run, and what they refuse is kept."""
         before, given = len(self.refusals), []
         for load in loaders:
             with self.guard():

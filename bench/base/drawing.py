@@ -66,8 +66,14 @@ _UNDATED = {
 _STAMP = "Source"
 # Level 2 and no filter of rows: an overlay takes 33 ms of processor and 1.19 MB, by level 3 53 ms and 1.08 MB; by
 # Pillow, which tries each row's filters, 89 ms and 1.11 MB. Sensing planes come out smaller, too.
-_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 2, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_DEFAULT,
-        cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE)  # fmt: skip
+_PNG = (
+    cv2.IMWRITE_PNG_COMPRESSION,
+    2,
+    cv2.IMWRITE_PNG_STRATEGY,
+    cv2.IMWRITE_PNG_STRATEGY_DEFAULT,
+    cv2.IMWRITE_PNG_FILTER,
+    cv2.IMWRITE_PNG_FILTER_NONE,
+)
 _HEADER_BYTES = 33  # of a PNG: its signature and what says the size
 SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
 
@@ -137,7 +143,9 @@ def _lay_out(figure: "Figure") -> None:
         figure.set_layout_engine(None)
 
 
-def publish(figure: "Figure", stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150) -> list[Path]:
+def publish(
+    figure: "Figure", stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150
+) -> list[Path]:
     """Write <stem>.<format> of each of FORMATS that is asked for, whole; the same figure gives the same bytes. The
     paths written."""
     paths = [stem.with_name(f"{stem.name}.{name}") for name in formats]

@@ -39,7 +39,9 @@ def _check_packages() -> None:
 
 
 def _check_opencv_distributions() -> None:
-    names = {re.sub(r"[-_.]+", "-", d.metadata["Name"] or "").lower() for d in metadata.distributions()}
+    names = {
+        re.sub(r"[-_.]+", "-", d.metadata["Name"] or "").lower() for d in metadata.distributions()
+    }
     found = sorted(name for name in names if name.startswith("opencv"))
     if found != [OPENCV]:
         what = " and ".join(found) or "no OpenCV"

@@ -10,7 +10,14 @@ class BadInput(Exception):
     `check` can list many.
     """
 
-    def __init__(self, reason: str, *, file: str | PurePath | None = None, row: int | None = None, column=None):
+    def __init__(
+        self,
+        reason: str,
+        *,
+        file: str | PurePath | None = None,
+        row: int | None = None,
+        column=None,
+    ):
         self.reason, self.file, self.row, self.column = reason, file, row, column
         place = ", ".join(_places(file, row, column))
         super().__init__(" ".join(f"{place}: {reason}".split()) if place else reason)

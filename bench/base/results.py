@@ -21,10 +21,20 @@ _TRUTH_FILES = re.compile(r"truth(@.+)?\.(csv|toml|json)")  # of one whisker, or
 # What a result is made from, as folders and files of our sources: a line changed in one of them makes it anew.
 SEEING = (
     *("vision", "bench/session", "bench/cameras", "bench/gauges/felt.py", "bench/trials/seen.py"),
-    *("bench/trials/pictures.py", "bench/trials/other_wires.py", "bench/trials/whose_wire.py"),
-    *("bench/trials/consistency.py", "bench/trials/placing.py", "bench/trials/scene.py", "bench/trials/seeing.py"),
+    *("bench/trials/trial_frames.py", "bench/trials/other_wires.py", "bench/trials/whose_wire.py"),
+    *(
+        "bench/trials/consistency.py",
+        "bench/trials/placing.py",
+        "bench/trials/still_scene.py",
+        "bench/trials/seeing.py",
+    ),
     *("bench/records", "bench/base/doubts.py", "bench/base/results.py", "bench/base/settings.py"),
-    *("bench/trials/one_camera.py", "estimator/seen_shape.py", "estimator/beam.py", "estimator/load_cell.py"),
+    *(
+        "bench/trials/one_camera.py",
+        "estimator/seen_shape.py",
+        "estimator/beam.py",
+        "estimator/load_cell.py",
+    ),
 )
 ESTIMATING = (*SEEING, "estimator", "bench/gauges", "bench/trials")
 DRAWING = ("bench/report", "bench/base/drawing.py")
@@ -36,14 +46,20 @@ _MANY = 1000  # values; larger arrays are hashed by their bytes
 def hash_of(*parts: object) -> str:
     """Hash of plain values, in their order. Pictures count by their pixels, paths by their names: a session that was
     moved is the same session."""
-    return hashlib.blake2b(json.dumps(_hashable(parts), sort_keys=True).encode(), digest_size=16).hexdigest()
+    return hashlib.blake2b(
+        json.dumps(_hashable(parts), sort_keys=True).encode(), digest_size=16
+    ).hexdigest()
 
 
 def _hashable(value):
     if isinstance(value, Path):
         return value.name
     if isinstance(value, np.ndarray) and value.size > _MANY:
-        return [value.shape, str(value.dtype), hashlib.blake2b(np.ascontiguousarray(value).tobytes()).hexdigest()]
+        return [
+            value.shape,
+            str(value.dtype),
+            hashlib.blake2b(np.ascontiguousarray(value).tobytes()).hexdigest(),
+        ]
     if is_dataclass(value) and not isinstance(value, type):
         return {f.name: _hashable(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
@@ -64,7 +80,9 @@ def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = co
     places = ([path] if path.is_file() else sorted(_below(path)) for path in sorted(set(paths)))
     files = [file for place in places for file in place if _counts(file.name)]
     some = [files[k : k + _FILES_AT_ONCE] for k in range(0, len(files), _FILES_AT_ONCE)]
-    contents = chain.from_iterable(in_threads(lambda batch: [digest_of(file) for file in batch], some))
+    contents = chain.from_iterable(
+        in_threads(lambda batch: [digest_of(file) for file in batch], some)
+    )
     for file, content in zip(files, contents):
         digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
         digest.update(content)

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from bench.base.errors import BadInput
-from vision.geometry.settings import VisionSettings
+from vision.geometry.vision_settings import VisionSettings
 
 # The paper's 5 Hz at 10 deg/s and 45 Hz at 90 deg/s: half a hertz for each deg/s.
 CUTOFF_HZ_PER_DEG_S = 0.5
@@ -95,11 +95,24 @@ class Settings:
     def seen(self) -> list:
         """The settings that what is seen depends on."""
         one = [] if self.one_camera is None else [self.one_camera]
-        return [self.theta_deg, self.clock_sigma_s, self.seeing.vision, self.seeing.cameras, self.accuracy_mm, *one]
+        return [
+            self.theta_deg,
+            self.clock_sigma_s,
+            self.seeing.vision,
+            self.seeing.cameras,
+            self.accuracy_mm,
+            *one,
+        ]
 
     def estimated(self) -> list:
         """The settings that a trial's whole result depends on."""
-        own = self.alpha_est_deg, self.alpha_est_sigma_deg, self.cutoff_Hz, self.estimators, self.gauges_from_all
+        own = (
+            self.alpha_est_deg,
+            self.alpha_est_sigma_deg,
+            self.cutoff_Hz,
+            self.estimators,
+            self.gauges_from_all,
+        )
         return [*self.seen(), *own]
 
     def takes(self, trial: str) -> bool:
@@ -123,4 +136,6 @@ def _source_of(module: str) -> str:
 def _require(option: str, value: float, low: float, high: float, *, above: bool = False) -> None:
     inside = low < value <= high if above else low <= value <= high
     if not inside:
-        raise BadInput(f"{option} {value:g}: must be {'above' if above else 'from'} {low:g} and at most {high:g}")
+        raise BadInput(
+            f"{option} {value:g}: must be {'above' if above else 'from'} {low:g} and at most {high:g}"
+        )

@@ -13,7 +13,17 @@ from bench.base.errors import BadInput
 
 # Of an evaluated session, beside a track a trial; one that has nothing to say has its head alone.
 TABLES = (
-    *("whisks", "estimates", "budget", "beam", "friction", "phases", "surfaces", "explained", "error_map"),
+    *(
+        "whisks",
+        "estimates",
+        "budget",
+        "beam",
+        "friction",
+        "phases",
+        "surfaces",
+        "explained",
+        "error_map",
+    ),
     *("against_theta", "compliance", "curvature", "tilts", "sensors", "ledger"),
 )
 
@@ -37,12 +47,45 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[dict]) -> Non
 
 
 # Columns that hold text, and whole numbers that are never missing; all others are numbers.
-TEXT = ("whisker", "trial", "surface", "looked", "estimator", "beta_from", "record", "kind", "shape", "notes", "status")
+TEXT = (
+    "whisker",
+    "trial",
+    "surface",
+    "looked",
+    "estimator",
+    "beta_from",
+    "record",
+    "kind",
+    "shape",
+    "notes",
+    "status",
+)
 TEXT += ("refinement", "verdict", "surface_from", "camera")
 SAID = ("status", "notes")  # sentences of ours
 _ASCII = {
-    **{"°": " deg", "±": "+-", "·": "*", "×": "x", "≥": ">=", "≤": "<=", "²": "2", "−": "-", "–": "-", "…": "..."},
-    **{"→": "->", "α": "alpha", "β": "beta", "θ": "theta", "μ": "mu", "σ": "sigma", "φ": "phi", "χ": "chi", "ψ": "psi"},
+    **{
+        "°": " deg",
+        "±": "+-",
+        "·": "*",
+        "×": "x",
+        "≥": ">=",
+        "≤": "<=",
+        "²": "2",
+        "−": "-",
+        "–": "-",
+        "…": "...",
+    },
+    **{
+        "→": "->",
+        "α": "alpha",
+        "β": "beta",
+        "θ": "theta",
+        "μ": "mu",
+        "σ": "sigma",
+        "φ": "phi",
+        "χ": "chi",
+        "ψ": "psi",
+    },
 }
 WHOLE = ("whisk", "whisks", "frame", "touching", "cameras", "frames_used")
 WHOLE += ("rests_seen", "jumps_seen", "rests_felt", "jumps_felt")
@@ -54,16 +97,26 @@ def read_table(path: Path) -> np.ndarray:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             columns, *rows = csv.reader(file)
-        kinds = [(name, str if name in TEXT else int if name in WHOLE else float) for name in columns]
+        kinds = [
+            (name, str if name in TEXT else int if name in WHOLE else float) for name in columns
+        ]
         whole = [row for row in rows if dict(zip(columns, row, strict=True)).get("whisk", "one")]
         cells = {
             name: [kind(cell) if cell or kind is str else math.nan for cell in column]
             for (name, kind), column in zip(kinds, zip(*whole))
         }
     except (OSError, ValueError, csv.Error) as problem:
-        raise BadInput(f"cannot be read ({problem}); evaluate the session again into this folder", file=path) from None
-    longest = {name: max((len(c) for c in cells.get(name, ())), default=1) or 1 for name, kind in kinds if kind is str}
-    table = np.zeros(len(whole), [(name, f"U{longest[name]}" if kind is str else kind) for name, kind in kinds])
+        raise BadInput(
+            f"cannot be read ({problem}); evaluate the session again into this folder", file=path
+        ) from None
+    longest = {
+        name: max((len(c) for c in cells.get(name, ())), default=1) or 1
+        for name, kind in kinds
+        if kind is str
+    }
+    table = np.zeros(
+        len(whole), [(name, f"U{longest[name]}" if kind is str else kind) for name, kind in kinds]
+    )
     for name, values in cells.items():
         table[name] = values
     return table

@@ -36,7 +36,9 @@ class Workers:
 
     def __init__(self, count: int, progress: bool = False):
         self.count, self.progress = count, progress
-        self._processes: list[ProcessPoolExecutor] = []  # one process each: a death is the death of one task
+        self._processes: list[
+            ProcessPoolExecutor
+        ] = []  # one process each: a death is the death of one task
 
     def __enter__(self) -> "Workers":
         return self
@@ -55,7 +57,11 @@ class Workers:
         """
         results = [None] * len(tasks)
         for place, result in tqdm(
-            self._finished(job, tasks), desc=name, total=len(tasks), leave=False, disable=not self.progress
+            self._finished(job, tasks),
+            desc=name,
+            total=len(tasks),
+            leave=False,
+            disable=not self.progress,
         ):
             if result is DIED and lost is None:
                 raise BadInput(KILLED)
@@ -75,7 +81,11 @@ class Workers:
     def _by_processes(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
         while len(self._processes) < min(self.count, len(tasks)):
             self._processes.append(_process())
-        idle, waiting, deaths = list(range(len(self._processes))), deque(range(len(tasks))), Counter()
+        idle, waiting, deaths = (
+            list(range(len(self._processes))),
+            deque(range(len(tasks))),
+            Counter(),
+        )
         busy: dict[Future, tuple[int, int]] = {}
         while waiting or busy:
             while waiting and idle:

@@ -17,7 +17,7 @@ from vision.boards.marker_size import check_marker_size
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
 
 # A series longer than this is sampled in runs of neighbours, which tell how the board moved.
@@ -40,7 +40,9 @@ class SessionViews(BoardViews):
 def read_board_views(session: Session) -> SessionViews:
     """Finds the board everywhere. Raises BadInput where it is not found, naming the setting that would find it."""
     if session.board is None:
-        raise BadInput("[board] is missing: the cameras are calibrated from it", file="session.toml")
+        raise BadInput(
+            "[board] is missing: the cameras are calibrated from it", file="session.toml"
+        )
     if not session.board_sources:
         raise BadInput("there is no folder of pictures nor a video of the board", file="boards")
     boards, rig, trials, sizes, notes = {}, {}, {}, {}, []
@@ -69,7 +71,11 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
 
     def look(frame: tuple[int, np.ndarray | None]):
         index, grey = frame
-        return index, grey, find_corners(grey, board) if grey is not None and index in chosen else Corners.none()
+        return (
+            index,
+            grey,
+            find_corners(grey, board) if grey is not None and index in chosen else Corners.none(),
+        )
 
     for index, grey, view in in_threads(look, frames.read()):
         views.append(view)
@@ -102,7 +108,9 @@ def rig_view(session: Session, name: str, size_px: tuple[int, int]) -> Corners:
     shown, grey = f"boards/rig/{path.name}", rig_picture(path)
     if grey.shape[::-1] != tuple(size_px):
         found = f"is {grey.shape[1]} x {grey.shape[0]} px"
-        raise BadInput(f"{found}, boards/{name} is {size_px[0]} x {size_px[1]} px; take both alike", file=shown)
+        raise BadInput(
+            f"{found}, boards/{name} is {size_px[0]} x {size_px[1]} px; take both alike", file=shown
+        )
     return find_corners(grey, session.board)
 
 
@@ -119,15 +127,19 @@ def _trial_views(session: Session, name: str, rig_view: Corners) -> tuple[list[C
         if shift < _MOVED_PX:
             kept += views
         elif np.isfinite(shift):
-            notes.append(f"camera {name} stands {shift:.1f} px elsewhere in trial {trial.name} than in boards/rig; "
-                         "that trial was not used for calibration")  # fmt: skip
+            notes.append(
+                f"camera {name} stands {shift:.1f} px elsewhere in trial {trial.name} than in boards/rig; "
+                "that trial was not used for calibration"
+            )
     return kept, notes
 
 
 def _views_of(source: Path, each: int, rig_view: Corners, board: Board) -> Iterator[Corners]:
     count = frame_count(source)
     chosen = np.unique(np.linspace(0, count - 1, min(each, count)).astype(int)) if count else []
-    greys = (grey for grey in read_frames(source, (int(k) for k in chosen)).values() if grey is not None)
+    greys = (
+        grey for grey in read_frames(source, (int(k) for k in chosen)).values() if grey is not None
+    )
     views = in_threads(lambda grey: refine_corners(grey, rig_view.px, rig_view.ids, board), greys)
     return filter(len, views)
 
@@ -135,7 +147,9 @@ def _views_of(source: Path, each: int, rig_view: Corners, board: Board) -> Itera
 def _shift_px(view: Corners, rig_view: Corners) -> float:
     """Median distance of a view's corners from the rig picture's."""
     place = dict(zip(rig_view.ids.tolist(), rig_view.px))
-    return float(np.median([np.linalg.norm(px - place[k]) for k, px in zip(view.ids.tolist(), view.px)]))
+    return float(
+        np.median([np.linalg.norm(px - place[k]) for k, px in zip(view.ids.tolist(), view.px)])
+    )
 
 
 def _times(session: Session, boards: Mapping[str, list[Corners]]) -> dict[str, np.ndarray] | None:
@@ -150,5 +164,8 @@ def _times(session: Session, boards: Mapping[str, list[Corners]]) -> dict[str, n
         require_columns(table, ("time_s",), shown)
         times[name] = forward_in_time(table, "time_s", shown)[0]["time_s"]
         if len(times[name]) != len(boards[name]):
-            raise BadInput(f"has {len(times[name])} rows, boards/{name} has {len(boards[name])} frames", file=shown)
+            raise BadInput(
+                f"has {len(times[name])} rows, boards/{name} has {len(boards[name])} frames",
+                file=shown,
+            )
     return times

@@ -11,10 +11,10 @@ from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
+from vision.calibration.hub_turning import FirstRig, MovingLines, first_rig, moving_lines
 from vision.calibration.place import Placement
-from vision.calibration.turning import FirstRig, MovingLines, first_rig, moving_lines
 from vision.geometry.camera import Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 Item = TypeVar("Item")
 
@@ -27,7 +27,11 @@ _SIGMA_RAD, _SIGMA_MM = np.radians(5.0), 5.0
 
 def spread(items: Sequence[Item], most: int = MOST_TRIALS) -> list[Item]:
     """At most so many of the items, spread over all of them."""
-    return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, most).astype(int))] if len(items) else []
+    return (
+        [items[k] for k in np.unique(np.linspace(0, len(items) - 1, most).astype(int))]
+        if len(items)
+        else []
+    )
 
 
 def by_first_look() -> Placement:
@@ -38,7 +42,9 @@ def by_first_look() -> Placement:
 def first_look(session: Session, cameras: Cameras) -> FirstRig:
     """The rig in the cameras' frame, by what moves in the pictures. Raises BadInput where nothing turns."""
     trials = spread([trial for trial in session.trials if trial.camera_sources])
-    lines = [one for many in in_threads(lambda trial: _lines(trial, cameras), trials) for one in many]
+    lines = [
+        one for many in in_threads(lambda trial: _lines(trial, cameras), trials) for one in many
+    ]
     try:
         return first_rig(lines)
     except Refused as reason:
@@ -49,7 +55,11 @@ def _lines(trial: Trial, cameras: Cameras) -> list[MovingLines]:
     """Of each stroke of a trial."""
     signals, times = read_signals(trial), frame_times(trial)
     motor = signals.motor_at(times.time_s)
-    strokes = [range(*times.frames_in(signals, s).indices(len(motor))) for s in forward_strokes(signals)]
+    strokes = [
+        range(*times.frames_in(signals, s).indices(len(motor))) for s in forward_strokes(signals)
+    ]
     strokes = [spread(stroke, _MOST_FRAMES) for stroke in spread(strokes, _MOST_STROKES)]
     frames = read_trial(trial, times, (f for stroke in strokes for f in stroke))
-    return [moving_lines(frames, {f: float(motor[f]) for f in stroke}, cameras) for stroke in strokes]
+    return [
+        moving_lines(frames, {f: float(motor[f]) for f in stroke}, cameras) for stroke in strokes
+    ]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.gauges.felt import Stroke
+from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix, Gauges
-from bench.gauges.readings import Pairs
 from bench.gauges.reversal import Reversal, in_percent
 from bench.gauges.weights import Scale
 from bench.session.whisker import Whisker
@@ -45,7 +45,8 @@ class Certificate:
             return self
         f = scale.factor
         pairs = tuple(
-            replace(p, moments=f * p.moments, moments_covariance=f**2 * p.moments_covariance) for p in self.pairs
+            replace(p, moments=f * p.moments, moments_covariance=f**2 * p.moments_covariance)
+            for p in self.pairs
         )
         return replace(self, gauges=self.gauges.scaled(f), pairs=pairs, scale=scale)
 
@@ -80,14 +81,18 @@ class Certificate:
         coefficients, squares, *_ = np.linalg.lstsq(design, off, rcond=None)
         scatter = np.sqrt(squares[0] / (len(off) - 2)) if len(squares) else 0.0
         sigma = scatter * np.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-        return 25.0 * abs(coefficients[1]), 25.0 * U95 * sigma  # a parabola b s² is b/4 from its chord at half scale
+        return 25.0 * abs(
+            coefficients[1]
+        ), 25.0 * U95 * sigma  # a parabola b s² is b/4 from its chord at half scale
 
     def repeatability_percent(self) -> float | None:
         """Standard deviation, in %, of the gain over whisks in one position of the follicle; None without a second."""
         gains: dict[float, list[float]] = {}
         for p in self.pairs:
             felt = p.volts @ self.gauges.all.matrix.T
-            gains.setdefault(p.roll_deg, []).append(float(np.sum(felt * p.moments) / np.sum(p.moments**2)))
+            gains.setdefault(p.roll_deg, []).append(
+                float(np.sum(felt * p.moments) / np.sum(p.moments**2))
+            )
         groups = [np.array(values) for values in gains.values() if len(values) > 1]
         if not groups:
             return None
@@ -133,9 +138,13 @@ class Certificate:
             yield f"Non-linearity of {name}: {said}"
         again = self.repeatability_percent()
         yield "Repeatability of the gain: " + (
-            f"{NOT_MEASURED} (no second whisk in one position)" if again is None else f"{again:.2f} % (one SD)"
+            f"{NOT_MEASURED} (no second whisk in one position)"
+            if again is None
+            else f"{again:.2f} % (one SD)"
         )
-        hysteresis, returned = in_percent(self.reversals, self.gauges.all.matrix, self.gauges.full_scale_Nmm)
+        hysteresis, returned = in_percent(
+            self.reversals, self.gauges.all.matrix, self.gauges.full_scale_Nmm
+        )
         yield f"Hysteresis, friction along the rod included: {_of_full_scale(hysteresis)}"
         yield f"Zero return: {_of_full_scale(returned)}"
         rms = np.sqrt(np.mean(self.residuals**2, axis=0))
@@ -157,7 +166,11 @@ class Certificate:
         yield ""
 
     def _assumed(self) -> Iterator[str]:
-        turn = f"± {U95 * self.roll_sigma_deg:.2f}°, which is in U95" if self.roll_sigma_deg else "taken as exact"
+        turn = (
+            f"± {U95 * self.roll_sigma_deg:.2f}°, which is in U95"
+            if self.roll_sigma_deg
+            else "taken as exact"
+        )
         yield f"The follicle's turn: {turn}; 1° of it would look like 1.75 points of cross-talk."
         if self.scale is not None:
             yield from self._by_weights(self.scale)
@@ -204,9 +217,17 @@ def page(certificate: Certificate) -> "Figure":
 
     figure = Figure(figsize=(8.27, 11.69))
     figure.text(
-        0.08, 0.965, "\n".join(certificate.lines()), va="top", fontsize=7.6, family="monospace", linespacing=1.4
+        0.08,
+        0.965,
+        "\n".join(certificate.lines()),
+        va="top",
+        fontsize=7.6,
+        family="monospace",
+        linespacing=1.4,
     )
-    grid = figure.subplots(1, 2, gridspec_kw={"left": 0.1, "right": 0.96, "bottom": 0.06, "top": 0.34, "wspace": 0.3})
+    grid = figure.subplots(
+        1, 2, gridspec_kw={"left": 0.1, "right": 0.96, "bottom": 0.06, "top": 0.34, "wspace": 0.3}
+    )
     for axis, (axes, name) in enumerate(zip(grid, ("m_y", "m_z"))):
         _draw_residuals(axes, certificate.pairs, certificate.gauges.all.matrix, axis)
         axes.set(xlabel=f"{name} seen  [N·mm]", ylabel="gauge less seen  [N·mm]")
@@ -219,4 +240,12 @@ def page(certificate: Certificate) -> "Figure":
 def _draw_residuals(axes, pairs: Sequence[Pairs], matrix, axis: int) -> None:
     for p in pairs:
         off, sigma = p.residuals(matrix)[:, axis], p.moments_sigma[:, axis]
-        axes.errorbar(p.moments[:, axis], off, sigma, fmt="o", ms=3, lw=0.8, label=f"{p.trial}, whisk {p.whisk}")
+        axes.errorbar(
+            p.moments[:, axis],
+            off,
+            sigma,
+            fmt="o",
+            ms=3,
+            lw=0.8,
+            label=f"{p.trial}, whisk {p.whisk}",
+        )

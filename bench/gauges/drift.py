@@ -43,7 +43,9 @@ def _slope_of(stroke: Stroke, samples: np.ndarray) -> FreeSlope | None:
     free = (stroke.motor_rad < touch.motor_rad - _GUARD_RAD) & np.isfinite(samples).all(axis=1)
     samples = np.where(free[:, None], samples, 0.0)
     start = stroke.time_s[0]
-    per_second = noise.line_weights(stroke.time_s, free, start + 1.0) - noise.line_weights(stroke.time_s, free, start)
+    per_second = noise.line_weights(stroke.time_s, free, start + 1.0) - noise.line_weights(
+        stroke.time_s, free, start
+    )
     variance = np.diag(noise.Memory.of(stroke.time_s, samples, free).of_sum(per_second))
     return FreeSlope(noise.line_slope(stroke.time_s, samples, free), variance)
 
@@ -57,11 +59,16 @@ def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
     """
     if not slopes:
         return np.zeros(2)
-    squares, variances = np.array([s.slope**2 for s in slopes]), np.array([s.variance for s in slopes])
+    squares, variances = (
+        np.array([s.slope**2 for s in slopes]),
+        np.array([s.variance for s in slopes]),
+    )
     excess = np.zeros(squares.shape[1])
     for _ in range(_ROUNDS):
         information = 0.5 / np.maximum(excess + variances, noise.TINY) ** 2
-        excess = np.maximum(0.0, np.sum(information * (squares - variances), axis=0) / information.sum(axis=0))
+        excess = np.maximum(
+            0.0, np.sum(information * (squares - variances), axis=0) / information.sum(axis=0)
+        )
     return np.sqrt(excess + information.sum(axis=0) ** -0.5)
 
 

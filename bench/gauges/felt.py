@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.records.trial import FeltWhisk, SeenWhisk
+from bench.records.trial_result import FeltWhisk, SeenWhisk
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, back_stroke, forward_strokes, ways_back
 from bench.session.trial import Trial
@@ -31,7 +31,9 @@ def gauge_delay(filter_Hz: float | None) -> Value:
     """
     mean_s = np.sqrt(2.0) * np.sqrt(2.0 + np.sqrt(2.0)) / (2.0 * np.pi)
     if filter_Hz is None:
-        return Value(float(mean_s / PAPERS_FILTER_HZ), float(mean_s / PAPERS_FILTER_HZ / np.sqrt(3.0)))
+        return Value(
+            float(mean_s / PAPERS_FILTER_HZ), float(mean_s / PAPERS_FILTER_HZ / np.sqrt(3.0))
+        )
     return Value(float(mean_s / filter_Hz) if filter_Hz else 0.0, 0.0)
 
 
@@ -62,7 +64,9 @@ def touch_on_the_way_back(signals: Signals, delay_s: float) -> Value:
     time_s, motor_rad = signals.time_s[where], signals.motor_rad[where]
     touch = felt_touch(motor_rad[::-1], channels[::-1], time_s[-1] - time_s[::-1])
     speed_rad_s = float(np.ptp(motor_rad) / np.ptp(time_s))
-    return UNKNOWN if touch.status else Value(touch.motor_rad + delay_s * speed_rad_s, touch.sigma_rad)
+    return (
+        UNKNOWN if touch.status else Value(touch.motor_rad + delay_s * speed_rad_s, touch.sigma_rad)
+    )
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,12 @@ class Stroke:
         """The stroke as it was before the drift was taken out."""
         if self.drift is None:
             return self
-        return replace(self, channels=self.channels + self.drift, filtered=self.filtered + self.drift, drift=None)
+        return replace(
+            self,
+            channels=self.channels + self.drift,
+            filtered=self.filtered + self.drift,
+            drift=None,
+        )
 
     def touch(self) -> Touch:
         """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
@@ -113,7 +122,9 @@ class Stroke:
         return moment_at(theta_rad, self.motor_rad, self.channels, touch, **known, **window)
 
 
-def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: bool = True) -> list[Stroke]:
+def strokes_of(
+    signals: Signals, trial: Trial, settings: Settings, *, level: bool = True
+) -> list[Stroke]:
     """The forward strokes of a trial, each a whisk.
 
     The whole recording goes through the zero-phase low-pass of section V, so that a stroke's ends are no edges of it.
@@ -127,7 +138,9 @@ def strokes_of(signals: Signals, trial: Trial, settings: Settings, *, level: boo
     strokes, lowpassed = [], {}
     for where, end in zip(places, [*(place.start for place in places[1:]), len(signals.time_s)]):
         time, motor = signals.time_s[where], signals.motor_rad[where]
-        cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
+        cutoff_Hz = settings.cutoff_for(
+            trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time)))
+        )
         if cutoff_Hz not in lowpassed:  # strokes at the stated speed share one
             lowpassed[cutoff_Hz] = _lowpass(channels, signals.rate_Hz, cutoff_Hz)
         forces = None if signals.forces_N is None else signals.forces_N[where]
@@ -148,10 +161,14 @@ def ways_back_of(signals: Signals, trial: Trial, settings: Settings) -> list[Str
             continue
         mine = off_the_rails(channels[where]) if signals.kind == "V" else channels[where]
         time, motor = signals.time_s[where], signals.motor_rad[where]
-        cutoff_Hz = settings.cutoff_for(trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time))))
+        cutoff_Hz = settings.cutoff_for(
+            trial.speed_deg_s or float(np.degrees(np.ptp(motor) / np.ptp(time)))
+        )
         smooth = _lowpass(mine, signals.rate_Hz, cutoff_Hz)
         forces = None if signals.forces_N is None else signals.forces_N[where][::-1]
-        found.append(Stroke(time[-1] - time[::-1], motor[::-1], mine[::-1], smooth[::-1], forces_N=forces))
+        found.append(
+            Stroke(time[-1] - time[::-1], motor[::-1], mine[::-1], smooth[::-1], forces_N=forces)
+        )
     return found
 
 
@@ -166,13 +183,18 @@ def _levelled(stroke: Stroke, time_s, motor_rad, channels) -> Stroke:
     free = touch.motor_rad - _GUARD_RAD
     before, after = (
         (t[m < free], c[m < free])
-        for t, m, c in ((stroke.time_s, stroke.motor_rad, stroke.channels), (time_s, motor_rad, channels))
+        for t, m, c in (
+            (stroke.time_s, stroke.motor_rad, stroke.channels),
+            (time_s, motor_rad, channels),
+        )
     )
     if min(len(before[0]), len(after[0])) < _LEAST_FREE:
         return stroke
     (start, zero), (end, returned) = ((t.mean(), np.nanmean(c, axis=0)) for t, c in (before, after))
     drift = np.outer(stroke.time_s - start, (returned - zero) / (end - start))
-    return replace(stroke, channels=stroke.channels - drift, filtered=stroke.filtered - drift, drift=drift)
+    return replace(
+        stroke, channels=stroke.channels - drift, filtered=stroke.filtered - drift, drift=drift
+    )
 
 
 def _lowpass(channels, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:

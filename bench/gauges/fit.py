@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtri
 
-from bench.gauges.checks import Undetermined, check_channels, check_heard
+from bench.gauges.gauge_faults import Undetermined, check_channels, check_heard
+from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import FROM_TRIALS, GaugeMatrix, Gauges
-from bench.gauges.readings import Pairs
 
 # Below this share of the stronger direction, the weaker one is not known to the per cent that is wanted: a mount that
 # was turned by 6° instead of 90°, or one slope only.
@@ -29,15 +29,26 @@ def fit_gauges(pairs: Sequence[Pairs]) -> Gauges:
     fitted = fit_matrix(pairs)
     if fitted is None:
         raise Undetermined(
-            f"the gauge trials do not fix both channels ({_recorded(pairs)}); {RECORD}", file="trials"
+            f"the gauge trials do not fix both channels ({_recorded(pairs)}); {RECORD}",
+            file="trials",
         )
     check_channels(fitted)
     full_scale = np.abs(np.concatenate([p.moments for p in pairs])).max(axis=0)
-    return Gauges(fitted, FROM_TRIALS, leave_out(pairs, fitted), one_factor(pairs), four_at_angle(pairs), full_scale)
+    return Gauges(
+        fitted,
+        FROM_TRIALS,
+        leave_out(pairs, fitted),
+        one_factor(pairs),
+        four_at_angle(pairs),
+        full_scale,
+    )
 
 
 def _recorded(pairs: Sequence[Pairs]) -> str:
-    return ", ".join(f"{p.trial} with the follicle at {p.roll_deg:g}°" for p in pairs) or "no whisk could be read"
+    return (
+        ", ".join(f"{p.trial} with the follicle at {p.roll_deg:g}°" for p in pairs)
+        or "no whisk could be read"
+    )
 
 
 def fit_matrix(pairs: Sequence[Pairs]) -> GaugeMatrix | None:
@@ -47,7 +58,10 @@ def fit_matrix(pairs: Sequence[Pairs]) -> GaugeMatrix | None:
     """
     if not fixes_matrix(pairs):
         return None
-    volts, moments = np.concatenate([p.volts for p in pairs]), np.concatenate([p.moments for p in pairs])
+    volts, moments = (
+        np.concatenate([p.volts for p in pairs]),
+        np.concatenate([p.moments for p in pairs]),
+    )
     matrix = np.linalg.lstsq(volts, moments, rcond=None)[0].T
     for _ in range(_ROUNDS):
         parts = [_normal(p, matrix) for p in pairs]
@@ -108,7 +122,9 @@ def _weight(p: Pairs, matrix) -> np.ndarray:
     coefficients towards zero, the more so the wider the residuals (Peelle's puzzle).
     """
     through, fitted = np.kron(np.eye(len(p)), matrix), p.scale_sigma * (p.volts @ matrix.T).ravel()
-    return np.linalg.inv(p.moments_covariance + np.outer(fitted, fitted) + through @ p.volts_covariance @ through.T)
+    return np.linalg.inv(
+        p.moments_covariance + np.outer(fitted, fitted) + through @ p.volts_covariance @ through.T
+    )
 
 
 def widening(pairs: Sequence[Pairs], matrix: np.ndarray) -> float:
@@ -128,7 +144,10 @@ def four_at_angle(pairs: Sequence[Pairs]) -> GaugeMatrix | None:
     read = [p for p in pairs if np.isfinite(p.paper_volts).all()]
     if not fixes_matrix(read):
         return None
-    moments, volts = np.array([p.paper_moment for p in read]), np.array([p.paper_volts for p in read])
+    moments, volts = (
+        np.array([p.paper_moment for p in read]),
+        np.array([p.paper_volts for p in read]),
+    )
     return GaugeMatrix(np.linalg.lstsq(volts, moments, rcond=None)[0].T)
 
 

@@ -15,7 +15,8 @@ from bench.session.session import Session
 from bench.session.strict_toml import Keys, as_keys, read_toml
 
 Rows4 = Annotated[
-    list[Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]], msgspec.Meta(min_length=4, max_length=4)
+    list[Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]],
+    msgspec.Meta(min_length=4, max_length=4),
 ]
 Matrix = Annotated[list[manifest.Pair], msgspec.Meta(min_length=2, max_length=2)]
 
@@ -55,7 +56,10 @@ def read_gauges(path: Path, C_Nmm2: float) -> Gauges:
     """
     keys = as_keys(read_toml(path, path.name), FileKeys, path.name, Doubts())
     scale = 1.0 if keys.C_Nmm2 is None else C_Nmm2 / keys.C_Nmm2
-    without = {name: _scaled(w.matrix_Nmm_per_V, w.covariance, scale) for name, w in (keys.without or {}).items()}
+    without = {
+        name: _scaled(w.matrix_Nmm_per_V, w.covariance, scale)
+        for name, w in (keys.without or {}).items()
+    }
     sigma = keys.matrix_sigma_Nmm_per_V
     given = _matrix(keys.matrix_Nmm_per_V, sigma)
     covariance = given.covariance if keys.covariance is None else np.array(keys.covariance)
@@ -65,13 +69,21 @@ def read_gauges(path: Path, C_Nmm2: float) -> Gauges:
         FROM_FILE,
         without,
         None if factors is None else GaugeMatrix(scale * np.diag(factors)),
-        full_scale_Nmm=None if keys.full_scale_Nmm is None else scale * np.array(keys.full_scale_Nmm),
-        notes=() if abs(scale - 1.0) < 1e-9 else (f"scaled by {scale:.6g} from the C that they were made with",),
+        full_scale_Nmm=None
+        if keys.full_scale_Nmm is None
+        else scale * np.array(keys.full_scale_Nmm),
+        notes=()
+        if abs(scale - 1.0) < 1e-9
+        else (f"scaled by {scale:.6g} from the C that they were made with",),
     )
 
 
 def write_gauges(
-    path: Path, gauges: Gauges, zero: tuple[np.ndarray, np.ndarray], C: tuple[float, float], header: list[str]
+    path: Path,
+    gauges: Gauges,
+    zero: tuple[np.ndarray, np.ndarray],
+    C: tuple[float, float],
+    header: list[str],
 ) -> None:
     """Write gauges.toml whole; `header` goes before it as comments.
 
@@ -90,7 +102,10 @@ def write_gauges(
     if gauges.one_factor is not None and np.isfinite(gauges.one_factor.matrix).all():
         document["one_factor_Nmm_per_V"] = _listed(np.diag(gauges.one_factor.matrix))
     document["without"] = {name: _without(matrix) for name, matrix in gauges.without.items()}
-    write_whole(path, "".join(f"# {line}".rstrip() + "\n" for line in header) + "\n" + tomli_w.dumps(document))
+    write_whole(
+        path,
+        "".join(f"# {line}".rstrip() + "\n" for line in header) + "\n" + tomli_w.dumps(document),
+    )
 
 
 def _without(matrix: GaugeMatrix | None) -> dict:

@@ -7,7 +7,11 @@ import numpy as np
 
 _BEYOND = 1.05  # of the largest calibrated moment; up to there a line is still the same line
 
-FROM_FILE, FROM_MANIFEST, FROM_TRIALS = "gauges.toml", "session.toml [gauges]", "the session's gauge trials"
+FROM_FILE, FROM_MANIFEST, FROM_TRIALS = (
+    "gauges.toml",
+    "session.toml [gauges]",
+    "the session's gauge trials",
+)
 FROM_ALL = "all trials that can serve (--gauges-from-all)"
 
 
@@ -72,7 +76,9 @@ class Gauges:
     def scaled(self, factor: float) -> "Gauges":
         """The same gauges in another unit of stiffness: everything in N·mm times `factor`."""
         without = {name: matrix and matrix.scaled(factor) for name, matrix in self.without.items()}
-        one, four = (matrix and matrix.scaled(factor) for matrix in (self.one_factor, self.at_angle))
+        one, four = (
+            matrix and matrix.scaled(factor) for matrix in (self.one_factor, self.at_angle)
+        )
         most = None if self.full_scale_Nmm is None else factor * self.full_scale_Nmm
         return Gauges(self.all.scaled(factor), self.source, without, one, four, most, self.notes)
 
@@ -87,7 +93,9 @@ class Gauges:
         over = np.abs(moments_Nmm) > _BEYOND * self.full_scale_Nmm
         worst = "; ".join(
             f"{name} of {value:.2f} N·mm is beyond the {most:.2f} N·mm that the gauges were calibrated to"
-            for name, value, most, is_over in zip(("m_y", "m_z"), moments_Nmm, self.full_scale_Nmm, over)
+            for name, value, most, is_over in zip(
+                ("m_y", "m_z"), moments_Nmm, self.full_scale_Nmm, over
+            )
             if is_over
         )
         return worst

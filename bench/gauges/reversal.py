@@ -13,7 +13,8 @@ from bench.session.trial import Trial
 
 _GUARD_RAD = np.radians(0.2)  # rad before felt touch, beyond what that is uncertain by. Set by eye
 _LEAST_SAMPLES = 20  # of a mean or a way back: fewer tell no level beyond the noise. Set by eye
-_ANGLES = 15  # between a tenth and nine tenths of the push: the largest of so many is the hysteresis
+# between a tenth and nine tenths of the push: the largest of so many is the hysteresis
+_ANGLES = 15
 _HALF_WINDOW_RAD = np.radians(0.15)  # rad: a line is straight over twice that. Set by eye
 
 
@@ -49,9 +50,13 @@ def _reversal(name: str, stroke: Stroke, motor, channels) -> Reversal | None:
     if motor.min() > touch.motor_rad + 0.1 * push:
         return None
     angles = touch.motor_rad + push * np.linspace(0.1, 0.9, _ANGLES)
-    there, back = (_means(m, c, angles) for m, c in ((stroke.motor_rad, stroke.channels), (motor, channels)))
+    there, back = (
+        _means(m, c, angles) for m, c in ((stroke.motor_rad, stroke.channels), (motor, channels))
+    )
     free = motor < touch.motor_rad - _GUARD_RAD
-    after = np.nanmean(channels[free], axis=0) if free.sum() >= _LEAST_SAMPLES else np.full(2, np.nan)
+    after = (
+        np.nanmean(channels[free], axis=0) if free.sum() >= _LEAST_SAMPLES else np.full(2, np.nan)
+    )
     return Reversal(name, back - there, after - touch.offset)
 
 
@@ -59,7 +64,9 @@ def _means(motor, channels, angles) -> np.ndarray:
     """Channels (k, 2) at motor angles: a line through the samples around each."""
     near = (np.abs(motor - angle) < _HALF_WINDOW_RAD for angle in angles)
     good = np.isfinite(channels).all(axis=1)
-    return np.array([_line_at(motor[n & good] - angle, channels[n & good]) for n, angle in zip(near, angles)])
+    return np.array(
+        [_line_at(motor[n & good] - angle, channels[n & good]) for n, angle in zip(near, angles)]
+    )
 
 
 def _line_at(motor, channels) -> np.ndarray:
@@ -75,5 +82,9 @@ def in_percent(
     """Largest hysteresis (2,) and largest return error (2,) of m_y, m_z in % of full scale; None where not measured."""
     scale = 100.0 / np.asarray(full_scale_Nmm)
     differences = [np.nanmax(np.abs(one.difference @ matrix.T), axis=0) for one in reversals]
-    returns = [np.abs(matrix @ one.zero_return) for one in reversals if np.isfinite(one.zero_return).all()]
-    return tuple(np.max(values, axis=0) * scale if values else None for values in (differences, returns))
+    returns = [
+        np.abs(matrix @ one.zero_return) for one in reversals if np.isfinite(one.zero_return).all()
+    ]
+    return tuple(
+        np.max(values, axis=0) * scale if values else None for values in (differences, returns)
+    )

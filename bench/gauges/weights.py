@@ -29,7 +29,9 @@ class Scale:
 
     def of(self, value: float, value_sigma_share: float = 0.0) -> tuple[float, float]:
         """A stated stiffness or modulus put right, with its sigma; value_sigma_share: of what else it rests on."""
-        return self.factor * value, value * float(np.hypot(self.sigma, self.factor * value_sigma_share))
+        return self.factor * value, value * float(
+            np.hypot(self.sigma, self.factor * value_sigma_share)
+        )
 
 
 def scale_by_weights(
@@ -45,7 +47,9 @@ def scale_by_weights(
     if not loaded:
         return None
     zeros = {t.follicle_roll_deg: _reading(t) for t in weights if not t.force_N}
-    scaled = [_one(t, gauges, *zeros.get(t.follicle_roll_deg, (zero_V, zero_sigma_V))) for t in loaded]
+    scaled = [
+        _one(t, gauges, *zeros.get(t.follicle_roll_deg, (zero_V, zero_sigma_V))) for t in loaded
+    ]
     factors, sigmas = np.array(scaled).T
     shares = sigmas**-2.0 / np.sum(sigmas**-2.0)
     factor = float(shares @ factors)
@@ -69,7 +73,11 @@ def _one(trial: Trial, gauges: GaugeMatrix, zero_V, zero_sigma_V) -> tuple[float
             file=trial.shown("trial.toml"),
         )
     factor = trial.force_N * trial.at_mm / felt
-    shares = (trial.force_sigma_N / trial.force_N, trial.at_sigma_mm / trial.at_mm, felt_sigma / felt)
+    shares = (
+        trial.force_sigma_N / trial.force_N,
+        trial.at_sigma_mm / trial.at_mm,
+        felt_sigma / felt,
+    )
     return factor, factor * float(np.linalg.norm(shares))
 
 
@@ -78,4 +86,6 @@ def _reading(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     signals = read_signals(trial)
     parts = np.array_split(np.stack([signals.y, signals.z], axis=1), min(_BLOCKS, len(signals.y)))
     means = np.array([part.mean(axis=0) for part in parts])
-    return means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.zeros(2)
+    return means.mean(axis=0), means.std(axis=0, ddof=1) / np.sqrt(len(means)) if len(
+        means
+    ) > 1 else np.zeros(2)

@@ -5,21 +5,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.plan.sight import Hides, Sight, bar_points, blank_view, curves_of, nothing_hides, sight_of, wire_points
+from bench.plan.sight import (
+    Hides,
+    Sight,
+    bar_points,
+    blank_view,
+    curves_of,
+    nothing_hides,
+    sight_of,
+    wire_points,
+)
 from bench.plan.staged import Staged
-from vision.bar.one_view import seen_from_one_side
 from vision.fit.line_noise import LineNoise
 from vision.fit.problem import BAR, REST, Problem, State
 from vision.fit.solve import weighted_jacobian
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import is_before
-from vision.geometry.errors import Refused
-from vision.geometry.settings import VisionSettings
+from vision.geometry.refusals import Refused
+from vision.geometry.vision_settings import VisionSettings
+from vision.touched.one_view import seen_from_one_side
 from vision.truth.records import WhiskTruth
-from vision.truth.rows import to_whisk
 from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early
-from vision.truth.whisk import require_both_rods
+from vision.truth.truth_rows import to_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_truth import require_both_rods
 
 _USUAL = VisionSettings()
 
@@ -34,10 +43,17 @@ class Expected:
     fitted: FittedWhisk | None = None
 
 
-def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], hides: Hides = nothing_hides,
-             settings: VisionSettings = _USUAL) -> Expected:
+def expected(
+    staged: Staged,
+    cameras: Cameras,
+    lines: Mapping[str, LineNoise],
+    hides: Hides = nothing_hides,
+    settings: VisionSettings = _USUAL,
+) -> Expected:
     """A whisk seen by cameras whose lines have such sigmas."""
-    facing = [camera.name for camera in cameras if is_before(camera, staged.rods.wire, staged.motor_rad)]
+    facing = [
+        camera.name for camera in cameras if is_before(camera, staged.rods.wire, staged.motor_rad)
+    ]
     if not facing:
         return Expected(WhiskTruth(0, None, status="all cameras have the whisker behind them"), {})
     cameras, curves = cameras.subset(facing), curves_of(staged, near_frames(staged))
@@ -47,21 +63,34 @@ def expected(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], h
     except Refused as reason:
         return Expected(WhiskTruth(0, None, cameras=len(cameras), status=str(reason)), sights)
     except np.linalg.LinAlgError:
-        return Expected(WhiskTruth(0, None, cameras=len(cameras), status="the fit of wire and bar does not settle"),
-                        sights)
+        return Expected(
+            WhiskTruth(
+                0, None, cameras=len(cameras), status="the fit of wire and bar does not settle"
+            ),
+            sights,
+        )
     every = range(len(staged.motor_rad))
     views = tuple(blank_view(camera, every) for camera in cameras)
-    whisk = WhiskPictures(0, every, staged.time_s, staged.motor_rad, views, cameras, staged.rods, None, settings)
+    whisk = WhiskPictures(
+        0, every, staged.time_s, staged.motor_rad, views, cameras, staged.rods, None, settings
+    )
     return Expected(to_whisk(whisk, fitted), sights, fitted)
 
 
 def near_frames(staged: Staged) -> list[int]:
     """The frames that make the truth."""
-    return TouchByClearance().near(dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad)))
+    return TouchByClearance().near(
+        dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad))
+    )
 
 
-def _fitted(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], sights: Mapping[str, Sight],
-            curves) -> FittedWhisk:
+def _fitted(
+    staged: Staged,
+    cameras: Cameras,
+    lines: Mapping[str, LineNoise],
+    sights: Mapping[str, Sight],
+    curves,
+) -> FittedWhisk:
     """The fit to the predicted lines. Raises Refused where there is none."""
     frames, seen = list(curves), []
     for number, camera in enumerate(cameras):
@@ -75,7 +104,16 @@ def _fitted(staged: Staged, cameras: Cameras, lines: Mapping[str, LineNoise], si
     if not np.any(touches):
         raise Refused(NEVER_TOUCHES)
     alike = [lines[name].alike if name in lines else 0.0 for name in cameras.names]
-    problem = Problem(cameras, staged.rods, staged.axis, staged.motor_rad[frames], touches, touches, seen, alike=alike)
+    problem = Problem(
+        cameras,
+        staged.rods,
+        staged.axis,
+        staged.motor_rad[frames],
+        touches,
+        touches,
+        seen,
+        alike=alike,
+    )
     by_edges = any(one.side for one in seen)
     few = by_edges and len({one.camera for one in seen if one.frame >= 0}) < 2
     parted = _by_onset if seen_from_one_side(cameras, staged.axis) or few else _by_clearance
@@ -92,8 +130,8 @@ def _answer(problem: Problem, state: State) -> np.ndarray:
 def state_of(problem: Problem, staged: Staged, frames: Sequence[int]) -> State:
     """The parameters as staged."""
     vector = np.zeros(problem.size)
-    vector[BAR:BAR + REST] = np.ravel(staged.rest_mm)
-    vector[problem.first_bend:] = staged.bend_rad[frames][problem.bent].ravel()
+    vector[BAR : BAR + REST] = np.ravel(staged.rest_mm)
+    vector[problem.first_bend :] = staged.bend_rad[frames][problem.bent].ravel()
     return State(vector, staged.arc_mm[frames])
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from bench.plan.expected import Expected
 from bench.plan.sight import ALONG_RAD
+from vision.fit.covariance import variance_by_cause
 from vision.fit.line_noise import LineNoise
-from vision.fit.uncertainty import variance_by_cause
 from vision.truth.at_angle import scatter
 from vision.truth.records import WhiskTruth
 
@@ -36,7 +36,9 @@ class Outlook:
     """One whisk as planned. sigma: by column, NaN where there is none; limits: by column, the cause of the largest part
     of the variance, and that part; obstacles: sentences on cameras; status: why there is no truth, or a doubt."""
 
-    sigma: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(QUANTITIES, float("nan")))
+    sigma: Mapping[str, float] = field(
+        default_factory=lambda: dict.fromkeys(QUANTITIES, float("nan"))
+    )
     limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     obstacles: tuple[str, ...] = ()
     status: str = ""
@@ -60,20 +62,34 @@ def outlook(found: Expected, lines: Mapping[str, LineNoise], theta_rad: float) -
 def sigmas(truth: WhiskTruth, theta_rad: float) -> dict[str, float]:
     """Sigmas by column; at an angle with the scatter of its frames, which the staged ones do not have."""
     at = truth.at(theta_rad)
-    found = {"d_x_mm": truth.d_x_mm, "touch_deg": truth.touch_rad, "beta_deg": truth.beta_rad, "slip_mm": at.slip_mm,
-             "phi_deg": at.phi_rad, "alpha_deg": at.alpha_rad}
+    found = {
+        "d_x_mm": truth.d_x_mm,
+        "touch_deg": truth.touch_rad,
+        "beta_deg": truth.beta_rad,
+        "slip_mm": at.slip_mm,
+        "phi_deg": at.phi_rad,
+        "alpha_deg": at.alpha_rad,
+    }
     one_fit = truth.smooth is not None and not at.status
-    expected = {name: scatter(truth.smooth, key, theta_rad).expected if one_fit else 0.0
-                for name, (key, _) in AT_THETA.items()}
-    return {name: float(np.hypot(found[name].sigma, expected.get(name, 0.0))) * scale
-            for name, (_, scale) in (AT_TOUCH | AT_THETA).items()}
+    expected = {
+        name: scatter(truth.smooth, key, theta_rad).expected if one_fit else 0.0
+        for name, (key, _) in AT_THETA.items()
+    }
+    return {
+        name: float(np.hypot(found[name].sigma, expected.get(name, 0.0))) * scale
+        for name, (_, scale) in (AT_TOUCH | AT_THETA).items()
+    }
 
 
 def _limits(found: Expected, theta_rad: float) -> dict[str, tuple[str, float]]:
     fitted = found.fitted
-    frame = int(np.argmin(np.abs(fitted.problem.motor_rad - fitted.measured.whisk["touch"] - theta_rad)))
+    frame = int(
+        np.argmin(np.abs(fitted.problem.motor_rad - fitted.measured.whisk["touch"] - theta_rad))
+    )
     gradients = {name: fitted.by_parameter.whisk[key] for name, (key, _) in AT_TOUCH.items()}
-    gradients |= {name: fitted.by_parameter.frame[key][frame] for name, (key, _) in AT_THETA.items()}
+    gradients |= {
+        name: fitted.by_parameter.frame[key][frame] for name, (key, _) in AT_THETA.items()
+    }
     return {name: _largest(fitted, gradient) for name, gradient in gradients.items()}
 
 

@@ -6,19 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.plan.staged import Staged
-from vision.bar.pieces import ARM_MM
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves, one_curve
 from vision.geometry.contact import BarAxis, outline_of_bar
 from vision.geometry.rods import Rods
-from vision.geometry.settings import VisionSettings
 from vision.geometry.silhouette import normals, outline
-from vision.lines.bands import Pieces
-from vision.lines.points import LinePoints, Observed
-from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
+from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.truth.whisk import BESIDE_BAR_PX
+from vision.touched.pieces import ARM_MM
+from vision.truth.whisk_truth import BESIDE_BAR_PX
+from vision.wire.bands import Pieces
+from vision.wire.points import LinePoints, Observed
+from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 
 # Which of points (n, 3) something else stands before, as a camera sees them.
 Hides = Callable[[Camera, np.ndarray], np.ndarray]
@@ -51,8 +51,16 @@ def blank_view(camera: Camera, frames: Sequence[int]) -> View:
 
 def curves_of(staged: Staged, frames: Sequence[int]) -> dict[int, Curves]:
     """The whisker by frame, as vision models it."""
-    return {f: one_curve(staged.rest_mm, staged.bend_rad[f], staged.arc_mm[f], staged.motor_rad[f], staged.rods.wire)
-            for f in frames}
+    return {
+        f: one_curve(
+            staged.rest_mm,
+            staged.bend_rad[f],
+            staged.arc_mm[f],
+            staged.motor_rad[f],
+            staged.rods.wire,
+        )
+        for f in frames
+    }
 
 
 def nothing_hides(_: Camera, points_mm: np.ndarray) -> np.ndarray:
@@ -60,11 +68,22 @@ def nothing_hides(_: Camera, points_mm: np.ndarray) -> np.ndarray:
     return np.zeros(len(points_mm), dtype=bool)
 
 
-def sight_of(camera: Camera, staged: Staged, curves: Mapping[int, Curves], settings: VisionSettings,
-             hides: Hides = nothing_hides) -> Sight:
+def sight_of(
+    camera: Camera,
+    staged: Staged,
+    curves: Mapping[int, Curves],
+    settings: VisionSettings,
+    hides: Hides = nothing_hides,
+) -> Sight:
     """What a camera has in sight in these frames."""
     axis, rods = staged.axis, staged.rods
-    every = wire_pieces(blank_view(camera, curves), curves, rods.wire, settings.wire_piece_px, settings.wire_margin_px)
+    every = wire_pieces(
+        blank_view(camera, curves),
+        curves,
+        rods.wire,
+        settings.wire_piece_px,
+        settings.wire_margin_px,
+    )
     every = every.select(every.place > NEAR_CLAMP_MM)
     inside = np.mean(every.weight > 0, axis=1) > _LEAST_IN_PICTURE
     clear = clear_of_bar(every, *outline_of_bar(camera, axis, rods.bar.radius_mm), BESIDE_BAR_PX)
@@ -72,21 +91,35 @@ def sight_of(camera: Camera, staged: Staged, curves: Mapping[int, Curves], setti
     hidden = hides(camera, points)
     count = max(len(every), 1)
     wanted = _pieces_in_a_full_picture(camera, curves, settings)
-    return Sight(camera, every.select(inside & clear & ~hidden), 1.0 - inside.sum() / max(wanted, count),
-                 float(np.sum(inside & ~clear)) / count, _bar_is_nearer(camera, staged),
-                 float(np.sum(inside & clear & hidden)) / count, *_of_bar(camera, axis))
+    return Sight(
+        camera,
+        every.select(inside & clear & ~hidden),
+        1.0 - inside.sum() / max(wanted, count),
+        float(np.sum(inside & ~clear)) / count,
+        _bar_is_nearer(camera, staged),
+        float(np.sum(inside & clear & hidden)) / count,
+        *_of_bar(camera, axis),
+    )
 
 
-def _pieces_in_a_full_picture(camera: Camera, curves: Mapping[int, Curves], settings: VisionSettings) -> float:
+def _pieces_in_a_full_picture(
+    camera: Camera, curves: Mapping[int, Curves], settings: VisionSettings
+) -> float:
     """How many pieces the wires would make were the picture large enough: bands end at its edges."""
-    ends = [camera.project(curve.at(np.array([NEAR_CLAMP_MM, curve.arc_mm[-1]]))[0]) for curve in curves.values()]
+    ends = [
+        camera.project(curve.at(np.array([NEAR_CLAMP_MM, curve.arc_mm[-1]]))[0])
+        for curve in curves.values()
+    ]
     long = [np.max(np.abs(last - first)) for first, last in ends]
     return float(np.sum(np.nan_to_num(long) // settings.wire_piece_px))
 
 
 def _bar_is_nearer(camera: Camera, staged: Staged) -> bool:
     """Whether the bar stands before the whisker at first touch."""
-    away = [np.linalg.norm(point - camera.centre_mm) for point in (staged.foot_mm, staged.touch.point_mm)]
+    away = [
+        np.linalg.norm(point - camera.centre_mm)
+        for point in (staged.foot_mm, staged.touch.point_mm)
+    ]
     return bool(away[0] < away[1])
 
 
@@ -113,19 +146,37 @@ def _in_space(pieces: Pieces, curves: Mapping[int, Curves]) -> np.ndarray:
     return points
 
 
-def wire_points(sight: Sight, number: int, curves: Mapping[int, Curves], sigma_px: float) -> list[Observed]:
+def wire_points(
+    sight: Sight, number: int, curves: Mapping[int, Curves], sigma_px: float
+) -> list[Observed]:
     """Line points of the wire where it is exactly, one Observed a frame; frames by their place among the curves'."""
     px = sight.camera.project(_in_space(sight.pieces, curves))
     points = LinePoints(px, sight.pieces.normal, np.full(len(px), sigma_px), sight.pieces.place)
-    return [Observed(place, number, points.select(sight.pieces.source == frame))
-            for place, frame in enumerate(curves) if np.any(sight.pieces.source == frame)]
+    return [
+        Observed(place, number, points.select(sight.pieces.source == frame))
+        for place, frame in enumerate(curves)
+        if np.any(sight.pieces.source == frame)
+    ]
 
 
-def bar_points(camera: Camera, number: int, axis: BarAxis, rods: Rods, bar_px: np.ndarray) -> list[Observed]:
+def bar_points(
+    camera: Camera, number: int, axis: BarAxis, rods: Rods, bar_px: np.ndarray
+) -> list[Observed]:
     """Lines of the bar where it is exactly; bar_px (k, 3): see `vision.fit.line_noise.LineNoise`."""
     place = np.array([-ARM_MM, 0.0, ARM_MM])
     along = axis.point_mm + place[:, None] * axis.direction
-    middle, half = outline(camera, along, np.broadcast_to(axis.direction, along.shape), rods.bar.radius_mm)
-    ends = LinePoints(middle, normals(middle), np.ones(3), place).select(np.array([True, False, True]))
-    return [Observed(-1, number, replace(ends, px=ends.px + side * half[[0, 2], None] * ends.normal, sigma_px=sigmas),
-                     int(side)) for side, sigmas in ((row[0], row[1:]) for row in bar_px)]
+    middle, half = outline(
+        camera, along, np.broadcast_to(axis.direction, along.shape), rods.bar.radius_mm
+    )
+    ends = LinePoints(middle, normals(middle), np.ones(3), place).select(
+        np.array([True, False, True])
+    )
+    return [
+        Observed(
+            -1,
+            number,
+            replace(ends, px=ends.px + side * half[[0, 2], None] * ends.normal, sigma_px=sigmas),
+            int(side),
+        )
+        for side, sigmas in ((row[0], row[1:]) for row in bar_px)
+    ]

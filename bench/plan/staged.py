@@ -8,11 +8,11 @@ import msgspec
 import numpy as np
 
 from bench.rig.bar import Bar, Touch, turned
-from bench.rig.friction import Friction
+from bench.rig.elastic_rod import Rod
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.recording import Recording
-from bench.rig.rod import Rod
+from bench.rig.stick_slip import Friction
 from vision.geometry import rods as seen_rods
 from vision.geometry.centreline import REST_POWERS
 from vision.geometry.contact import BarAxis, upward
@@ -58,33 +58,71 @@ class Staged:
 def of_run(protocol: Protocol, run: Run) -> Staged:
     """A whisk of a protocol's trial, everything where it was wanted. Raises ArithmeticError where the whisker slips off
     or buckles."""
-    plain = {name: 0.0 for name in run.table.__struct_fields__ if name.endswith(("_scatter_deg", "_scatter_mm"))}
+    plain = {
+        name: 0.0
+        for name in run.table.__struct_fields__
+        if name.endswith(("_scatter_deg", "_scatter_mm"))
+    }
     table = msgspec.structs.replace(run.table, whisks=1, **plain)
-    gauges = msgspec.structs.replace(protocol.gauges, vibration=False, filter_Hz=0.0, rate_Hz=_SLOW_HZ)
+    gauges = msgspec.structs.replace(
+        protocol.gauges, vibration=False, filter_Hz=0.0, rate_Hz=_SLOW_HZ
+    )
     friction = msgspec.structs.replace(protocol.friction, scatter=0.0, irregular=0.0)
     alone = msgspec.structs.replace(protocol, gauges=gauges, friction=friction)
-    made = Recording.make(alone, msgspec.structs.replace(run, table=table), np.random.default_rng(0))
+    made = Recording.make(
+        alone, msgspec.structs.replace(run, table=table), np.random.default_rng(0)
+    )
     forth = ~made.frames.back
-    return replace(staged(made.whisks[0], made.frames.motor_rad[forth], made.frames.time_s[forth]), recording=made)
+    return replace(
+        staged(made.whisks[0], made.frames.motor_rad[forth], made.frames.time_s[forth]),
+        recording=made,
+    )
 
 
-def on_bar(rod: Rod, bar: Bar, touch: Touch, friction: float, motor_rad: Sequence[float], time_s: np.ndarray) -> Staged:
+def on_bar(
+    rod: Rod,
+    bar: Bar,
+    touch: Touch,
+    friction: float,
+    motor_rad: Sequence[float],
+    time_s: np.ndarray,
+) -> Staged:
     """A whisk over these motor angles with one coefficient of friction. Raises ArithmeticError as `of_run`."""
     motor = np.asarray(motor_rad, dtype=float)
-    whisk = MarchedWhisk.run(rod, bar, Friction(friction, friction), touch, float(motor.max()), step_rad=_STEP_RAD,
-                      stops_rad=motor)
+    whisk = MarchedWhisk.run(
+        rod,
+        bar,
+        Friction(friction, friction),
+        touch,
+        float(motor.max()),
+        step_rad=_STEP_RAD,
+        stops_rad=motor,
+    )
     return staged(whisk, motor, time_s)
 
 
 def staged(whisk: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) -> Staged:
     """A whisk of the rig in vision's terms, at the motor angles of the frames (f,); diameters are exact."""
-    states = [whisk.forward.state_at(motor) if motor > whisk.touch.motor_rad else None for motor in motor_rad]
+    states = [
+        whisk.forward.state_at(motor) if motor > whisk.touch.motor_rad else None
+        for motor in motor_rad
+    ]
     bends = [np.zeros(2) if state is None else _bend(whisk.rod, state) for state in states]
     arcs = [whisk.touch.arc_mm if state is None else state.arc_mm for state in states]
     rod = whisk.rod
-    wire = seen_rods.Wire(rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm)
+    wire = seen_rods.Wire(
+        rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm
+    )
     rods = seen_rods.Rods(wire, seen_rods.Bar(2.0 * whisk.bar.radius_mm))
-    return Staged(whisk, rods, np.asarray(motor_rad), np.asarray(time_s), np.array(bends), np.array(arcs), _rest(rod))
+    return Staged(
+        whisk,
+        rods,
+        np.asarray(motor_rad),
+        np.asarray(time_s),
+        np.array(bends),
+        np.array(arcs),
+        _rest(rod),
+    )
 
 
 def _bend(rod: Rod, state) -> np.ndarray:
@@ -99,4 +137,6 @@ def _rest(rod: Rod) -> np.ndarray:
     """The rod's rest shape as polynomials (2, 4) of the share of its length."""
     share = np.linspace(0.0, 1.0, 50)
     powers = np.vander(share, REST_POWERS, increasing=True)
-    return np.linalg.lstsq(powers, rod.rest.offset_mm(share * rod.length_mm)[:, 1:], rcond=None)[0].T
+    return np.linalg.lstsq(powers, rod.rest.offset_mm(share * rod.length_mm)[:, 1:], rcond=None)[
+        0
+    ].T

@@ -7,9 +7,9 @@ import msgspec
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.plan.calibration import seen_camera
 from bench.plan.expected import expected
 from bench.plan.painted import Clamp
+from bench.plan.planned_cameras import seen_camera
 from bench.plan.staged import Staged
 from bench.plan.tries import USUAL, direction_of
 from bench.rig import build
@@ -29,7 +29,11 @@ def place_cameras(protocol: Protocol, staged: Sequence[Staged], target_mm: np.nd
         return protocol
     chosen = [staged[int(k)] for k in np.unique(np.linspace(0, len(staged) - 1, _TRIALS).round())]
     options = [_options(table, protocol, chosen, target_mm) for table in protocol.cameras]
-    ways = [one for one in itertools.product(*options) if _differ(one) and _first_of_its_kind(one, protocol)]
+    ways = [
+        one
+        for one in itertools.product(*options)
+        if _differ(one) and _first_of_its_kind(one, protocol)
+    ]
     best = min(ways, key=lambda tables: _largest_sigma(protocol, tables, chosen), default=None)
     if best is None or not np.isfinite(_largest_sigma(protocol, best, chosen)):
         found = "no place tried for the cameras without position_mm gives a truth; give them places, or other lenses"
@@ -37,7 +41,9 @@ def place_cameras(protocol: Protocol, staged: Sequence[Staged], target_mm: np.nd
     return msgspec.structs.replace(protocol, cameras=list(best))
 
 
-def _options(table: CameraTable, protocol: Protocol, staged: Sequence[Staged], target_mm) -> list[CameraTable]:
+def _options(
+    table: CameraTable, protocol: Protocol, staged: Sequence[Staged], target_mm
+) -> list[CameraTable]:
     """A camera at each place from which it would see every bar from its side."""
     if table.position_mm is not None:
         return [table]
@@ -68,7 +74,9 @@ def _first_of_its_kind(tables: Sequence[CameraTable], protocol: Protocol) -> boo
     return all(places == sorted(places) for places in kinds.values())
 
 
-def _largest_sigma(protocol: Protocol, tables: Sequence[CameraTable], staged: Sequence[Staged]) -> float:
+def _largest_sigma(
+    protocol: Protocol, tables: Sequence[CameraTable], staged: Sequence[Staged]
+) -> float:
     """The largest sigma of d_x over these whisks, mm, with exact cameras whose lines are as sure as usual."""
     cameras = Cameras(_seen(protocol, tables))
     lines = dict.fromkeys(cameras.names, USUAL)
@@ -77,4 +85,7 @@ def _largest_sigma(protocol: Protocol, tables: Sequence[CameraTable], staged: Se
 
 
 def _seen(protocol: Protocol, tables: Sequence[CameraTable]) -> tuple[Camera, ...]:
-    return tuple(seen_camera(c) for c in build.cameras(msgspec.structs.replace(protocol, cameras=list(tables))))
+    return tuple(
+        seen_camera(c)
+        for c in build.cameras(msgspec.structs.replace(protocol, cameras=list(tables)))
+    )

@@ -10,7 +10,7 @@ from bench.base.atomic import write_whole
 from bench.base.results import write_result
 from bench.base.tables import sigma_name, write_table
 from bench.plan.outlook import QUANTITIES, WORDS
-from bench.plan.rows import Row
+from bench.plan.plan_rows import Row
 from bench.plan.tries import Try
 
 FACTS = ("trial", "whisk", "purpose", "surface", "speed_deg_s", "beta_deg", "psi_deg", "d_x_mm")
@@ -19,8 +19,14 @@ STATED = tuple(name.replace("_sigma_", "_stated_sigma_") for name in SIGMAS)
 LIMITS = tuple(f"{name.rpartition('_')[0]}_limited_by" for name in QUANTITIES)
 COLUMNS = (*FACTS, *SIGMAS, *STATED, *LIMITS, "best_change", "best_share", "obstacles", "status")
 CHANGES = ("trial", "whisk", "kind", "change", *SIGMAS)
-_SHOWN = {"d_x_mm": "d_x mm", "touch_deg": "touch °", "beta_deg": "β °", "slip_mm": "slip mm", "phi_deg": "φ °",
-          "alpha_deg": "α °"}
+_SHOWN = {
+    "d_x_mm": "d_x mm",
+    "touch_deg": "touch °",
+    "beta_deg": "β °",
+    "slip_mm": "slip mm",
+    "phi_deg": "φ °",
+    "alpha_deg": "α °",
+}
 # Where the stated sigma is this many times the expected one or more, a whisk was seen worse than its place allows.
 _WORSE = 1.25
 _MOST_NAMED = 8
@@ -52,8 +58,17 @@ class Plan:
 def write_plan(out: Path, plan: Plan) -> str:
     """All but the pictures. The text."""
     write_table(out / "plan.csv", COLUMNS, map(_cells, plan.rows))
-    changes = ({"trial": row.facts.trial, "whisk": row.facts.whisk, "kind": one.kind, "change": one.words,
-                **_named(one.sigma, SIGMAS)} for row in plan.rows for one in row.tried)
+    changes = (
+        {
+            "trial": row.facts.trial,
+            "whisk": row.facts.whisk,
+            "kind": one.kind,
+            "change": one.words,
+            **_named(one.sigma, SIGMAS),
+        }
+        for row in plan.rows
+        for one in row.tried
+    )
     write_table(out / "changes.csv", CHANGES, changes)
     write_result(out / "plan.json", _plain(plan))
     text = "\n".join(lines_of(plan)) + "\n"
@@ -67,24 +82,54 @@ def _named(sigma, columns: Sequence[str]) -> dict[str, float]:
 
 def _cells(row: Row) -> dict:
     best, found = row.best(), row.outlook.limits
-    limits = {column: f"{WORDS[found[name][0]]} {100 * found[name][1]:.0f} %"
-              for column, name in zip(LIMITS, QUANTITIES) if name in found}
-    return {**{name: getattr(row.facts, name) for name in FACTS}, **_named(row.outlook.sigma, SIGMAS),
-            **_named(row.stated or {}, STATED), **limits, "best_change": best[0].words if best else None,
-            "best_share": best[1] if best else None, "obstacles": "; ".join(row.outlook.obstacles),
-            "status": row.outlook.status}
+    limits = {
+        column: f"{WORDS[found[name][0]]} {100 * found[name][1]:.0f} %"
+        for column, name in zip(LIMITS, QUANTITIES)
+        if name in found
+    }
+    return {
+        **{name: getattr(row.facts, name) for name in FACTS},
+        **_named(row.outlook.sigma, SIGMAS),
+        **_named(row.stated or {}, STATED),
+        **limits,
+        "best_change": best[0].words if best else None,
+        "best_share": best[1] if best else None,
+        "obstacles": "; ".join(row.outlook.obstacles),
+        "status": row.outlook.status,
+    }
 
 
 def _plain(plan: Plan) -> dict:
     """As JSON has it."""
-    rows = [{**{name: getattr(row.facts, name) for name in FACTS}, "sigma": dict(row.outlook.sigma),
-             "stated_sigma": row.stated, "status": row.outlook.status, "obstacles": list(row.outlook.obstacles),
-             "limits": {name: {"cause": cause, "share": part} for name, (cause, part) in row.outlook.limits.items()},
-             "lines": {name: {"wire_px": noise.wire_px, "bar_px": noise.bar_px} for name, noise in row.lines.items()},
-             "tried": [{"kind": one.kind, "change": one.words, "sigma": dict(one.sigma)} for one in row.tried]}
-            for row in plan.rows]
-    return {"title": plan.title, "theta_deg": plan.theta_deg, "cameras": list(plan.cameras),
-            "assumed": list(plan.assumed), "rows": rows}
+    rows = [
+        {
+            **{name: getattr(row.facts, name) for name in FACTS},
+            "sigma": dict(row.outlook.sigma),
+            "stated_sigma": row.stated,
+            "status": row.outlook.status,
+            "obstacles": list(row.outlook.obstacles),
+            "limits": {
+                name: {"cause": cause, "share": part}
+                for name, (cause, part) in row.outlook.limits.items()
+            },
+            "lines": {
+                name: {"wire_px": noise.wire_px, "bar_px": noise.bar_px}
+                for name, noise in row.lines.items()
+            },
+            "tried": [
+                {"kind": one.kind, "change": one.words, "sigma": dict(one.sigma)}
+                for one in row.tried
+            ],
+        }
+        for row in plan.rows
+    ]
+    return {
+        "title": plan.title,
+        "theta_deg": plan.theta_deg,
+        "cameras": list(plan.cameras),
+        "assumed": list(plan.assumed),
+        "rows": rows,
+    }
 
 
 def lines_of(plan: Plan) -> Iterator[str]:
@@ -110,11 +155,19 @@ def _table(plan: Plan) -> Iterator[str]:
     names = [_name(row) for row in plan.rows]
     wide = max(map(len, names), default=5)
     each = 17 if plan.recorded else 9
-    yield "  ".join([f"{'trial':<{wide}}", "  β °", " d_x", *(f"{_SHOWN[name]:>{each}}" for name in QUANTITIES)])
+    yield "  ".join(
+        [f"{'trial':<{wide}}", "  β °", " d_x", *(f"{_SHOWN[name]:>{each}}" for name in QUANTITIES)]
+    )
     for name, row in zip(names, plan.rows):
         cells = [_cell(row, column) for column in QUANTITIES]
-        yield "  ".join([f"{name:<{wide}}", f"{row.facts.beta_deg:5.1f}", f"{row.facts.d_x_mm:4.0f}",
-                         *(f"{cell:>{each}}" for cell in cells)])
+        yield "  ".join(
+            [
+                f"{name:<{wide}}",
+                f"{row.facts.beta_deg:5.1f}",
+                f"{row.facts.d_x_mm:4.0f}",
+                *(f"{cell:>{each}}" for cell in cells),
+            ]
+        )
 
 
 def _name(row: Row) -> str:
@@ -143,8 +196,10 @@ def _limited(rows: Sequence[Row]) -> Iterator[str]:
         for row in known:
             cause, part = row.outlook.limits[name]
             shares.setdefault(cause, []).append(part)
-        told = ", ".join(f"{WORDS[cause]} in {len(parts)} ({100 * np.median(parts):.0f} % of the variance)"
-                         for cause, parts in sorted(shares.items(), key=lambda one: -len(one[1])))
+        told = ", ".join(
+            f"{WORDS[cause]} in {len(parts)} ({100 * np.median(parts):.0f} % of the variance)"
+            for cause, parts in sorted(shares.items(), key=lambda one: -len(one[1]))
+        )
         yield f"{_SHOWN[name].split()[0]} is limited by {told}."
 
 
@@ -175,9 +230,13 @@ def _over_all(rows: Sequence[Row]) -> Iterator[str]:
     yield ""
     yield f"What is left of each sigma, %, median over {len(known)} whisks (- where a change costs the truth of more)"
     yield "  ".join([*(f"{_SHOWN[name].split()[0]:>5}" for name in QUANTITIES), "change"])
-    shares = [(one.words, one.kind, _shares(known, number)) for number, one in enumerate(known[0].tried)]
+    shares = [
+        (one.words, one.kind, _shares(known, number)) for number, one in enumerate(known[0].tried)
+    ]
     best = {}
-    for words, kind, share in sorted(shares, key=lambda one: one[2][0] if np.isfinite(one[2][0]) else np.inf):
+    for words, kind, share in sorted(
+        shares, key=lambda one: one[2][0] if np.isfinite(one[2][0]) else np.inf
+    ):
         best.setdefault(kind, (words, share))
     for words, share in best.values():
         yield "  ".join([*(f"{100 * x:5.0f}" if np.isfinite(x) else "    -" for x in share), words])
@@ -185,8 +244,10 @@ def _over_all(rows: Sequence[Row]) -> Iterator[str]:
 
 def _shares(rows: Sequence[Row], number: int) -> list[float]:
     """What a change leaves of each sigma, in the median; NaN where it costs the truth of half of them."""
-    left = [[row.tried[number].sigma.get(name, np.inf) / row.outlook.sigma[name] for name in QUANTITIES]
-            for row in rows]
+    left = [
+        [row.tried[number].sigma.get(name, np.inf) / row.outlook.sigma[name] for name in QUANTITIES]
+        for row in rows
+    ]
     median = np.median(left, axis=0)
     return [float(x) if np.isfinite(x) else float("nan") for x in median]
 
@@ -197,12 +258,19 @@ def _beside_stated(rows: Sequence[Row]) -> Iterator[str]:
     if not both:
         return
     yield ""
-    ratios = {name: np.array([row.outlook.sigma[name] / row.stated[name] for row in both]) for name in QUANTITIES}
-    told = ", ".join(f"{_SHOWN[name].split()[0]} {np.median(one):.2f}" for name, one in ratios.items())
+    ratios = {
+        name: np.array([row.outlook.sigma[name] / row.stated[name] for row in both])
+        for name in QUANTITIES
+    }
+    told = ", ".join(
+        f"{_SHOWN[name].split()[0]} {np.median(one):.2f}" for name, one in ratios.items()
+    )
     yield f"Expected over stated, median over {len(both)} whisks: {told}."
     for name, one in ratios.items():
         worse = [_name(row) for row, ratio in zip(both, one) if ratio < 1.0 / _WORSE]
         if worse:
             named = ", ".join([*worse[:_MOST_NAMED], *["…"] * (len(worse) > _MOST_NAMED)])
-            yield (f"{_SHOWN[name].split()[0]} of {named} is stated wider than rods, cameras and lines ask for: look "
-                   "at the frames (a slip in jumps, a lost frame).")
+            yield (
+                f"{_SHOWN[name].split()[0]} of {named} is stated wider than rods, cameras and lines ask for: look "
+                "at the frames (a slip in jumps, a lost frame)."
+            )

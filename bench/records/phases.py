@@ -33,7 +33,9 @@ class Phases:
         values, sigmas = np.array([(a.alpha_rad, a.sigma_rad) for a in chosen]).T
         weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
         mean = float(weights @ values)
-        scatter = np.sqrt(len(values) / (len(values) - 1) * np.sum(weights**2 * (values - mean) ** 2))
+        scatter = np.sqrt(
+            len(values) / (len(values) - 1) * np.sum(weights**2 * (values - mean) ** 2)
+        )
         return mean, float(max(scatter, np.sum(sigmas**-2.0) ** -0.5))
 
 

@@ -28,7 +28,9 @@ def to_plain(value: object) -> Any:
 def _keys(field: Field, value: object) -> list[tuple[str, Any]]:
     if isinstance(value, Value):
         return [(field.name, plain(value.value)), (sigma_name(field.name), plain(value.sigma))]
-    return [] if value is None and field.metadata == WHERE_THERE else [(field.name, to_plain(value))]
+    return (
+        [] if value is None and field.metadata == WHERE_THERE else [(field.name, to_plain(value))]
+    )
 
 
 def from_plain(kind: type[Record], value: Any) -> Record:
@@ -42,14 +44,20 @@ def from_plain(kind: type[Record], value: Any) -> Record:
 def _read(kind: Any, value: Any) -> Any:
     """A plain value as its annotation has it; fields of other types stay as they are."""
     if isinstance(kind, UnionType):
-        return None if value is None else _read(next(k for k in get_args(kind) if k is not NoneType), value)
+        return (
+            None
+            if value is None
+            else _read(next(k for k in get_args(kind) if k is not NoneType), value)
+        )
     if kind is float:
         return NAN if value is None else float(value)
     if kind is np.ndarray:
         return _array(value)
     if is_dataclass(kind):
         hints = _hints(kind)
-        return kind(**{f.name: part for f in fields(kind) for part in _field(kind, f, hints[f.name], value)})
+        return kind(
+            **{f.name: part for f in fields(kind) for part in _field(kind, f, hints[f.name], value)}
+        )
     if get_origin(kind) is tuple:
         return tuple(_read(get_args(kind)[0], item) for item in value)
     if get_origin(kind) is dict:
@@ -59,7 +67,9 @@ def _read(kind: Any, value: Any) -> Any:
 
 def _field(kind: type, field: Field, hint: Any, table: Mapping) -> list:
     """The value of a field, or nothing where its default is to stand. Raises ValueError where there is neither."""
-    if table.get(field.name) is None and (field.default is not MISSING or field.default_factory is not MISSING):
+    if table.get(field.name) is None and (
+        field.default is not MISSING or field.default_factory is not MISSING
+    ):
         return []
     if field.name not in table:
         raise ValueError(f"{kind.__name__}: {field.name} is missing")

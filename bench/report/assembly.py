@@ -8,9 +8,9 @@ import numpy as np
 
 from bench.base.doubts import in_one_status
 from bench.base.tables import sigma_name, write_table
-from bench.records.trial import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from estimator.distance import cartesian, contact_point
-from vision.fit.uncertainty import CAUSES
+from vision.fit.covariance import CAUSES
 from vision.truth.value import NAN, UNKNOWN, Value
 
 # Column and field of the value; in the table each is followed by its sigma.
@@ -47,7 +47,9 @@ def _with_sigmas(names: Iterable[str]) -> tuple[str, ...]:
 
 WHISK_COLUMNS = (
     *("trial", "whisk", "surface", "speed_deg_s", "beta_nominal_deg", "theta_deg"),
-    *_with_sigmas(["touch_deg", "touch_felt_deg", *(name for name, _ in (*_SEEN[1:], *_AT_ANGLE, *_FELT[1:]))]),
+    *_with_sigmas(
+        ["touch_deg", "touch_felt_deg", *(name for name, _ in (*_SEEN[1:], *_AT_ANGLE, *_FELT[1:]))]
+    ),
     *_with_sigmas(_PLACE),
     *("cameras", "frames_used", "looked", "status"),
 )
@@ -64,8 +66,19 @@ ESTIMATE_COLUMNS = (
     "beta_est_deg",
     "error_mm",
     "error_percent",
-    *("theta_c_deg", "theta_c_sigma_deg", "z_c_mm", "z_c_sigma_mm", "r_theta_correlation", "point_error_mm"),
-    *(column for name in _AT_CONTACT for column in (f"{name}_est_mm", f"{name}_est_sigma_mm", f"{name}_error_mm")),
+    *(
+        "theta_c_deg",
+        "theta_c_sigma_deg",
+        "z_c_mm",
+        "z_c_sigma_mm",
+        "r_theta_correlation",
+        "point_error_mm",
+    ),
+    *(
+        column
+        for name in _AT_CONTACT
+        for column in (f"{name}_est_mm", f"{name}_est_sigma_mm", f"{name}_error_mm")
+    ),
     "status",
 )
 TRACK_COLUMNS = (
@@ -85,13 +98,20 @@ TRACK_COLUMNS = (
 )
 
 
-_BEAM = (("d_x_mm", "d_x"), ("touch_deg", "touch"), ("slip_mm", "slip"))  # column and field of the whisk's `beam`
+_BEAM = (
+    ("d_x_mm", "d_x"),
+    ("touch_deg", "touch"),
+    ("slip_mm", "slip"),
+)  # column and field of the whisk's `beam`
 BEAM_COLUMNS = (
     *("trial", "whisk", "theta_deg"),
-    *(f"{stem}_{what}_{unit}" for stem, unit in (name.rsplit("_", 1) for name, _ in _BEAM)
-      for what in ("beam", "spline", "difference_sigma")),
+    *(
+        f"{stem}_{what}_{unit}"
+        for stem, unit in (name.rsplit("_", 1) for name, _ in _BEAM)
+        for what in ("beam", "spline", "difference_sigma")
+    ),
     "chance",
-)  # fmt: skip
+)
 BUDGET_COLUMNS = ("trial", "whisk", "d_x_sigma_mm", *(f"{cause}_percent" for cause in CAUSES))
 
 
@@ -109,7 +129,9 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     """A row a whisk, by column."""
     for result, seen, felt in whisks(results):
         trial, row = result.trial, {"theta_deg": result.theta_deg, "status": status_of(seen, felt)}
-        row |= {name: getattr(trial, name) for name in ("surface", "speed_deg_s", "beta_nominal_deg")}
+        row |= {
+            name: getattr(trial, name) for name in ("surface", "speed_deg_s", "beta_nominal_deg")
+        }
         for source, names in ((seen, _SEEN), (felt, _FELT), (seen.at, _AT_ANGLE)):
             for column, key in names:
                 row |= _cells(column, key, getattr(source, key, UNKNOWN))
@@ -131,7 +153,10 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     for result, seen, _ in whisks(results):
         if not (seen.has_truth and seen.beam):
             continue
-        row = _whisk_of(result, seen) | {"chance": seen.beam.chance, "theta_deg": math.degrees(seen.beam.theta_rad)}
+        row = _whisk_of(result, seen) | {
+            "chance": seen.beam.chance,
+            "theta_deg": math.degrees(seen.beam.theta_rad),
+        }
         for name, key in _BEAM:
             (stem, unit), compared = name.rsplit("_", 1), getattr(seen.beam, key)
             for what in ("beam", "spline", "difference_sigma"):
@@ -152,7 +177,12 @@ def _whisk_of(result: TrialResult, seen: SeenWhisk) -> dict:
 def _cells(column: str, key: str, value: Value) -> dict[str, float]:
     """A value and its sigma in the unit of the column."""
     numbers = (value.value, value.sigma)
-    return dict(zip((column, sigma_name(column)), map(math.degrees, numbers) if key.endswith("_rad") else numbers))
+    return dict(
+        zip(
+            (column, sigma_name(column)),
+            map(math.degrees, numbers) if key.endswith("_rad") else numbers,
+        )
+    )
 
 
 def _place(point, sigma) -> dict[str, float]:
@@ -193,7 +223,9 @@ def _contact_cells(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> dic
     cells["point_error_mm"] = point_error_mm(seen, felt, answer)
     for name in _AT_CONTACT:
         found, truth = getattr(answer, f"{name}_est_mm"), getattr(seen.at, f"{name}_mm", UNKNOWN)
-        cells |= _cells(f"{name}_est_mm", f"{name}_mm", found) | {f"{name}_error_mm": found.value - truth.value}
+        cells |= _cells(f"{name}_est_mm", f"{name}_mm", found) | {
+            f"{name}_error_mm": found.value - truth.value
+        }
     return cells
 
 

@@ -4,16 +4,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.analyses.curved import Curved
+from bench.analyses.friction_tables import SurfaceFriction, friction_of
+from bench.analyses.runs import with_runs
+from bench.analyses.soft import Soft
+from bench.analyses.tilted import Tilted
 from bench.base.settings import Settings
-from bench.cameras.calibration import SessionCalibration
-from bench.friction.curved import Curved
-from bench.friction.runs import with_runs
-from bench.friction.soft import Soft
-from bench.friction.tables import SurfaceFriction, friction_of
-from bench.friction.tilted import Tilted
+from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.certificate import Certificate
 from bench.gauges.matrix import Gauges
-from bench.records.trial import FeltWhisk, TrialResult
+from bench.records.trial_result import FeltWhisk, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch

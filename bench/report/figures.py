@@ -7,18 +7,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bench.analyses.figure_8 import figure_8
+from bench.analyses.surfaces import Surface
 from bench.base.drawing import SLOPES_DEG, colour_of, is_drawn, label_of, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.friction.surfaces import Surface
-from bench.records.trial import TrialResult
+from bench.records.trial_result import TrialResult
 from bench.report.evaluation import Evaluation
-from bench.report.figure_8 import figure_8
 from bench.report.overlays import draw_overlays
 from bench.report.planes import draw_planes
 from bench.session.trial import Trial
-from bench.trials.compare import Judged, judge
+from bench.trials.estimate_errors import Judged, judge
 from estimator.threshold import distance_error
 
 _MARKERS = "osD^vP"
@@ -38,12 +38,17 @@ def write_figures(evaluation: Evaluation, pool: Workers) -> list[str]:
     if judged and not is_drawn(out / names[-1], stamp):
         with style():
             save(error_against_slope(judged, fitted, settings), out / names[-1], stamp)
-    tasks = [(evaluation.session.trial(r.trial.name), r, _friction_of(r, fitted, settings), out) for r in results]
+    tasks = [
+        (evaluation.session.trial(r.trial.name), r, _friction_of(r, fitted, settings), out)
+        for r in results
+    ]
     drawn = pool.run(draw_trial, tasks, "figures")
     return [*names, *(name for group in drawn for name in group)]
 
 
-def _friction_of(result: TrialResult, fitted: Sequence[Surface], settings: Settings) -> tuple[float, str]:
+def _friction_of(
+    result: TrialResult, fitted: Sequence[Surface], settings: Settings
+) -> tuple[float, str]:
     """Half opening of the friction cone to draw, rad, and where it comes from."""
     for surface in fitted:
         if surface.panel == result.trial.panel and surface.fit is not None:
@@ -56,10 +61,15 @@ def draw_trial(task: tuple[Trial, TrialResult, tuple[float, str], Path]) -> list
     trial, result, friction, out = task
     stamp = hash_of(result.hash, friction, hash_of_code(DRAWING))
     with style():
-        return [*draw_planes(result, friction, out, stamp), *draw_overlays(trial, result, out, stamp)]
+        return [
+            *draw_planes(result, friction, out, stamp),
+            *draw_overlays(trial, result, out, stamp),
+        ]
 
 
-def error_against_slope(judged: Sequence[Judged], fitted: Sequence[Surface], settings: Settings) -> Figure:
+def error_against_slope(
+    judged: Sequence[Judged], fitted: Sequence[Surface], settings: Settings
+) -> Figure:
     """Error of d_x against slope: every estimator, and on the right without (2), whose error dwarfs the others'."""
     figure = Figure(figsize=(9.6, 4.3), layout="constrained")
     whole, near = figure.subplots(1, 2)
@@ -82,18 +92,28 @@ def error_against_slope(judged: Sequence[Judged], fitted: Sequence[Surface], set
 
 def _limits(judged: Sequence[Judged]) -> tuple[float, float]:
     """All points with room for their sigmas, and never less than ± 5 %."""
-    reach = [j.error_percent + sign * 2.0 * min(j.error_sigma_percent, 50.0) for j in judged for sign in (-1, 1)]
+    reach = [
+        j.error_percent + sign * 2.0 * min(j.error_sigma_percent, 50.0)
+        for j in judged
+        for sign in (-1, 1)
+    ]
     low, high = min([-5.0, *reach]), max([5.0, *reach])
     return low - 0.06 * (high - low), high + 0.06 * (high - low)
 
 
-def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], settings: Settings) -> None:
+def _predicted(
+    axes: Axes, name: str, number: int, fitted: Sequence[Surface], settings: Settings
+) -> None:
     """The error that (13), (14) predict where the surface has its fitted α."""
-    assumed = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}.get(name)
+    assumed = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}.get(
+        name
+    )
     equation = "no_slip" if name == "no_slip" else "with_friction"
     for surface in fitted if assumed is not None else ():
         if surface.fit is not None:
-            error = distance_error(np.radians(SLOPES_DEG), surface.alpha_rad, assumed, equation=equation)
+            error = distance_error(
+                np.radians(SLOPES_DEG), surface.alpha_rad, assumed, equation=equation
+            )
             error = surface.beam.error_share(surface.common_d_x_mm, error)
             axes.plot(
                 SLOPES_DEG,
@@ -106,11 +126,17 @@ def _predicted(axes: Axes, name: str, number: int, fitted: Sequence[Surface], se
             )
 
 
-def _points(axes: Axes, judged: Sequence[Judged], number: int, name: str, fitted: Sequence[Surface]) -> None:
+def _points(
+    axes: Axes, judged: Sequence[Judged], number: int, name: str, fitted: Sequence[Surface]
+) -> None:
     keys = [s.panel for s in fitted]
     for one_factor in (False, True):
         for place, key in enumerate(keys):
-            chosen = [j for j in judged if j.one_factor == one_factor and (j.surface, j.speed_deg_s) == key]
+            chosen = [
+                j
+                for j in judged
+                if j.one_factor == one_factor and (j.surface, j.speed_deg_s) == key
+            ]
             if chosen:
                 axes.errorbar(
                     [abs(j.beta_deg) for j in chosen],

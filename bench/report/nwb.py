@@ -17,7 +17,7 @@ from bench.base.results import hash_of
 from bench.base.tables import read_table
 from bench.records.plain import to_plain
 from bench.report.record import read_record
-from bench.report.run import RunRecord
+from bench.report.run_facts import RunRecord
 from bench.session.inside import check_outside
 from bench.session.session import Session, load_session
 from bench.session.signals import read_signals
@@ -57,23 +57,36 @@ def write_nwb(path: Path, out: Path, session: Path) -> None:
 def _file(record: RunRecord, session: Session, out: Path):
     from pynwb import NWBFile
 
-    first = min((session.trial(name).signals_path.stat().st_mtime for name in record.recordings), default=0.0)
+    first = min(
+        (session.trial(name).signals_path.stat().st_mtime for name in record.recordings),
+        default=0.0,
+    )
     file = NWBFile(
         session_description=f"{record.session}: {' '.join(record.verdict)}",
         identifier=hash_of(record.results),
         session_start_time=datetime.fromtimestamp(first, UTC),
         experiment_description=(out / "methods.md").read_text(encoding="utf-8"),
-        notes=json.dumps({"settings": to_plain(record.settings), "versions": record.versions}, sort_keys=True),
+        notes=json.dumps(
+            {"settings": to_plain(record.settings), "versions": record.versions}, sort_keys=True
+        ),
         keywords=["whisker", "contact distance", "ground truth"],
     )
     for name in record.recordings:
         for series in _series(session, name):
             file.add_acquisition(series)
-    module = file.create_processing_module("whisker_bench", "truth, estimates and tracks of every whisk")
+    module = file.create_processing_module(
+        "whisker_bench", "truth, estimates and tracks of every whisk"
+    )
     for name, what in _TABLES.items():
         module.add(_table(name, what, out / f"{name}.csv"))
     for name in record.recordings:
-        module.add(_table(f"track_{name}", f"a row a frame of {name}; {_OWN_CLOCK}", out / "track" / f"{name}.csv"))
+        module.add(
+            _table(
+                f"track_{name}",
+                f"a row a frame of {name}; {_OWN_CLOCK}",
+                out / "track" / f"{name}.csv",
+            )
+        )
     return file
 
 
@@ -83,14 +96,20 @@ def _series(session: Session, name: str) -> Iterator:
     signals = read_signals(session.trial(name))
     unit, columns = ("volts", "y_V, z_V") if signals.kind == "V" else ("N mm", "m_y_Nmm, m_z_Nmm")
     motor = TimeSeries(
-        name=f"{name}_motor", data=np.degrees(signals.motor_rad), unit="degrees", timestamps=signals.time_s,
+        name=f"{name}_motor",
+        data=np.degrees(signals.motor_rad),
+        unit="degrees",
+        timestamps=signals.time_s,
         description=f"angle of the motor; {_OWN_CLOCK}",
-    )  # fmt: skip
+    )
     yield motor
     yield TimeSeries(
-        name=f"{name}_gauges", data=np.column_stack([signals.y, signals.z]), unit=unit, timestamps=motor,
+        name=f"{name}_gauges",
+        data=np.column_stack([signals.y, signals.z]),
+        unit=unit,
+        timestamps=motor,
         description=f"{columns}; {_OWN_CLOCK}",
-    )  # fmt: skip
+    )
 
 
 def _table(name: str, what: str, path: Path):
@@ -99,7 +118,8 @@ def _table(name: str, what: str, path: Path):
 
     rows = read_table(path)
     columns = [
-        VectorData(name=column, description=_said(column), data=rows[column].tolist()) for column in rows.dtype.names
+        VectorData(name=column, description=_said(column), data=rows[column].tolist())
+        for column in rows.dtype.names
     ]
     return DynamicTable(name=name, description=what, columns=columns)
 

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from bench.base.drawing import is_drawn, save_picture
-from bench.records.trial import SeenWhisk, TrialResult
+from bench.records.trial_result import SeenWhisk, TrialResult
 from bench.report.painting import as_8_bit, polyline
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
@@ -20,7 +20,11 @@ _MOMENTS = {"touch": "at touch", "theta": "at θ"}
 _AROUND_PX = 34  # half width of the view that is enlarged
 _MARGIN_PX = 70  # of a picture, around the whisker
 _PANEL_PX = (800, 450)
-_INSET_PX, _EDGE_PX, _CROSS_PX = 186, 12, 6  # enlarged view, distance from the panel's edges; half of a contact's cross
+_INSET_PX, _EDGE_PX, _CROSS_PX = (
+    186,
+    12,
+    6,
+)  # enlarged view, distance from the panel's edges; half of a contact's cross
 _GAP_PX, _TITLE_PX, _FONT_PX = 10, 26, 16
 
 
@@ -42,9 +46,18 @@ def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
     pictures = _pictures(trial, cameras, {chosen[m].frame for m in _MOMENTS})
     (width, height), rows, titles = _PANEL_PX, [], []
     for row, camera in enumerate(cameras):
-        panels = [_panel(pictures[camera].get(chosen[m].frame), chosen[m].cameras[camera]) for m in _MOMENTS]
-        rows.append(np.hstack([np.pad(p, ((_TITLE_PX, _GAP_PX), (0, _GAP_PX), (0, 0)), constant_values=255)
-                               for p in panels]))  # fmt: skip
+        panels = [
+            _panel(pictures[camera].get(chosen[m].frame), chosen[m].cameras[camera])
+            for m in _MOMENTS
+        ]
+        rows.append(
+            np.hstack(
+                [
+                    np.pad(p, ((_TITLE_PX, _GAP_PX), (0, _GAP_PX), (0, 0)), constant_values=255)
+                    for p in panels
+                ]
+            )
+        )
         for column, (moment, said) in enumerate(_MOMENTS.items()):
             frame = chosen[moment].frame
             place = column * (width + _GAP_PX), row * (height + _TITLE_PX + _GAP_PX) + 3
@@ -60,7 +73,9 @@ def _font() -> ImageFont.FreeTypeFont:
     """Matplotlib's own, which is there wherever figures are drawn."""
     from matplotlib import get_data_path
 
-    return ImageFont.truetype(str(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), _FONT_PX)
+    return ImageFont.truetype(
+        str(Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), _FONT_PX
+    )
 
 
 def _theta(whisk: SeenWhisk, frame: int) -> str:
@@ -90,14 +105,18 @@ def _panel(picture: np.ndarray | None, lines: Mapping[str, np.ndarray]) -> np.nd
     if np.isfinite(contact).all():
         seen = contact - _AROUND_PX
         inset = _drawn(grey, seen, _INSET_PX / (2.0 * _AROUND_PX), (_INSET_PX, _INSET_PX), lines)
-        low, high = (np.round(scale * (at - corner)).astype(int) for at in (seen, contact + _AROUND_PX))
+        low, high = (
+            np.round(scale * (at - corner)).astype(int) for at in (seen, contact + _AROUND_PX)
+        )
         cv2.rectangle(panel, low.tolist(), high.tolist(), _WHITE, 1)
         cv2.rectangle(inset, (0, 0), (_INSET_PX - 1, _INSET_PX - 1), _WHITE, 2)
         panel[-_EDGE_PX - _INSET_PX : -_EDGE_PX, -_EDGE_PX - _INSET_PX : -_EDGE_PX] = inset
     return panel
 
 
-def _drawn(grey: np.ndarray, corner_px, scale: float, size_px, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+def _drawn(
+    grey: np.ndarray, corner_px, scale: float, size_px, lines: Mapping[str, np.ndarray]
+) -> np.ndarray:
     """The part of a picture from its pixel corner_px (2,) on, enlarged by scale to size_px, with the lines in it."""
     shift = -scale * np.asarray(corner_px)
     moved = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
@@ -114,7 +133,10 @@ def _drawn(grey: np.ndarray, corner_px, scale: float, size_px, lines: Mapping[st
 def _around(shape: tuple[int, ...], wire: np.ndarray) -> tuple[np.ndarray, float]:
     """Corner (2,) of the part that holds the whisker (n, 2), in the panel's shape, and its scale there."""
     finite, panel = wire[np.isfinite(wire).all(axis=1)], np.array(_PANEL_PX, dtype=float)
-    middle, size = 0.5 * (finite.min(axis=0) + finite.max(axis=0)), np.ptp(finite, axis=0) + 2 * _MARGIN_PX
+    middle, size = (
+        0.5 * (finite.min(axis=0) + finite.max(axis=0)),
+        np.ptp(finite, axis=0) + 2 * _MARGIN_PX,
+    )
     scale = float(np.min(panel / size))
     room = np.maximum(np.array(shape[1::-1]) - panel / scale, 0.0)
     return np.clip(middle - 0.5 * panel / scale, 0.0, room), scale

@@ -6,17 +6,17 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from bench.analyses.against_theta import against_theta, figure
+from bench.analyses.error_map import draw_error_map, measured_cells, typical_taper
+from bench.analyses.explained import draw_explained, explained_rows, mean_row
+from bench.analyses.figure_8 import figure_8
+from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.drawing import paper_style, publish
 from bench.base.settings import Settings
-from bench.friction.error_map import draw_error_map, measured_cells, typical_taper
-from bench.friction.explained import draw_explained, explained_rows, mean_row
-from bench.friction.tables import SurfaceFriction
-from bench.records.trial import TrialResult
-from bench.report.against_theta import against_theta, figure
-from bench.report.figure_8 import figure_8
+from bench.records.trial_result import TrialResult
 from bench.report.figures import error_against_slope
 from bench.session.whisker import Whisker
-from bench.trials.compare import judge
+from bench.trials.estimate_errors import judge
 
 FOLDER = "figures"
 # IEEE's journals: one column is 3.5 in wide, both are 7.16 in.
@@ -26,13 +26,18 @@ _BESIDE = 2  # panels side by side take both columns
 
 
 def session_figures(
-    results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], whisker: Whisker, settings: Settings
+    results: Sequence[TrialResult],
+    friction: Sequence[SurfaceFriction],
+    whisker: Whisker,
+    settings: Settings,
 ) -> dict[str, Figure]:
     """All figures of the session that the results allow, by the names of their files."""
     fitted, figures = [f.surface for f in friction], {}
     if fitted:
         figures["fig8"] = figure_8(fitted)
-    judged = [j for j in judge(results) if j.purpose == "measure" and math.isfinite(j.error_percent)]
+    judged = [
+        j for j in judge(results) if j.purpose == "measure" and math.isfinite(j.error_percent)
+    ]
     if judged:
         figures["error_against_slope"] = error_against_slope(judged, fitted, settings)
     rows = list(explained_rows(results, whisker))
@@ -40,7 +45,9 @@ def session_figures(
         figures["explained"] = draw_explained([*rows, mean_row(rows)])
     cells = measured_cells(results, friction, settings.alpha_est_rad)
     if cells:
-        figures["error_map"] = draw_error_map(cells, settings.alpha_est_rad, typical_taper(friction))
+        figures["error_map"] = draw_error_map(
+            cells, settings.alpha_est_rad, typical_taper(friction)
+        )
     by_theta = against_theta(results)
     if any(row.whisks for row in by_theta):
         figures["against_theta"] = figure(by_theta)
@@ -59,7 +66,9 @@ def write_paper_figures(
     written."""
     paths = []
     with paper_style():
-        for name, figure in session_figures(results, friction, whisker, settings).items() if formats else ():
+        for name, figure in (
+            session_figures(results, friction, whisker, settings).items() if formats else ()
+        ):
             width, height = figure.get_size_inches()
             wide = _BOTH_IN if _columns(figure) >= _BESIDE else _COLUMN_IN
             figure.set_size_inches(wide, wide * max(height / width, 0.45))
@@ -70,5 +79,10 @@ def write_paper_figures(
 def _columns(figure: Figure) -> int:
     """Panels side by side."""
     return max(
-        (axes.get_subplotspec().get_gridspec().ncols for axes in figure.axes if axes.get_subplotspec()), default=1
+        (
+            axes.get_subplotspec().get_gridspec().ncols
+            for axes in figure.axes
+            if axes.get_subplotspec()
+        ),
+        default=1,
     )

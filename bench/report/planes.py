@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon, Wedge
 
 from bench.base.drawing import is_drawn, save
-from bench.records.trial import SeenTrial, SeenWhisk, TrialResult
+from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult
 from bench.report.page.plane import contact_path
 
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
@@ -19,7 +19,9 @@ _LABEL_MM = 0.4  # of room that a name takes
 _LEG = {"fontsize": 9, "color": "0.25"}
 
 
-def draw_planes(result: TrialResult, friction: tuple[float, str], out: Path, stamp: str) -> list[str]:
+def draw_planes(
+    result: TrialResult, friction: tuple[float, str], out: Path, stamp: str
+) -> list[str]:
     """planes/<trial>.png, a panel for each whisk that was seen to be pushed; nothing where there is none."""
     whisks = [w for w in result.seen.whisks if w.has_truth and np.isfinite(w.at.d_y_mm.value)]
     if not whisks:
@@ -43,12 +45,22 @@ def _room(columns: int, rows: int) -> dict[str, float]:
     (wide, high), (left, right, bottom, top) = _PANEL_IN, _AROUND_IN
     inner = wide - left - right, high - bottom - top
     return {
-        **{"left": left / wide / columns, "right": 1.0 - right / wide / columns, "wspace": (left + right) / inner[0]},
-        **{"bottom": bottom / high / rows, "top": 1.0 - top / high / rows, "hspace": (bottom + top) / inner[1]},
+        **{
+            "left": left / wide / columns,
+            "right": 1.0 - right / wide / columns,
+            "wspace": (left + right) / inner[0],
+        },
+        **{
+            "bottom": bottom / high / rows,
+            "top": 1.0 - top / high / rows,
+            "hspace": (bottom + top) / inner[1],
+        },
     }
 
 
-def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: tuple[float, str]) -> None:
+def sensing_plane(
+    axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: tuple[float, str]
+) -> None:
     """One whisk: y to the right, z up, both in the contact frame from P0 on."""
     path = contact_path(whisk)
     beta, at = whisk.beta_rad.value, whisk.at
@@ -64,8 +76,16 @@ def sensing_plane(axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: t
     _draw_slip(axes, contact, normal)
     points = np.array([np.zeros(2), contact, virtual])
     low, high = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="y  [mm]", ylabel="z  [mm]")
-    axes.set_title(f"{result.trial.name}, whisk {whisk.whisk}, θ = {np.degrees(at.theta_rad):.2f}°", loc="left")
+    axes.set(
+        xlim=(low[0], high[0]),
+        ylim=(low[1], high[1]),
+        aspect="equal",
+        xlabel="y  [mm]",
+        ylabel="z  [mm]",
+    )
+    axes.set_title(
+        f"{result.trial.name}, whisk {whisk.whisk}, θ = {np.degrees(at.theta_rad):.2f}°", loc="left"
+    )
     axes.text(
         0.98,
         0.02,
@@ -85,7 +105,13 @@ def _draw_bar(axes: Axes, seen: SeenTrial, radius_mm: float, along, normal) -> N
     near = -radius_mm * normal
     width = -2.0 * seen.bar_radius_mm * normal
     axes.add_patch(
-        Polygon([near - far, near + far, near + far + width, near - far + width], fc=_BAR, ec="0.45", lw=0.8, zorder=0)
+        Polygon(
+            [near - far, near + far, near + far + width, near - far + width],
+            fc=_BAR,
+            ec="0.45",
+            lw=0.8,
+            zorder=0,
+        )
     )
     axis = near + 0.5 * width
     axes.plot(*zip(axis - far, axis + far), color="0.45", lw=0.7, ls=(0, (8, 3, 1, 3)), zorder=1)
@@ -132,8 +158,12 @@ def _draw_whisker(axes: Axes, radius_mm: float, contact, virtual, path, onward, 
         (contact, "P", at_p),
         (virtual, "V", (0.55, -0.55)),
     ):
-        axes.annotate(name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7, columnspacing=1.2)
+        axes.annotate(
+            name, place + np.array(shift), ha="center", va="center", fontsize=10, zorder=6
+        )
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7, columnspacing=1.2
+    )
 
 
 def _draw_slip(axes: Axes, contact, normal) -> None:
@@ -147,7 +177,9 @@ def _draw_slip(axes: Axes, contact, normal) -> None:
         aside,
         arrowprops={"arrowstyle": "<->", "color": _PATH, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
     )
-    axes.annotate("σ", 0.5 * contact + 1.25 * normal, ha="center", va="center", color=_PATH, fontsize=10)
+    axes.annotate(
+        "σ", 0.5 * contact + 1.25 * normal, ha="center", va="center", color=_PATH, fontsize=10
+    )
 
 
 def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual, radius_mm: float) -> None:
@@ -156,27 +188,59 @@ def _draw_angles(axes: Axes, whisk: SeenWhisk, contact, virtual, radius_mm: floa
     corner = np.array([contact[0], virtual[1]])
     side = 1.0 if contact[1] >= virtual[1] else -1.0
     axes.plot(*zip(virtual, corner, contact), color="0.35", lw=0.8, ls=":", zorder=2)
-    axes.annotate("d$_y$", 0.5 * (virtual + corner) - [0, 0.25 * side], ha="center", va="center", **_LEG)
-    if abs(contact[1] - virtual[1]) > 0.4:  # its label stands beside what the circle leaves of the leg
+    axes.annotate(
+        "d$_y$", 0.5 * (virtual + corner) - [0, 0.25 * side], ha="center", va="center", **_LEG
+    )
+    if (
+        abs(contact[1] - virtual[1]) > 0.4
+    ):  # its label stands beside what the circle leaves of the leg
         free = max(abs(contact[1] - virtual[1]) - radius_mm, 0.3)
-        by_first = np.linalg.norm(contact) < 2.0 * radius_mm + _LABEL_MM  # P0's circle lies to the left of it
+        by_first = (
+            np.linalg.norm(contact) < 2.0 * radius_mm + _LABEL_MM
+        )  # P0's circle lies to the left of it
         at, ha = (0.12, "left") if by_first else (-0.12, "right")
-        axes.annotate("d$_z$", corner + np.array([at, 0.5 * side * free]), ha=ha, va="center", **_LEG)
+        axes.annotate(
+            "d$_z$", corner + np.array([at, 0.5 * side * free]), ha=ha, va="center", **_LEG
+        )
     if abs(phi) > _LEAST_DEG:
-        _draw_angle(axes, virtual, min(1.6, 0.9 * abs(virtual[0] - contact[0])), 180.0, 180.0 - phi, "φ", contact)
+        _draw_angle(
+            axes,
+            virtual,
+            min(1.6, 0.9 * abs(virtual[0] - contact[0])),
+            180.0,
+            180.0 - phi,
+            "φ",
+            contact,
+        )
     axes.plot([0, 0], [0, 2.0], color="0.35", lw=0.8, ls=":", zorder=2)
     if abs(beta) > _LEAST_DEG:
         _draw_angle(axes, np.zeros(2), 1.6, 90.0, 90.0 - beta, "β", contact)
 
 
-def _draw_angle(axes: Axes, corner, radius_mm: float, first_deg: float, last_deg: float, name: str, contact) -> None:
+def _draw_angle(
+    axes: Axes, corner, radius_mm: float, first_deg: float, last_deg: float, name: str, contact
+) -> None:
     """An arc from one direction to another; its name within, before it where P's circle is within, or past its end
     where there is no room."""
     low, high = sorted((first_deg, last_deg))
-    axes.add_patch(Arc(corner, 2 * radius_mm, 2 * radius_mm, theta1=low, theta2=high, color="0.2", lw=0.9, zorder=4))
+    axes.add_patch(
+        Arc(
+            corner,
+            2 * radius_mm,
+            2 * radius_mm,
+            theta1=low,
+            theta2=high,
+            color="0.2",
+            lw=0.9,
+            zorder=4,
+        )
+    )
     if high - low > _ROOM_DEG:
         way, at = np.radians(0.5 * (first_deg + last_deg)), 0.72 * radius_mm
-        if np.linalg.norm(corner + at * np.array([np.cos(way), np.sin(way)]) - contact) < 2.0 * _LABEL_MM:
+        if (
+            np.linalg.norm(corner + at * np.array([np.cos(way), np.sin(way)]) - contact)
+            < 2.0 * _LABEL_MM
+        ):
             at = radius_mm + 0.5 * _LABEL_MM
     else:
         way, at = np.radians(last_deg + np.copysign(9.0, last_deg - first_deg)), radius_mm

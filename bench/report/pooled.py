@@ -4,14 +4,14 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+from bench.analyses.figure_8 import COLUMNS, figure_8, rows
+from bench.analyses.surfaces import Surface, friction_lines, surfaces
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.results import read_result
 from bench.base.tables import write_table
-from bench.friction.surfaces import Surface, friction_lines, surfaces
 from bench.records.plain import from_plain
-from bench.records.trial import TrialResult, WhiskerFacts
-from bench.report.figure_8 import COLUMNS, figure_8, rows
+from bench.records.trial_result import TrialResult, WhiskerFacts
 from estimator.beam import Beam
 
 TABLE = "whisks.csv"
@@ -61,7 +61,9 @@ def read_run(out: Path) -> list[TrialResult]:
     """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run, or
     another one was stopped half-way in the same folder."""
     if not (out / TABLE).is_file():
-        raise BadInput(f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out)
+        raise BadInput(
+            f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out
+        )
     results = [_result(out, trial) for trial in _trials(out / TABLE)]
     if not results:
         raise BadInput(f"holds no whisk ({TABLE} has no rows)", file=out)
@@ -89,7 +91,9 @@ def _result(out: Path, trial: str | None) -> TrialResult:
     try:
         return from_plain(TrialResult, kept)
     except ValueError:
-        raise BadInput(f"{path.relative_to(out)} is of an older version; {_AGAIN}", file=out) from None
+        raise BadInput(
+            f"{path.relative_to(out)} is of an older version; {_AGAIN}", file=out
+        ) from None
 
 
 def _check_given_once(runs: Sequence[tuple[Path, list[TrialResult]]]) -> None:
@@ -127,4 +131,7 @@ def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
             first, reference = known.setdefault(surface.panel, (out, d_x))
             if abs(d_x / reference - 1.0) > _SAME_DISTANCE:
                 found = f"{surface.title}: d_x is {d_x:.1f} mm, in {first} {reference:.1f} mm"
-                raise BadInput(f"{found}; whisks at distances {_SAME_DISTANCE:.0%} apart cannot be pooled", file=out)
+                raise BadInput(
+                    f"{found}; whisks at distances {_SAME_DISTANCE:.0%} apart cannot be pooled",
+                    file=out,
+                )

@@ -8,15 +8,18 @@ from pathlib import Path
 from bench.base.atomic import write_whole
 from bench.base.environment import versions
 from bench.base.errors import BadInput
-from bench.cameras.calibration import SessionCalibration
+from bench.cameras.session_cameras import SessionCalibration
 from bench.records.plain import from_plain, to_plain
 from bench.report.evaluation import Evaluation
-from bench.report.run import BoardFacts, CameraFacts, GaugeFacts, GaugePoints, RunRecord
-from bench.report.summary.page import Summary
+from bench.report.run_facts import BoardFacts, CameraFacts, GaugeFacts, GaugePoints, RunRecord
+from bench.report.summary.compose import Summary
 from bench.session.session import Session
 
 RECORD, SESSION = "run.json", ".session"
-ARRAY, RUNS = "array.json", "whiskers"  # of several whiskers: each one's run stands in a folder of its own
+ARRAY, RUNS = (
+    "array.json",
+    "whiskers",
+)  # of several whiskers: each one's run stands in a folder of its own
 _AGAIN = "evaluate the session again into this folder"
 
 
@@ -51,7 +54,9 @@ def _cameras(calibration: SessionCalibration) -> tuple[CameraFacts, ...]:
 def _board(session: Session, calibration: SessionCalibration) -> BoardFacts | None:
     if session.board is None or calibration.T_rig_board is None:
         return None
-    return BoardFacts(tuple(session.board.squares), session.board.square_mm, calibration.T_rig_board)
+    return BoardFacts(
+        tuple(session.board.squares), session.board.square_mm, calibration.T_rig_board
+    )
 
 
 def _gauges(evaluation: Evaluation) -> GaugeFacts | None:
@@ -68,7 +73,10 @@ def _gauges(evaluation: Evaluation) -> GaugeFacts | None:
 
 def write_record(out: Path, record: RunRecord, session: Path) -> RunRecord:
     """run.json and .session, each whole. The record as the file holds it, which is what is used in every run."""
-    write_whole(out / RECORD, json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1) + "\n")
+    write_whole(
+        out / RECORD,
+        json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1) + "\n",
+    )
     write_whole(out / SESSION, f"{session.resolve()}\n")
     return read_record(out)
 
@@ -76,9 +84,14 @@ def write_record(out: Path, record: RunRecord, session: Path) -> RunRecord:
 def read_record(out: Path) -> RunRecord:
     """The run of a folder. Raises BadInput where it is no finished run of this version."""
     if (out / ARRAY).is_file():
-        raise BadInput(f"is of several whiskers; give the folder of one of them, {RUNS}/<name> in it", file=out)
+        raise BadInput(
+            f"is of several whiskers; give the folder of one of them, {RUNS}/<name> in it", file=out
+        )
     if not (out / RECORD).is_file():
-        raise BadInput(f"is no evaluated run (there is no {RECORD} in it); give the OUT of `evaluate`", file=out)
+        raise BadInput(
+            f"is no evaluated run (there is no {RECORD} in it); give the OUT of `evaluate`",
+            file=out,
+        )
     try:
         return from_plain(RunRecord, json.loads((out / RECORD).read_text(encoding="utf-8")))
     except (ValueError, BadInput):

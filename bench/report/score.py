@@ -39,7 +39,11 @@ class Score:
         """Bias, RMS, and how well the stated sigmas hold."""
         z = np.abs(self.errors) / self.sigmas
         finite = z[np.isfinite(z)]
-        held = f"{100 * np.mean(finite <= Z_95):5.0f} %   {finite.max():5.2f}" if len(finite) else "    -       -"
+        held = (
+            f"{100 * np.mean(finite <= Z_95):5.0f} %   {finite.max():5.2f}"
+            if len(finite)
+            else "    -       -"
+        )
         return (
             f"{self.name:<28}{len(self.errors):5d}  {np.mean(self.errors):+9.4f}  "
             f"{np.sqrt(np.mean(self.errors**2)):8.4f} {self.unit:<4}{held}"
@@ -60,13 +64,18 @@ def score_all(runs: Sequence[tuple[Session, Path]], gauges: Gauges | None = None
         return [f"the truth files cannot be read: {type(problem).__name__} {problem}"]
     if not found:
         return lines
-    scores = [_together([s for s in found if s.name == name]) for name in dict.fromkeys(s.name for s in found)]
+    scores = [
+        _together([s for s in found if s.name == name])
+        for name in dict.fromkeys(s.name for s in found)
+    ]
     head = f"{'':<28}{'n':>5}  {'bias':>9}  {'RMS':>8}     in 95 %  most |z|"
     return [head, *(s.line() for s in scores), *lines]
 
 
 def _together(scores: Sequence[Score]) -> Score:
-    errors, sigmas = (np.concatenate([getattr(s, key) for s in scores]) for key in ("errors", "sigmas"))
+    errors, sigmas = (
+        np.concatenate([getattr(s, key) for s in scores]) for key in ("errors", "sigmas")
+    )
     return Score(scores[0].name, scores[0].unit, errors, sigmas)
 
 
@@ -75,16 +84,30 @@ def _scores(session: Session, out: Path) -> Iterator[Score]:
     paired = [(row, truth) for row in rows if (truth := _truth(session, row)) is not None]
     for column, key in _AT_TOUCH:
         yield from _compared(column, [(row, truth.get(key)) for row, truth in paired])
-    at_3 = [(row, truth.get("slip_at_3deg_mm")) for row, truth in paired if float(row["theta_deg"]) == _SLIP_THETA_DEG]
+    at_3 = [
+        (row, truth.get("slip_at_3deg_mm"))
+        for row, truth in paired
+        if float(row["theta_deg"]) == _SLIP_THETA_DEG
+    ]
     yield from _compared("slip_mm", at_3, "slip_mm at 3 deg")
     for column in ("x_mm", "y_mm", "z_mm", "slip_mm"):
-        yield from _compared(column, list(_frames(session, out, column)), f"{column}, touching frames")
+        yield from _compared(
+            column, list(_frames(session, out, column)), f"{column}, touching frames"
+        )
     yield from _friction(session, out)
     measured = {trial.name for trial in session.trials if trial.purpose == "measure"}
-    exact = {(row["trial"], row["whisk"]): truth.get("d_x_mm") for row, truth in paired if row["trial"] in measured}
+    exact = {
+        (row["trial"], row["whisk"]): truth.get("d_x_mm")
+        for row, truth in paired
+        if row["trial"] in measured
+    }
     estimates = _read(out / "estimates.csv")
     for estimator in dict.fromkeys(row["estimator"] for row in estimates):
-        mine = [(row, exact.get((row["trial"], row["whisk"]))) for row in estimates if row["estimator"] == estimator]
+        mine = [
+            (row, exact.get((row["trial"], row["whisk"])))
+            for row in estimates
+            if row["estimator"] == estimator
+        ]
         yield from _compared("d_x_est_mm", mine, f"d_x by {estimator}")
 
 
@@ -95,10 +118,14 @@ def _friction(session: Session, out: Path) -> Iterator[Score]:
     known = [(row, truth) for row, truth in rows if truth is not None and "mu_kinetic" in truth]
     alike = {True: [], False: []}
     for row, truth in known:
-        angles = {key: float(np.degrees(np.arctan(truth[f"mu_{key}"]))) for key in ("static", "kinetic")}
+        angles = {
+            key: float(np.degrees(np.arctan(truth[f"mu_{key}"]))) for key in ("static", "kinetic")
+        }
         alike[truth["mu_static"] == truth["mu_kinetic"]].append((row, angles))
     for record in ("seen", "felt"):
-        yield from _compared(f"alpha_{record}_deg", [(row, angles["kinetic"]) for row, angles in alike[True]])
+        yield from _compared(
+            f"alpha_{record}_deg", [(row, angles["kinetic"]) for row, angles in alike[True]]
+        )
         for kind in ("static", "kinetic"):
             pairs = [(row, angles[kind]) for row, angles in alike[False]]
             yield from _compared(f"alpha_{kind}_{record}_deg", pairs)
@@ -156,7 +183,11 @@ def _gauge_lines(session: Session, gauges: Gauges | None) -> Iterator[str]:
     if true is None:
         return
     true = np.array(true)
-    for name, made in (("fitted", gauges.all), ("at one angle", gauges.at_angle), ("one factor", gauges.one_factor)):
+    for name, made in (
+        ("fitted", gauges.all),
+        ("at one angle", gauges.at_angle),
+        ("one factor", gauges.one_factor),
+    ):
         if made is not None:
             diagonal = 100.0 * (np.diag(made.matrix) * _inverse(np.diag(true)) - 1.0)
             cross = 100.0 * (_over_diagonal(made.matrix) - _over_diagonal(true))

@@ -12,12 +12,12 @@ import numpy as np
 
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
-from bench.records.trial import SeenWhisk, TrialResult
+from bench.records.trial_result import SeenWhisk, TrialResult
 from bench.report.page.svg import limits, ticks
 from bench.report.painting import as_8_bit, polyline
 from bench.report.pooled import read_run
 from bench.report.record import SESSION, read_record
-from bench.report.run import CameraFacts
+from bench.report.run_facts import CameraFacts
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
@@ -29,7 +29,12 @@ from vision.geometry.rods import Wire
 FOURCC = {".webm": "VP90", ".avi": "MJPG"}
 _WIDTH_PX = 720  # of each camera's picture
 _STRIP_PX = 190  # of the curves below
-_WIRE, _BAR, _CONTACT, _TRAIL = (47, 217, 255), (74, 175, 77), (28, 26, 228), (142, 126, 31)  # blue, green, red
+_WIRE, _BAR, _CONTACT, _TRAIL = (
+    (47, 217, 255),
+    (74, 175, 77),
+    (28, 26, 228),
+    (142, 126, 31),
+)  # blue, green, red
 _INK, _GREY, _PAPER = (30, 30, 30), (170, 170, 170), (255, 255, 255)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _AT_ONCE = 32  # frames
@@ -45,7 +50,11 @@ class Curve:
 
 
 def write_video(
-    out: Path, trial: str, path: Path | None = None, session: Path | None = None, rate_Hz: float = 10.0
+    out: Path,
+    trial: str,
+    path: Path | None = None,
+    session: Path | None = None,
+    rate_Hz: float = 10.0,
 ) -> Path:
     """The film of a trial of an evaluated run; where it was written (by default OUT/video/<trial>.webm).
 
@@ -61,7 +70,9 @@ def write_video(
     if not (math.isfinite(rate_Hz) and 0.1 <= rate_Hz <= 240.0):
         raise BadInput(f"--rate-Hz is {rate_Hz:g}; from 0.1 to 240 is allowed")
     source = _session_folder(out) if session is None else session
-    recorded = load_session(source, lenses_known=True, follow_links=record.settings.follow_links).trial(trial)
+    recorded = load_session(
+        source, lenses_known=True, follow_links=record.settings.follow_links
+    ).trial(trial)
     cameras = {c.name: c for c in record.cameras if c.name in recorded.camera_sources}
     if not cameras:
         raise BadInput("has no pictures of this trial; give --session", file=source)
@@ -96,7 +107,9 @@ def _write(path: Path, pictures: Iterator[np.ndarray], code: str, rate_Hz: float
             with _quiet_ffmpeg():
                 writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), rate_Hz, size)
             if not writer.isOpened():
-                raise BadInput(f"this OpenCV writes no {code} film; try --out with .avi", file=path.name)
+                raise BadInput(
+                    f"this OpenCV writes no {code} film; try --out with .avi", file=path.name
+                )
         writer.write(picture)
     if writer is None:
         raise BadInput("no camera has a picture of these frames; give --session")
@@ -116,7 +129,9 @@ def _quiet_ffmpeg() -> Iterator[None]:
         os.close(kept)
 
 
-def _frames(trial: Trial, cameras: Mapping[str, CameraFacts], result: TrialResult) -> Iterator[np.ndarray]:
+def _frames(
+    trial: Trial, cameras: Mapping[str, CameraFacts], result: TrialResult
+) -> Iterator[np.ndarray]:
     """Pictures (h, w, 3) of the film, in the order of the frames."""
     times = frame_times(trial)
     for whisk in result.seen.whisks:
@@ -129,7 +144,10 @@ def _frames(trial: Trial, cameras: Mapping[str, CameraFacts], result: TrialResul
                 found = read_frames(trial.camera_sources[name], [i for i in index if i >= 0])
                 read[name] = [found.get(i) for i in index]
             for place, k in enumerate(rows):
-                shown = [_picture(read[name][place], camera, result, whisk, k) for name, camera in cameras.items()]
+                shown = [
+                    _picture(read[name][place], camera, result, whisk, k)
+                    for name, camera in cameras.items()
+                ]
                 yield _with_curves(_beside(shown), whisk, k)
 
 
@@ -142,8 +160,12 @@ def _picture(grey, facts: CameraFacts, result: TrialResult, whisk: SeenWhisk, k:
         picture = np.full((size[1], size[0], 3), 60, np.uint8)
         _text(picture, f"{facts.name}: no picture", (12, 24), _PAPER)
         return picture
-    picture = cv2.cvtColor(cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR)
-    camera = Camera(facts.name, tuple(facts.size_px), facts.matrix, facts.distortion, facts.T_camera_rig)
+    picture = cv2.cvtColor(
+        cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA), cv2.COLOR_GRAY2BGR
+    )
+    camera = Camera(
+        facts.name, tuple(facts.size_px), facts.matrix, facts.distortion, facts.T_camera_rig
+    )
     for points, colour in _lines(camera, result, whisk, k):
         polyline(picture, scale * (camera.project(points) + 0.5) - 0.5, colour)
     if whisk.frames.touching[k]:
@@ -170,15 +192,23 @@ def _lines(camera: Camera, result: TrialResult, whisk: SeenWhisk, k: int):
         yield past, _TRAIL
 
 
-def _wire(result: TrialResult, whisk: SeenWhisk, k: int, contact_mm: np.ndarray | None) -> np.ndarray:
+def _wire(
+    result: TrialResult, whisk: SeenWhisk, k: int, contact_mm: np.ndarray | None
+) -> np.ndarray:
     """The whisker (n, 3), mm, as it was fitted in frame k; unbent in frames that are not in the fit."""
     motor = float(whisk.frames.motor_rad[k])
     if whisk.shape is None:
         return wire_between(motor, contact_mm, result.whisker.length_mm)
     facts, shape = result.whisker, whisk.shape
-    wire = Wire(facts.shape, facts.length_mm, facts.diameter_mm, tip_diameter_mm=facts.tip_diameter_mm)
+    wire = Wire(
+        facts.shape, facts.length_mm, facts.diameter_mm, tip_diameter_mm=facts.tip_diameter_mm
+    )
     mine = np.flatnonzero(shape.index == whisk.frames.index[k])
-    bend, arc = (shape.bend_rad[mine[0]], shape.arc_mm[mine[0]]) if len(mine) else (np.zeros(2), facts.length_mm)
+    bend, arc = (
+        (shape.bend_rad[mine[0]], shape.arc_mm[mine[0]])
+        if len(mine)
+        else (np.zeros(2), facts.length_mm)
+    )
     return one_curve(shape.rest_mm, bend, arc, motor, wire).points_mm
 
 

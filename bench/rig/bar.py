@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
 
 
 def turned(vectors: np.ndarray, angle_rad: float) -> np.ndarray:
@@ -17,7 +17,9 @@ def turned(vectors: np.ndarray, angle_rad: float) -> np.ndarray:
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross product of two vectors; numpy's own takes ten times as long for one pair."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
 
 
 def cross_matrix(a: np.ndarray) -> np.ndarray:
@@ -57,8 +59,13 @@ class Bar:
         stiffness_N_mm: float = math.inf,
     ) -> "Bar":
         """The bar that a straight whisker at motor angle `touch_rad` would just touch at `d_x_mm`."""
-        axis = np.array([math.sin(psi_rad), math.cos(psi_rad) * math.sin(beta_rad),
-                         math.cos(psi_rad) * math.cos(beta_rad)])
+        axis = np.array(
+            [
+                math.sin(psi_rad),
+                math.cos(psi_rad) * math.sin(beta_rad),
+                math.cos(psi_rad) * math.cos(beta_rad),
+            ]
+        )
         towards_whisker = np.array([0.0, -math.cos(beta_rad), math.sin(beta_rad)])
         point = np.array([d_x_mm, 0.0, 0.0]) - (radius_mm + whisker_radius_mm) * towards_whisker
         return cls(turned(point, touch_rad), turned(axis, touch_rad), radius_mm, stiffness_N_mm)
@@ -71,7 +78,9 @@ class Bar:
 
     def moving(self, velocity_mm_rad: np.ndarray, touch_rad: float) -> "Bar":
         """The bar as one that moves."""
-        return replace(self, velocity_mm_rad=np.asarray(velocity_mm_rad, float), touch_rad=touch_rad)
+        return replace(
+            self, velocity_mm_rad=np.asarray(velocity_mm_rad, float), touch_rad=touch_rad
+        )
 
     def moved_mm(self, motor_rad: float | np.ndarray) -> np.ndarray:
         """How far (..., 3) a bar that moves has come since first touch, at motor angles."""
@@ -82,7 +91,9 @@ class Bar:
         """The bar where it is at a motor angle, standing."""
         if self.velocity_mm_rad is None:
             return self
-        return replace(self, point_mm=self.point_mm + self.moved_mm(motor_rad), velocity_mm_rad=None)
+        return replace(
+            self, point_mm=self.point_mm + self.moved_mm(motor_rad), velocity_mm_rad=None
+        )
 
     def given(self, gave_mm: np.ndarray) -> "Bar":
         """The bar that has given way by so much (3,)."""
@@ -128,7 +139,9 @@ class Touch:
         return float(np.linalg.norm(self.point_mm))
 
 
-def unloaded(rod: Rod, motor_rad: float, arc_mm: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def unloaded(
+    rod: Rod, motor_rad: float, arc_mm: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Points and tangents of the unloaded whisker in the rig frame, each (..., 3)."""
     arc = np.asarray(arc_mm, float)
     along = np.stack([arc, 0 * arc, 0 * arc], -1)
@@ -145,8 +158,13 @@ def first_touch(rod: Rod, bar: Bar, motor_rad: float, arc_mm: float) -> Touch:
     at = np.array([motor_rad, min(arc_mm, rod.length_mm)])
     for _ in range(30):
         residual = _gap(rod, bar, at)
-        jacobian = np.stack([(_gap(rod, bar, at + h) - _gap(rod, bar, at - h)) / 2e-6
-                             for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))], -1)
+        jacobian = np.stack(
+            [
+                (_gap(rod, bar, at + h) - _gap(rod, bar, at - h)) / 2e-6
+                for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))
+            ],
+            -1,
+        )
         step = np.linalg.solve(jacobian, residual)
         at = at - step
         if abs(step[0]) < 1e-13 and abs(step[1]) < 1e-10:

@@ -7,10 +7,12 @@ import math
 import cv2
 import numpy as np
 
-from bench.rig.board import Board
-from bench.rig.camera import Camera
+from bench.rig.pinhole import Camera
+from bench.rig.printed_board import Board
 
-_GOLDEN_RAD = math.pi * (3 - math.sqrt(5))  # rad: the golden angle, by which views lean to all sides evenly
+_GOLDEN_RAD = math.pi * (
+    3 - math.sqrt(5)
+)  # rad: the golden angle, by which views lean to all sides evenly
 
 
 def poses(board: Board, camera: Camera, count: int, rng: np.random.Generator) -> list[np.ndarray]:
@@ -26,7 +28,10 @@ def _pose(board, camera, index, depth_rank, count, rng):
     tilt = math.radians(rng.uniform(15, 42)) if index else 0.0
     way = index * _GOLDEN_RAD
     axis = np.array([math.cos(way), math.sin(way), 0.0])
-    turn = cv2.Rodrigues(tilt * axis)[0] @ cv2.Rodrigues(np.array([0, 0, math.radians(rng.uniform(-50, 50))]))[0]
+    turn = (
+        cv2.Rodrigues(tilt * axis)[0]
+        @ cv2.Rodrigues(np.array([0, 0, math.radians(rng.uniform(-50, 50))]))[0]
+    )
     spread = 0.28 * np.array([math.cos(2.4 * way), math.sin(2.4 * way)]) * math.sqrt(index / count)
     off_px = spread * camera.size_px + rng.uniform(-20, 20, 2)
     ray = np.append(off_px / np.diag(camera.matrix)[:2], 1.0)

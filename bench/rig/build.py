@@ -6,29 +6,47 @@ import cv2
 import msgspec
 import numpy as np
 
-from bench.rig.board import Board, Ink
-from bench.rig.camera import Camera
-from bench.rig.gauges import Gauges
+from bench.rig.elastic_rod import Rest, Rod
+from bench.rig.force_sensor import LoadCell
 from bench.rig.light import Light, Material
-from bench.rig.load_cell import LoadCell
+from bench.rig.painted_scene import Looks, Scene, Stand
+from bench.rig.pinhole import Camera
+from bench.rig.printed_board import Board, Ink
 from bench.rig.protocol import ColumnTable, Protocol
-from bench.rig.rod import Rest, Rod
-from bench.rig.scene import Looks, Scene, Stand
 from bench.rig.sensor import Sensor
+from bench.rig.strain_gauges import Gauges
 
 
 def rod(protocol: Protocol) -> Rod:
     """The whisker of a protocol."""
     w = protocol.whisker
     rest = Rest(w.length_mm, w.sag_mm, w.set_y_mm, w.set_z_mm)
-    return Rod(w.shape, w.length_mm, w.diameter_mm, w.youngs_modulus_GPa, w.density_kg_m3, rest, w.tip_diameter_mm)
+    return Rod(
+        w.shape,
+        w.length_mm,
+        w.diameter_mm,
+        w.youngs_modulus_GPa,
+        w.density_kg_m3,
+        rest,
+        w.tip_diameter_mm,
+    )
 
 
 def gauges(protocol: Protocol) -> Gauges:
     """The gauges of a protocol."""
     g = protocol.gauges
-    return Gauges(np.array(g.matrix_Nmm_per_V), np.array(g.offset_V), g.noise_V, g.hum_V, g.hum_Hz, g.drift_V_per_s,
-                  g.filter_Hz, g.rate_Hz, g.adc_bits, g.range_V)
+    return Gauges(
+        np.array(g.matrix_Nmm_per_V),
+        np.array(g.offset_V),
+        g.noise_V,
+        g.hum_V,
+        g.hum_Hz,
+        g.drift_V_per_s,
+        g.filter_Hz,
+        g.rate_Hz,
+        g.adc_bits,
+        g.range_V,
+    )
 
 
 def load_cell(protocol: Protocol) -> LoadCell | None:
@@ -44,9 +62,20 @@ def cameras(protocol: Protocol) -> list[Camera]:
     nowhere = [c.name for c in protocol.cameras if c.position_mm is None]
     if nowhere:
         raise ValueError(f"camera {nowhere[0]} has no position_mm; `whisker-bench plan` finds one")
-    return [Camera.looking(c.name, size_px=c.size_px, focal_px=c.focal, aspect=c.aspect, distortion=c.distortion,
-                           position_mm=np.array(c.position_mm), target_mm=np.array(c.target_mm),
-                           roll_rad=math.radians(c.roll_deg), centre_px=c.centre_px) for c in protocol.cameras]
+    return [
+        Camera.looking(
+            c.name,
+            size_px=c.size_px,
+            focal_px=c.focal,
+            aspect=c.aspect,
+            distortion=c.distortion,
+            position_mm=np.array(c.position_mm),
+            target_mm=np.array(c.target_mm),
+            roll_rad=math.radians(c.roll_deg),
+            centre_px=c.centre_px,
+        )
+        for c in protocol.cameras
+    ]
 
 
 def board(protocol: Protocol) -> Board:
@@ -78,22 +107,31 @@ def scene(protocol: Protocol) -> Scene:
     """The scene of a protocol: its light and what things look like in it."""
     table = protocol.light
     towards = np.array(table.towards) / np.linalg.norm(table.towards)
-    looks = Looks(Light(towards, table.lamp, table.soft), Ink(table.paper, table.ink),
-                  Material(table.wire_matt, table.wire_shiny, table.wire_gloss, table.wire_rim),
-                  Material(table.bar_matt, table.bar_shiny, table.bar_gloss, table.bar_rim),
-                  Material(0.03), table.floor, table.wall)
+    looks = Looks(
+        Light(towards, table.lamp, table.soft),
+        Ink(table.paper, table.ink),
+        Material(table.wire_matt, table.wire_shiny, table.wire_gloss, table.wire_rim),
+        Material(table.bar_matt, table.bar_shiny, table.bar_gloss, table.bar_rim),
+        Material(0.03),
+        table.floor,
+        table.wall,
+    )
     return Scene(board(protocol), T_rig_board(protocol), looks, _stands(protocol))
 
 
 def _stands(protocol: Protocol) -> tuple[Stand, ...]:
     if not protocol.columns:
         return (Stand.alone(),)
-    return tuple(Stand.of_column(column_pose(column), column.heights_mm) for column in protocol.columns)
+    return tuple(
+        Stand.of_column(column_pose(column), column.heights_mm) for column in protocol.columns
+    )
 
 
 def column_pose(column: ColumnTable) -> np.ndarray:
     """Of a column's height 0 in the rig frame, (3, 4): turned about the rig's x, then y, then z."""
-    about_x, about_y, about_z = (cv2.Rodrigues(turn)[0] for turn in np.diag(np.radians(column.base_deg)))
+    about_x, about_y, about_z = (
+        cv2.Rodrigues(turn)[0] for turn in np.diag(np.radians(column.base_deg))
+    )
     return np.column_stack([about_z @ about_y @ about_x, column.base_mm])
 
 

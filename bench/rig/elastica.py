@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from bench.rig.elastic_rod import Rod
 from bench.rig.linear import solved
-from bench.rig.rod import Rod
 
 
 class Bent:
@@ -65,7 +65,9 @@ class Elastica:
         self.nodes = Nodes.make(nodes or (20 if rod.shape == "cylinder" else 40))
         self._uniform = self.nodes.from_base @ self.nodes.to_load
 
-    def solve(self, force_x_N: float, force_e_N: float, arc_mm: float, guess: np.ndarray | None = None) -> Bent:
+    def solve(
+        self, force_x_N: float, force_e_N: float, arc_mm: float, guess: np.ndarray | None = None
+    ) -> Bent:
         """Equilibrium under a force (along the clamped tangent, across it) at arc length.
 
         Raises ArithmeticError where Newton's method does not settle (loads far past buckling with no guess nearby).
@@ -80,8 +82,12 @@ class Elastica:
             step = solved(matrix, twice @ load - angle)
             angle = angle + step
             if np.abs(step).max() < 1e-9:  # quadratic: the next step would be below 1e-16
-                return self._bent(angle, matrix, twice, twice_by_arc, scale, (force_x_N, force_e_N), arc_mm)
-        raise ArithmeticError(f"no equilibrium found for {force_x_N:.4g}, {force_e_N:.4g} N at {arc_mm:.4g} mm")
+                return self._bent(
+                    angle, matrix, twice, twice_by_arc, scale, (force_x_N, force_e_N), arc_mm
+                )
+        raise ArithmeticError(
+            f"no equilibrium found for {force_x_N:.4g}, {force_e_N:.4g} N at {arc_mm:.4g} mm"
+        )
 
     def _double_integral(self, arc_mm):
         if self.rod.shape == "cylinder":
@@ -89,7 +95,9 @@ class Elastica:
         at, base, load = self.nodes.at, self.nodes.from_base, self.nodes.to_load
         per_mm = self.rod.lost / self.rod.length_mm
         width = 1 - at * arc_mm * per_mm
-        width[-1] = max(width[-1], 1e-3)  # at the very tip both moment and rigidity vanish; the curvature is finite
+        width[-1] = max(
+            width[-1], 1e-3
+        )  # at the very tip both moment and rigidity vanish; the curvature is finite
         softness = width**-4.0
         by_arc = 4 * softness / width * at * per_mm
         return (base * softness) @ load, (base * by_arc) @ load
@@ -97,12 +105,16 @@ class Elastica:
     def _bent(self, angle, matrix, twice, twice_by_arc, scale, force, arc_mm):
         cos, sin = np.cos(angle), np.sin(angle)
         load = scale * (force[1] * cos - force[0] * sin)
-        sources = np.stack([-scale * (twice @ sin), scale * (twice @ cos), 2 / arc_mm * (twice @ load)], -1)
+        sources = np.stack(
+            [-scale * (twice @ sin), scale * (twice @ cos), 2 / arc_mm * (twice @ load)], -1
+        )
         if twice_by_arc is not None:
             sources[:, 2] += twice_by_arc @ load
         angle_by = solved(matrix, sources)
         unit_end = np.array([self.nodes.weights @ cos, self.nodes.weights @ sin])
-        end_by = arc_mm * np.stack([-(self.nodes.weights * sin) @ angle_by, (self.nodes.weights * cos) @ angle_by])
+        end_by = arc_mm * np.stack(
+            [-(self.nodes.weights * sin) @ angle_by, (self.nodes.weights * cos) @ angle_by]
+        )
         end_by[:, 2] += unit_end
         return Bent(angle, arc_mm, arc_mm * unit_end, end_by, angle[-1], angle_by[-1])
 
@@ -110,8 +122,10 @@ class Elastica:
         """Points (n, 2) of the bent rod at arc lengths (n,), straight beyond the load."""
         arc = np.asarray(arc_mm, float)
         within = np.clip(arc / bent.arc_mm, 0, 1)
-        points = bent.arc_mm * np.stack([self.nodes.from_base @ np.cos(bent.angle),
-                                         self.nodes.from_base @ np.sin(bent.angle)], -1)
+        points = bent.arc_mm * np.stack(
+            [self.nodes.from_base @ np.cos(bent.angle), self.nodes.from_base @ np.sin(bent.angle)],
+            -1,
+        )
         curve = chebyshev.chebval(2 * within - 1, np.linalg.solve(self._values(), points)).T
         beyond = np.maximum(arc - bent.arc_mm, 0)[:, None]
         return curve + beyond * np.array([np.cos(bent.slope), np.sin(bent.slope)])

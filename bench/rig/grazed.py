@@ -7,8 +7,8 @@ import numpy as np
 
 from bench.rig.bar import Bar
 from bench.rig.grazed_ring import SeenRing
-from bench.rig.rounded import Cone, Ring, Sphere
-from bench.rig.sights import Hits, Rays, Seen, across, sine_off, unit
+from bench.rig.rays import Hits, Rays, Seen, across, sine_off, unit
+from bench.rig.round_objects import Cone, Ring, Sphere
 
 # mm below and above the height at which it is touched, along its axis: how much there is of a cone
 _CONE_DOWN_MM, _CONE_UP_MM = 30.0, 60.0
@@ -30,13 +30,17 @@ class SeenSphere:
     def points_mm(self) -> np.ndarray:
         """As `Seen.points_mm`."""
         polar, around = np.meshgrid(np.linspace(0, np.pi, 33), np.linspace(0, 2 * np.pi, 65))
-        ways = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], -1)
+        ways = np.stack(
+            [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], -1
+        )
         return self.thing.point_mm + self.thing.radius_mm * ways.reshape(-1, 3)
 
     def cover(self, rays: Rays) -> np.ndarray:
         """As `Seen.cover`."""
         centre = self.thing.point_mm
-        return rays.within((centre @ centre - self.thing.radius_mm**2) * np.eye(3) - np.outer(centre, centre))
+        return rays.within(
+            (centre @ centre - self.thing.radius_mm**2) * np.eye(3) - np.outer(centre, centre)
+        )
 
     def hits(self, rays: np.ndarray) -> Hits:
         """As `Seen.hits`."""
@@ -57,7 +61,9 @@ class SeenCone:
     def _ends(self) -> list[tuple[np.ndarray, float]]:
         """Centre (3,) and radius of base and upper end."""
         thing, sin = self.thing, math.sin(self.thing.half_angle_rad)
-        touched = thing.radius_mm * (sin - 1 / sin)  # along the axis from the tip: the height of where it is touched
+        touched = thing.radius_mm * (
+            sin - 1 / sin
+        )  # along the axis from the tip: the height of where it is touched
         heights = touched - _CONE_DOWN_MM, min(touched + _CONE_UP_MM, 0.0)
         tan = math.tan(thing.half_angle_rad)
         return [(thing.tip_mm + height * thing.axis, -height * tan) for height in heights]
@@ -79,8 +85,10 @@ class SeenCone:
         sides = rays.beside(planes[0]) * rays.beside(planes[1])
         for (centre, radius), (other, _) in zip(ends, ends[::-1]):
             if radius:
-                touching = [centre + radius * unit(plane - (plane @ self.thing.axis) * self.thing.axis)
-                            for plane in planes]  # fmt: skip
+                touching = [
+                    centre + radius * unit(plane - (plane @ self.thing.axis) * self.thing.axis)
+                    for plane in planes
+                ]
                 chord = np.cross(*touching)
                 sides = sides * rays.beside(-np.copysign(1.0, chord @ other) * chord)
         return np.maximum(cover, sides)
@@ -98,11 +106,18 @@ class SeenCone:
         camera looks at the tip from within its cone."""
         plane = np.stack(across(unit(self.thing.tip_mm)))
         axis = self.thing.axis
-        form = plane @ (np.outer(centre, centre) + radius**2 * (np.outer(axis, axis) - np.eye(3))) @ plane.T
+        form = (
+            plane
+            @ (np.outer(centre, centre) + radius**2 * (np.outer(axis, axis) - np.eye(3)))
+            @ plane.T
+        )
         (low, high), ways = np.linalg.eigh(form)
         if low >= 0 or high <= 0:
             return []
-        normals = [(math.sqrt(high) * ways[:, 0] + side * math.sqrt(-low) * ways[:, 1]) @ plane for side in (-1, 1)]
+        normals = [
+            (math.sqrt(high) * ways[:, 0] + side * math.sqrt(-low) * ways[:, 1]) @ plane
+            for side in (-1, 1)
+        ]
         return [-np.copysign(1.0, normal @ centre) * normal for normal in normals]
 
     def hits(self, rays: np.ndarray) -> Hits:
@@ -115,7 +130,10 @@ class SeenCone:
         outward = flat / np.linalg.norm(flat, axis=1)[:, None]
         sin, cos = math.sin(thing.half_angle_rad), math.cos(thing.half_angle_rad)
         ways = rays / np.linalg.norm(rays, axis=1)[:, None]
-        normals, across = cos * outward + sin * thing.axis, sine_off(ways, cos * thing.axis - sin * outward)
+        normals, across = (
+            cos * outward + sin * thing.axis,
+            sine_off(ways, cos * thing.axis - sin * outward),
+        )
         for sign, end in zip((-1, 1), ends):
             on_end = end == depth
             normals[on_end], across[on_end] = sign * thing.axis, np.abs(ways[on_end] @ thing.axis)
@@ -124,7 +142,11 @@ class SeenCone:
     def _side_hits(self, rays: np.ndarray) -> np.ndarray:
         """Depths (n,) of the slanting surface, NaN where a ray misses it."""
         thing, square = self.thing, math.cos(self.thing.half_angle_rad) ** 2
-        tip, along, tip_along = thing.tip_mm, rays @ self.thing.axis, self.thing.tip_mm @ self.thing.axis
+        tip, along, tip_along = (
+            thing.tip_mm,
+            rays @ self.thing.axis,
+            self.thing.tip_mm @ self.thing.axis,
+        )
         a = along**2 - square * (rays * rays).sum(1)
         b = square * (rays @ tip) - along * tip_along
         root = b**2 - a * (tip_along**2 - square * (tip @ tip))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.rounded import Ring
-from bench.rig.sights import Hits, Rays, across, sine_off
+from bench.rig.rays import Hits, Rays, across, sine_off
+from bench.rig.round_objects import Ring
 
 _STATIONS = 64  # of a ring, from which the nearest to a ray is looked for
 _COARSE = 8  # samples: every so many one is asked first, how near the ring is
@@ -50,7 +50,10 @@ class SeenRing:
         circle = self._circle(self._nearest(ways))
         depth = (circle * ways).sum(1) / (ways * ways).sum(1)
         away = np.linalg.norm(depth[:, None] * ways - circle, axis=1)
-        step = max(np.abs(np.diff(rays.x, axis=1)).max(initial=0), np.abs(np.diff(rays.y, axis=0)).max(initial=0))
+        step = max(
+            np.abs(np.diff(rays.x, axis=1)).max(initial=0),
+            np.abs(np.diff(rays.y, axis=0)).max(initial=0),
+        )
         margin = (2 * _COARSE * step + 10 * rays.soft_px / rays.focal_px.min()) * depth
         near = (away < self.thing.radius_mm + margin).reshape(x.shape)
         rows, columns = rays.x.shape
@@ -95,7 +98,9 @@ class _HalfSquare:
     c: np.ndarray
 
     @classmethod
-    def of(cls, ways: np.ndarray, ring: Ring, across: tuple[np.ndarray, np.ndarray]) -> "_HalfSquare":
+    def of(
+        cls, ways: np.ndarray, ring: Ring, across: tuple[np.ndarray, np.ndarray]
+    ) -> "_HalfSquare":
         """Of rays (n, 3) and a ring's circle, angles from the first of two ways (3,) across its axis."""
         first, second = (ring.ring_radius_mm * way for way in across)
         unit, centre = ways / np.linalg.norm(ways, axis=1)[:, None], ring.point_mm

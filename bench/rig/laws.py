@@ -67,6 +67,9 @@ class Held:
             return [motion[0], shear[1]], np.stack([motion_by[0], shear_by[1]])
         soft = math.hypot(motion[1], GIVE_MM)
         way, way_by = motion[1] / soft, GIVE_MM**2 / soft**3 * motion_by[1]
-        left, left_by = cone * (1 - x**2), (1 + x**2) * self.friction * press_by - 2 * x * shear_by[0]
+        left, left_by = (
+            cone * (1 - x**2),
+            (1 + x**2) * self.friction * press_by - 2 * x * shear_by[0],
+        )
         law = [motion[0], shear[1] + way * left]
         return law, np.stack([motion_by[0], shear_by[1] + way * left_by + left * way_by])

@@ -30,7 +30,9 @@ def draw_layers(layers: Sequence[Layer], radiance: np.ndarray) -> None:
     rows, columns, cover, tone = rows[order], columns[order], cover[order], tone[order]
     first = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))
     number = np.arange(len(rows))
-    rank = number - np.maximum.accumulate(np.where(first, number, 0))  # of each sample's layers from afar
+    rank = number - np.maximum.accumulate(
+        np.where(first, number, 0)
+    )  # of each sample's layers from afar
     for nearer in range(int(rank.max()) + 1):
         now = rank == nearer
         at = rows[now], columns[now]

@@ -31,7 +31,12 @@ class Material:
 
 
 def round_shade(
-    light: Light, material: Material, across: np.ndarray, facing: np.ndarray, aside: np.ndarray, mirror: np.ndarray
+    light: Light,
+    material: Material,
+    across: np.ndarray,
+    facing: np.ndarray,
+    aside: np.ndarray,
+    mirror: np.ndarray,
 ) -> np.ndarray:
     """Brightness on a round bar at `across` (−1…1 from silhouette to silhouette).
 
@@ -40,7 +45,9 @@ def round_shade(
     against `across`.
     """
     up = np.sqrt(np.maximum(1 - across**2, 0))
-    return surface_shade(light, material, up * facing + across * aside, up * mirror[0] + across * mirror[1], up)
+    return surface_shade(
+        light, material, up * facing + across * aside, up * mirror[0] + across * mirror[1], up
+    )
 
 
 def surface_shade(
@@ -52,4 +59,7 @@ def surface_shade(
     diffuse = np.maximum(lamp, 0)
     highlight = np.maximum(mirror, 0) ** material.gloss
     edge = up**material.rim if material.rim else 1.0
-    return (material.matt * (light.soft + light.lamp * diffuse) + material.shiny * light.lamp * highlight) * edge
+    return (
+        material.matt * (light.soft + light.lamp * diffuse)
+        + material.shiny * light.lamp * highlight
+    ) * edge

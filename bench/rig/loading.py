@@ -12,7 +12,9 @@ from bench.rig.vibration import Mode, ring
 _TICK_S = 5e-4  # s: over which the motor's speed, and its changes, are taken
 
 
-def quasi_static_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
+def quasi_static_Nmm(
+    stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray
+) -> np.ndarray:
     """(n, 2): m_y, m_z in the hub frame at times, without vibration."""
     return _over_time(stroke, whisks, times_s, Instants.moments_at, 2)
 
@@ -22,7 +24,9 @@ def base_force_N(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.nda
     return _over_time(stroke, whisks, times_s, Instants.forces_at, 3)
 
 
-def _over_time(stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.ndarray], count) -> np.ndarray:
+def _over_time(
+    stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.ndarray], count
+) -> np.ndarray:
     """(n, count): zeros where there is no whisk."""
     motor = stroke.angle_rad(times_s)
     found = np.zeros((len(times_s), count))
@@ -33,7 +37,9 @@ def _over_time(stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.
     return found
 
 
-def ringing_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray, damping: float) -> np.ndarray:
+def ringing_Nmm(
+    stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray, damping: float
+) -> np.ndarray:
     """(n, 2): the free mode rung by the motor's ramps, the propped one by touch and by every jump of stick–slip."""
     rod, total = whisks[0].rod, np.zeros((len(times_s), 2))
     free = Mode.of(rod)
@@ -43,19 +49,31 @@ def ringing_Nmm(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndar
         for when, change in _speed_changes(stroke, start, touch_s):
             rate = free.swing * change * free.moment_Nmm
             total[:, 1] += ring(times_s, when, touch_s, free.frequency_rad_s, damping, rate=rate)
-        struck = propped.strike * _speed(stroke, touch_s) * propped.moment_Nmm * _push(whisk) / propped.push_Nmm
+        struck = (
+            propped.strike
+            * _speed(stroke, touch_s)
+            * propped.moment_Nmm
+            * _push(whisk)
+            / propped.push_Nmm
+        )
         for axis in (0, 1):
-            total[:, axis] += ring(times_s, touch_s, end, propped.frequency_rad_s, damping, rate=struck[axis])
+            total[:, axis] += ring(
+                times_s, touch_s, end, propped.frequency_rad_s, damping, rate=struck[axis]
+            )
         for when, jump in _jumps(stroke, number, whisk):
             for axis in (0, 1):
-                total[:, axis] += ring(times_s, when, end, propped.frequency_rad_s, damping, value=-jump[axis])
+                total[:, axis] += ring(
+                    times_s, when, end, propped.frequency_rad_s, damping, value=-jump[axis]
+                )
     return total
 
 
 def _periods(stroke, whisks) -> Iterator[tuple[MarchedWhisk, float, float, float]]:
     """Each whisk with its beginning, its turning back and its end; together they are the whole recording."""
     starts = [0.0, *(start for start, _ in stroke.forward[1:])]
-    for whisk, start, end, (_, turn) in zip(whisks, starts, [*starts[1:], math.inf], stroke.forward):
+    for whisk, start, end, (_, turn) in zip(
+        whisks, starts, [*starts[1:], math.inf], stroke.forward
+    ):
         yield whisk, start, turn, end
 
 

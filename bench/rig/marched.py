@@ -8,10 +8,10 @@ from typing import Self
 import numpy as np
 
 from bench.rig.bar import Bar, Touch, turned, unloaded
-from bench.rig.contact import ContactState, moments_Nmm
+from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
-from bench.rig.friction import Friction, March
-from bench.rig.rod import Rod
+from bench.rig.rod_contact import ContactState, moments_Nmm
+from bench.rig.stick_slip import Friction, March
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,10 @@ class Instants:
     def of(cls, path_rad: np.ndarray, states: Sequence[ContactState | None]) -> "Instants":
         """What a path of motor angles and the states on it (None while free) tell."""
         free = np.full(3, np.nan), np.nan, (0.0, 0.0), np.zeros(3)
-        rows = [free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s), -s.force_hub_N) for s in states]
+        rows = [
+            free if s is None else (s.point_mm, s.arc_mm, moments_Nmm(s), -s.force_hub_N)
+            for s in states
+        ]
         points, arcs, moments, forces = (np.array(column) for column in zip(*rows))
         return cls(np.asarray(path_rad), points, arcs, moments, forces, tuple(states))
 
@@ -66,7 +69,7 @@ class Instants:
         if row < 0 or self.states[row] is None:
             return None
         row = min(row, len(self.states) - 2)
-        (before, after), angles = self.states[row:row + 2], self.motor_rad[row:row + 2]
+        (before, after), angles = self.states[row : row + 2], self.motor_rad[row : row + 2]
         if before is None or angles[0] == angles[1]:
             return after
         part = (motor_rad - angles[0]) / (angles[1] - angles[0])
@@ -110,7 +113,14 @@ class MarchedWhisk:
         if not back:
             return cls(rod, bar, touch, friction, forward, None)
         down, returned = march.along(np.append(up[-2::-1], touch.motor_rad))
-        return cls(rod, bar, touch, friction, forward, Instants.of(np.append(path[-1], down), [states[-1], *returned]))
+        return cls(
+            rod,
+            bar,
+            touch,
+            friction,
+            forward,
+            Instants.of(np.append(path[-1], down), [states[-1], *returned]),
+        )
 
     def slip_mm(self, point_mm: np.ndarray, motor_rad: float | np.ndarray) -> np.ndarray:
         """Along the bar since first touch, in the direction that its axis has there; over it where it moves itself."""
@@ -138,15 +148,21 @@ class MarchedWhisk:
         """Slip (mm) on the forward stroke at pushing angles, NaN where it does not reach them."""
         motor = self.touch.motor_rad + np.asarray(theta_rad)
         way = self.forward
-        return np.interp(motor, way.motor_rad, self.slip_mm(way.point_mm, way.motor_rad), right=np.nan)
+        return np.interp(
+            motor, way.motor_rad, self.slip_mm(way.point_mm, way.motor_rad), right=np.nan
+        )
 
-    def centreline_mm(self, motor_rad: float, state: ContactState | None, arc_mm: np.ndarray) -> np.ndarray:
+    def centreline_mm(
+        self, motor_rad: float, state: ContactState | None, arc_mm: np.ndarray
+    ) -> np.ndarray:
         """Points (n, 3) of the whisker at arc lengths (n,) in the rig frame, bent by the force of `state` or free."""
         if state is None or not state.force_hub_N.any():
             return unloaded(self.rod, motor_rad, arc_mm)[0]
         force, elastica = state.force_hub_N, Elastica(self.rod)
         across = float(np.hypot(force[1], force[2]))
-        plane = elastica.curve_mm(elastica.solve(force[0], across, state.arc_mm, state.angle), arc_mm)
+        plane = elastica.curve_mm(
+            elastica.solve(force[0], across, state.arc_mm, state.angle), arc_mm
+        )
         points = np.column_stack([plane[:, 0], plane[:, 1:] * force[1:] / across])
         return turned(points + self.rod.rest.offset_mm(arc_mm), motor_rad)
 
@@ -154,6 +170,8 @@ class MarchedWhisk:
 def _stations(start, end, step, stops):
     """Rising angles after `start` up to `end`: an even grid and the stops, none closer than 1e-9 rad."""
     stops = np.asarray(stops, float)
-    inner = np.concatenate([np.arange(start + step, end, step), stops[(stops > start + 1e-6) & (stops < end)], [end]])
+    inner = np.concatenate(
+        [np.arange(start + step, end, step), stops[(stops > start + 1e-6) & (stops < end)], [end]]
+    )
     inner = np.unique(inner)
     return inner[np.append(np.diff(inner) > 1e-9, True)]

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.rig.array import ArrayRecording, Mounted
+from bench.rig.array_rig import ArrayRecording, Mounted
 from bench.rig.bar import unloaded
+from bench.rig.elastic_rod import Rod
 from bench.rig.light import Material
 from bench.rig.marched import MarchedWhisk
+from bench.rig.painted_scene import HUB_FRONT_MM
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
-from bench.rig.rod import Rod
-from bench.rig.scene import HUB_FRONT_MM
 from bench.rig.studio import Moment, Studio
 from bench.rig.tube import Tube
 
@@ -19,16 +19,34 @@ _STATIONS = 257  # of a whisker's axis
 
 
 def moments_of(
-    protocol: Protocol, studio: Studio, recording: Recording, whisk: MarchedWhisk, motor: float, back: bool
+    protocol: Protocol,
+    studio: Studio,
+    recording: Recording,
+    whisk: MarchedWhisk,
+    motor: float,
+    back: bool,
 ) -> list[Moment]:
     """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
-    turns = _turns(protocol, studio, recording.run.speed_deg_s, recording.rod.length_mm, recording.touch.point_mm)
-    return [Moment.alone(m, _whisker(whisk, m, back, studio.scene.looks.wire)) for m in (motor + turns).tolist()]
+    turns = _turns(
+        protocol,
+        studio,
+        recording.run.speed_deg_s,
+        recording.rod.length_mm,
+        recording.touch.point_mm,
+    )
+    return [
+        Moment.alone(m, _whisker(whisk, m, back, studio.scene.looks.wire))
+        for m in (motor + turns).tolist()
+    ]
 
 
 def moments_of_array(
-    protocol: Protocol, studio: Studio, recording: ArrayRecording, whiskers: Sequence[Mounted], time_s: float,
-    whisk: int
+    protocol: Protocol,
+    studio: Studio,
+    recording: ArrayRecording,
+    whiskers: Sequence[Mounted],
+    time_s: float,
+    whisk: int,
 ) -> list[Moment]:
     """The same of an array, about a time of one of its whisks; `whiskers`: those that were recorded."""
     longest = max(whisker.rod.length_mm for whisker in whiskers)
@@ -38,8 +56,12 @@ def moments_of_array(
     return [
         Moment(
             tuple(stand.hub(motor[name] + turn) for name, stand in columns.items()),
-            tuple(_mounted(one, recording, whisk, motor[one.column.name] + turn, studio.scene.looks.wire)
-                  for one in whiskers),
+            tuple(
+                _mounted(
+                    one, recording, whisk, motor[one.column.name] + turn, studio.scene.looks.wire
+                )
+                for one in whiskers
+            ),
         )
         for turn in turns.tolist()
     ]
@@ -56,10 +78,17 @@ def _turns(protocol, studio, speed_deg_s, length_mm, near_mm) -> np.ndarray:
 
 def _whisker(whisk: MarchedWhisk, motor: float, back: bool, material: Material) -> Tube:
     arc = _arcs(whisk.rod)
-    return _tube(whisk.rod, arc, whisk.centreline_mm(motor, whisk.way(back).state_between(motor), arc), material)
+    return _tube(
+        whisk.rod,
+        arc,
+        whisk.centreline_mm(motor, whisk.way(back).state_between(motor), arc),
+        material,
+    )
 
 
-def _mounted(whisker: Mounted, recording: ArrayRecording, whisk: int, motor: float, material: Material) -> Tube:
+def _mounted(
+    whisker: Mounted, recording: ArrayRecording, whisk: int, motor: float, material: Material
+) -> Tube:
     """A whisker of an array in the rig frame; straight where it touches nothing in its trial."""
     one, arc = recording.recordings[whisker.name], _arcs(whisker.rod)
     if one is None:

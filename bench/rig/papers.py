@@ -9,34 +9,51 @@ import numpy as np
 import tomli_w
 
 from bench.rig import build
-from bench.rig.array import ArrayRecording, Mounted, base_keys
+from bench.rig.array_rig import ArrayRecording, Mounted, base_keys
 from bench.rig.bar import Bar
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
-from bench.rig.rounded import Cone, Ring, Sphere
-from bench.rig.slip import COLUMNS, slips_mm
+from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.surface_slip import COLUMNS, slips_mm
 
 _GAUGED, _FORCES = ("time_s", "motor_deg", "y_V", "z_V"), ("f_x_N", "f_y_N", "f_z_N")
 _TRUTH = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"
 
 
-def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray, whiskers: Sequence[Mounted] = ()) -> str:
+def session_toml(
+    protocol: Protocol, stated_T_rig_board: np.ndarray, whiskers: Sequence[Mounted] = ()
+) -> str:
     """session.toml, with T_rig_board (3, 4) as someone would have measured it. whiskers: of an array."""
     w, b, g = protocol.whisker, protocol.board, protocol.gauges
     rig = {"T_rig_board": [[round(float(x), 9) for x in row] for row in stated_T_rig_board]}
     for unit, sigma in (("mm", b.pose_sigma_mm), ("deg", b.pose_sigma_deg)):
         if sigma:
             rig[f"T_rig_board_sigma_{unit}"] = sigma
-    cameras = [{"name": c.name, "exposure_s": protocol.pictures.exposure_s} for c in protocol.cameras]
+    cameras = [
+        {"name": c.name, "exposure_s": protocol.pictures.exposure_s} for c in protocol.cameras
+    ]
     session = {
-        "format": 1, "name": protocol.name,
-        "surfaces": list(dict.fromkeys(t.surface for t in protocol.trials if t.purpose == "measure")),
-        "whisker": {"shape": w.shape, "length_mm": w.length_mm, "diameter_mm": w.diameter_mm,
-                    **({"tip_diameter_mm": w.tip_diameter_mm} if w.tip_diameter_mm else {}),
-                    "youngs_modulus_GPa": w.youngs_modulus_GPa},
+        "format": 1,
+        "name": protocol.name,
+        "surfaces": list(
+            dict.fromkeys(t.surface for t in protocol.trials if t.purpose == "measure")
+        ),
+        "whisker": {
+            "shape": w.shape,
+            "length_mm": w.length_mm,
+            "diameter_mm": w.diameter_mm,
+            **({"tip_diameter_mm": w.tip_diameter_mm} if w.tip_diameter_mm else {}),
+            "youngs_modulus_GPa": w.youngs_modulus_GPa,
+        },
         "bar": {"diameter_mm": protocol.bar_diameter_mm},
-        "board": {"squares": list(b.squares), "square_mm": b.square_mm, "marker_mm": b.marker_mm,
-                  "dictionary": b.dictionary, "legacy": b.legacy, "inverted": b.inverted},
+        "board": {
+            "squares": list(b.squares),
+            "square_mm": b.square_mm,
+            "marker_mm": b.marker_mm,
+            "dictionary": b.dictionary,
+            "legacy": b.legacy,
+            "inverted": b.inverted,
+        },
         "rig": rig,
         **({"cameras": cameras} if cameras else {}),
         "trial": {"gauge_filter_Hz": g.filter_Hz},
@@ -46,17 +63,34 @@ def session_toml(protocol: Protocol, stated_T_rig_board: np.ndarray, whiskers: S
         several = len({w.column.name for w in whiskers}) > 1
         session["whiskers"] = [base_keys(whisker, several) for whisker in whiskers]
     elif g.known:
-        session["gauges"] = {"offset_V": list(g.offset_V), "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V]}
+        session["gauges"] = {
+            "offset_V": list(g.offset_V),
+            "matrix_Nmm_per_V": [list(r) for r in g.matrix_Nmm_per_V],
+        }
     return tomli_w.dumps(session)
 
 
 def truth_json(protocol: Protocol, seed: int, whiskers: Sequence[Mounted] = ()) -> str:
     """Exact cameras, board pose, gauges and friction; the seed and the protocol's fingerprint. whiskers: of an array,
     whose gauges are each one's own."""
-    cameras = {c.name: {"name": c.name, "K": c.matrix.tolist(), "dist": c.distortion.tolist(), "width": c.size_px[0],
-                        "height": c.size_px[1], "R": c.rotation.tolist(), "t": c.translation_mm.tolist()}
-               for c in build.cameras(protocol)}
-    alphas = sorted({(_alpha_deg(t.static_friction, t.friction), _alpha_deg(t.friction)) for t in protocol.trials})
+    cameras = {
+        c.name: {
+            "name": c.name,
+            "K": c.matrix.tolist(),
+            "dist": c.distortion.tolist(),
+            "width": c.size_px[0],
+            "height": c.size_px[1],
+            "R": c.rotation.tolist(),
+            "t": c.translation_mm.tolist(),
+        }
+        for c in build.cameras(protocol)
+    }
+    alphas = sorted(
+        {
+            (_alpha_deg(t.static_friction, t.friction), _alpha_deg(t.friction))
+            for t in protocol.trials
+        }
+    )
     truth = {
         "cameras": cameras,
         "T_rig_board": [*build.T_rig_board(protocol).tolist(), [0.0, 0.0, 0.0, 1.0]],
@@ -72,8 +106,10 @@ def truth_json(protocol: Protocol, seed: int, whiskers: Sequence[Mounted] = ()) 
         own = ("gauge_matrix_Nmm_per_V", "gauge_offset_V")
         for key in own:
             truth.pop(key)
-        truth["whiskers"] = {w.name: dict(zip(own, (w.gauges.matrix_Nmm_per_V.tolist(), w.gauges.offset_V.tolist())))
-                             for w in whiskers}
+        truth["whiskers"] = {
+            w.name: dict(zip(own, (w.gauges.matrix_Nmm_per_V.tolist(), w.gauges.offset_V.tolist())))
+            for w in whiskers
+        }
     return json.dumps(truth, indent=1) + "\n"
 
 
@@ -84,8 +120,13 @@ def _alpha_deg(*coefficients):
 def trial_toml(recording: Recording) -> str:
     """trial.toml of a recording."""
     run, table = recording.run, recording.run.table
-    trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "beta_deg": float(run.beta_deg),
-             "d_x_mm": float(run.d_x_mm), "purpose": table.purpose}
+    trial = {
+        "surface": table.surface,
+        "speed_deg_s": float(run.speed_deg_s),
+        "beta_deg": float(run.beta_deg),
+        "d_x_mm": float(run.d_x_mm),
+        "purpose": table.purpose,
+    }
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
     if table.both_ways:
@@ -118,7 +159,11 @@ def array_trial_toml(recording: ArrayRecording, *, says_where: bool = True) -> s
     """trial.toml of an array's recording: slope and distance are not those of any one whisker. says_where: where the
     object stands, too, as people know it who take no pictures."""
     run, table = recording.run, recording.run.table
-    trial = {"surface": table.surface, "speed_deg_s": float(run.speed_deg_s), "purpose": table.purpose}
+    trial = {
+        "surface": table.surface,
+        "speed_deg_s": float(run.speed_deg_s),
+        "purpose": table.purpose,
+    }
     if table.bar_diameter_mm:
         trial["bar_diameter_mm"] = table.bar_diameter_mm
     return tomli_w.dumps(trial | _said_object(recording.bar, says_where=says_where))
@@ -126,7 +171,11 @@ def array_trial_toml(recording: ArrayRecording, *, says_where: bool = True) -> s
 
 def _said_object(bar: Bar, *, says_where: bool) -> dict:
     """[object] of trial.toml: nothing of a straight bar whose place is not said."""
-    return {"object": _object(bar, says_where=says_where)} if says_where or type(bar) is not Bar else {}
+    return (
+        {"object": _object(bar, says_where=says_where)}
+        if says_where or type(bar) is not Bar
+        else {}
+    )
 
 
 def _object(bar: Bar, *, says_where: bool = True) -> dict:
@@ -135,17 +184,27 @@ def _object(bar: Bar, *, says_where: bool = True) -> dict:
     if isinstance(bar, Sphere):
         shape = "sphere"
     if isinstance(bar, Cone):
-        shape, point, sizes = "cone", bar.tip_mm, {"half_angle_deg": math.degrees(bar.half_angle_rad)}
+        shape, point, sizes = (
+            "cone",
+            bar.tip_mm,
+            {"half_angle_deg": math.degrees(bar.half_angle_rad)},
+        )
     if isinstance(bar, Ring):
         shape, sizes = "ring", {"ring_diameter_mm": 2 * bar.ring_radius_mm}
-    where = {"point_mm": point.tolist()} | ({} if shape == "sphere" else {"axis": bar.axis.tolist()})
+    where = {"point_mm": point.tolist()} | (
+        {} if shape == "sphere" else {"axis": bar.axis.tolist()}
+    )
     return {"shape": shape} | (where if says_where else {}) | sizes
 
 
 def array_signals_csv(recording: ArrayRecording) -> str:
     """signals.csv of an array's recording."""
-    form = ",".join("%.5f" if name.startswith("motor_deg") else "%.6f" for name in recording.channels)
-    lines = [form % tuple(row) for row in np.column_stack(list(recording.channels.values())).tolist()]
+    form = ",".join(
+        "%.5f" if name.startswith("motor_deg") else "%.6f" for name in recording.channels
+    )
+    lines = [
+        form % tuple(row) for row in np.column_stack(list(recording.channels.values())).tolist()
+    ]
     return "\n".join([",".join(recording.channels), *lines]) + "\n"
 
 
@@ -154,7 +213,9 @@ def truth_csv(recording: Recording) -> str:
     slips = {}
     if type(recording.bar) is not Bar:
         ways = (False, True)[: 1 + (recording.whisks[0].back is not None)]
-        slips = {(id(whisk), back): slips_mm(whisk, back) for whisk in recording.whisks for back in ways}
+        slips = {
+            (id(whisk), back): slips_mm(whisk, back) for whisk in recording.whisks for back in ways
+        }
     rows = (
         _truth_row(i, recording.whisks[w], t, m, back, slips.get((id(recording.whisks[w]), back)))
         for i, (t, m, w, back) in enumerate(recording.frames)
@@ -171,14 +232,23 @@ def _truth_row(frame, whisk, time_s, motor_rad, back, slips=None):
         values = [*[math.nan] * 5, 0.0, 0.0]
     else:
         moment = way.moment_Nmm[way.row_at(motor_rad)]
-        values = [*state.point_mm, float(whisk.slip_mm(state.point_mm, motor_rad)), state.arc_mm, *moment]
-    first, rest = (",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values))
+        values = [
+            *state.point_mm,
+            float(whisk.slip_mm(state.point_mm, motor_rad)),
+            state.arc_mm,
+            *moment,
+        ]
+    first, rest = (
+        ",".join(f"{v:.6f}" for v in part) for part in ([time_s, math.degrees(motor_rad)], values)
+    )
     status = "free" if state is None else state.status
     gave = np.linalg.norm(whisk.gave_mm(motor_rad, back))
     more = [gave] if math.isfinite(whisk.bar.stiffness_N_mm) else []
     if slips is not None:
         more += [math.nan] * 4 if state is None else [*slips[way.row_at(motor_rad)]]
-    return ",".join([f"{frame},{first},{int(state is not None)},{rest},{status}", *(f"{v:.6f}" for v in more)])
+    return ",".join(
+        [f"{frame},{first},{int(state is not None)},{rest},{status}", *(f"{v:.6f}" for v in more)]
+    )
 
 
 def truth_toml(recording: Recording) -> str:
@@ -201,10 +271,14 @@ def _true_object(bar: Bar) -> str:
 def _whisk_truth(whisk):
     beta, psi = whisk.bar.slope(whisk.touch.motor_rad, whisk.touch.point_mm)
     return {
-        "touch_deg": math.degrees(whisk.touch.motor_rad), "d_x_mm": whisk.touch.d_x_mm,
-        "beta_deg": math.degrees(beta), "psi_deg": math.degrees(psi),
-        "slip_at_3deg_mm": float(whisk.slip_at(math.radians(3))), "slip_jump_mm": _largest_jump_mm(whisk),
-        "mu_static": whisk.friction.static, "mu_kinetic": whisk.friction.kinetic,
+        "touch_deg": math.degrees(whisk.touch.motor_rad),
+        "d_x_mm": whisk.touch.d_x_mm,
+        "beta_deg": math.degrees(beta),
+        "psi_deg": math.degrees(psi),
+        "slip_at_3deg_mm": float(whisk.slip_at(math.radians(3))),
+        "slip_jump_mm": _largest_jump_mm(whisk),
+        "mu_static": whisk.friction.static,
+        "mu_kinetic": whisk.friction.kinetic,
         "stiffness_N_mm": whisk.bar.stiffness_N_mm,
     }
 

@@ -34,7 +34,10 @@ class Print:
 
     def framed(self, margin_mm: float, reflectance: float) -> "Print":
         """With a margin of one tone all round."""
-        x, y = (np.concatenate([[e[0] - margin_mm], e, [e[-1] + margin_mm]]) for e in (self.x_mm, self.y_mm))
+        x, y = (
+            np.concatenate([[e[0] - margin_mm], e, [e[-1] + margin_mm]])
+            for e in (self.x_mm, self.y_mm)
+        )
         return Print(np.pad(self.reflectance, 1, constant_values=reflectance), x, y)
 
 
@@ -60,12 +63,17 @@ class Plate:
     def draw(self, window: Window, radiance: np.ndarray, light: Light) -> None:
         """Over what is drawn, where the camera is in front of the print."""
         camera = window.camera
-        if not self.faces(camera.centre_mm) or (camera.in_camera(self.corners_mm())[:, 2] <= 1).any():
+        if (
+            not self.faces(camera.centre_mm)
+            or (camera.in_camera(self.corners_mm())[:, 2] <= 1).any()
+        ):
             return
         part = window.around(camera.project(self.corners_mm()), 4 * window.soft_px + 2)
         if part is None:
             return
-        cover, tone = _printed(self.print, *_on_plane(camera, self.pose, *part.rays(), part.soft_px))
+        cover, tone = _printed(
+            self.print, *_on_plane(camera, self.pose, *part.rays(), part.soft_px)
+        )
         canvas = radiance[part.within(window)]
         canvas += cover * (np.float32(light.flat(-self.pose[:, 2])) * tone - canvas)
 
@@ -76,8 +84,14 @@ class Plate:
             return np.zeros(len(layer.cover))
         x, y = (ray[layer.at] for ray in window.rays())
         across, down, soft_across, soft_down, _ = _on_plane(camera, self.pose, x, y, window.soft_px)
-        cover = _inside(self.print.x_mm, across, soft_across) * _inside(self.print.y_mm, down, soft_down)
-        points = self.pose[:, 3] + np.multiply.outer(across, self.pose[:, 0]) + np.multiply.outer(down, self.pose[:, 1])
+        cover = _inside(self.print.x_mm, across, soft_across) * _inside(
+            self.print.y_mm, down, soft_down
+        )
+        points = (
+            self.pose[:, 3]
+            + np.multiply.outer(across, self.pose[:, 0])
+            + np.multiply.outer(down, self.pose[:, 1])
+        )
         return cover * (np.linalg.norm(points - camera.centre_mm, axis=1) < layer.depth_mm)
 
 
@@ -87,11 +101,18 @@ def _on_plane(camera, pose, x, y, soft_px):
     place = camera.rotation @ pose[:, 3] + camera.translation_mm
     inverse = np.linalg.inv(np.column_stack([to_camera, place])).astype(np.float32)
     # The third component is one over the depth; rays that miss the plane in front of the camera get one far away on it.
-    scale = 1 / np.maximum(inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2], np.float32(_NEVER))
+    scale = 1 / np.maximum(
+        inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2], np.float32(_NEVER)
+    )
     across, down = ((inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2]) * scale for i in (0, 1))
     soft = np.float32(soft_px) / np.float32([camera.matrix[0, 0], camera.matrix[1, 1]])
-    (a0, a1), (d0, d1) = (((inverse[i, 0] - p * inverse[2, 0]) * scale * soft[0],
-                           (inverse[i, 1] - p * inverse[2, 1]) * scale * soft[1]) for i, p in ((0, across), (1, down)))
+    (a0, a1), (d0, d1) = (
+        (
+            (inverse[i, 0] - p * inverse[2, 0]) * scale * soft[0],
+            (inverse[i, 1] - p * inverse[2, 1]) * scale * soft[1],
+        )
+        for i, p in ((0, across), (1, down))
+    )
     soft_across, soft_down = np.sqrt(a0**2 + a1**2), np.sqrt(d0**2 + d1**2)
     return across, down, soft_across, soft_down, (a0 * d0 + a1 * d1) / (soft_across * soft_down)
 
@@ -116,8 +137,11 @@ def _printed(print_, x, y, soft_x, soft_y, correlation):
     corner = (row + 1 + corner_y) * width + column + 1 + corner_x
     saddle = flat[corner] - flat[corner + 1] - flat[corner + width] + flat[corner + width + 1]
     density = np.exp(-0.5 * (near_x**2 + near_y**2)) / _ROOT_2PI**2
-    terms = correlation * (1 + 0.5 * correlation * near_x * near_y
-                           + correlation**2 / 6 * (near_x**2 - 1) * (near_y**2 - 1))
+    terms = correlation * (
+        1
+        + 0.5 * correlation * near_x * near_y
+        + correlation**2 / 6 * (near_x**2 - 1) * (near_y**2 - 1)
+    )
     tone += saddle * density * terms
     return cover, tone
 
@@ -133,7 +157,12 @@ def _cells(edges, x, soft):
     first, last = cell == 0, cell == len(edges) - 2
     before[first], after[last] = 0, 0
     is_high = high < low
-    return cell, (before, 1 - before - after, after), is_high.astype(int), np.where(is_high, -high, low)
+    return (
+        cell,
+        (before, 1 - before - after, after),
+        is_high.astype(int),
+        np.where(is_high, -high, low),
+    )
 
 
 def _inside(edges, x, soft):

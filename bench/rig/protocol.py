@@ -75,7 +75,11 @@ class CameraTable(Table, kw_only=True):
     @property
     def focal(self) -> float:
         """Focal length, px."""
-        return 1000.0 * self.focal_mm / self.pixel_um if self.focal_mm and self.pixel_um else self.focal_px
+        return (
+            1000.0 * self.focal_mm / self.pixel_um
+            if self.focal_mm and self.pixel_um
+            else self.focal_px
+        )
 
 
 class LightTable(Table):
@@ -193,7 +197,9 @@ class ColumnTable(Table, kw_only=True):
     base_mm: Three = (0.0, 0.0, 0.0)  # of height 0, rig frame
     base_deg: Three = (0.0, 0.0, 0.0)  # turned about the rig's x, then y, then z
     heights_mm: Annotated[list[float], msgspec.Meta(min_length=1)]
-    length_mm: Positive | list[Positive] | None = None  # one of all, or one a height; by default [whisker]'s
+    length_mm: Positive | list[Positive] | None = (
+        None  # one of all, or one a height; by default [whisker]'s
+    )
     diameter_mm: Positive | list[Positive] | None = None
     gauge_scatter: Zero = 0.03  # sigma of each whisker's own coefficients, in parts of [gauges]'
 
@@ -217,14 +223,28 @@ class TrialTable(Table):
     after_deg: Positive | None = None
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
-    stiffness_N_mm: Positive | None = None  # of the bar's surface, which gives way; by default it is rigid
+    stiffness_N_mm: Positive | None = (
+        None  # of the bar's surface, which gives way; by default it is rigid
+    )
     # Absent where not given, so that protocols without them stay what they were:
-    object: Literal["ring", "sphere", "cone"] | msgspec.UnsetType = msgspec.UNSET  # by default a straight bar
-    ring_diameter_mm: Positive | msgspec.UnsetType = msgspec.UNSET  # of the circle that a ring's axis is
-    cone_half_angle_deg: Positive | msgspec.UnsetType = msgspec.UNSET  # between a cone's axis and its surface
-    both_ways: bool | msgspec.UnsetType = msgspec.UNSET  # the way back is recorded, and to be evaluated
-    object_velocity_mm_s: Three | msgspec.UnsetType = msgspec.UNSET  # of the bar, rig frame; by default it stands
-    object_velocity_sigma_mm_s: Zero | msgspec.UnsetType = msgspec.UNSET  # of what trial.toml states of it, each way
+    object: Literal["ring", "sphere", "cone"] | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # by default a straight bar
+    ring_diameter_mm: Positive | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # of the circle that a ring's axis is
+    cone_half_angle_deg: Positive | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # between a cone's axis and its surface
+    both_ways: bool | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # the way back is recorded, and to be evaluated
+    object_velocity_mm_s: Three | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # of the bar, rig frame; by default it stands
+    object_velocity_sigma_mm_s: Zero | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # of what trial.toml states of it, each way
     purpose: Literal["measure", "gauge"] = "measure"
     follicle_roll_deg: float = 0.0
     name: str = ""
@@ -250,17 +270,27 @@ class Protocol(Table, kw_only=True):
     friction: FrictionTable = FrictionTable()
     gauges: GaugesTable = GaugesTable()
     load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET  # none, and no channels of it
-    columns: list[ColumnTable] | msgspec.UnsetType = msgspec.UNSET  # an array's; without any, one whisker at the origin
+    columns: list[ColumnTable] | msgspec.UnsetType = (
+        msgspec.UNSET
+    )  # an array's; without any, one whisker at the origin
     trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
 
     def runs(self) -> list["Run"]:
         """The trials one by one."""
         runs = [run for table in self.trials for run in _runs(table, self.motor)]
-        return [msgspec.structs.replace(run, name=name) for run, name in zip(runs, _distinct([r.name for r in runs]))]
+        return [
+            msgspec.structs.replace(run, name=name)
+            for run, name in zip(runs, _distinct([r.name for r in runs]))
+        ]
 
     def goes_back(self, run: "Run") -> bool:
         """Whether a trial's recording holds back strokes."""
-        return run.table.whisks > 1 or bool(run.table.both_ways) or self.motor.back_stroke or self.pictures.back_stroke
+        return (
+            run.table.whisks > 1
+            or bool(run.table.both_ways)
+            or self.motor.back_stroke
+            or self.pictures.back_stroke
+        )
 
     def fingerprint(self) -> str:
         """Changes with any value."""
@@ -281,7 +311,9 @@ class Run(msgspec.Struct, frozen=True):
 
 
 def _runs(table, motor):
-    combinations = itertools.product(*map(_many, (table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm)))
+    combinations = itertools.product(
+        *map(_many, (table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm))
+    )
     for (speed, beta, psi, d_x), _ in itertools.product(combinations, range(table.repeats)):
         name = table.name or ("gauge" if table.purpose == "gauge" else table.surface)
         if table.purpose == "gauge":
@@ -308,7 +340,9 @@ def load(protocol: str | Path) -> Protocol:
         tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except OSError as problem:
         known = ", ".join(sorted(p.stem for p in FOLDER.glob("*.toml")))
-        raise BadInput(f"cannot be read ({problem.strerror}); the built-in protocols are {known}", file=path) from None
+        raise BadInput(
+            f"cannot be read ({problem.strerror}); the built-in protocols are {known}", file=path
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
         raise BadInput(f"is not TOML: {problem}", file=path) from None
     try:

@@ -24,10 +24,14 @@ class Sensor:
         """Grey levels (uint8 or uint16) of a picture in parts of full scale; without `rng` there is no noise."""
         level = brightness * self._falloff(brightness.shape) * np.float32(255)
         if rng is not None:
-            spread = np.sqrt(self.read**2 + self.shot**2 * np.abs(level) + (self.grain * level) ** 2)
+            spread = np.sqrt(
+                self.read**2 + self.shot**2 * np.abs(level) + (self.grain * level) ** 2
+            )
             level += spread.astype(np.float32) * rng.standard_normal(level.shape, np.float32)
         top = 2**self.bits - 1
-        return np.clip(np.rint(level * np.float32(top / 255)), 0, top).astype(np.uint8 if self.bits == 8 else np.uint16)
+        return np.clip(np.rint(level * np.float32(top / 255)), 0, top).astype(
+            np.uint8 if self.bits == 8 else np.uint16
+        )
 
     def _falloff(self, shape):
         rows, columns = (np.linspace(-1, 1, n, dtype=np.float32) for n in shape)

@@ -13,7 +13,11 @@ from bench.rig import build, papers
 from bench.rig.parts import Job, Part
 from bench.rig.protocol import load
 
-_MEGABYTES = {"jpg": 0.28, "png": 0.46, "mkv": 0.45}  # a picture of 1280 × 720 (tests/speed/rig.py)
+_MEGABYTES = {
+    "jpg": 0.28,
+    "png": 0.46,
+    "mkv": 0.45,
+}  # a picture of 1280 × 720 (tests/studies/speed/rig.py)
 _PICTURE_S, _WHISK_S = 0.08, 0.3  # of one core
 
 
@@ -54,7 +58,9 @@ def forecast(job: Job, workers: int) -> str:
     frames = sum(run.table.whisks * pictures.frames_a_whisk(run.speed_deg_s) for run in runs)
     seen = 0 if job.signals_only else (frames + job.protocol.board.views + 1) * len(cameras)
     scale = sum(c.size_px[0] * c.size_px[1] for c in cameras) / (1280 * 720 * max(len(cameras), 1))
-    size = seen * scale * _MEGABYTES[pictures.format] + sum(_signal_megabytes(job, run) for run in runs)
+    size = seen * scale * _MEGABYTES[pictures.format] + sum(
+        _signal_megabytes(job, run) for run in runs
+    )
     minutes = (seen * scale * _PICTURE_S + whisks * _WHISK_S) / max(workers, 1) / 60
     return f"{len(runs)} trials, {whisks} whisks, {seen} pictures: about {size:.0f} MB and {minutes:.1f} minutes"
 
@@ -88,9 +94,13 @@ def _claim(job):
     texts, truth = job.papers(), job.session / "truth.json"
     if truth.exists():
         if truth.read_text(encoding="utf-8") != texts["truth.json"]:
-            raise BadInput("holds a session of another protocol or seed; name another folder", file=job.session)
+            raise BadInput(
+                "holds a session of another protocol or seed; name another folder", file=job.session
+            )
     elif job.session.exists() and any(job.session.iterdir()):
-        raise BadInput("is not empty and holds no simulated session; name another folder", file=job.session)
+        raise BadInput(
+            "is not empty and holds no simulated session; name another folder", file=job.session
+        )
     (job.session / "trials").mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         if not (job.session / name).exists():

@@ -10,7 +10,7 @@ from bench.rig.bar import Bar
 from bench.rig.grazed import seen
 from bench.rig.layer import Layer
 from bench.rig.light import Light, Material, surface_shade
-from bench.rig.sights import Hits, Rays, Seen
+from bench.rig.rays import Hits, Rays, Seen
 from bench.rig.window import Window
 
 _COVERS = 1e-6  # of a sample: what covers less is not drawn, what covers all but so much has no edge there
@@ -44,7 +44,9 @@ class Solid:
             return None
         tone, depth = self._lit(shape, light, camera.rotation @ light.towards, rays, cover)
         at, (rows, columns) = np.nonzero(covered), part.within(window)
-        return Layer((at[0] + rows.start, at[1] + columns.start), cover[covered], tone[at], depth[at])
+        return Layer(
+            (at[0] + rows.start, at[1] + columns.start), cover[covered], tone[at], depth[at]
+        )
 
     def _lit(self, shape: Seen, light: Light, towards: np.ndarray, rays: Rays, cover: np.ndarray):
         """Brightness and distance (rows, columns) where it covers anything; towards (3,): the lamp, in the camera's
@@ -82,7 +84,9 @@ class Solid:
         half = towards - unit
         half /= np.linalg.norm(half, axis=1)[:, None]
         facing = np.clip(-(hits.normals * unit).sum(1) / np.maximum(hits.across, 1e-9), 0, 1)
-        return surface_shade(light, self.material, hits.normals @ towards, (hits.normals * half).sum(1), facing)
+        return surface_shade(
+            light, self.material, hits.normals @ towards, (hits.normals * half).sum(1), facing
+        )
 
 
 def _filled(values: np.ndarray, wanted: np.ndarray) -> np.ndarray:

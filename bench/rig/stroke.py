@@ -29,7 +29,10 @@ class Stroke:
     ) -> "Stroke":
         """`whisks` strokes from below `low_rad` to above `high_rad`, at constant speed between the two. Raises
         ValueError for several without a back stroke."""
-        knots, forward = [(0.0, low_rad - 0.5 * speed_rad_s * ramp_s, 0.0 if ramp_s else speed_rad_s)], []
+        knots, forward = (
+            [(0.0, low_rad - 0.5 * speed_rad_s * ramp_s, 0.0 if ramp_s else speed_rad_s)],
+            [],
+        )
         backward = []
         for whisk in range(whisks):
             _rest(knots, pause_s)
@@ -48,7 +51,9 @@ class Stroke:
 
     def angle_rad(self, time_s: float | np.ndarray) -> np.ndarray:
         """Motor angle at times within the recording."""
-        i = np.clip(np.searchsorted(self.times_s, time_s, side="right") - 1, 0, len(self.times_s) - 2)
+        i = np.clip(
+            np.searchsorted(self.times_s, time_s, side="right") - 1, 0, len(self.times_s) - 2
+        )
         length = self.times_s[i + 1] - self.times_s[i]
         part = np.asarray(time_s) - self.times_s[i]
         gained = (self.speeds_rad_s[i + 1] - self.speeds_rad_s[i]) / np.where(length > 0, length, 1)

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from bench.rig.bar import Bar
-from bench.rig.camera import Camera
 from bench.rig.layer import Front
-from bench.rig.scene import Box, Scene, Stand, floor_and_wall
+from bench.rig.painted_scene import Box, Scene, Stand, floor_and_wall
+from bench.rig.pinhole import Camera
 from bench.rig.sensor import Sensor
 from bench.rig.tube import Tube
 from bench.rig.window import Window
@@ -70,13 +70,15 @@ class Studio:
 
     def cropped(self, picture: np.ndarray) -> np.ndarray:
         """The camera's picture out of a wider one."""
-        return picture[self._margin:-self._margin, self._margin:-self._margin]
+        return picture[self._margin : -self._margin, self._margin : -self._margin]
 
 
 class Setting:
     """A trial's still scene, ready for its frames."""
 
-    def __init__(self, studio: Studio, radiance: np.ndarray, seen: np.ndarray, front: Front | None = None):
+    def __init__(
+        self, studio: Studio, radiance: np.ndarray, seen: np.ndarray, front: Front | None = None
+    ):
         self._studio, self._radiance, self._seen, self._front = studio, radiance, seen, front
 
     @property

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from bench.rig.camera import Camera
 from bench.rig.layer import Front, Layer, draw_layers
 from bench.rig.light import Light, Material, round_shade
+from bench.rig.pinhole import Camera
 from bench.rig.window import Window
 
 _GAUSS = 0.5 / np.sqrt(3)  # Gauss–Legendre's two points across a sample
@@ -26,7 +26,12 @@ class Tube:
 
     @classmethod
     def straight(
-        cls, start_mm: np.ndarray, end_mm: np.ndarray, radius_mm: float, material: Material, stations: int = 160
+        cls,
+        start_mm: np.ndarray,
+        end_mm: np.ndarray,
+        radius_mm: float,
+        material: Material,
+        stations: int = 160,
     ) -> "Tube":
         """A straight tube of one radius."""
         at = np.linspace(0, 1, stations)[:, None]
@@ -38,8 +43,12 @@ class Tube:
         facing, aside, near = self._seen_from(camera.centre_mm)
         cos = (self.radius_mm / near)[:, None]
         sin = np.sqrt(1 - cos**2)
-        return tuple(camera.project(self.axis_mm + self.radius_mm[:, None] * (cos * facing + s * sin * aside))
-                     for s in (-1, 1))
+        return tuple(
+            camera.project(
+                self.axis_mm + self.radius_mm[:, None] * (cos * facing + s * sin * aside)
+            )
+            for s in (-1, 1)
+        )
 
     def _tangent(self):
         tangent = np.gradient(self.axis_mm, axis=0, edge_order=2)
@@ -93,14 +102,20 @@ class Tube:
 
 
 def draw_tubes(
-    tubes: Sequence[Tube], window: Window, radiance: np.ndarray, light: Light, front: Front | None = None
+    tubes: Sequence[Tube],
+    window: Window,
+    radiance: np.ndarray,
+    light: Light,
+    front: Front | None = None,
 ) -> None:
     """Several tubes over what is drawn: in each sample the nearer over the farther, all but behind an object."""
     if len(tubes) == 1 and front is None:
         tubes[0].draw(window, radiance, light)
         return
     layers = [layer for layer in (tube.layer(window, light) for tube in tubes) if layer is not None]
-    draw_layers(layers if front is None else [front.left_of(layer, window) for layer in layers], radiance)
+    draw_layers(
+        layers if front is None else [front.left_of(layer, window) for layer in layers], radiance
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +154,9 @@ class _Frame:
         """
         (low, cos_low), (high, cos_high) = self.edge(0, along), self.edge(1, along)
         sign = np.sign(high - low)
-        cover = ndtr(sign * (side - low) * cos_low / soft) - ndtr(sign * (side - high) * cos_high / soft)
+        cover = ndtr(sign * (side - low) * cos_low / soft) - ndtr(
+            sign * (side - high) * cos_high / soft
+        )
         start, end = (0.5 * (self.along[0][i] + self.along[1][i]) for i in (0, -1))
         cover = cover * ndtr((along - start) / soft) * ndtr((end - along) / soft)
         return cover, np.clip(2 * (side - low) / (high - low) - 1, -1, 1), 2 / np.abs(high - low)

@@ -13,11 +13,16 @@ from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss
 from scipy.linalg import eigh, null_space
 
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
 
 # Each vanishes at the base with its slope; a unit of length is the whisker's.
-_CLAMPED = [Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1]) for k in range(14)]
-_BENT = [shape.deriv(2) for shape in _CLAMPED]  # their curvatures, by which a vibrating rod bends at its clamp
+_CLAMPED = [
+    Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1])
+    for k in range(14)
+]
+_BENT = [
+    shape.deriv(2) for shape in _CLAMPED
+]  # their curvatures, by which a vibrating rod bends at its clamp
 
 
 @dataclass(frozen=True)
@@ -42,11 +47,21 @@ class Mode:
         at, weights = leggauss(64)
         at, weights = 0.5 * (at + 1), 0.5 * length * weights
         width = rod.width(at * rod.length_mm)
-        mass, stiff = weights * rod.mass_kg_m * width**2, weights * 1e-6 * rod.rigidity_Nmm2 * width**4
+        mass, stiff = (
+            weights * rod.mass_kg_m * width**2,
+            weights * 1e-6 * rod.rigidity_Nmm2 * width**4,
+        )
         shape, bend = _values(_CLAMPED, at), _values(_BENT, at) / length**2
-        free = np.eye(len(_CLAMPED)) if prop_mm is None else null_space(_values(_CLAMPED, [prop_mm / rod.length_mm]))
-        squares, modes = eigh(free.T @ (bend.T * stiff) @ bend @ free, free.T @ (shape.T * mass) @ shape @ free,
-                              subset_by_index=[0, 0])
+        free = (
+            np.eye(len(_CLAMPED))
+            if prop_mm is None
+            else null_space(_values(_CLAMPED, [prop_mm / rod.length_mm]))
+        )
+        squares, modes = eigh(
+            free.T @ (bend.T * stiff) @ bend @ free,
+            free.T @ (shape.T * mass) @ shape @ free,
+            subset_by_index=[0, 0],
+        )
         mode = free @ modes[:, 0]
         at_base = float(_values(_BENT, [0.0])[0] @ mode) / length**2
         moment, moved = -1e-3 * rod.rigidity_Nmm2 * at_base, mass * (shape @ mode)

@@ -6,7 +6,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from bench.rig.camera import Camera
+from bench.rig.pinhole import Camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,10 @@ class Window:
 
     def around(self, px: np.ndarray, margin: float) -> "Window | None":
         """The part of this window that holds points (n, 2) and a margin; None where nothing is left."""
-        low, high = np.floor(px.min(0) - margin).astype(int), np.ceil(px.max(0) + margin).astype(int) + 1
+        low, high = (
+            np.floor(px.min(0) - margin).astype(int),
+            np.ceil(px.max(0) + margin).astype(int) + 1,
+        )
         left, top = max(self.left, low[0]), max(self.top, low[1])
         right, bottom = min(self.right, high[0]), min(self.bottom, high[1])
         if left >= right or top >= bottom:
@@ -40,8 +43,10 @@ class Window:
 
     def within(self, other: "Window") -> tuple[slice, slice]:
         """Rows and columns of this window in the samples of a window that holds it."""
-        return (slice((self.top - other.top) * self.fine, (self.bottom - other.top) * self.fine),
-                slice((self.left - other.left) * self.fine, (self.right - other.left) * self.fine))
+        return (
+            slice((self.top - other.top) * self.fine, (self.bottom - other.top) * self.fine),
+            slice((self.left - other.left) * self.fine, (self.right - other.left) * self.fine),
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -69,4 +74,6 @@ class Window:
         left = np.sqrt(max(blur_px**2 - self.soft_px**2, 0.0)) * self.fine
         blurred = cv2.GaussianBlur(radiance, (0, 0), left) if left > 0.2 else radiance
         rows, columns = self.shape
-        return cv2.resize(blurred, (columns // self.fine, rows // self.fine), interpolation=cv2.INTER_AREA)
+        return cv2.resize(
+            blurred, (columns // self.fine, rows // self.fine), interpolation=cv2.INTER_AREA
+        )

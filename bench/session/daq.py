@@ -44,10 +44,16 @@ def daq_file(keys: manifest.SignalKeys | None, shown: str) -> DaqFile | None:
     if keys is None:
         return None
     if Path(keys.file).name != keys.file or keys.file in ("", ".", ".."):
-        raise BadInput(f"[signals] file {keys.file!r} must be the name of a file in each trial's folder", file=shown)
+        raise BadInput(
+            f"[signals] file {keys.file!r} must be the name of a file in each trial's folder",
+            file=shown,
+        )
     if Path(keys.file).suffix.lower() not in _READERS:
         known = ", ".join(_READERS)
-        raise BadInput(f"[signals] file {keys.file!r} is of no kind that is read; these are: {known}", file=shown)
+        raise BadInput(
+            f"[signals] file {keys.file!r} is of no kind that is read; these are: {known}",
+            file=shown,
+        )
     named = values(keys, leave_out=("file", "rate_Hz"))
     channels = {name: Channel(**values(one)) for name, one in named.items() if one is not None}
     return DaqFile(keys.file, keys.rate_Hz, channels)
@@ -68,7 +74,9 @@ def read_daq(path: Path, daq: DaqFile, shown: str) -> Table:
     count = lengths.pop()
     if _TIME not in columns:
         if daq.rate_Hz is None:
-            raise BadInput("[signals] has neither a time_s channel nor rate_Hz", file="session.toml")
+            raise BadInput(
+                "[signals] has neither a time_s channel nor rate_Hz", file="session.toml"
+            )
         columns = {_TIME: np.arange(count) / daq.rate_Hz} | columns
     return Table(columns, np.arange(1, count + 1))
 
@@ -79,7 +87,10 @@ def frame_edges(path: Path, daq: DaqFile, time_s: np.ndarray, shown: str) -> np.
     channel = daq.channels[_FRAME]
     level = _scaled(_read(path, [channel.channel], shown)[0], channel, shown)
     if len(level) != len(time_s):
-        raise BadInput(f"channel {channel.channel} has {len(level)} samples, the others {len(time_s)}", file=shown)
+        raise BadInput(
+            f"channel {channel.channel} has {len(level)} samples, the others {len(time_s)}",
+            file=shown,
+        )
     middle = 0.5 * (level.min() + level.max())
     k = np.flatnonzero((level[:-1] < middle) & (level[1:] >= middle))
     share = (middle - level[k]) / (level[k + 1] - level[k])
@@ -93,24 +104,33 @@ def _scaled(series, channel: Channel, shown: str) -> np.ndarray:
         raise BadInput(f"channel {channel.channel} holds no numbers", file=shown) from None
     raw = np.squeeze(raw)
     if raw.ndim != 1 or len(raw) < 2:
-        raise BadInput(f"channel {channel.channel} is no series: its shape is {raw.shape}", file=shown)
+        raise BadInput(
+            f"channel {channel.channel} is no series: its shape is {raw.shape}", file=shown
+        )
     bad = np.flatnonzero(~np.isfinite(raw))
     if len(bad):
-        raise BadInput(f"channel {channel.channel} is not a finite number", file=shown, row=int(bad[0]) + 1)
+        raise BadInput(
+            f"channel {channel.channel} is not a finite number", file=shown, row=int(bad[0]) + 1
+        )
     return channel.scale * raw + channel.offset
 
 
 def _read(path: Path, names: list[str], shown: str) -> list:
     """Raw series by the file's own names."""
     if path.stat().st_size > _MOST_BYTES:
-        raise BadInput(f"has more than {_MOST_BYTES >> 20} MB; record in several trials", file=shown)
+        raise BadInput(
+            f"has more than {_MOST_BYTES >> 20} MB; record in several trials", file=shown
+        )
     return _READERS[path.suffix.lower()](path, names, shown)
 
 
 def _missing(name: str, there, shown: str) -> BadInput:
     listed = list(there)
     more = ", …" if len(listed) > _MOST_LISTED else ""
-    return BadInput(f"has no channel {name}; it has {', '.join(listed[:_MOST_LISTED]) or 'none'}{more}", file=shown)
+    return BadInput(
+        f"has no channel {name}; it has {', '.join(listed[:_MOST_LISTED]) or 'none'}{more}",
+        file=shown,
+    )
 
 
 def _csv(path: Path, names: list[str], shown: str) -> list:
@@ -130,7 +150,16 @@ def _mat(path: Path, names: list[str], shown: str) -> list:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:  # version 7.3 is HDF5
         return _hdf5(path, names, shown)
-    except (MatReadError, ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, MemoryError) as problem:
+    except (
+        MatReadError,
+        ValueError,
+        TypeError,
+        KeyError,
+        OSError,
+        EOFError,
+        OverflowError,
+        MemoryError,
+    ) as problem:
         raise BadInput(f"cannot be read as a MATLAB file ({problem})", file=shown) from None
     return [_within(content, name, shown) for name in names]
 
@@ -139,7 +168,11 @@ def _within(content: dict, name: str, shown: str):
     found = content
     for part in name.split("/"):
         if not isinstance(found, dict) or part not in found:
-            there = [key for key in found if not key.startswith("__")] if isinstance(found, dict) else []
+            there = (
+                [key for key in found if not key.startswith("__")]
+                if isinstance(found, dict)
+                else []
+            )
             raise _missing(name, there, shown)
         found = found[part]
     return found
@@ -163,7 +196,11 @@ def _tdms(path: Path, names: list[str], shown: str) -> list:
         file = nptdms.TdmsFile.read(path)
     except (ValueError, OSError, KeyError, EOFError, IndexError) as problem:
         raise BadInput(f"cannot be read as TDMS ({problem})", file=shown) from None
-    there = {f"{group.name}/{channel.name}": channel for group in file.groups() for channel in group.channels()}
+    there = {
+        f"{group.name}/{channel.name}": channel
+        for group in file.groups()
+        for channel in group.channels()
+    }
     for name in names:
         if name not in there:
             raise _missing(name, there, shown)
@@ -174,7 +211,9 @@ def _extra(module: str, extra: str, shown: str):
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise BadInput(f"needs {module}: pip install 'whisker-bench[{extra}]'", file=shown) from None
+        raise BadInput(
+            f"needs {module}: pip install 'whisker-bench[{extra}]'", file=shown
+        ) from None
 
 
 _READERS: dict[str, Callable[[Path, list[str], str], list]] = {

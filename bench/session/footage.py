@@ -6,8 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from vision.geometry.errors import Refused
-from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES, natural_order, pictures_in, read_picture
+from vision.geometry.refusals import Refused
+from vision.pictures.files import (
+    FILM_SUFFIXES,
+    PICTURE_SUFFIXES,
+    natural_order,
+    pictures_in,
+    read_picture,
+)
 from vision.pictures.frames import Frames
 
 
@@ -23,7 +29,9 @@ def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
             continue
         name = entry.name if entry.is_dir() else entry.stem
         if name in sources:
-            raise BadInput(f"camera {name} has {sources[name].name} and {entry.name}; keep one", file=shown)
+            raise BadInput(
+                f"camera {name} has {sources[name].name} and {entry.name}; keep one", file=shown
+            )
         sources[name] = entry
     return sources
 

@@ -13,12 +13,13 @@ from bench.session.signals import Signals
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 from vision.geometry.counted import counted
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
 
 FRAME, TIME = "frame", "time_s"
 _DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame
-_RATE_TOLERANCE = 1e-3  # of the interval stated, beyond the steps in which times are written. Set by eye
+# of the interval stated, beyond the steps in which times are written. Set by eye
+_RATE_TOLERANCE = 1e-3
 # A header's rate is nominal: crystals are right to 1e-4, a computer's timers to some 1e-3.
 _HEADER_TOLERANCE = 1e-2
 _MOST_NAMED = 5  # frames in a line
@@ -72,12 +73,16 @@ def frame_times(trial: Trial) -> FrameTimes:
     """
     if (trial.folder / "frames.csv").is_file():
         return _common(trial)
-    if trial.camera_sources and all((trial.folder / _own(camera)).is_file() for camera in trial.camera_sources):
+    if trial.camera_sources and all(
+        (trial.folder / _own(camera)).is_file() for camera in trial.camera_sources
+    ):
         return _merged(trial)
     own = [camera for camera in trial.camera_sources if (trial.folder / _own(camera)).is_file()]
     if own:
         missing = next(camera for camera in trial.camera_sources if camera not in own)
-        raise BadInput(f"is missing, and camera {own[0]} has its own", file=trial.shown(_own(missing)))
+        raise BadInput(
+            f"is missing, and camera {own[0]} has its own", file=trial.shown(_own(missing))
+        )
     if not trial.camera_sources:
         return FrameTimes(np.array([]), "none", {})
     if trial.daq is not None and "frame_V" in trial.daq.channels:
@@ -91,7 +96,11 @@ def read_trial(
     """Grey pictures by camera and frame index, of the frames wanted (None: all); lost ones are left out."""
     frames, wanted = {}, range(len(times)) if wanted is None else sorted(set(wanted))
     for name, source in trial.camera_sources.items():
-        place = {frame: int(times.picture[name][frame]) for frame in wanted if times.picture[name][frame] >= 0}
+        place = {
+            frame: int(times.picture[name][frame])
+            for frame in wanted
+            if times.picture[name][frame] >= 0
+        }
         read = read_frames(source, place.values())
         frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
     return frames
@@ -115,7 +124,9 @@ def _common(trial: Trial) -> FrameTimes:
     """frames.csv: all cameras triggered together."""
     shown = trial.shown("frames.csv")
     table, repeats = _read(trial.folder / "frames.csv", shown)
-    doubts = tuple(d for camera in trial.camera_sources for d in _check_count(trial, camera, len(table), shown))
+    doubts = tuple(
+        d for camera in trial.camera_sources for d in _check_count(trial, camera, len(table), shown)
+    )
     _check_rate(table[TIME], trial, shown)
     doubts += tuple(_header_rates(table[TIME], trial, trial.camera_sources, shown))
     if repeats:
@@ -137,7 +148,9 @@ def _merged(trial: Trial) -> FrameTimes:
     return FrameTimes(time_s, "frames_<camera>.csv", picture, spread_s, tuple(doubts))
 
 
-def merge_times(times_s: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray], float]:
+def merge_times(
+    times_s: Mapping[str, np.ndarray],
+) -> tuple[np.ndarray, dict[str, np.ndarray], float]:
     """One series of frames from several cameras' times.
 
     Returns time_s (n,), camera -> picture index or −1 (n,), and the largest spread within a frame, s.
@@ -166,8 +179,12 @@ def merge_times(times_s: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str
 def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:
     """Rising edges of a channel of the DAQ, one a frame of every camera."""
     shown = trial.shown(trial.signals_path.name)
-    edges_s = frame_edges(trial.signals_path, daq, read_daq(trial.signals_path, daq, shown)[TIME], shown)
-    count = _one_count({camera: frame_count(source) for camera, source in trial.camera_sources.items()}, trial)
+    edges_s = frame_edges(
+        trial.signals_path, daq, read_daq(trial.signals_path, daq, shown)[TIME], shown
+    )
+    count = _one_count(
+        {camera: frame_count(source) for camera, source in trial.camera_sources.items()}, trial
+    )
     if len(edges_s) != count:
         found = f"channel {daq.channels['frame_V'].channel} rises {len(edges_s)} times, the cameras have {count} frames"
         raise BadInput(f"{found}; there must be an edge a frame", file=shown)
@@ -181,7 +198,11 @@ def _steady(trial: Trial) -> FrameTimes:
     counts = {camera: frame_count(source) for camera, source in trial.camera_sources.items()}
     count = _one_count(counts, trial)
     first_s = 0.0 if trial.first_frame_s is None else trial.first_frame_s
-    doubts = () if trial.first_frame_s is not None else (f"{_shown(trial)}: first_frame_s is not given; taken as 0",)
+    doubts = (
+        ()
+        if trial.first_frame_s is not None
+        else (f"{_shown(trial)}: first_frame_s is not given; taken as 0",)
+    )
     picture = {camera: np.arange(count) for camera in counts}
     time_s = first_s + np.arange(count) / trial.frame_rate_Hz
     sigma_s = _clock_sigma_s(trial, 1.0 / trial.frame_rate_Hz)
@@ -196,7 +217,9 @@ def _clock_sigma_s(trial: Trial, interval_s: float) -> float:
 
 def _from_container(trial: Trial) -> FrameTimes:
     """The times that the video's container states, which may be any clock's."""
-    times = {camera: _container_times(source, trial) for camera, source in trial.camera_sources.items()}
+    times = {
+        camera: _container_times(source, trial) for camera, source in trial.camera_sources.items()
+    }
     count = _one_count({camera: len(t) for camera, t in times.items()}, trial)
     first_s = trial.first_frame_s or 0.0
     camera = next(iter(times))
@@ -204,7 +227,9 @@ def _from_container(trial: Trial) -> FrameTimes:
     picture = {name: np.arange(count) for name in times}
     doubts = (doubt + "nothing ties them to the signals' clock",)
     sigma_s = _clock_sigma_s(trial, float(np.median(np.diff(times[camera]))) if count > 1 else 0.0)
-    return FrameTimes(first_s + times[camera], "container", picture, doubts=doubts, clock_sigma_s=sigma_s)
+    return FrameTimes(
+        first_s + times[camera], "container", picture, doubts=doubts, clock_sigma_s=sigma_s
+    )
 
 
 def _container_times(source: Path, trial: Trial) -> np.ndarray:
@@ -215,7 +240,9 @@ def _container_times(source: Path, trial: Trial) -> np.ndarray:
             raise BadInput(f"there are no frame times; {fix}", file=trial.shown("frames.csv"))
         return found
     except Refused as problem:
-        raise BadInput(f"there are no frame times, and {problem}; {fix}", file=_shown(trial)) from None
+        raise BadInput(
+            f"there are no frame times, and {problem}; {fix}", file=_shown(trial)
+        ) from None
 
 
 def _read(path: Path, shown: str) -> tuple[Table, int]:
@@ -225,7 +252,9 @@ def _read(path: Path, shown: str) -> tuple[Table, int]:
     wrong = np.flatnonzero(np.diff(table[FRAME]) <= 0)
     if len(wrong):
         row = int(table.row[wrong[0] + 1])
-        raise BadInput("frame numbers must increase, a row a picture", file=shown, row=row, column=FRAME)
+        raise BadInput(
+            "frame numbers must increase, a row a picture", file=shown, row=row, column=FRAME
+        )
     return table, repeats
 
 
@@ -243,7 +272,9 @@ def _check_count(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str,
         return (f"{trial.shown(source.name)}: the video cannot be opened: truncated or damaged",)
     found = decoded_count(source)
     if found == rows:
-        return (f"{trial.shown(source.name)}: the header declares {counted(declared, 'frame')}, there are {found}",)
+        return (
+            f"{trial.shown(source.name)}: the header declares {counted(declared, 'frame')}, there are {found}",
+        )
     unlike = f"has {counted(rows, 'row')}, camera {camera} has {counted(found, 'frame')}"
     raise BadInput(f"{unlike}; there must be a row a frame", file=shown)
 
@@ -252,7 +283,9 @@ def _one_count(counts: Mapping[str, int], trial: Trial) -> int:
     if len(set(counts.values())) > 1:
         found = ", ".join(f"{camera} {count}" for camera, count in counts.items())
         fix = "record frames.csv or frames_<camera>.csv to say which frames belong together"
-        raise BadInput(f"the cameras have different numbers of frames ({found}); {fix}", file=_shown(trial))
+        raise BadInput(
+            f"the cameras have different numbers of frames ({found}); {fix}", file=_shown(trial)
+        )
     return next(iter(counts.values()))
 
 
@@ -273,9 +306,15 @@ def _usual_steps(time_s: np.ndarray) -> np.ndarray:
     return steps[steps < _DROPPED_STEPS * np.median(steps)]
 
 
-def _header_rates(time_s: np.ndarray, trial: Trial, cameras: Iterable[str], shown: str) -> Iterator[str]:
+def _header_rates(
+    time_s: np.ndarray, trial: Trial, cameras: Iterable[str], shown: str
+) -> Iterator[str]:
     """A line on each video whose header states another rate than the times, where trial.toml does not settle it."""
-    videos = {source.name: source for source in map(trial.camera_sources.get, cameras) if not source.is_dir()}
+    videos = {
+        source.name: source
+        for source in map(trial.camera_sources.get, cameras)
+        if not source.is_dir()
+    }
     if trial.frame_rate_Hz is not None or len(time_s) < 3:
         return
     found_Hz = 1.0 / float(_usual_steps(time_s).mean())

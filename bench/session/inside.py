@@ -84,4 +84,6 @@ def _is_footage(target: Path, name: PurePath) -> bool:
 def check_outside(out: Path, session: Path, option: str = "--out") -> None:
     """Raises BadInput where results would be written into the session: it is what was recorded, and stays so."""
     if out.resolve().is_relative_to(session.resolve()):
-        raise BadInput(f"{option} {out} lies in the session, which is never written to; give a folder outside of it")
+        raise BadInput(
+            f"{option} {out} lies in the session, which is never written to; give a folder outside of it"
+        )

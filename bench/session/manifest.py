@@ -87,7 +87,9 @@ class GaugeKeys(Keys, kw_only=True):
     offset_V: Pair
     offset_sigma_V: Pair | None = None
     matrix_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)]
-    matrix_sigma_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)] | None = None
+    matrix_sigma_Nmm_per_V: (
+        Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)] | None
+    ) = None
 
 
 class ChannelNames(Keys, kw_only=True):
@@ -114,7 +116,10 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
     gauges: GaugeKeys | None = None
     channels: ChannelNames = ChannelNames()
 
-    windows: ClassVar = WhiskerKeys.windows | {"base_mm": plausible.PLACE, "base_deg": plausible.ANGLE}
+    windows: ClassVar = WhiskerKeys.windows | {
+        "base_mm": plausible.PLACE,
+        "base_deg": plausible.ANGLE,
+    }
     tables: ClassVar = {"gauges": GaugeKeys, "channels": ChannelNames}
 
 
@@ -207,7 +212,19 @@ class SignalKeys(Keys, kw_only=True):
 
     windows: ClassVar = {"rate_Hz": plausible.RATE}
     tables: ClassVar = dict.fromkeys(
-        ("time_s", "motor_deg", "y_V", "z_V", "m_y_Nmm", "m_z_Nmm", "f_x_N", "f_y_N", "f_z_N", "frame_V"), ChannelKeys
+        (
+            "time_s",
+            "motor_deg",
+            "y_V",
+            "z_V",
+            "m_y_Nmm",
+            "m_z_Nmm",
+            "f_x_N",
+            "f_y_N",
+            "f_z_N",
+            "frame_V",
+        ),
+        ChannelKeys,
     )
 
 
@@ -242,5 +259,9 @@ class SessionKeys(Keys, kw_only=True):
 
 def sigma_key(key: str) -> str:
     """The key of a value's standard deviation, or '' for a key that has none: 'd_x_mm' -> 'd_x_sigma_mm'."""
-    names = (n for n in TrialKeys.__struct_fields__ if "_sigma_" in n and n.replace("_sigma_", "_") == key)
+    names = (
+        n
+        for n in TrialKeys.__struct_fields__
+        if "_sigma_" in n and n.replace("_sigma_", "_") == key
+    )
     return next(names, "")

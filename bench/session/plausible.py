@@ -30,7 +30,11 @@ class Window:
     @property
     def allowed(self) -> str:
         """The window in words."""
-        return f"{self.low:g} or more" if self.high == math.inf else f"from {self.low:g} to {self.high:g}"
+        return (
+            f"{self.low:g} or more"
+            if self.high == math.inf
+            else f"from {self.low:g} to {self.high:g}"
+        )
 
     def guess(self, value: float) -> str:
         """' Is it in metres? Then write 100.' or nothing."""
@@ -42,7 +46,9 @@ class Window:
     def check(self, value: float, name: str, file: str) -> None:
         """Raises BadInput where the value is outside."""
         if not self.holds(value):
-            raise BadInput(f"{name} is {value:g}; {self.allowed} is allowed.{self.guess(value)}", file=file)
+            raise BadInput(
+                f"{name} is {value:g}; {self.allowed} is allowed.{self.guess(value)}", file=file
+            )
 
 
 LENGTH = Window(1.0, 5000.0, (METRES, MICROMETRES))

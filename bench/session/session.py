@@ -18,7 +18,7 @@ from bench.session.strict_toml import as_keys, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import invert_transform, nearest_rotation
 from vision.pictures.files import natural_order
 
@@ -27,7 +27,8 @@ MANIFEST = "session.toml"
 NMM2_PER_NM2 = 1e6  # N·mm² in a N·m²
 # Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.
 _ROTATION_TOLERANCE = 2e-3
-_NEAREST_BOARD_MM = 0.5  # a board's origin this near to the whisker's base is a board placed in metres
+# a board's origin this near to the whisker's base is a board placed in metres
+_NEAREST_BOARD_MM = 0.5
 _FARTHEST_BOARD_MM = 5000.0  # mm: no bench is larger; written in another unit
 
 
@@ -62,7 +63,7 @@ class Session:
     """What session.toml and the folders say; T_rig_board is (3, 4), mm; sigmas are 0 where taken as exact.
 
     whisker and bar are given wherever there are trials; board wherever there is no cameras.toml but pictures. base: of
-    the whisker whose view of an array this is (`bench.session.array`), whole: the array's session, in the rig frame;
+    the whisker whose view of an array this is (`bench.session.array_view`), whole: the array's session, in the rig frame;
     both None where the session is one whisker's.
     """
 
@@ -95,7 +96,10 @@ class Session:
         for trial in self.trials:
             if trial.name == name:
                 return trial
-        raise BadInput(f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}", file="trials")
+        raise BadInput(
+            f"there is no trial {name!r}; there are {_listed(t.name for t in self.trials)}",
+            file="trials",
+        )
 
 
 def load_session(
@@ -116,7 +120,9 @@ def load_session(
     path, doubts = Path(path), doubts or Doubts()
     keys = read_manifest(path, doubts, follow_links)
     if keys.whiskers:
-        raise BadInput("has several whiskers ([[whiskers]]); evaluate and check alone take them", file=MANIFEST)
+        raise BadInput(
+            "has several whiskers ([[whiskers]]); evaluate and check alone take them", file=MANIFEST
+        )
     return loaded(path, keys, doubts, lenses_known=lenses_known, trials=trials)
 
 
@@ -129,7 +135,11 @@ def loaded(
     trials: Collection[str] | None = None,
 ) -> Session:
     """The session of a manifest that is read; options and errors of `load_session`."""
-    parts = partial(_whisker, keys.whisker), partial(_board, keys.board), partial(_pose, keys.rig.T_rig_board)
+    parts = (
+        partial(_whisker, keys.whisker),
+        partial(_board, keys.board),
+        partial(_pose, keys.rig.T_rig_board),
+    )
     whisker, board, T_rig_board = doubts.each(parts)
     bar = keys.bar
     board_sources = camera_sources(path / "boards", "boards")
@@ -164,11 +174,15 @@ def read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.Se
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
     if not (path / MANIFEST).is_file():
-        raise BadInput(f"there is no {MANIFEST} in this folder, so it is not a session", file=str(path))
+        raise BadInput(
+            f"there is no {MANIFEST} in this folder, so it is not a session", file=str(path)
+        )
     check_inside(path, doubts, follow_links)
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
-        raise BadInput(f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST)
+        raise BadInput(
+            f"format is {tables['format']!r}; this version reads format {FORMAT}", file=MANIFEST
+        )
     named = ("bar",) if "whiskers" in tables else ("whisker", "bar")
     needed = named if visible(path / "trials") else ()
     return as_keys(tables, manifest.SessionKeys, MANIFEST, doubts, needed)
@@ -181,7 +195,9 @@ def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
 def stated_whisker(keys: manifest.WhiskerKeys, table: str) -> Whisker:
     """The whisker of a table, which messages name so. Raises BadInput for one that cannot be."""
     try:
-        whisker = Whisker(**{name: getattr(keys, name) for name in manifest.WhiskerKeys.__struct_fields__})
+        whisker = Whisker(
+            **{name: getattr(keys, name) for name in manifest.WhiskerKeys.__struct_fields__}
+        )
     except ValueError as problem:
         raise BadInput(f"{table} {problem}", file=MANIFEST) from None
     _check_rigidity(whisker, table)
@@ -223,7 +239,10 @@ def _pose(rows: list[list[float]] | None) -> np.ndarray | None:
         )
     if 0 < shift_mm < _NEAREST_BOARD_MM or shift_mm > _FARTHEST_BOARD_MM:
         hint = " Is the last column in metres? It is mm." if shift_mm < _NEAREST_BOARD_MM else ""
-        raise BadInput(f"[rig] T_rig_board puts the board {shift_mm:.3g} mm from the base.{hint}", file=MANIFEST)
+        raise BadInput(
+            f"[rig] T_rig_board puts the board {shift_mm:.3g} mm from the base.{hint}",
+            file=MANIFEST,
+        )
     return np.column_stack([nearest_rotation(rotation), pose[:, 3]])
 
 
@@ -260,7 +279,9 @@ def _check_surfaces(trials: Iterable[Trial], order: Sequence[str], doubts: Doubt
     there = {t.surface for t in trials}
     for name in order:
         if there and name not in there:
-            doubts.note(f"{MANIFEST}: surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}")
+            doubts.note(
+                f"{MANIFEST}: surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}"
+            )
 
 
 def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:
@@ -275,7 +296,11 @@ def _check_cameras(session: Session, named: list[str], doubts: Doubts, lenses_kn
     for trial in session.trials:
         with doubts.guard():
             _check_trial_cameras(trial, session.camera_names)
-    if any(t.camera_sources for t in session.trials) and session.cameras_toml is None and not lenses_known:
+    if (
+        any(t.camera_sources for t in session.trials)
+        and session.cameras_toml is None
+        and not lenses_known
+    ):
         for name in session.camera_names:
             with doubts.guard():
                 _check_camera_boards(session, name)
@@ -296,9 +321,14 @@ def _check_camera_boards(session: Session, name: str) -> None:
     if session.board is None:
         raise BadInput("[board] is missing, and there is no cameras.toml", file=MANIFEST)
     if name not in session.board_sources:
-        raise BadInput(f"there are no board views of camera {name}, and no cameras.toml", file=f"boards/{name}")
+        raise BadInput(
+            f"there are no board views of camera {name}, and no cameras.toml", file=f"boards/{name}"
+        )
     if session.T_rig_board is not None and name not in session.rig_pictures:
-        raise BadInput(f"there is no picture of the board on the rig by camera {name}", file=f"boards/rig/{name}")
+        raise BadInput(
+            f"there is no picture of the board on the rig by camera {name}",
+            file=f"boards/rig/{name}",
+        )
 
 
 def _if_there(path: Path) -> Path | None:

@@ -8,7 +8,13 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.session import strokes
 from bench.session.daq import read_daq
-from bench.session.plausible import DEGREES_PER_RADIAN, MICROSECONDS, MILLISECONDS, MILLIVOLTS, Window
+from bench.session.plausible import (
+    DEGREES_PER_RADIAN,
+    MICROSECONDS,
+    MILLISECONDS,
+    MILLIVOLTS,
+    Window,
+)
 from bench.session.table import Table, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 
@@ -18,7 +24,9 @@ FORCES = ("f_x_N", "f_y_N", "f_z_N")
 
 SAMPLING_STEP = Window(1e-6, 0.05, (MILLISECONDS, MICROSECONDS))  # s: 1 MHz to 20 Hz
 VOLTAGE = Window(-30.0, 30.0, (MILLIVOLTS,))  # V: what a DAQ's input takes
-FORCE = Window(-20.0, 20.0, (("millinewtons", 1e-3),))  # N: a whisker of 1 mm gives way at a hundredth of it
+FORCE = Window(
+    -20.0, 20.0, (("millinewtons", 1e-3),)
+)  # N: a whisker of 1 mm gives way at a hundredth of it
 MOMENT = Window(-1e5, 1e5, (("N um", 1e-3), ("nN m", 1e-3)))
 _TURN_DEG = 360.0  # °: an encoder that wraps does so by a turn
 _STILL_DEG = 0.02  # less is an encoder that stands still
@@ -98,7 +106,9 @@ def read_signals(trial: Trial) -> Signals:
         y=table[channels[0]],
         z=table[channels[1]],
         kind=kind,
-        dropped={cause: n for cause, n in (("duplicate rows", duplicates), ("encoder wraps", wraps)) if n},
+        dropped={
+            cause: n for cause, n in (("duplicate rows", duplicates), ("encoder wraps", wraps)) if n
+        },
         doubts=doubts,
         forces_N=np.column_stack([table[name] for name in forces]) if forces else None,
     )
@@ -106,7 +116,9 @@ def read_signals(trial: Trial) -> Signals:
 
 def _columns(table: Table, shown: str) -> tuple[str, tuple[str, str]]:
     """("V" or "Nmm", its two columns)."""
-    has_volts, has_moments = (any(name in table.columns for name in pair) for pair in (VOLTS, MOMENTS))
+    has_volts, has_moments = (
+        any(name in table.columns for name in pair) for pair in (VOLTS, MOMENTS)
+    )
     if has_volts and has_moments:
         raise BadInput("has volts and moments; keep y_V,z_V or m_y_Nmm,m_z_Nmm", file=shown, row=1)
     kind, channels = ("Nmm", MOMENTS) if has_moments else ("V", VOLTS)
@@ -141,13 +153,18 @@ def _extreme(values: np.ndarray) -> float:
     return float(values[np.argmax(np.abs(values))])
 
 
-def _check_motor(time_s: np.ndarray, motor_deg: np.ndarray, trial: Trial, shown: str) -> tuple[str, ...]:
+def _check_motor(
+    time_s: np.ndarray, motor_deg: np.ndarray, trial: Trial, shown: str
+) -> tuple[str, ...]:
     """Doubts about angle and speed. Raises BadInput where the angle is in radians or encoder counts."""
     range_deg = float(np.ptp(strokes.without_spikes(motor_deg)[0]))
     if range_deg < _STILL_DEG:
         return (f"{shown}: the motor stands still ({range_deg:.3g}°): no whisk",)
     if range_deg > _TURN_DEG:
-        raise BadInput(f"motor_deg spans {range_deg:.6g}, more than a turn. Is it in encoder counts?", file=shown)
+        raise BadInput(
+            f"motor_deg spans {range_deg:.6g}, more than a turn. Is it in encoder counts?",
+            file=shown,
+        )
     speed_deg_s = _measured_speed(time_s, motor_deg)
     too_small = range_deg < _SMALL_RANGE_DEG and not _is(speed_deg_s, trial.speed_deg_s)
     if too_small or _is(DEGREES_PER_RADIAN * speed_deg_s, trial.speed_deg_s):
@@ -165,10 +182,15 @@ def _speed_doubts(speed_deg_s: float, trial: Trial, shown: str) -> tuple[str, ..
         return ()
     if _is(speed_deg_s / DEGREES_PER_RADIAN, trial.speed_deg_s):
         found = f"speed_deg_s is {trial.speed_deg_s:g}, but the motor goes at {speed_deg_s:.3g}°/s"
-        raise BadInput(f"{found}. Is it in rad/s? Then write {speed_deg_s:.3g}.", file=trial.shown("trial.toml"))
+        raise BadInput(
+            f"{found}. Is it in rad/s? Then write {speed_deg_s:.3g}.",
+            file=trial.shown("trial.toml"),
+        )
     if _is(speed_deg_s, trial.speed_deg_s):
         return ()
-    return (f"{shown}: the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {trial.speed_deg_s:g}",)
+    return (
+        f"{shown}: the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {trial.speed_deg_s:g}",
+    )
 
 
 def _measured_speed(time_s: np.ndarray, motor_deg: np.ndarray) -> float:

@@ -27,7 +27,9 @@ class Keys(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 def read_toml(path: Path, shown: str) -> dict[str, Any]:
     """The tables of a TOML file. Raises BadInput, naming the file as `shown`, where it is not one."""
     if path.stat().st_size > _MOST_BYTES:
-        raise BadInput(f"has more than {_MOST_BYTES >> 20} MB; a few lines are expected", file=shown)
+        raise BadInput(
+            f"has more than {_MOST_BYTES >> 20} MB; a few lines are expected", file=shown
+        )
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except OSError as problem:
@@ -92,14 +94,18 @@ def _value_checks(keys: Keys, table: str, shown: str) -> Iterator[Callable[[], N
             yield partial(_check_value, value, name, keys.windows.get(name), table, shown)
 
 
-def _check_value(value: Any, name: str, window: plausible.Window | None, table: str, shown: str) -> None:
+def _check_value(
+    value: Any, name: str, window: plausible.Window | None, table: str, shown: str
+) -> None:
     if "_sigma_" in name:
         window = plausible.SIGMA
     for number in _numbers(value):
         (window or plausible.CLOCK).check(number, table + name, shown)
     if name in ("beta_deg", "follicle_roll_deg") and plausible.looks_like_radians(value):
         degrees = value * plausible.DEGREES_PER_RADIAN
-        raise BadInput(f"{table}{name} is {value:g}. Is it in radians? Then write {degrees:.4g}.", file=shown)
+        raise BadInput(
+            f"{table}{name} is {value:g}. Is it in radians? Then write {degrees:.4g}.", file=shown
+        )
 
 
 def _numbers(value: Any) -> list[float]:
@@ -108,7 +114,9 @@ def _numbers(value: Any) -> list[float]:
     return [float(value)] if isinstance(value, int | float) and not isinstance(value, bool) else []
 
 
-def _unknown_keys(value: Any, kind: type[Keys], top: type[Keys], path: tuple[str, ...] = ()) -> Iterator[str]:
+def _unknown_keys(
+    value: Any, kind: type[Keys], top: type[Keys], path: tuple[str, ...] = ()
+) -> Iterator[str]:
     """A line for each key of a table, or of a list of tables, that is none of `kind`'s; tables within included."""
     for table in value if isinstance(value, list) else [value]:
         for key, inner in table.items() if isinstance(table, dict) else ():
@@ -137,7 +145,11 @@ def _only_keys_of(value: Any, kind: type[Keys] | None) -> Any:
     if kind and isinstance(value, list):
         return [_only_keys_of(item, kind) for item in value]
     if kind and isinstance(value, dict):
-        return {k: _only_keys_of(v, kind.tables.get(k)) for k, v in value.items() if k in kind.__struct_fields__}
+        return {
+            k: _only_keys_of(v, kind.tables.get(k))
+            for k, v in value.items()
+            if k in kind.__struct_fields__
+        }
     return value
 
 
@@ -146,7 +158,9 @@ def _meant(key: str, kind: type[Keys], top: type[Keys]) -> str:
     allowed = kind.__struct_fields__
     if near := difflib.get_close_matches(key, allowed, n=1, cutoff=0.6):
         return f"did you mean {near[0]!r}?"
-    if homes := [f"[{name}]" for name, table in top.tables.items() if key in table.__struct_fields__]:
+    if homes := [
+        f"[{name}]" for name, table in top.tables.items() if key in table.__struct_fields__
+    ]:
         return f"it belongs in {' or '.join(homes)}."
     return f"allowed are {', '.join(name for name in allowed if '_sigma_' not in name)}."
 
@@ -172,8 +186,16 @@ def _choices(path: list[str], kind: type[Keys]) -> str:
 
 def _what_is_wrong(what: str) -> str:
     """msgspec's "Expected `float | null`, got `str`" in the words of a person who writes TOML."""
-    words = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "null": "nothing"}
-    found = re.sub(r"`([^`]*)`", lambda m: words.get(m.group(1).removesuffix(" | null"), m.group(1)), what)
+    words = {
+        "float": "a number",
+        "int": "a whole number",
+        "str": "text",
+        "bool": "true or false",
+        "null": "nothing",
+    }
+    found = re.sub(
+        r"`([^`]*)`", lambda m: words.get(m.group(1).removesuffix(" | null"), m.group(1)), what
+    )
     return found.replace("Expected", "expected").replace("got", "found")
 
 

@@ -3,15 +3,20 @@
 import numpy as np
 from scipy.ndimage import median_filter
 
-SMALLEST_STROKE_RAD = np.radians(0.3)  # rad: less is a motor that settles, or its encoder's steps. Set by eye
+SMALLEST_STROKE_RAD = np.radians(
+    0.3
+)  # rad: less is a motor that settles, or its encoder's steps. Set by eye
 # Of the largest stroke: a shorter one is kept (a recording may start mid-stroke), a settling motor is not.
 _SMALLEST_SHARE = 0.2
 # A turn counts when the motor goes back by this share of its range, or by so many times its jitter.
 _TURN_SHARE, _TURN_JITTERS = 0.1, 4.0
-_SPIKE_SAMPLES = 5  # a median over these removes spikes of one or two samples and leaves ramps as they are
+# a median over these removes spikes of one or two samples and leaves ramps as they are
+_SPIKE_SAMPLES = 5
 
 
-def forward_strokes(motor_rad: np.ndarray, smallest_rad: float = SMALLEST_STROKE_RAD) -> tuple[slice, ...]:
+def forward_strokes(
+    motor_rad: np.ndarray, smallest_rad: float = SMALLEST_STROKE_RAD
+) -> tuple[slice, ...]:
     """Slices of samples in which the motor goes forward, in their order. motor_rad: (n,).
 
     A pause within a stroke does not end it; back strokes and pauses between strokes belong to none. Strokes
@@ -24,7 +29,9 @@ def forward_strokes(motor_rad: np.ndarray, smallest_rad: float = SMALLEST_STROKE
     runs = _forward_runs(angle, turn) if turn > 0 else []
     rises = [angle[crest] - angle[trough] for trough, crest in runs]
     smallest = max(smallest_rad, _SMALLEST_SHARE * max(rises, default=0.0))
-    return tuple(_without_pauses(angle, *run, jitter) for run, rise in zip(runs, rises) if rise >= smallest)
+    return tuple(
+        _without_pauses(angle, *run, jitter) for run, rise in zip(runs, rises) if rise >= smallest
+    )
 
 
 def without_spikes(motor_rad: np.ndarray) -> tuple[np.ndarray, float]:
@@ -65,7 +72,9 @@ def _without_pauses(angle: np.ndarray, trough: int, crest: int, jitter: float) -
 
     An encoder stands still between two of its steps, so one step's time at either end belongs to the stroke.
     """
-    within = 2 * jitter  # trough and crest are extremes of the noise, so a pause lies up to twice that from them
+    within = (
+        2 * jitter
+    )  # trough and crest are extremes of the noise, so a pause lies up to twice that from them
     run = angle[trough : crest + 1]
     leaves = np.flatnonzero(run <= run[0] + within)[-1]
     arrives = np.flatnonzero(run >= run[-1] - within)[0]

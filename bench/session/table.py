@@ -48,7 +48,9 @@ def read_table(path: Path, shown: str, only: Collection[str] | None = None) -> T
     values = _fast(lines[1:], len(names), chosen)
     if values is None:
         values = _row_by_row(lines[1:], names, shown)[:, chosen]
-    return Table({names[k]: column for k, column in zip(chosen, values.T)}, np.arange(2, len(values) + 2))
+    return Table(
+        {names[k]: column for k, column in zip(chosen, values.T)}, np.arange(2, len(values) + 2)
+    )
 
 
 def column_names(path: Path, shown: str) -> list[str]:
@@ -72,7 +74,11 @@ def forward_in_time(table: Table, time: str, shown: str) -> tuple[Table, int]:
     wrong = np.flatnonzero(np.diff(table[time]) <= 0)
     if len(wrong):
         before, after = table[time][wrong[0]], table[time][wrong[0] + 1]
-        found = f"goes back from {before:.10g} to {after:.10g}" if after < before else f"{after:.10g} comes twice"
+        found = (
+            f"goes back from {before:.10g} to {after:.10g}"
+            if after < before
+            else f"{after:.10g} comes twice"
+        )
         fix = "; times must increase (rows that are wholly the same are dropped)"
         raise BadInput(found + fix, file=shown, row=int(table.row[wrong[0] + 1]), column=time)
     return table, int(repeats.sum())
@@ -83,13 +89,19 @@ def require_columns(table: Table, names: tuple[str, ...], shown: str) -> None:
     for name in names:
         if name not in table.columns:
             near = difflib.get_close_matches(name, table.columns, n=1, cutoff=0.6)
-            hint = f"; found {near[0]!r} (names carry units)" if near else f"; found {','.join(table.columns)}"
+            hint = (
+                f"; found {near[0]!r} (names carry units)"
+                if near
+                else f"; found {','.join(table.columns)}"
+            )
             raise BadInput(f"column {name} is missing{hint}", file=shown, row=1)
 
 
 def _lines(path: Path, shown: str) -> list[str]:
     if path.stat().st_size > _MOST_BYTES:
-        raise BadInput(f"has more than {_MOST_BYTES >> 20} MB; record in several trials", file=shown)
+        raise BadInput(
+            f"has more than {_MOST_BYTES >> 20} MB; record in several trials", file=shown
+        )
     try:
         lines = path.read_bytes().decode("utf-8-sig").splitlines()
     except OSError as problem:
@@ -107,7 +119,10 @@ def _header(lines: list[str], shown: str) -> list[str]:
     header = lines[0]
     for mark, name in ((";", "semicolons"), ("\t", "tabs")):
         if mark in header:
-            raise BadInput(f"columns are separated by {name}; export with commas (and decimal points)", file=shown)
+            raise BadInput(
+                f"columns are separated by {name}; export with commas (and decimal points)",
+                file=shown,
+            )
     names = [name.strip() for name in next(csv.reader([header]))]
     if all(_is_number(name) for name in names):
         raise BadInput(f"the first row must name the columns; found {header!r}", file=shown, row=1)
@@ -125,22 +140,36 @@ def _fast(lines: list[str], width: int, chosen: list[int]) -> np.ndarray | None:
         values = np.loadtxt(lines, delimiter=",", comments=None, quotechar='"', ndmin=2, **some)
     except ValueError:
         return None
-    return values if values.shape == (len(lines), len(chosen)) and np.isfinite(values).all() else None
+    return (
+        values if values.shape == (len(lines), len(chosen)) and np.isfinite(values).all() else None
+    )
 
 
 def _row_by_row(lines: list[str], names: list[str], shown: str) -> np.ndarray:
     """The same, slowly, to say which cell is bad."""
-    return np.array([_row(cells, names, shown, row) for row, cells in enumerate(csv.reader(lines), start=2)])
+    return np.array(
+        [_row(cells, names, shown, row) for row, cells in enumerate(csv.reader(lines), start=2)]
+    )
 
 
 def _row(cells: list[str], names: list[str], shown: str, row: int) -> list[float]:
     if not cells or not "".join(cells).strip():
         raise BadInput("is empty", file=shown, row=row)
     if ";" in "".join(cells):
-        raise BadInput("values are separated by semicolons; export with commas", file=shown, row=row)
+        raise BadInput(
+            "values are separated by semicolons; export with commas", file=shown, row=row
+        )
     if len(cells) != len(names):
-        hint = " Decimal commas? Export with decimal points." if len(names) < len(cells) <= 2 * len(names) else ""
-        raise BadInput(f"has {counted(len(cells), 'value')}, the header names {len(names)}.{hint}", file=shown, row=row)
+        hint = (
+            " Decimal commas? Export with decimal points."
+            if len(names) < len(cells) <= 2 * len(names)
+            else ""
+        )
+        raise BadInput(
+            f"has {counted(len(cells), 'value')}, the header names {len(names)}.{hint}",
+            file=shown,
+            row=row,
+        )
     return [_cell(cell.strip(), name, shown, row) for cell, name in zip(cells, names)]
 
 

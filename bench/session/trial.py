@@ -97,7 +97,9 @@ class Trial:
         return self.folder / (f"{stem}@{self.whisker}.{suffix}" if self.whisker else file)
 
 
-def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq: DaqFile | None = None) -> Trial:
+def load_trial(
+    folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq: DaqFile | None = None
+) -> Trial:
     """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput. daq: of [signals]."""
     shown = f"trials/{folder.name}"
     keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}", doubts)
@@ -105,14 +107,18 @@ def load_trial(folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq:
     _check_motion(keys, f"{shown}/{MANIFEST}")
     signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
-        raise BadInput("is not there; a trial needs its signals", file=f"{shown}/{signals_path.name}")
+        raise BadInput(
+            "is not there; a trial needs its signals", file=f"{shown}/{signals_path.name}"
+        )
     trial = Trial(
         name=folder.name,
         folder=folder,
         camera_sources=camera_sources(folder, shown),
         signals_path=signals_path,
         daq=daq,
-        **values(keys) | _bar(keys, session.bar) | {"object": _object(keys.object, f"{shown}/{MANIFEST}")},
+        **values(keys)
+        | _bar(keys, session.bar)
+        | {"object": _object(keys.object, f"{shown}/{MANIFEST}")},
     )
     _check_size(trial, f"{shown}/{MANIFEST}")
     return trial
@@ -125,10 +131,14 @@ def _check_size(trial: Trial, shown: str) -> None:
     thick, wide = trial.bar_diameter_mm, trial.object.ring_diameter_mm
     if wide is not None and thick is not None and wide <= thick:
         found = f"[object] ring_diameter_mm is {wide:g}, of a bar of {thick:g} mm (bar_diameter_mm)"
-        raise BadInput(f"{found}; it is the diameter along the bar's middle, and larger", file=shown)
+        raise BadInput(
+            f"{found}; it is the diameter along the bar's middle, and larger", file=shown
+        )
 
 
-def _trial_keys(folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts) -> manifest.TrialKeys:
+def _trial_keys(
+    folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts
+) -> manifest.TrialKeys:
     """trial.toml, absent keys from the session's [trial]; a sigma comes from where its value comes from."""
     file = folder / MANIFEST
     if not file.is_file():
@@ -159,13 +169,17 @@ def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None
         return None
     for key, shape in (("ring_diameter_mm", "ring"), ("half_angle_deg", "cone")):
         if (keys.shape == shape) != (getattr(keys, key) is not None):
-            raise BadInput(f'[object] {key} belongs to shape = "{shape}", and to no other shape', file=shown)
+            raise BadInput(
+                f'[object] {key} belongs to shape = "{shape}", and to no other shape', file=shown
+            )
     if keys.axis is not None and not any(keys.axis):
         raise BadInput("[object] axis is a direction, not zero", file=shown)
     sizes = keys.ring_diameter_mm, keys.half_angle_deg
     if keys.point_mm is None:
         if keys.axis is not None or keys.point_sigma_mm:
-            raise BadInput("[object] says how it stands, and not where; point_mm is missing", file=shown)
+            raise BadInput(
+                "[object] says how it stands, and not where; point_mm is missing", file=shown
+            )
         return StatedObject(keys.shape, None, 0.0, None, *sizes)
     point, axis = tuple(keys.point_mm), tuple(keys.axis or _UPRIGHT)
     return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, *sizes)
@@ -174,7 +188,10 @@ def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None
 def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:
     """The trial's own bar diameter with its sigma, else the session's."""
     if keys.bar_diameter_mm is not None:
-        return {"bar_diameter_mm": keys.bar_diameter_mm, "bar_diameter_sigma_mm": keys.bar_diameter_sigma_mm}
+        return {
+            "bar_diameter_mm": keys.bar_diameter_mm,
+            "bar_diameter_sigma_mm": keys.bar_diameter_sigma_mm,
+        }
     return {
         "bar_diameter_mm": bar and bar.diameter_mm,
         "bar_diameter_sigma_mm": bar.diameter_sigma_mm if bar else 0.0,

@@ -32,7 +32,9 @@ class Whisker:
         if (self.shape == "tapered") != (self.tip_diameter_mm is not None):
             raise ValueError('tip_diameter_mm belongs to shape = "tapered", and to no other shape')
         if self.tip_diameter_mm is not None and not 0 < self.tip_diameter_mm < self.diameter_mm:
-            raise ValueError(f"tip_diameter_mm = {self.tip_diameter_mm:g}: must be below diameter_mm, and above 0")
+            raise ValueError(
+                f"tip_diameter_mm = {self.tip_diameter_mm:g}: must be below diameter_mm, and above 0"
+            )
 
     @property
     def wire(self) -> Wire:
@@ -60,7 +62,9 @@ class Whisker:
     @property
     def beam(self) -> Beam:
         """What an estimator may know of it."""
-        tip_share = None if self.tip_diameter_mm is None else self.tip_diameter_mm / self.diameter_mm
+        tip_share = (
+            None if self.tip_diameter_mm is None else self.tip_diameter_mm / self.diameter_mm
+        )
         return Beam(self.C_Nmm2, self.length_mm, self.shape, tip_share)
 
     @property

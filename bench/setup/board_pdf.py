@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from bench.base.drawing import paper_style, publish
 from bench.base.errors import BadInput
-from bench.rig import board as rig
+from bench.rig import printed_board as rig
 from bench.session.plausible import WIDTH
 from vision.geometry.board import Board
 
@@ -55,7 +55,9 @@ def paper_for(board: Board) -> Paper:
             if need[0] <= across and need[1] <= down:
                 return Paper(f"A{number} {name}", across, down)
         short, long = long, 2.0 * short
-    raise BadInput(f"a board of {width:g} x {height:g} mm fits no page up to A0; take fewer or smaller squares")
+    raise BadInput(
+        f"a board of {width:g} x {height:g} mm fits no page up to A0; take fewer or smaller squares"
+    )
 
 
 def toml_block(board: Board) -> list[str]:
@@ -79,7 +81,9 @@ def page(board: Board, paper: Paper) -> Figure:
     width, height = (n * board.square_mm for n in board.squares)
     left = 0.5 * (paper.width_mm + _LEFT_MM - _RIGHT_MM - width)
     top = 0.5 * (paper.height_mm + _TOP_MM - _BELOW_MM - height)
-    axes.add_collection(PolyCollection(list(dark_rectangles(board, left, top)), fc="black", ec="none", lw=0))
+    axes.add_collection(
+        PolyCollection(list(dark_rectangles(board, left, top)), fc="black", ec="none", lw=0)
+    )
     _ruler(axes, (left, top + height + _RULER_MM), width, down=False)
     _ruler(axes, (left - _RULER_MM, top), height, down=True)
     _words(axes, board, left, top + height + _RULER_MM + 11.0)
@@ -89,11 +93,26 @@ def page(board: Board, paper: Paper) -> Figure:
 def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.ndarray]:
     """What is printed, as rectangles (4, 2), mm. They overlap, so that no seam shows between them: runs of cells along
     rows, runs along columns, and the four cells about each point where both have a seam."""
-    made = rig.Board(board.squares, board.square_mm, board.marker_mm, board.dictionary, board.legacy, board.inverted)
-    printed = made.printed(_INK, board.square_mm / 2 if board.inverted else 0.0).moved(left_mm, top_mm)
+    made = rig.Board(
+        board.squares,
+        board.square_mm,
+        board.marker_mm,
+        board.dictionary,
+        board.legacy,
+        board.inverted,
+    )
+    printed = made.printed(_INK, board.square_mm / 2 if board.inverted else 0.0).moved(
+        left_mm, top_mm
+    )
     dark, x, y = printed.reflectance < 0.5, printed.x_mm, printed.y_mm
-    yield from (_box(x[a], x[b], y[row], y[row + 1]) for row, cells in enumerate(dark) for a, b in _runs(cells))
-    yield from (_box(x[k], x[k + 1], y[a], y[b]) for k, cells in enumerate(dark.T) for a, b in _runs(cells))
+    yield from (
+        _box(x[a], x[b], y[row], y[row + 1])
+        for row, cells in enumerate(dark)
+        for a, b in _runs(cells)
+    )
+    yield from (
+        _box(x[k], x[k + 1], y[a], y[b]) for k, cells in enumerate(dark.T) for a, b in _runs(cells)
+    )
     all_four = dark[1:, 1:] & dark[:-1, 1:] & dark[1:, :-1] & dark[:-1, :-1]
     yield from (_box(x[k], x[k + 2], y[row], y[row + 2]) for row, k in np.argwhere(all_four))
 

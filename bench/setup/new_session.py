@@ -36,16 +36,29 @@ class Question:
 
 QUESTIONS = (
     Question("whisker_length_mm", "whisker", "length_mm", "length of the whisker, base to tip, mm"),
-    Question("whisker_diameter_mm", "whisker", "diameter_mm", "diameter of the whisker at its base, mm"),
-    Question("youngs_modulus_GPa", "whisker", "youngs_modulus_GPa", "Young's modulus of the whisker, GPa"),
-    Question("bar_diameter_mm", "bar", "diameter_mm", "diameter of the round bar that is touched, mm"),
-    Question("square_mm", "board", "square_mm", "side of a square of the ChArUco board, as measured, mm"),
+    Question(
+        "whisker_diameter_mm", "whisker", "diameter_mm", "diameter of the whisker at its base, mm"
+    ),
+    Question(
+        "youngs_modulus_GPa", "whisker", "youngs_modulus_GPa", "Young's modulus of the whisker, GPa"
+    ),
+    Question(
+        "bar_diameter_mm", "bar", "diameter_mm", "diameter of the round bar that is touched, mm"
+    ),
+    Question(
+        "square_mm", "board", "square_mm", "side of a square of the ChArUco board, as measured, mm"
+    ),
     Question("marker_mm", "board", "marker_mm", "side of a marker of the board, mm"),
 )
 
 
 def new_session(
-    path: Path, name: str, given: Mapping[str, float], squares: tuple[int, int], dictionary: str, ask: Ask | None = None
+    path: Path,
+    name: str,
+    given: Mapping[str, float],
+    squares: tuple[int, int],
+    dictionary: str,
+    ask: Ask | None = None,
 ) -> list[str]:
     """Make the folder of a session with its manifest. Lines that say what comes next. Raises BadInput where there is a
     session already, or a number is implausible.
@@ -56,14 +69,18 @@ def new_session(
         raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
     for question in QUESTIONS:
         if question.option in given:
-            question.window.check(given[question.option], f"--{question.option.replace('_', '-')}", str(path))
+            question.window.check(
+                given[question.option], f"--{question.option.replace('_', '-')}", str(path)
+            )
     answers = dict(given)
     for question in QUESTIONS if ask else ():
         if question.option not in answers:
             answers |= _answered(question, ask)
     for folder in FOLDERS:
         (path / folder).mkdir(parents=True, exist_ok=True)
-    write_whole(path / MANIFEST, manifest_text(name or path.resolve().name, answers, squares, dictionary))
+    write_whole(
+        path / MANIFEST, manifest_text(name or path.resolve().name, answers, squares, dictionary)
+    )
     return list(_next_steps(path, answers))
 
 
@@ -80,7 +97,9 @@ def _answered(question: Question, ask: Ask) -> dict[str, float]:
     return {}
 
 
-def manifest_text(name: str, answers: Mapping[str, float], squares: tuple[int, int], dictionary: str) -> str:
+def manifest_text(
+    name: str, answers: Mapping[str, float], squares: tuple[int, int], dictionary: str
+) -> str:
     """session.toml with what is known, and a line to fill in for what is not."""
     lines = {q.option: _line(q.key, answers.get(q.option), q.asked) for q in QUESTIONS}
     named = tomli_w.dumps({"name": name}).strip()
@@ -88,7 +107,11 @@ def manifest_text(name: str, answers: Mapping[str, float], squares: tuple[int, i
 
 
 def _line(key: str, value: float | None, asked: str) -> str:
-    return f"# {key} =        # FILL IN: {asked}" if value is None else f"{key} = {value:.10g}".ljust(32) + f"# {asked}"
+    return (
+        f"# {key} =        # FILL IN: {asked}"
+        if value is None
+        else f"{key} = {value:.10g}".ljust(32) + f"# {asked}"
+    )
 
 
 def _next_steps(path: Path, answers: Mapping[str, float]):

@@ -11,14 +11,16 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.theory.readings import StrokeNoise, stroke_noise
+from bench.theory.sample_noise import StrokeNoise, stroke_noise
 from estimator import distance, first_order, slip, uncertainty
 from estimator.beam import flexural_rigidity
 from estimator.domain import Numbers
 
 NAMES = ("theta_deg", "alpha_est_deg", "diameter_mm", "length_mm", "taper", "tilt_deg")
 _SLOPES, _ALPHAS, _PLACES = 13, 7, 5  # of the region's grid: the worst may lie between its corners
-_ALONG = np.linspace(0.0, 0.99, 34)  # parts of the way to the contact, at which the strain is looked at
+_ALONG = np.linspace(
+    0.0, 0.99, 34
+)  # parts of the way to the contact, at which the strain is looked at
 _NONE = 1e6  # %: of a design that is none; more where it is further from being one
 _GENERATIONS, _POPULATION, _TOLERANCE = 120, 12, 1e-4
 
@@ -34,10 +36,15 @@ class Region:
     bar_radius_mm: float = 3.0
     lean_sigma_deg: float = 5.0
 
-    def points(self, slopes: int = _SLOPES, alphas: int = _ALPHAS, places: int = _PLACES) -> np.ndarray:
+    def points(
+        self, slopes: int = _SLOPES, alphas: int = _ALPHAS, places: int = _PLACES
+    ) -> np.ndarray:
         """(3, slopes · alphas · places): slopes and friction angles, rad, and distances, over the region."""
-        axes = (np.radians(np.linspace(*self.beta_deg, slopes)), np.radians(np.linspace(*self.alpha_deg, alphas)),
-                np.linspace(*self.d_x_mm, places))  # fmt: skip
+        axes = (
+            np.radians(np.linspace(*self.beta_deg, slopes)),
+            np.radians(np.linspace(*self.alpha_deg, alphas)),
+            np.linspace(*self.d_x_mm, places),
+        )
         return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
 
     def corners(self) -> np.ndarray:
@@ -103,7 +110,12 @@ def expected(design: Design, region: Region, means: Means, points: np.ndarray) -
         felt = theta, m_y, m_z, alpha_est, C
         found = distance.with_friction(*felt)
         of_friction = 1.0 / (1.0 / found + design.taper / design.length_mm) / d_x - 1.0
-        noise = _noise_share(felt, found, stroke_noise(theta, means.noise_Nmm, means.rate_Hz, means.speed_deg_s)) * left
+        noise = (
+            _noise_share(
+                felt, found, stroke_noise(theta, means.noise_Nmm, means.rate_Hz, means.speed_deg_s)
+            )
+            * left
+        )
         phi = np.arctan2(m_y, m_z)
         lean = first_order.leaning(theta, np.radians(region.lean_sigma_deg), phi, alpha)
     bias = of_friction + _left_out(design, region, slope, alpha, d_x, left)
@@ -151,14 +163,25 @@ def worst_percent(design: Design, region: Region, means: Means) -> float:
 
 def faults(design: Design, region: Region, means: Means) -> dict[str, float]:
     """By how much, as a share, a design goes beyond what can be: the whisker's reach, its strain, the gauges' range."""
-    d_x, far = np.array(region.d_x_mm), 1.02 * region.d_x_mm[1]  # 2 %: it slips along the whisker, too
+    d_x, far = (
+        np.array(region.d_x_mm),
+        1.02 * region.d_x_mm[1],
+    )  # 2 %: it slips along the whisker, too
     if design.length_mm <= far:
         return {"length": far / design.length_mm - 1.0 + 1e-9}
-    moments = design.theta_rad * 3.0 * design.rigidity_Nmm2(means) * (1.0 / d_x - design.taper / design.length_mm)
+    moments = (
+        design.theta_rad
+        * 3.0
+        * design.rigidity_Nmm2(means)
+        * (1.0 / d_x - design.taper / design.length_mm)
+    )
     along = _ALONG[:, None] * d_x
     bent = moments * (1.0 - _ALONG[:, None]) / (1.0 - design.taper * along / design.length_mm) ** 3
     strain = 0.5 * design.diameter_mm * bent.max() / design.rigidity_Nmm2(means)
-    most = {"strain": strain / means.most_strain, "gauges' range": moments.max() / means.full_scale_Nmm}
+    most = {
+        "strain": strain / means.most_strain,
+        "gauges' range": moments.max() / means.full_scale_Nmm,
+    }
     return {name: share - 1.0 for name, share in most.items() if share > 1.0}
 
 
@@ -182,7 +205,9 @@ def best_design(
     found = differential_evolution(worst, Bounds(low, high), rng=np.random.default_rng(seed), **how)
     near = minimize(worst, found.x, method="Nelder-Mead", bounds=Bounds(low, high))
     values = near.x if near.fun < found.fun else found.x
-    return _told(replace(held, **dict(zip(free, values.tolist()))), min(near.fun, found.fun), region, means)
+    return _told(
+        replace(held, **dict(zip(free, values.tolist()))), min(near.fun, found.fun), region, means
+    )
 
 
 def _told(design: Design, worst: float, region: Region, means: Means) -> tuple[Design, float]:
@@ -208,7 +233,9 @@ def worth_of_each(
         low, high = ranges[name]
         if low < high:
             try:
-                found[name] = best_design({**ranges, name: (paper[name], paper[name])}, region, means, seed)[1]
+                found[name] = best_design(
+                    {**ranges, name: (paper[name], paper[name])}, region, means, seed
+                )[1]
             except BadInput:
                 found[name] = np.inf
     return found

@@ -12,20 +12,46 @@ from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
 from bench.base.tables import write_table
 from bench.rig.bar import Bar, first_touch
-from bench.rig.contact import moments_Nmm
-from bench.rig.friction import Friction, March
-from bench.rig.rod import Rod
-from bench.theory.design import Design, Expected, Means, Region, best_design, expected, faults, worth_of_each
+from bench.rig.elastic_rod import Rod
+from bench.rig.rod_contact import moments_Nmm
+from bench.rig.stick_slip import Friction, March
+from bench.theory.design import (
+    Design,
+    Expected,
+    Means,
+    Region,
+    best_design,
+    expected,
+    faults,
+    worth_of_each,
+)
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk
 
-COLUMNS = ("beta_deg", "alpha_deg", "d_x_mm", "bias_percent", "sigma_percent", "bound_percent", "exact_percent")
+COLUMNS = (
+    "beta_deg",
+    "alpha_deg",
+    "d_x_mm",
+    "bias_percent",
+    "sigma_percent",
+    "bound_percent",
+    "exact_percent",
+)
 _STEPS = 6  # of the march from touch, as in bench.theory.model_error
 _THINNEST = 1e-3  # share of the base's diameter: a tip that is thinner is a cone's
-_MAP, _MAP_ALPHAS = (61, 41), 7  # slopes and distances of the figure; friction angles of which the worst is shown
-_UNITS = {"theta_deg": "θ = {:.2f}°", "alpha_est_deg": "α_est = {:.1f}°", "diameter_mm": "diameter {:.2f} mm",
-          "length_mm": "length {:.0f} mm", "taper": "taper {:.2f}", "tilt_deg": "base tilted by {:.1f}°"}  # fmt: skip
+_MAP, _MAP_ALPHAS = (
+    (61, 41),
+    7,
+)  # slopes and distances of the figure; friction angles of which the worst is shown
+_UNITS = {
+    "theta_deg": "θ = {:.2f}°",
+    "alpha_est_deg": "α_est = {:.1f}°",
+    "diameter_mm": "diameter {:.2f} mm",
+    "length_mm": "length {:.0f} mm",
+    "taper": "taper {:.2f}",
+    "tilt_deg": "base tilted by {:.1f}°",
+}
 
 
 @dataclass(frozen=True)
@@ -42,11 +68,22 @@ class Designed:
     paper_percent: float
 
 
-def designed(ranges: Mapping[str, tuple[float, float]], region: Region, means: Means, seed: int = 0) -> Designed:
+def designed(
+    ranges: Mapping[str, tuple[float, float]], region: Region, means: Means, seed: int = 0
+) -> Designed:
     """Raises BadInput where no design within the ranges serves the region."""
     best = best_design(ranges, region, means, seed)
-    exact = np.array([exact_percent(best[0], region, means, corner) for corner in region.corners().T])
-    return Designed(*best, region, means, exact, worth_of_each(ranges, region, means, seed), of_paper(region, means))
+    exact = np.array(
+        [exact_percent(best[0], region, means, corner) for corner in region.corners().T]
+    )
+    return Designed(
+        *best,
+        region,
+        means,
+        exact,
+        worth_of_each(ranges, region, means, seed),
+        of_paper(region, means),
+    )
 
 
 def of_paper(region: Region, means: Means) -> float:
@@ -61,8 +98,14 @@ def exact_percent(design: Design, region: Region, means: Means, point: Sequence[
     d_x; NaN where the whisker finds no hold or (10) has no distance."""
     (beta, alpha, d_x), theta = map(float, point), design.theta_rad
     rod, beam = rod_and_beam(design, means)
-    bar = Bar.placed(d_x_mm=d_x, beta_rad=beta - math.radians(design.tilt_deg), psi_rad=0.0, touch_rad=0.0,
-                     radius_mm=region.bar_radius_mm, whisker_radius_mm=float(rod.radius_mm(d_x)))  # fmt: skip
+    bar = Bar.placed(
+        d_x_mm=d_x,
+        beta_rad=beta - math.radians(design.tilt_deg),
+        psi_rad=0.0,
+        touch_rad=0.0,
+        radius_mm=region.bar_radius_mm,
+        whisker_radius_mm=float(rod.radius_mm(d_x)),
+    )
     try:
         touch = first_touch(rod, bar, 0.0, d_x)
         march = March(rod, bar, Friction(math.tan(alpha), math.tan(alpha)), touch)
@@ -84,7 +127,9 @@ def rod_and_beam(design: Design, means: Means) -> tuple[Rod, Beam]:
         shape = "cylinder" if share == 1.0 else "cone"
         beam = Beam.from_rigidity(design.rigidity_Nmm2(means), size[0], shape)
         return Rod(shape, *size, means.youngs_modulus_GPa), beam
-    rod = Rod("tapered", *size, means.youngs_modulus_GPa, tip_diameter_mm=share * design.diameter_mm)
+    rod = Rod(
+        "tapered", *size, means.youngs_modulus_GPa, tip_diameter_mm=share * design.diameter_mm
+    )
     return rod, Beam.from_rigidity(design.rigidity_Nmm2(means), size[0], "tapered", share)
 
 
@@ -93,8 +138,14 @@ def design_lines(made: Designed) -> Iterator[str]:
     design, region = made.design, made.region
     said = ", ".join(text.format(getattr(design, name)) for name, text in _UNITS.items())
     yield f"{said} (EI {design.rigidity_Nmm2(made.means):.0f} N·mm² at the base)"
-    where = ", ".join(f"{name} {low:g} to {high:g}{unit}" for name, (low, high), unit in (
-        ("β", region.beta_deg, "°"), ("α", region.alpha_deg, "°"), ("d_x", region.d_x_mm, " mm")))  # fmt: skip
+    where = ", ".join(
+        f"{name} {low:g} to {high:g}{unit}"
+        for name, (low, high), unit in (
+            ("β", region.beta_deg, "°"),
+            ("α", region.alpha_deg, "°"),
+            ("d_x", region.d_x_mm, " mm"),
+        )
+    )
     yield f"worst error of (10) over {where}: {made.worst_percent:.2f} % of d_x (|bias| + 1.96 sigma)"
     yield f"the paper's whisker, θ = 3°, α_est = 10°: {_percent(made.paper_percent)}"
     for name, worst in sorted(made.worth.items(), key=lambda item: -item[1]):
@@ -145,11 +196,16 @@ def draw(made: Designed) -> Figure:
     """The worst over α at each slope and distance: this design, and the paper's whisker."""
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    beta, d_x = (np.linspace(*ends, n) for ends, n in zip((made.region.beta_deg, made.region.d_x_mm), _MAP))
-    for panel, design, title in zip(panels, (made.design, Design()), ("this design", "the paper's whisker")):
+    beta, d_x = (
+        np.linspace(*ends, n) for ends, n in zip((made.region.beta_deg, made.region.d_x_mm), _MAP)
+    )
+    for panel, design, title in zip(
+        panels, (made.design, Design()), ("this design", "the paper's whisker")
+    ):
         bound = _worst_over_alpha(design, made)
-        shown = panel.pcolormesh(beta, d_x, np.minimum(bound, 100.0), cmap="viridis", shading="nearest",
-                                 rasterized=True)  # fmt: skip
+        shown = panel.pcolormesh(
+            beta, d_x, np.minimum(bound, 100.0), cmap="viridis", shading="nearest", rasterized=True
+        )
         figure.colorbar(shown, ax=panel, label="|bias| + 1.96 σ, % of d$_x$")
         panel.set(xlabel="slope β, °", title=title)
     panels[0].set_ylabel("d$_x$, mm")
@@ -160,5 +216,7 @@ def _worst_over_alpha(design: Design, made: Designed) -> np.ndarray:
     """(distances, slopes), %."""
     slopes, places = _MAP
     points = made.region.points(slopes, _MAP_ALPHAS, places)
-    bound = expected(design, made.region, made.means, points).bound_percent.reshape(slopes, _MAP_ALPHAS, places)
+    bound = expected(design, made.region, made.means, points).bound_percent.reshape(
+        slopes, _MAP_ALPHAS, places
+    )
     return bound.max(axis=1).T

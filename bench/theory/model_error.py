@@ -11,9 +11,9 @@ import numpy as np
 
 from bench.base.workers import Workers
 from bench.rig.bar import Bar, first_touch
-from bench.rig.contact import moments_Nmm
-from bench.rig.friction import Friction, March
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
+from bench.rig.rod_contact import moments_Nmm
+from bench.rig.stick_slip import Friction, March
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.whisk import EstimatorSettings, Whisk
@@ -81,9 +81,15 @@ def errors_percent(push: Push) -> tuple[float, float]:
         return _NO_HOLD
     if state is None:
         return _NO_HOLD
-    felt = Whisk(*(np.zeros(0),) * 4, theta, *moments_Nmm(state), _NOISE_NMM**2 * np.eye(2), 0.0, _BEAM)
-    settings = EstimatorSettings(alpha, object_radius_mm=push.bar_radius_mm, whisker_radius_mm=ROD.diameter_mm / 2)
-    return tuple(100.0 * (f(felt, settings).d_x_mm / touch.d_x_mm - 1.0) for f in (with_friction, corrected))
+    felt = Whisk(
+        *(np.zeros(0),) * 4, theta, *moments_Nmm(state), _NOISE_NMM**2 * np.eye(2), 0.0, _BEAM
+    )
+    settings = EstimatorSettings(
+        alpha, object_radius_mm=push.bar_radius_mm, whisker_radius_mm=ROD.diameter_mm / 2
+    )
+    return tuple(
+        100.0 * (f(felt, settings).d_x_mm / touch.d_x_mm - 1.0) for f in (with_friction, corrected)
+    )
 
 
 def predicted_percent(push: Push) -> float:
@@ -93,7 +99,9 @@ def predicted_percent(push: Push) -> float:
     of bar and whisker together. Held at β = ψ = 0: 100 θ (−⅕ tan α − ⅜ R/d_x). NaN where it is held otherwise: there it
     hangs on how friction is shared between the two directions.
     """
-    theta, alpha, beta, psi = np.radians([push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg])
+    theta, alpha, beta, psi = np.radians(
+        [push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg]
+    )
     if beta >= alpha:
         by_friction = 0.5 * np.tan(psi) * np.sin(beta - alpha) / np.cos(alpha)
     else:
@@ -102,16 +110,27 @@ def predicted_percent(push: Push) -> float:
     return float(100.0 * theta * (by_friction - 0.375 * reach * np.cos(beta) / np.cos(psi) ** 2))
 
 
-def tilt_map(pool: Workers, *, beta_deg: Sequence[float] = BETA_DEG, psi_deg: Sequence[float] = PSI_DEG) -> list[Panel]:
+def tilt_map(
+    pool: Workers, *, beta_deg: Sequence[float] = BETA_DEG, psi_deg: Sequence[float] = PSI_DEG
+) -> list[Panel]:
     """β × ψ at d_x = 60 mm on a bar of 6 mm: without friction, on the paper's steel and on its sandpaper."""
     return [
-        _panel(pool, f"α = {alpha:g}°", Push(alpha_deg=alpha), ("beta_deg", beta_deg), ("psi_deg", psi_deg))
+        _panel(
+            pool,
+            f"α = {alpha:g}°",
+            Push(alpha_deg=alpha),
+            ("beta_deg", beta_deg),
+            ("psi_deg", psi_deg),
+        )
         for alpha in (0.0, 10.5, 23.3)
     ]
 
 
 def radius_map(
-    pool: Workers, *, d_x_mm: Sequence[float] = D_X_MM, bar_radius_mm: Sequence[float] = BAR_RADIUS_MM
+    pool: Workers,
+    *,
+    d_x_mm: Sequence[float] = D_X_MM,
+    bar_radius_mm: Sequence[float] = BAR_RADIUS_MM,
 ) -> list[Panel]:
     """d_x × bar radius at ψ = 0: slip along the whisker alone, with friction, and with slip sideways."""
     return [

@@ -15,7 +15,12 @@ from bench.base.tables import write_table
 from bench.base.workers import Workers
 from bench.theory.model_error import Panel, Push, radius_map, tilt_map
 
-COLUMNS = (*(f.name for f in fields(Push)), "error_percent", "predicted_percent", "corrected_percent")
+COLUMNS = (
+    *(f.name for f in fields(Push)),
+    "error_percent",
+    "predicted_percent",
+    "corrected_percent",
+)
 _LEVELS = np.array([-5.0, -2.0, -1.0, -0.5, -0.2, -0.1, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
 _LINES = {"levels": _LEVELS, "linewidths": 0.8}
 _LABEL_ROOM = 0.03  # of a panel's sides: a line's number nearer to an edge would be cut off
@@ -70,13 +75,17 @@ def draw(panels: Sequence[Panel], title: str) -> Figure:
         drawn = _errors(above, panel, panel.error_percent)
         _errors(below, panel, panel.corrected_percent)
         if np.isfinite(panel.predicted_percent).any():
-            above.contour(*_axes(panel), panel.predicted_percent, **_LINES, colors="0.35", linestyles="--")
+            above.contour(
+                *_axes(panel), panel.predicted_percent, **_LINES, colors="0.35", linestyles="--"
+            )
         above.set_title(panel.title)
         below.set_xlabel(_NAMES[panel.x])
     for axes, name in zip(grid[:, 0], ("(10)", "(10) corrected")):
         axes.set_ylabel(f"{name}\n{_NAMES[panels[0].y]}")
     lines = [Line2D([], [], color=c, ls=ls, lw=0.8) for c, ls in (("black", "-"), ("0.35", "--"))]
-    figure.legend(lines, ["exact mechanics", "to first order in θ"], loc="outside lower center", ncols=2)
+    figure.legend(
+        lines, ["exact mechanics", "to first order in θ"], loc="outside lower center", ncols=2
+    )
     figure.suptitle(title, fontsize=9)
     figure.colorbar(drawn, ax=grid, label="error of d$_x$  [%]", ticks=_LEVELS)
     return figure
@@ -85,7 +94,9 @@ def draw(panels: Sequence[Panel], title: str) -> Figure:
 def _errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:
     """Errors in colour, and their lines with numbers."""
     finite = np.ma.masked_invalid(percent)
-    drawn = axes.contourf(*_axes(panel), finite, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both")
+    drawn = axes.contourf(
+        *_axes(panel), finite, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both"
+    )
     lines = axes.contour(*_axes(panel), finite, **_LINES, colors="black", linestyles="-")
     for label in axes.clabel(lines, fmt=_percent, fontsize=7):
         x, y = axes.transAxes.inverted().transform(axes.transData.transform(label.get_position()))

@@ -1,6 +1,6 @@
 """Felt against seen, whisk by whisk: the moments at the base that the seen shape asks for, beside those that were felt.
 
-The seen ones are the exact rod's through the contact (`bench.gauges.rod`), frame by frame; felt are the channels at the
+The seen ones are the exact rod's through the contact (`bench.gauges.clamped_rod`), frame by frame; felt are the channels at the
 same motor angles. Both lines rise from nothing at touch, so their slopes are compared, two numbers with one covariance:
 of pictures, distance, friction along the rod, noise, zero, gauges and the follicle's turn.
 """
@@ -11,14 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix
-from bench.gauges.readings import Pairs
 
 # Once in ten thousand whisks by chance: a session of 640 is then told of one that is sound in one of fifteen.
 LEAST_CHANCE = 1e-4
 _EXPLAINED = 0.01  # of the chance that a cause must leave
 _PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
-_OTHERWISE = "no fault of the gauges alone explains it; look whether these are another trial's signals"
+_OTHERWISE = (
+    "no fault of the gauges alone explains it; look whether these are another trial's signals"
+)
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Ag
     slopes = Slopes.of(pairs, gauges, scale_sigma)
     found = slopes.chi2(gauges.matrix @ slopes.volts)
     chance = float(chdtrc(2, found))
-    return Agreement(found, chance, likeliest_cause(slopes, gauges.matrix) if chance < LEAST_CHANCE else "")
+    return Agreement(
+        found, chance, likeliest_cause(slopes, gauges.matrix) if chance < LEAST_CHANCE else ""
+    )
 
 
 def likeliest_cause(slopes: Slopes, matrix: np.ndarray) -> str:
@@ -77,7 +81,10 @@ def likeliest_cause(slopes: Slopes, matrix: np.ndarray) -> str:
     tried = list(_causes(slopes, matrix))
     left = [slopes.chi2(felt) for _, free, felt in tried]
     explains = [chdtrc(2 - free, c) > _EXPLAINED for c, (_, free, _) in zip(left, tried)]
-    costs = [c + _PER_PARAMETER * free if ok else np.inf for c, ok, (_, free, _) in zip(left, explains, tried)]
+    costs = [
+        c + _PER_PARAMETER * free if ok else np.inf
+        for c, ok, (_, free, _) in zip(left, explains, tried)
+    ]
     best = int(np.argmin(costs))
     return tried[best][0] if np.isfinite(costs[best]) else _OTHERWISE
 
@@ -103,7 +110,11 @@ def _causes(slopes: Slopes, matrix: np.ndarray) -> Iterator[tuple[str, int, np.n
             yield said, 1, felt + (share - 1) * alone
     share = _share(slopes, felt, np.zeros(2))
     if share > 0:
-        yield f"the whisker looks {100 * share:.1f} % as stiff in the gauges' newtons as its E says", 1, share * felt
+        yield (
+            f"the whisker looks {100 * share:.1f} % as stiff in the gauges' newtons as its E says",
+            1,
+            share * felt,
+        )
 
 
 def _share(slopes: Slopes, part, rest) -> float:

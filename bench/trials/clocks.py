@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bench.gauges.felt import motor_speed
-from bench.records.trial import SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import SeenWhisk, TrialResult, whisks
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
@@ -94,7 +94,9 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     chance = float(chdtrc(2, pull @ covariance @ pull))
     back = int(np.sum(speed < 0))
     speeds = float(speed.min()), float(speed.max())
-    return SharedTouch(covariance @ pull, covariance, chance, float(moved - zero), speeds, len(rows) - back, back)
+    return SharedTouch(
+        covariance @ pull, covariance, chance, float(moved - zero), speeds, len(rows) - back, back
+    )
 
 
 def _rows(results: Iterable[TrialResult]):
@@ -104,12 +106,21 @@ def _rows(results: Iterable[TrialResult]):
         clock_s, back = result.seen.clock.sigma_s if result.seen.clock else 0.0, result.seen.back
         delay_s = max((f.delay_s.sigma for f in result.felt.whisks), default=np.nan)
         pairs = [
-            (s.touch_rad, s.touch_shared_rad, Value(f.touch_felt_rad.value, f.theta_sigma_rad), motor_speed(s.frames),
-             f.delay_s.sigma)
+            (
+                s.touch_rad,
+                s.touch_shared_rad,
+                Value(f.touch_felt_rad.value, f.theta_sigma_rad),
+                motor_speed(s.frames),
+                f.delay_s.sigma,
+            )
             for _, s, f in whisks([result])
             if np.isfinite(s.touch_rad.value)
         ]
-        pairs += [(back.touch_rad, 0.0, result.felt.back_touch_rad, back.speed_rad_s, delay_s)] if back else []
+        pairs += (
+            [(back.touch_rad, 0.0, result.felt.back_touch_rad, back.speed_rad_s, delay_s)]
+            if back
+            else []
+        )
         for seen, shared, felt, speed, filter_s in pairs:
             own = np.sqrt(max(seen.sigma**2 - shared**2 - (clock_s * speed) ** 2, 0.0))
             row = felt.value - seen.value, own, felt.sigma
@@ -117,12 +128,17 @@ def _rows(results: Iterable[TrialResult]):
                 yield *row, speed, float(np.hypot(clock_s, filter_s))
 
 
-def with_shared_touch(results: Sequence[TrialResult], shared: SharedTouch | None) -> tuple[TrialResult, ...]:
+def with_shared_touch(
+    results: Sequence[TrialResult], shared: SharedTouch | None
+) -> tuple[TrialResult, ...]:
     """The results with the error that all whisks share in the sigma of touch seen, where there is one."""
     if shared is None or not shared.is_error:
         return tuple(results)
     return tuple(
-        replace(result, seen=replace(result.seen, whisks=tuple(_wider(s, shared) for s in result.seen.whisks)))
+        replace(
+            result,
+            seen=replace(result.seen, whisks=tuple(_wider(s, shared) for s in result.seen.whisks)),
+        )
         for result in results
     )
 

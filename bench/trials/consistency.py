@@ -12,9 +12,9 @@ from scipy.special import chdtrc
 
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from vision.bar.width import in_all
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
+from vision.touched.width import in_all
 from vision.truth.value import UNKNOWN, Value
 
 # Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
@@ -67,11 +67,19 @@ class Difference:
         left = left - size * cause.trace
         return float(left @ self.information @ left), size
 
-    def likeliest(self, causes: Sequence[Cause], otherwise: str = "no single cause explains it") -> str:
+    def likeliest(
+        self, causes: Sequence[Cause], otherwise: str = "no single cause explains it"
+    ) -> str:
         """The cause that leaves the least χ², two for each number that it may choose; of those that explain all."""
         left = [self.without(cause) for cause in causes]
-        explains = [chdtrc(max(self.freedom - c.free, 1), x2) > _EXPLAINED for (x2, _), c in zip(left, causes)]
-        costs = [x2 + _PER_PARAMETER * c.free if ok else np.inf for (x2, _), c, ok in zip(left, causes, explains)]
+        explains = [
+            chdtrc(max(self.freedom - c.free, 1), x2) > _EXPLAINED
+            for (x2, _), c in zip(left, causes)
+        ]
+        costs = [
+            x2 + _PER_PARAMETER * c.free if ok else np.inf
+            for (x2, _), c, ok in zip(left, causes, explains)
+        ]
         best = int(np.argmin(costs))
         return causes[best].said(left[best][1]) if np.isfinite(costs[best]) else otherwise
 
@@ -98,7 +106,10 @@ def _without_mean(covariance: np.ndarray) -> np.ndarray:
 
 def _agree(values: np.ndarray, variances: np.ndarray) -> bool:
     """Whether values (n,) are one but for chance; a single one is."""
-    return len(values) == 1 or Difference(values, _without_mean(np.diag(variances)), len(values) - 1).is_chance
+    return (
+        len(values) == 1
+        or Difference(values, _without_mean(np.diag(variances)), len(values) - 1).is_chance
+    )
 
 
 def _logs(looks: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
@@ -122,11 +133,26 @@ def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
     for k in range(1, n):
         later, alone = np.arange(n) >= k, np.arange(n) == k
         frame = int(index[k])
-        yield Cause(_words(f"a frame before frame {frame} looks lost; pictures after it have the times of the one "
-                           "before"), ahead * later, None, 1)  # fmt: skip
-        yield Cause(_words(f"a frame too many before frame {frame}; pictures after it have the times of the next"),
-                    behind * later, None, 1)  # fmt: skip
-        yield Cause(_words(f"frame {frame} looks the same as the one before it"), behind * alone, None, 1)
+        yield Cause(
+            _words(
+                f"a frame before frame {frame} looks lost; pictures after it have the times of the one "
+                "before"
+            ),
+            ahead * later,
+            None,
+            1,
+        )
+        yield Cause(
+            _words(
+                f"a frame too many before frame {frame}; pictures after it have the times of the next"
+            ),
+            behind * later,
+            None,
+            1,
+        )
+        yield Cause(
+            _words(f"frame {frame} looks the same as the one before it"), behind * alone, None, 1
+        )
         yield Cause(_jump(motor[k]), none, later.astype(float), 2)
         yield Cause(_another_time(frame, speed_rad_s), none, alone.astype(float), 2)
 
@@ -141,7 +167,9 @@ def _jump(at_rad: float) -> Callable[[float], str]:
 
 
 def _another_time(frame: int, speed_rad_s: float) -> Callable[[float], str]:
-    return lambda size: f"frame {frame} looks taken {1e3 * size / speed_rad_s:+.1f} ms from its time"
+    return lambda size: (
+        f"frame {frame} looks taken {1e3 * size / speed_rad_s:+.1f} ms from its time"
+    )
 
 
 def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> str:
@@ -155,12 +183,18 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
         low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))
         found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
         return f"{found}: check its diameter_mm, or something else is taken for it"
-    sigma = float(np.hypot(looks_sigma / looks, trial.bar_diameter_sigma_mm / trial.bar_diameter_mm))
+    sigma = float(
+        np.hypot(looks_sigma / looks, trial.bar_diameter_sigma_mm / trial.bar_diameter_mm)
+    )
     difference = Difference(np.array([np.log(looks)]), np.array([[sigma**-2.0]]), 1)
     if difference.is_chance:
         return ""
     factor = float(np.exp(difference.values[0]))
-    scale = f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}" if board else "the cameras' scale"
+    scale = (
+        f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
+        if board
+        else "the cameras' scale"
+    )
     bar = f"some {trial.bar_diameter_mm * factor:.3g} for {trial.bar_diameter_mm:g}"
     found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
     return f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
@@ -178,7 +212,10 @@ def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> str:
     of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
     if of_all.is_chance or not _agree(logs, variances):
         return ""
-    factor, sigma = float(np.exp(np.average(logs, weights=1.0 / variances))), float(np.sum(1.0 / variances) ** -0.5)
+    factor, sigma = (
+        float(np.exp(np.average(logs, weights=1.0 / variances))),
+        float(np.sum(1.0 / variances) ** -0.5),
+    )
     if factor > 1.0:
         return ""
     found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
@@ -192,7 +229,9 @@ def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> str:
     the base."""
     if len(ends) < 2:
         return ""
-    places, sigmas = (np.array([getattr(end, name) for end in ends.values()]) for name in ("value", "sigma"))
+    places, sigmas = (
+        np.array([getattr(end, name) for end in ends.values()]) for name in ("value", "sigma")
+    )
     if not _agree(places, sigmas**2):
         return ""
     sigma = float(np.hypot(np.max(sigmas), whisker.length_sigma_mm))
@@ -210,12 +249,18 @@ def slope_doubt(beta: Value, trial: Trial) -> str:
     apart = beta.value - nominal.value
     if not np.isfinite(apart):
         return ""
-    difference = Difference(np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal.sigma**2)]]), 1)
+    difference = Difference(
+        np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal.sigma**2)]]), 1
+    )
     if difference.is_chance:
         return ""
     seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
     mirrored = replace(difference, values=np.array([beta.value + nominal.value]))
-    cause = "its sign looks turned" if mirrored.is_chance else "check it, or something else is taken for the bar"
+    cause = (
+        "its sign looks turned"
+        if mirrored.is_chance
+        else "check it, or something else is taken for the bar"
+    )
     return f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}"
 
 
@@ -231,7 +276,11 @@ def cone_doubt(phi: Value, beta: Value, what: str) -> str:
         return ""
     angles = f"φ {what} is {np.degrees(phi.value):.0f}°, {np.degrees(off):.0f}° from the normal of a bar at β = "
     others = {"y": -phi.value, "z": np.pi - phi.value, "y and z": np.pi + phi.value}
-    within = [name for name, other in others.items() if _from_normal(other, beta) <= _STEEPEST_FRICTION_RAD]
+    within = [
+        name
+        for name, other in others.items()
+        if _from_normal(other, beta) <= _STEEPEST_FRICTION_RAD
+    ]
     cause = f"; {' or '.join(within)} reversed would be within" if within else ""
     return f"{angles}{np.degrees(beta.value):.0f}°, where no friction holds a whisker (up to μ = 1){cause}"
 
@@ -245,4 +294,7 @@ def nominal_slope(trial: Trial) -> Value:
     """β of trial.toml, with a protractor's sigma where none is stated; UNKNOWN where it says nothing."""
     if trial.beta_deg is None:
         return UNKNOWN
-    return Value(float(np.radians(trial.beta_deg)), float(np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD))
+    return Value(
+        float(np.radians(trial.beta_deg)),
+        float(np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD),
+    )

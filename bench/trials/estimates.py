@@ -12,11 +12,11 @@ from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke, late_by
 from bench.gauges.matrix import GaugeMatrix, to_follicle
-from bench.records.trial import EstimateRow, FeltAt, FeltWhisk
+from bench.records.trial_result import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS, WITHOUT_ALPHA
-from estimator.contact import Contact, contact_of
+from estimator.contact_state import Contact, contact_of
 from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
 from estimator.uncertainty import Z_95
@@ -25,7 +25,26 @@ from vision.truth.value import Value
 
 UNTOLD = (math.nan, 0.0)  # radii of bar and whisker where nobody says
 # Pushing angles at which a run says how error and sigma go with θ: steps of a half and less, where errors bend.
-THETAS_DEG = (0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0)
+THETAS_DEG = (
+    0.2,
+    0.3,
+    0.5,
+    0.7,
+    1.0,
+    1.5,
+    2.0,
+    2.5,
+    3.0,
+    3.5,
+    4.0,
+    5.0,
+    6.0,
+    8.0,
+    10.0,
+    12.0,
+    15.0,
+    20.0,
+)
 
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
@@ -40,7 +59,9 @@ def _own(name: str) -> Estimator:
     try:
         found = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError, ValueError) as problem:
-        raise BadInput(f"--estimator {name}: {problem}; give module:function, importable from here") from None
+        raise BadInput(
+            f"--estimator {name}: {problem}; give module:function, importable from here"
+        ) from None
     if not callable(found):
         raise BadInput(f"--estimator {name}: is a {type(found).__name__}; give a function")
     return found
@@ -66,7 +87,12 @@ class Readout:
     @classmethod
     def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Readout":
         """The trial's follicle with these gauges."""
-        return cls(gauges, math.radians(trial.follicle_roll_deg), math.radians(trial.follicle_roll_sigma_deg), True)
+        return cls(
+            gauges,
+            math.radians(trial.follicle_roll_deg),
+            math.radians(trial.follicle_roll_sigma_deg),
+            True,
+        )
 
     @property
     def matrix(self) -> np.ndarray:
@@ -92,7 +118,12 @@ class Readout:
         return self._shared(np.linalg.solve(self.matrix, [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]))
 
     def _shared(self, channels: np.ndarray) -> np.ndarray:
-        by_roll = to_follicle(self.roll_rad + np.pi / 2).T @ self.gauges.matrix @ channels * self.roll_sigma_rad
+        by_roll = (
+            to_follicle(self.roll_rad + np.pi / 2).T
+            @ self.gauges.matrix
+            @ channels
+            * self.roll_sigma_rad
+        )
         return np.vstack([self.gauges.changes_at(channels) @ to_follicle(self.roll_rad), by_roll])
 
 
@@ -104,7 +135,9 @@ def felt_whisk(
     return touch, touch.status or whisk_at(stroke, readout, touch, beam, theta_rad)
 
 
-def whisk_at(stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_rad: float) -> Whisk | str:
+def whisk_at(
+    stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_rad: float
+) -> Whisk | str:
     """`felt_whisk` of a touch that is known."""
     at = stroke.at(theta_rad, touch)
     if at.status:
@@ -126,7 +159,9 @@ def whisk_at(stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_r
     )
 
 
-def as_felt(number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float, delay_s: Value) -> FeltWhisk:
+def as_felt(
+    number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float, delay_s: Value
+) -> FeltWhisk:
     """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`.
 
     The gauges' own filter makes all that is felt late by `delay_s`. That is taken out of the touch, and is in its
@@ -155,10 +190,16 @@ def _moments(whisk: Whisk) -> tuple[Value, Value]:
 
 
 def felt_by_theta(
-    stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, answered: Callable[[Whisk], tuple[EstimateRow, ...]]
+    stroke: Stroke,
+    readout: Readout,
+    touch: Touch,
+    beam: Beam,
+    answered: Callable[[Whisk], tuple[EstimateRow, ...]],
 ) -> tuple[FeltAt, ...]:
     """Moments and what estimators answer at THETAS_DEG, as far as the stroke goes."""
-    reached = (whisk_at(stroke, readout, touch, beam, theta) for theta in np.radians(THETAS_DEG).tolist())
+    reached = (
+        whisk_at(stroke, readout, touch, beam, theta) for theta in np.radians(THETAS_DEG).tolist()
+    )
     return tuple(felt_at(whisk, answered(whisk)) for whisk in reached if isinstance(whisk, Whisk))
 
 
@@ -180,15 +221,22 @@ def _slip_angle(whisk: Whisk) -> Value:
     """φ, equation (8), and its sigma."""
     m_y, m_z = whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
     gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
-    return Value(felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0)))
+    return Value(
+        felt_slip_angle(m_y, m_z), math.sqrt(max(gradient @ whisk.covariance_at @ gradient, 0.0))
+    )
 
 
 def answers(
-    whisk: Whisk, asked: Mapping[str, Estimator], settings: Settings, radii_mm: tuple[float, float] = UNTOLD
+    whisk: Whisk,
+    asked: Mapping[str, Estimator],
+    settings: Settings,
+    radii_mm: tuple[float, float] = UNTOLD,
 ) -> tuple[EstimateRow, ...]:
     """What each estimator says, as rows of estimates.csv without truth. radii_mm: see `answer`."""
     alpha = settings.alpha_est_rad, float(np.radians(settings.first_alpha_est_sigma_deg))
-    return tuple(answer(name, estimator, whisk, *alpha, radii_mm) for name, estimator in asked.items())
+    return tuple(
+        answer(name, estimator, whisk, *alpha, radii_mm) for name, estimator in asked.items()
+    )
 
 
 def answer(
@@ -211,14 +259,18 @@ def answer(
     if estimator in WITHOUT_ALPHA:
         exact_sigma_mm = doubted.sigma_mm
     elif exact_sigma_mm is None:
-        exact_sigma_mm = _asked(name, estimator, whisk, replace(told, alpha_est_sigma_rad=0.0)).sigma_mm
+        exact_sigma_mm = _asked(
+            name, estimator, whisk, replace(told, alpha_est_sigma_rad=0.0)
+        ).sigma_mm
     ends = (doubted.low_mm, doubted.high_mm)
     if math.isnan(doubted.low_mm) and math.isnan(doubted.high_mm):
         ends = (doubted.d_x_mm - Z_95 * doubted.sigma_mm, doubted.d_x_mm + Z_95 * doubted.sigma_mm)
     d_x = Value(doubted.d_x_mm, doubted.sigma_mm)
     angles = doubted.alpha_est_rad, float(doubted.beta_rad)
     row = EstimateRow(name, d_x, *angles, doubted.status, exact_sigma_mm, *map(float, ends))
-    return _with_contact(row, contact_of(whisk, doubted, told.alpha_est_sigma_rad if angles[0] else 0.0))
+    return _with_contact(
+        row, contact_of(whisk, doubted, told.alpha_est_sigma_rad if angles[0] else 0.0)
+    )
 
 
 def _with_contact(row: EstimateRow, contact: Contact) -> EstimateRow:
@@ -234,10 +286,14 @@ def _with_contact(row: EstimateRow, contact: Contact) -> EstimateRow:
 def _asked(name: str, estimator: Estimator, whisk: Whisk, told: EstimatorSettings) -> Estimate:
     try:
         estimate = estimator(whisk, told)
-    except Exception as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
+    except (
+        Exception
+    ) as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
         return Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
     if not isinstance(estimate, Estimate):
-        raise BadInput(f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate")
+        raise BadInput(
+            f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate"
+        )
     return held_to_its_word(estimate, whisk.beam.length_mm)
 
 
@@ -246,17 +302,27 @@ def held_to_its_word(estimate: Estimate, length_mm: float) -> Estimate:
     d_x, sigma = _float(estimate.d_x_mm), _float(estimate.sigma_mm)
     estimate = replace(estimate, d_x_mm=d_x, sigma_mm=sigma, status=str(estimate.status))
     if not (np.isfinite(d_x) and d_x > 0):
-        said = "gave no distance and no reason" if math.isnan(d_x) else f"gave {d_x:g} mm, which is no distance"
+        said = (
+            "gave no distance and no reason"
+            if math.isnan(d_x)
+            else f"gave {d_x:g} mm, which is no distance"
+        )
         return replace(estimate, d_x_mm=math.nan, sigma_mm=math.nan, status=estimate.status or said)
-    doubts = [] if np.isfinite(sigma) and sigma > 0 else [f"gave a sigma of {sigma:g} mm, which is none"]
+    doubts = (
+        [] if np.isfinite(sigma) and sigma > 0 else [f"gave a sigma of {sigma:g} mm, which is none"]
+    )
     if d_x > length_mm and not estimate.status:
         doubts.append(f"gave {d_x:.1f} mm, past the whisker's length of {length_mm:g} mm")
     sigma = math.nan if doubts and "sigma" in doubts[0] else sigma
-    if estimate.deflection_mm is not None and not _is_measured(estimate.deflection_mm, estimate.deflection_sigma_mm):
+    if estimate.deflection_mm is not None and not _is_measured(
+        estimate.deflection_mm, estimate.deflection_sigma_mm
+    ):
         given = f"{estimate.deflection_mm} ± {estimate.deflection_sigma_mm} mm"
         doubts.append(f"gave a deflection of {given}, which is none")
         estimate = replace(estimate, deflection_mm=None, deflection_sigma_mm=None)
-    return replace(estimate, sigma_mm=sigma, status="; ".join(filter(None, [estimate.status, *doubts])))
+    return replace(
+        estimate, sigma_mm=sigma, status="; ".join(filter(None, [estimate.status, *doubts]))
+    )
 
 
 def _is_measured(pair, sigmas) -> bool:
@@ -265,7 +331,9 @@ def _is_measured(pair, sigmas) -> bool:
         values, widths = np.asarray(pair, dtype=float), np.asarray(sigmas, dtype=float)
     except (TypeError, ValueError):
         return False
-    return values.shape == widths.shape == (2,) and bool(np.isfinite([values, widths]).all() and (widths > 0).all())
+    return values.shape == widths.shape == (2,) and bool(
+        np.isfinite([values, widths]).all() and (widths > 0).all()
+    )
 
 
 def _float(value) -> float:

@@ -10,7 +10,13 @@ from bench.records.plain import from_plain, to_plain
 from bench.session.signals import read_signals
 from bench.trials.unit import Unit
 
-_CODE = ("estimator", "bench/gauges", "bench/session", "bench/records", "bench/trials/free_strokes.py")
+_CODE = (
+    "estimator",
+    "bench/gauges",
+    "bench/session",
+    "bench/records",
+    "bench/trials/free_strokes.py",
+)
 
 
 @dataclass(frozen=True)

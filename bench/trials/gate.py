@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from bench.gauges.felt import Stroke
-from bench.records.trial import EstimateRow, FeltAt
+from bench.records.trial_result import EstimateRow, FeltAt
 from bench.trials.estimates import Readout, felt_at
-from bench.trials.phases import Rest, rests_of
+from bench.trials.stick_slip_phases import Rest, rests_of
 from estimator.signal import Touch
 from estimator.whisk import Whisk
 
@@ -21,7 +21,9 @@ _FEWEST = 2  # teeth: one jump may be a knock
 _FROM_SHARE, _TO_SHARE = 0.5, 1.5
 
 
-def kinetic_of(stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, given: EstimateRow) -> FeltAt | None:
+def kinetic_of(
+    stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, given: EstimateRow
+) -> FeltAt | None:
     """What a stroke shows of `kinetic_end`."""
     theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)
     found = kinetic_end(stroke.time_s, theta, moments, whisk, given)
@@ -29,7 +31,11 @@ def kinetic_of(stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, giv
 
 
 def kinetic_end(
-    time_s: np.ndarray, theta_rad: np.ndarray, moments_Nmm: np.ndarray, whisk: Whisk, given: EstimateRow
+    time_s: np.ndarray,
+    theta_rad: np.ndarray,
+    moments_Nmm: np.ndarray,
+    whisk: Whisk,
+    given: EstimateRow,
 ) -> Whisk | None:
     """The whisk as it would be felt on the kinetic cone, or None where its moments show no teeth.
 
@@ -38,7 +44,9 @@ def kinetic_end(
     """
     if not (given.d_x_est_mm.value > 0 and given.beta_est_rad != 0):
         return None
-    _, rests = rests_of(time_s, theta_rad, moments_Nmm, given.beta_est_rad, given.d_x_est_mm.value, whisk.beam)
+    _, rests = rests_of(
+        time_s, theta_rad, moments_Nmm, given.beta_est_rad, given.d_x_est_mm.value, whisk.beam
+    )
     low, high = _FROM_SHARE * whisk.theta_at_rad, _TO_SHARE * whisk.theta_at_rad
     ends = [_per_angle(rest) for rest in rests if low < rest.from_rad < high]
     if len(ends) < _FEWEST:
@@ -47,7 +55,9 @@ def kinetic_end(
     m_y, m_z = mean * whisk.theta_at_rad
     covariance = whisk.covariance_at + spread * whisk.theta_at_rad**2
     side = float(np.sign(given.beta_est_rad))
-    return replace(whisk, m_y_at_Nmm=side * float(m_y), m_z_at_Nmm=float(m_z), covariance_at=covariance)
+    return replace(
+        whisk, m_y_at_Nmm=side * float(m_y), m_z_at_Nmm=float(m_z), covariance_at=covariance
+    )
 
 
 def _per_angle(rest: Rest) -> np.ndarray:

@@ -9,7 +9,7 @@ from bench.base.doubts import Doubts
 from bench.base.results import read_result, write_result
 from bench.base.workers import MOST_DEATHS, Workers
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial import FeltTrial, FeltWhisk, SeenTrial, TrialResult
+from bench.records.trial_result import FeltTrial, FeltWhisk, SeenTrial, TrialResult
 from bench.session.signals import forward_strokes, read_signals
 from bench.trials.seen import unseen
 from bench.trials.unit import Unit, described, evaluate_unit, see_unit

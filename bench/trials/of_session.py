@@ -14,15 +14,15 @@ from bench.base.errors import BadInput
 from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.calibration import SessionCalibration, calibrate_session
+from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.gauges.certificate import Certificate
-from bench.gauges.checks import Undetermined, check_alive
 from bench.gauges.drift import drift_rate
 from bench.gauges.felt import strokes_of
 from bench.gauges.fit import fit_gauges
+from bench.gauges.gauge_faults import Undetermined, check_alive
+from bench.gauges.gauge_readings import pairs_of
 from bench.gauges.gauges_file import given_gauges
 from bench.gauges.matrix import FROM_ALL, Gauges
-from bench.gauges.readings import pairs_of
 from bench.gauges.reversal import reversals
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
@@ -56,7 +56,9 @@ def require_some(trials: Sequence[Trial], settings: Settings) -> None:
     there = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
     for name in settings.seeing.cameras:
         if name not in there:
-            raise BadInput(f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some_of(there)}")
+            raise BadInput(
+                f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some_of(there)}"
+            )
 
 
 def _some_of(names: Iterable[str]) -> str:
@@ -65,7 +67,12 @@ def _some_of(names: Iterable[str]) -> str:
 
 
 def placed_units(
-    session: Session, trials: Sequence[Trial], out: Path, settings: Settings, pool: Workers, doubts: Doubts
+    session: Session,
+    trials: Sequence[Trial],
+    out: Path,
+    settings: Settings,
+    pool: Workers,
+    doubts: Doubts,
 ) -> tuple[SessionCalibration, list[Unit]]:
     """The session's cameras in the rig frame of board and free strokes, and a unit of work for each trial, so far
     without gauges. Raises BadInput."""
@@ -73,8 +80,11 @@ def placed_units(
 
 
 def first_units(
-    session: Session, trials: Sequence[Trial], out: Path, settings: Settings,
-    calibration: SessionCalibration | None = None
+    session: Session,
+    trials: Sequence[Trial],
+    out: Path,
+    settings: Settings,
+    calibration: SessionCalibration | None = None,
 ) -> list[Unit]:
     """A unit of work for each trial, by the cameras where the board has them; calibration: where there is one already.
     Raises BadInput."""
@@ -82,7 +92,10 @@ def first_units(
     digests = Digests(out)
     hashes = [hash_of_files([trial.folder], digests.of) for trial in trials]
     digests.keep()
-    return [Unit(session, trial, files, calibration, settings, out) for trial, files in zip(trials, hashes)]
+    return [
+        Unit(session, trial, files, calibration, settings, out)
+        for trial, files in zip(trials, hashes)
+    ]
 
 
 def settled_units(
@@ -109,7 +122,10 @@ def session_drift(units: Sequence[Unit], pool: Workers) -> tuple[np.ndarray, np.
     forces, None where no load cell was recorded."""
     every = max(1, len(units) // _MOST_DRIFT_STROKES)
     found = pool.run(free_strokes, units[::every], "free strokes")
-    gauges, forces = ([one for of_trial in found for one in getattr(of_trial, kind)] for kind in ("channels", "forces"))
+    gauges, forces = (
+        [one for of_trial in found for one in getattr(of_trial, kind)]
+        for kind in ("channels", "forces")
+    )
     return drift_rate(gauges), drift_rate(forces) if forces else None
 
 
@@ -136,7 +152,9 @@ def _has_volts(unit: Unit) -> bool:
     return read_signals(unit.trial).kind == "V"
 
 
-def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts) -> Certificate:
+def certified(
+    units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
+) -> Certificate:
     """The gauges fitted to what the cameras and the gauges show of these trials, with all that they rest on.
 
     rate (2,): drift of the channels, V/s. Raises Undetermined where the trials do not fix the coefficients, BadInput
@@ -148,15 +166,21 @@ def certified(units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Do
         check_alive(of_trial)
     found = [
         pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
-        for unit, seen, of_trial in zip(units, seen_units(units, pool, "gauge trials", doubts), strokes)
+        for unit, seen, of_trial in zip(
+            units, seen_units(units, pool, "gauge trials", doubts), strokes
+        )
         for whisk, stroke in zip(seen.whisks, of_trial)
     ]
     pairs = tuple(p for p in found if p is not None)
     every_stroke = tuple(stroke for of_trial in strokes for stroke in of_trial)
-    back = tuple(r for unit in units for r in reversals(unit.trial, read_signals(unit.trial), settings))
+    back = tuple(
+        r for unit in units for r in reversals(unit.trial, read_signals(unit.trial), settings)
+    )
     turn = max(unit.trial.follicle_roll_sigma_deg for unit in units)
     gauges = fit_gauges(pairs)
-    return Certificate(session.name, session.whisker, gauges, pairs, every_stroke, rate, back, roll_sigma_deg=turn)
+    return Certificate(
+        session.name, session.whisker, gauges, pairs, every_stroke, rate, back, roll_sigma_deg=turn
+    )
 
 
 def _lacking(units: Sequence[Unit]) -> Iterator[str]:
@@ -164,6 +188,8 @@ def _lacking(units: Sequence[Unit]) -> Iterator[str]:
     for unit in units:
         seen = kept_seen(unit)
         whisks = seen.whisks if seen else ()
-        lacks = dict.fromkeys(whisk.status for whisk in whisks if not whisk.has_truth and whisk.status)
+        lacks = dict.fromkeys(
+            whisk.status for whisk in whisks if not whisk.has_truth and whisk.status
+        )
         if lacks:
             yield f"{unit.trial.name} has no truth: {', '.join(lacks)}"

@@ -5,12 +5,12 @@ It sees its own trial, as no other estimate does: its rows have a table and a li
 
 from bench.base.errors import BadInput
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
-from bench.records.trial import ByOneCamera
+from bench.records.trial_result import ByOneCamera
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from estimator.seen_shape import SeenShape, contact_of_shape
 from vision.truth.records import WhiskTruth
-from vision.truth.sights import sights_of
+from vision.truth.sight_lines import sights_of
 from vision.truth.value import Value
 
 NOT_SHOWN = "the camera shows nothing of this whisk's wire, or was left out"

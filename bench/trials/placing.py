@@ -9,15 +9,15 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.results import hash_of
 from bench.base.workers import Workers
-from bench.cameras.calibration import SessionCalibration
 from bench.cameras.first_look import by_first_look, first_look, spread
+from bench.cameras.session_cameras import SessionCalibration
 from bench.session.session import Session
 from bench.trials.consistency import Cause, Difference
 from bench.trials.lost import seen_units
 from bench.trials.unit import Unit
 from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
 from vision.calibration.swing import by_strokes
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform
 
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
@@ -27,7 +27,9 @@ _MOST_ROUNDS = 3  # ends before, where a step is small. Set by eye
 _ELSEWHERE_MM = 2.0
 # A T_rig_board known no better is a first guess: the strokes alone must then do.
 _BY_RULER_MM = 1.0
-_STAYS = "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
+_STAYS = (
+    "The cameras stay where they were: brought along, or placed by a T_rig_board taken as exact."
+)
 
 
 class _Unread(Refused):
@@ -35,7 +37,11 @@ class _Unread(Refused):
 
 
 def place_rig(
-    session: Session, calibration: SessionCalibration, units: Sequence[Unit], pool: Workers, doubts: Doubts
+    session: Session,
+    calibration: SessionCalibration,
+    units: Sequence[Unit],
+    pool: Workers,
+    doubts: Doubts,
 ) -> SessionCalibration:
     """The calibration with the cameras in the rig frame of board and free strokes together, and notes on both.
 
@@ -58,7 +64,9 @@ def place_rig(
     except Refused as reason:
         if alone:
             asked = "record free strokes of some 10 degrees, or measure T_rig_board"
-            raise BadInput(f"T_rig_board is missing, and {reason}: {asked}", file="trials") from None
+            raise BadInput(
+                f"T_rig_board is missing, and {reason}: {asked}", file="trials"
+            ) from None
         if isinstance(reason, _Unread):
             doubts.notes += _elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
@@ -66,7 +74,9 @@ def place_rig(
         _check_suffices(both, doubts)
     if both.alarm and not alone:
         doubts.note(both.alarm)
-    return placed_here.with_notes(*(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays)
+    return placed_here.with_notes(
+        *(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays
+    )
 
 
 def _by_scale(session: Session, board: Placement, strokes: Placement) -> str:
@@ -112,7 +122,11 @@ def _check_suffices(both: Placement, doubts: Doubts) -> None:
 
 
 def _settled(
-    calibration: SessionCalibration, board: Placement, chosen: Sequence[Unit], pool: Workers, doubts: Doubts
+    calibration: SessionCalibration,
+    board: Placement,
+    chosen: Sequence[Unit],
+    pool: Workers,
+    doubts: Doubts,
 ) -> tuple[SessionCalibration, Placement]:
     """The calibration moved to where board and strokes together have the rig, and that placement.
 
@@ -130,12 +144,16 @@ def _settled(
     return _moved(here, exact, both), both
 
 
-def _moved(calibration: SessionCalibration, before: Placement, after: Placement) -> SessionCalibration:
+def _moved(
+    calibration: SessionCalibration, before: Placement, after: Placement
+) -> SessionCalibration:
     cameras = placed(calibration.cameras, before, after)
     T_rig_board = calibration.T_rig_board
     if T_rig_board is not None:
         T_rig_board = compose(invert_transform(after.T_board_rig), T_rig_board)
-    made = hash_of([[camera, cameras.covariance, cameras.placement] for camera in cameras], calibration.hash)
+    made = hash_of(
+        [[camera, cameras.covariance, cameras.placement] for camera in cameras], calibration.hash
+    )
     return replace(calibration, cameras=cameras, T_rig_board=T_rig_board, hash=made)
 
 

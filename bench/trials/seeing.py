@@ -11,7 +11,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Seeing, Settings
 from bench.session.plausible import Window
 from bench.session.strict_toml import Keys, as_keys, read_toml, values
-from vision.geometry.settings import VisionSettings
+from vision.geometry.vision_settings import VisionSettings
 
 # Each rung has what the one before leaves out. What a rung costs and how wrong it is, `tradeoff` measures.
 PRESETS = {
@@ -64,7 +64,11 @@ def by_preset(name: str) -> Seeing:
 def from_file(path: Path) -> Seeing:
     """The settings of a TOML file. Raises BadInput, naming the key that is wrong."""
     keys = as_keys(read_toml(path, path.name), SettingsFile, path.name, Doubts()).seeing
-    given = {name: value for name, value in values(keys, ("preset", "cameras")).items() if value is not None}
+    given = {
+        name: value
+        for name, value in values(keys, ("preset", "cameras")).items()
+        if value is not None
+    }
     base = by_preset(keys.preset)
     return Seeing(path.name if given else base.name, replace(base.vision, **given), keys.cameras)
 
@@ -80,7 +84,9 @@ def as_toml(seeing: Seeing) -> str:
     """The settings as a file that `from_file` reads."""
     lines = [f"[{_OWN_TABLE}]"]
     if seeing.cameras:
-        lines.append(f"cameras = [{', '.join(f'{name!r}'.replace(chr(39), chr(34)) for name in seeing.cameras)}]")
+        lines.append(
+            f"cameras = [{', '.join(f'{name!r}'.replace(chr(39), chr(34)) for name in seeing.cameras)}]"
+        )
     for name in SeeingKeys.windows | {"check_beam": None}:
         value = getattr(seeing.vision, name)
         lines.append(f"{name} = {str(value).lower() if isinstance(value, bool) else f'{value:g}'}")

@@ -13,27 +13,31 @@ import numpy as np
 from bench.base.results import SEEING, hash_of, hash_of_code, hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.calibration import at_base, calibrate_session
+from bench.cameras.session_cameras import at_base, calibrate_session
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from bench.trials.of_session import first_units
 from bench.trials.other_wires import has_lines, lines_in, write_lines
-from bench.trials.pictures import Shown
+from bench.trials.trial_frames import Shown
 from bench.trials.unit import Unit
 from vision.geometry.centreline import REST_POWERS, one_curve
-from vision.geometry.errors import Refused
-from vision.lines.trace import lines_of
+from vision.geometry.refusals import Refused
 from vision.pictures.others import RodLines
 from vision.truth.observe import wire_lines
+from vision.wire.trace import lines_of
 
 _LOOKS = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
 
 
 def array_units(
-    views: Sequence[Session], recorded: Sequence[Sequence[Trial]], out: Path, folders: Sequence[Path],
-    settings: Settings, pool: Workers
+    views: Sequence[Session],
+    recorded: Sequence[Sequence[Trial]],
+    out: Path,
+    folders: Sequence[Path],
+    settings: Settings,
+    pool: Workers,
 ) -> list[list[Unit]]:
     """As `first_units`, of each whisker of an array, by its view, recorded trials and folder: by one calibration of the
     whole in `out`, and with where the others' wires are. Raises BadInput."""
@@ -43,9 +47,17 @@ def array_units(
         for view, trials, folder in zip(views, recorded, folders)
     ]
     for look in range(_LOOKS + 1):
-        staged = [replace(unit, stage=f"wires{look}") for units in known for unit in units if _is_seen(unit)]
+        staged = [
+            replace(unit, stage=f"wires{look}")
+            for units in known
+            for unit in units
+            if _is_seen(unit)
+        ]
         pool.run(_look if look else _predict, staged, "wires side by side")
-        known = [[_told(unit, known, look) if _is_seen(unit) else unit for unit in units] for units in known]
+        known = [
+            [_told(unit, known, look) if _is_seen(unit) else unit for unit in units]
+            for units in known
+        ]
     return known
 
 
@@ -62,11 +74,15 @@ def _told(unit: Unit, whiskers: Sequence[Sequence[Unit]], look: int) -> Unit:
         if one.trial.name == unit.trial.name
     )
     made_from = hash_of([name for name, _ in files], [hash_of_files([path]) for _, path in files])
-    return replace(unit, wires=files, wires_hash=made_from, straight=unit.straight if look else files)
+    return replace(
+        unit, wires=files, wires_hash=made_from, straight=unit.straight if look else files
+    )
 
 
 def _key(unit: Unit) -> str:
-    return hash_of(hash_of_code(("bench/trials/side_by_side.py",)), hash_of_code(SEEING), unit.seen_hash)
+    return hash_of(
+        hash_of_code(("bench/trials/side_by_side.py",)), hash_of_code(SEEING), unit.seen_hash
+    )
 
 
 def _predict(unit: Unit) -> None:
@@ -76,7 +92,10 @@ def _predict(unit: Unit) -> None:
     signals, times = read_signals(unit.trial), frame_times(unit.trial)
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
     wire, straight = unit.session.whisker.wire, np.zeros((2, REST_POWERS))
-    curves = {k: one_curve(straight, np.zeros(2), wire.length_mm, motor, wire) for k, motor in enumerate(motor_rad)}
+    curves = {
+        k: one_curve(straight, np.zeros(2), wire.length_mm, motor, wire)
+        for k, motor in enumerate(motor_rad)
+    }
     lines = {camera.name: lines_of(camera, wire, curves) for camera in unit.calibration.cameras}
     write_lines(unit.seen_path, _key(unit), lines)
 
@@ -98,4 +117,6 @@ def _found(unit: Unit) -> dict[str, RodLines]:
         return wire_lines(shown.pictures, whisks, unit.calibration.cameras, shown.rods, usual)
     except Refused:
         name = unit.session.base.name
-        return {camera: some[name] for camera, some in lines_in(unit.straight).items() if name in some}
+        return {
+            camera: some[name] for camera, some in lines_in(unit.straight).items() if name in some
+        }

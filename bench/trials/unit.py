@@ -14,12 +14,12 @@ import numpy as np
 
 from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_result, write_result
 from bench.base.settings import Settings
-from bench.cameras.calibration import SessionCalibration
+from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.felt import Stroke, gauge_delay, strokes_of, touch_on_the_way_back
+from bench.gauges.gauge_readings import Pairs, pairs_of
 from bench.gauges.matrix import Gauges
-from bench.gauges.readings import Pairs, pairs_of
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial import (
+from bench.records.trial_result import (
     EstimateRow,
     FeltTrial,
     FeltWhisk,
@@ -35,15 +35,15 @@ from bench.session.signals import Signals, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.agreement import Agreement, agreement
-from bench.trials.both_ways import feel_back
 from bench.trials.consistency import cone_doubt, nominal_slope
 from bench.trials.estimates import Readout, answers, as_felt, estimators, felt_by_theta, felt_whisk
 from bench.trials.gate import kinetic_of
-from bench.trials.moving import ASKED, MOVING, with_motion
+from bench.trials.object_motion import ASKED, MOVING, with_motion
 from bench.trials.other_wires import lines_in
-from bench.trials.phases import phases_of
 from bench.trials.seen import see_trial
-from bench.trials.sensors import with_others
+from bench.trials.sensor_readings import with_others
+from bench.trials.stick_slip_phases import phases_of
+from bench.trials.ways_back import feel_back
 from bench.trials.whose_wire import with_whose
 from estimator.builtin import ESTIMATORS
 from estimator.sensors import SENSORS
@@ -107,14 +107,24 @@ class Unit:
     @property
     def hash(self) -> str:
         """Hash of all that the result depends on."""
-        made_from = self.drift_rate, self.gauges, self.settings.estimated(), self.settings.own_code()
+        made_from = (
+            self.drift_rate,
+            self.gauges,
+            self.settings.estimated(),
+            self.settings.own_code(),
+        )
         return hash_of(hash_of_code(ESTIMATING), self.seen_hash, self.force_drift_rate, *made_from)
 
     def with_gauges(
-        self, drift_rate: np.ndarray, gauges: Gauges | None, force_drift_rate: np.ndarray | None = None
+        self,
+        drift_rate: np.ndarray,
+        gauges: Gauges | None,
+        force_drift_rate: np.ndarray | None = None,
     ) -> "Unit":
         """The unit complete, once the gauges are known."""
-        return replace(self, drift_rate=drift_rate, gauges=gauges, force_drift_rate=force_drift_rate)
+        return replace(
+            self, drift_rate=drift_rate, gauges=gauges, force_drift_rate=force_drift_rate
+        )
 
 
 def see_unit(unit: Unit) -> SeenTrial:
@@ -131,7 +141,9 @@ def _see(unit: Unit, signals: Signals) -> SeenTrial:
     if not unit.wires:
         return see_trial(*made_from)
     looked = lines_in(unit.wires)
-    return with_whose(see_trial(*made_from, looked), lines_in(unit.straight), looked, unit.session.base.name)
+    return with_whose(
+        see_trial(*made_from, looked), lines_in(unit.straight), looked, unit.session.base.name
+    )
 
 
 def kept_seen(unit: Unit) -> SeenTrial | None:
@@ -182,7 +194,11 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     whisks = tuple(_feel(unit, signals.kind, s, seen.whisks[k], k) for k, s in enumerate(strokes))
     delay = gauge_delay(unit.trial.gauge_filter_Hz)
     there = touch_on_the_way_back(signals, delay.value) if seen.back else UNKNOWN
-    back = feel_back(partial(_feel, unit, signals.kind), unit, signals, seen, whisks) if unit.trial.both_ways else ()
+    back = (
+        feel_back(partial(_feel, unit, signals.kind), unit, signals, seen, whisks)
+        if unit.trial.both_ways
+        else ()
+    )
     return FeltTrial(whisks, there, back)
 
 
@@ -196,26 +212,39 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     usable = None if status else whisk
     if usable is not None and readout.is_gauged:
         status = unit.gauges.beyond(readout.in_follicle(usable))
-    felt = as_felt(number, touch, usable, stroke.speed_rad_s, gauge_delay(unit.trial.gauge_filter_Hz))
+    felt = as_felt(
+        number, touch, usable, stroke.speed_rad_s, gauge_delay(unit.trial.gauge_filter_Hz)
+    )
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
     felt = replace(felt, shared_Nmm=readout.shared_Nmm(usable))
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     told = {"settings": unit.settings, "radii_mm": _radii_mm(unit)}
-    known = {"force_drift_rate": unit.force_drift_rate, "scale_sigma": _C_share(unit, readout, of_wire=True)}
+    known = {
+        "force_drift_rate": unit.force_drift_rate,
+        "scale_sigma": _C_share(unit, readout, of_wire=True),
+    }
     sensing = partial(with_others, stroke=stroke, readout=readout, touch=touch, **known)
     sensors = () if stroke.forces_N is None else _answered(sensing, usable, asked=SENSORS, **told)
     if unit.trial.object_velocity_mm_s is not None:
-        sensors += answers(with_motion(usable, unit.trial, stroke, felt.touch_felt_rad.value), ASKED, **told)
-    answered = partial(_answered, sensing if unit.settings.estimators else None,
-                       asked=estimators(unit.settings.estimators), **told)  # fmt: skip
+        sensors += answers(
+            with_motion(usable, unit.trial, stroke, felt.touch_felt_rad.value), ASKED, **told
+        )
+    answered = partial(
+        _answered,
+        sensing if unit.settings.estimators else None,
+        asked=estimators(unit.settings.estimators),
+        **told,
+    )
     estimates = answered(usable)
     return replace(
         felt,
         phases=phases_of(unit.trial, stroke, touch, readout, seen, beam),
         estimates=estimates,
-        kinetic=kinetic_of(stroke, touch, readout, usable, next(row for row in estimates if row.estimator == _TEN)),
+        kinetic=kinetic_of(
+            stroke, touch, readout, usable, next(row for row in estimates if row.estimator == _TEN)
+        ),
         by_theta=felt_by_theta(stroke, readout, touch, beam, answered),
         sensors=sensors,
         one_factor=_one_factor(unit, kind, stroke),
@@ -223,7 +252,9 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     )
 
 
-def _answered(sensing: Callable[[Whisk], Whisk] | None, whisk: Whisk, **asked) -> tuple[EstimateRow, ...]:
+def _answered(
+    sensing: Callable[[Whisk], Whisk] | None, whisk: Whisk, **asked
+) -> tuple[EstimateRow, ...]:
     """Answers about a whisk; sensing: tells it what other sensors have to say."""
     return answers(whisk if sensing is None else sensing(whisk), **asked)
 
@@ -235,13 +266,22 @@ def _C_share(unit: Unit, readout: Readout, *, of_wire: bool) -> float:
     return whisker.C_sigma_Nmm2 / whisker.C_Nmm2 if fitted == of_wire else 0.0
 
 
-def _against_pictures(felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk) -> FeltWhisk:
+def _against_pictures(
+    felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk
+) -> FeltWhisk:
     """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status. Where
     pictures contradict encoder or lengths, they tell nothing of gauges."""
     if seen.deflection is None or seen.contradicted:
-        odd = cone_doubt(felt.phi_felt_rad, nominal_slope(unit.trial), "felt") if seen.deflection is None else ""
+        odd = (
+            cone_doubt(felt.phi_felt_rad, nominal_slope(unit.trial), "felt")
+            if seen.deflection is None
+            else ""
+        )
         return replace(felt, apart=seen.contradicted or bool(odd), status=_joined(felt.status, odd))
-    whisker, rate = unit.session.whisker, np.zeros(2) if unit.drift_rate is None else unit.drift_rate
+    whisker, rate = (
+        unit.session.whisker,
+        np.zeros(2) if unit.drift_rate is None else unit.drift_rate,
+    )
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
     if pairs is None:
         return felt
@@ -299,4 +339,3 @@ def _radii_mm(unit: Unit) -> tuple[float, float]:
     """Of the bar, NaN where the manifest does not say, and of the whisker's base."""
     bar = unit.trial.bar_diameter_mm
     return (NAN if bar is None else 0.5 * bar), 0.5 * unit.session.whisker.diameter_mm
-

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.base.doubts import in_one_status
-from bench.records.trial import SeenTrial, SeenWhisk
+from bench.records.trial_result import SeenTrial, SeenWhisk
 from vision.fit.problem import REST_PRIOR_MM
 from vision.pictures.others import Others, RodLines
 
@@ -32,9 +32,14 @@ def _checked(whisk: SeenWhisk, straight, looked, own: str, radius_mm: float) -> 
     if not whisk.overlay:
         return whisk
     drawing = next(iter(whisk.overlay.values()))
-    wires = {camera: lines["wire"] for camera, lines in drawing.cameras.items() if camera in straight}
+    wires = {
+        camera: lines["wire"] for camera, lines in drawing.cameras.items() if camera in straight
+    }
     others = sorted({name for one in straight.values() for name in one} - {own})
-    starts = [_start(wire, straight[camera], drawing.frame, own, radius_mm) for camera, wire in wires.items()]
+    starts = [
+        _start(wire, straight[camera], drawing.frame, own, radius_mm)
+        for camera, wire in wires.items()
+    ]
     beside_mm, nearest = max(starts, default=(0.0, own))
     taken = [name for name in others if _lies_on(wires, looked, drawing.frame, name)]
     said = []
@@ -47,14 +52,19 @@ def _checked(whisk: SeenWhisk, straight, looked, own: str, radius_mm: float) -> 
     return replace(whisk, status=status, contradicted=whisk.contradicted or bool(said))
 
 
-def _start(wire: np.ndarray, straight: Others, frame: int, own: str, radius_mm: float) -> tuple[float, str]:
+def _start(
+    wire: np.ndarray, straight: Others, frame: int, own: str, radius_mm: float
+) -> tuple[float, str]:
     """How far, mm, the first part of a wire's line (m, 2) in a camera is beside where its base has it, and the whisker
     whose base has its wire nearest to it."""
     lines = {name: line for name in straight if (line := _line(straight[name], frame)) is not None}
     if own not in lines:
         return 0.0, own
     first = wire[1 : 1 + len(wire) // 10]
-    off_px = {name: float(np.sqrt(np.mean(_away_px(first, line) ** 2))) for name, (line, _) in lines.items()}
+    off_px = {
+        name: float(np.sqrt(np.mean(_away_px(first, line) ** 2)))
+        for name, (line, _) in lines.items()
+    }
     px_per_mm = lines[own][1] / radius_mm
     return off_px[own] / px_per_mm, min(off_px, key=lambda name: (off_px[name], name != own))
 
@@ -65,7 +75,9 @@ def _lies_on(wires: Mapping[str, np.ndarray], looked, frame: int, name: str) -> 
     on = []
     for camera, wire in wires.items():
         line = _line(looked.get(camera, {}).get(name), frame)
-        on.append(line is not None and float(np.mean(_away_px(wire, line[0]) < 2.0 * line[1])) > _MOSTLY)
+        on.append(
+            line is not None and float(np.mean(_away_px(wire, line[0]) < 2.0 * line[1])) > _MOSTLY
+        )
     return bool(on) and all(on)
 
 
@@ -78,6 +90,8 @@ def _line(lines: RodLines | None, frame: int) -> tuple[np.ndarray, float] | None
 def _away_px(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Distance (n,) of points (n, 2) from a line (m, 2) of straight parts."""
     start, step = line[:-1], np.diff(line, axis=0)
-    share = np.einsum("nmi,mi->nm", points[:, None] - start, step) / np.maximum(np.sum(step**2, axis=1), 1e-12)
+    share = np.einsum("nmi,mi->nm", points[:, None] - start, step) / np.maximum(
+        np.sum(step**2, axis=1), 1e-12
+    )
     nearest = start + np.clip(share, 0.0, 1.0)[..., None] * step
     return np.min(np.linalg.norm(points[:, None] - nearest, axis=2), axis=1)

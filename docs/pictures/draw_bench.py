@@ -11,7 +11,10 @@ OUT = Path(__file__).with_name("bench.svg")
 SIZE_PX, MIDDLE_PX = (960, 560), (430, 380)
 EYE_MM, LOOK_AT_MM, FOCAL_PX = np.array([430.0, -480.0, 300.0]), np.array([55.0, 0.0, 0.0]), 1330.0
 INK, BLUE, RED, ORANGE, GREY = "#222222", "#2166ac", "#b2182b", "#b35f00", "#9aa0a8"
-CAMERAS = {"camera “high”": np.array([15.0, -40.0, 165.0]), "camera “low”": np.array([190.0, 60.0, 80.0])}
+CAMERAS = {
+    "camera “high”": np.array([15.0, -40.0, 165.0]),
+    "camera “low”": np.array([190.0, 60.0, 80.0]),
+}
 _HALO = 'paint-order="stroke" stroke="#ffffff" stroke-width="4" stroke-linejoin="round"'
 SLOPE_RAD, LENGTH_MM, D_X_MM = np.radians(35.0), 100.0, 62.0
 
@@ -47,9 +50,18 @@ def board() -> list[str]:
             x, y = -20 + 15 * i, -45 + 15 * j
             corners = [(x, y, -40), (x + 15, y, -40), (x + 15, y + 15, -40), (x, y + 15, -40)]
             squares.append(
-                path(corners, fill="#ffffff" if (i + j) % 2 else "#555555", stroke=GREY, width=0.6, closed=True)
+                path(
+                    corners,
+                    fill="#ffffff" if (i + j) % 2 else "#555555",
+                    stroke=GREY,
+                    width=0.6,
+                    closed=True,
+                )
             )
-    return [*squares, label("ChArUco board on the rig: places the cameras", (40, -45, -40), (-60, 44))]
+    return [
+        *squares,
+        label("ChArUco board on the rig: places the cameras", (40, -45, -40), (-60, 44)),
+    ]
 
 
 def cylinder(low, high, radius: float, fill: str) -> list[str]:
@@ -61,7 +73,9 @@ def cylinder(low, high, radius: float, fill: str) -> list[str]:
     turn = np.linspace(0, 2 * np.pi, 40)[:, None]
     u = np.cross(along, [0.3, 1.0, 0.2])
     u /= np.linalg.norm(u)
-    rings = [end + radius * (np.cos(turn) * u + np.sin(turn) * np.cross(along, u)) for end in (low, high)]
+    rings = [
+        end + radius * (np.cos(turn) * u + np.sin(turn) * np.cross(along, u)) for end in (low, high)
+    ]
     body = [low - side, high - side, high + side, low + side]
     return [
         path(rings[0], fill=fill, stroke=GREY, width=0.8, closed=True),
@@ -75,13 +89,19 @@ def cylinder(low, high, radius: float, fill: str) -> list[str]:
 def whisker(motor_rad: float, slip_mm: float, *, faint: bool) -> str:
     """The wire as a beam with a point load, touching the bar where it has slipped to."""
     base = np.array([np.cos(motor_rad), np.sin(motor_rad), 0.0])
-    contact = np.array([D_X_MM, 0, 0]) + slip_mm * np.array([0, np.sin(SLOPE_RAD), np.cos(SLOPE_RAD)])
+    contact = np.array([D_X_MM, 0, 0]) + slip_mm * np.array(
+        [0, np.sin(SLOPE_RAD), np.cos(SLOPE_RAD)]
+    )
     reach = contact @ base
     s = np.linspace(0, LENGTH_MM / reach, 50)
     bend = np.where(s < 1, 0.5 * (3 * s**2 - s**3), 1 + 1.5 * (s - 1))
     points = (s * reach)[:, None] * base + bend[:, None] * (contact - reach * base)
     return path(
-        points, stroke=BLUE, width=1.2 if faint else 3.0, opacity=0.45 if faint else 1.0, dash="5 4" if faint else ""
+        points,
+        stroke=BLUE,
+        width=1.2 if faint else 3.0,
+        opacity=0.45 if faint else 1.0,
+        dash="5 4" if faint else "",
     )
 
 
@@ -105,7 +125,14 @@ def camera(name: str, centre: np.ndarray) -> list[str]:
     rays = [path([centre, corner], stroke=ORANGE, width=0.7, opacity=0.5) for corner in far]
     field = path(far, stroke=ORANGE, width=0.7, opacity=0.5, closed=True)
     faces = [
-        path([centre, near[k], near[(k + 1) % 4]], fill=ORANGE, stroke=ORANGE, width=1.0, closed=True, opacity=0.35)
+        path(
+            [centre, near[k], near[(k + 1) % 4]],
+            fill=ORANGE,
+            stroke=ORANGE,
+            width=1.0,
+            closed=True,
+            opacity=0.35,
+        )
         for k in range(4)
     ]
     return [*rays, field, *faces, label(name, centre, (10, -10), ORANGE)]
@@ -114,7 +141,11 @@ def camera(name: str, centre: np.ndarray) -> list[str]:
 def axes() -> list[str]:
     """The rig frame."""
     ends = {"x": (34, 0, 0), "y": (0, 40, 0), "z": (0, 0, 42)}
-    return [p for name, end in ends.items() for p in (path([(0, 0, 0), end], width=1.1), label(name, end, (4, -4)))]
+    return [
+        p
+        for name, end in ends.items()
+        for p in (path([(0, 0, 0), end], width=1.1), label(name, end, (4, -4)))
+    ]
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """The pictures of docs/maps.md: both maps as the command draws them, small enough for a repository.
 
-    python docs/pictures/draw_maps.py [--workers N]
+python docs/pictures/draw_maps.py [--workers N]
 """
 
 import argparse

@@ -17,7 +17,7 @@ from matplotlib.patches import Circle
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.scenes.recorded import Recorded
-from vision.geometry.settings import VisionSettings
+from vision.geometry.vision_settings import VisionSettings
 
 HERE = Path(__file__).resolve().parent
 SESSION = HERE.parents[1] / "fixtures" / "small-session"
@@ -37,7 +37,9 @@ def normals(line: np.ndarray) -> np.ndarray:
 def resampled(line: np.ndarray, step_px: float) -> np.ndarray:
     """A polyline (n, 2) with equal steps."""
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    return np.column_stack([np.interp(np.arange(0, arc[-1], step_px), arc, axis) for axis in line.T])
+    return np.column_stack(
+        [np.interp(np.arange(0, arc[-1], step_px), arc, axis) for axis in line.T]
+    )
 
 
 def across(picture: np.ndarray, line: np.ndarray) -> np.ndarray:
@@ -62,8 +64,15 @@ def draw_frame(axes: Axes, picture: np.ndarray, lines: dict, settings: VisionSet
         axes.plot(*np.array(lines[rim]).T, color="#2ca02c", lw=1.0)
     axes.plot(*np.array(lines["contact"]), "o", mfc="none", mec="red", ms=9)
     middle = np.array(lines["contact"])
-    axes.set(xlim=(middle[0] - 190, middle[0] + 130), ylim=(middle[1] + 110, middle[1] - 110), xticks=[], yticks=[])
-    axes.set_title("band and pieces of the wire (blue), line points (orange),\nthe bar's rims (green), contact (red)")
+    axes.set(
+        xlim=(middle[0] - 190, middle[0] + 130),
+        ylim=(middle[1] + 110, middle[1] - 110),
+        xticks=[],
+        yticks=[],
+    )
+    axes.set_title(
+        "band and pieces of the wire (blue), line points (orange),\nthe bar's rims (green), contact (red)"
+    )
 
 
 def draw_profile(axes: Axes, picture: np.ndarray, background: np.ndarray, line: np.ndarray) -> None:
@@ -71,7 +80,9 @@ def draw_profile(axes: Axes, picture: np.ndarray, background: np.ndarray, line: 
     frame, behind = across(picture, line).mean(axis=0), across(background, line).mean(axis=0)
     axes.plot(ACROSS_PX, frame, color=BLUE, label="frame")
     axes.plot(ACROSS_PX, behind, color="0.5", ls="--", label="rig picture: what is behind")
-    axes.plot(ACROSS_PX, frame - behind, color=ORANGE, label="difference: the lit cylinder, blurred")
+    axes.plot(
+        ACROSS_PX, frame - behind, color=ORANGE, label="difference: the lit cylinder, blurred"
+    )
     axes.set(xlabel="across the wire  [px]", ylabel="grey level", title="shading, two pieces long")
     axes.margins(y=0.3)
     axes.legend(fontsize=7, frameon=False, loc="lower left")
@@ -86,7 +97,9 @@ def draw_seeing() -> Figure:
     draw_frame(left, picture, lines, VisionSettings())
     wire = resampled(np.array(lines["wire"]), 1.0)
     starts = range(60, len(wire) - LONG_PX, 4)  # beyond the clamp
-    evenest = min(starts, key=lambda k: np.ptp(across(background, wire[k : k + LONG_PX]).mean(axis=0)))
+    evenest = min(
+        starts, key=lambda k: np.ptp(across(background, wire[k : k + LONG_PX]).mean(axis=0))
+    )
     draw_profile(right, picture, background, wire[evenest : evenest + LONG_PX])
     return figure
 
@@ -101,17 +114,29 @@ def draw_words() -> Figure:
     load = np.minimum(arc, d_x)
     bend = -np.tan(theta) * d_x * (3 * d_x * load**2 - load**3) / (2 * d_x**3)
     bend -= np.where(arc > d_x, 1.5 * np.tan(theta) * (arc - d_x), 0.0)
-    axes.plot(arc * np.cos(theta), arc * np.sin(theta) + bend, color=BLUE, lw=4, label="bent wire, pushed by θ")
+    axes.plot(
+        arc * np.cos(theta),
+        arc * np.sin(theta) + bend,
+        color=BLUE,
+        lw=4,
+        label="bent wire, pushed by θ",
+    )
     unbent = 100 * np.array([[0.0, 0.0], [np.cos(theta), np.sin(theta)]])
     axes.plot(*unbent.T, color=BLUE, lw=0.9, ls="--", label="where it would rest")
     axes.add_patch(Circle((d_x, reach), 3.6, color="#2ca02c", alpha=0.6))
     axes.annotate("", (d_x, reach), (d_x, 0), arrowprops={"arrowstyle": "<->", "lw": 1.0})
     axes.text(d_x + 4.5, reach - 1.5, "bar; reach = both radii", fontsize=8, va="top")
     axes.annotate("", (0, -4), (d_x, -4), arrowprops={"arrowstyle": "<->", "lw": 1.0})
-    axes.text(d_x / 2, -4.6, "d_x: base to contact at first touch", ha="center", va="top", fontsize=8)
+    axes.text(
+        d_x / 2, -4.6, "d_x: base to contact at first touch", ha="center", va="top", fontsize=8
+    )
     end = np.array([95 * np.cos(theta), 95 * np.sin(theta)])
-    axes.annotate("", end, (95 * np.cos(theta), np.interp(95, arc, arc * np.sin(theta) + bend)),
-                  arrowprops={"arrowstyle": "<->", "lw": 0.9, "color": "0.3"})  # fmt: skip
+    axes.annotate(
+        "",
+        end,
+        (95 * np.cos(theta), np.interp(95, arc, arc * np.sin(theta) + bend)),
+        arrowprops={"arrowstyle": "<->", "lw": 0.9, "color": "0.3"},
+    )
     axes.text(end[0] + 1.5, 0.6 * end[1], "bend", fontsize=8)
     turn = np.linspace(0, theta, 20)
     axes.plot(30 * np.cos(turn), 30 * np.sin(turn), "k", lw=0.9)

@@ -1,21 +1,23 @@
 """certificate.png for docs/gauges.md: the certificate of a session's gauge calibration.
 
-    python docs/pictures/take_certificate.py SESSION
+python docs/pictures/take_certificate.py SESSION
 """
 
 import argparse
 from pathlib import Path
 
 from bench.base.doubts import Doubts
-from bench.calibrate_gauges import calibrate_gauges, chosen_trials
+from bench.commands.calibrate_gauges import calibrate_gauges, chosen_trials
 from bench.gauges.certificate import page
-from bench.session.check import checked_session
+from bench.session.session_check import checked_session
 
 HERE = Path(__file__).resolve().parent
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("session", type=Path)
     session = checked_session(parser.parse_args().session)
     certificate = calibrate_gauges(session, chosen_trials(session, every_trial=False), Doubts())

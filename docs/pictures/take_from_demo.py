@@ -1,6 +1,6 @@
 """The README's pictures, out of what `make demo` wrote, small enough for a repository.
 
-    make demo && .venv/bin/python docs/pictures/take_from_demo.py
+make demo && .venv/bin/python docs/pictures/take_from_demo.py
 """
 
 from pathlib import Path

@@ -24,7 +24,9 @@ def main(out: Path, trial: str) -> None:
     for open_card in (False, True):
         with Page(out / "report.html", *SIZE) as page:
             if open_card:
-                page.run(f"[...document.querySelectorAll('#table a')].find(a => a.innerText === '{trial}').click()")
+                page.run(
+                    f"[...document.querySelectorAll('#table a')].find(a => a.innerText === '{trial}').click()"
+                )
             page.screenshot(ROOT / "shot.png", whole=False)
         shots.append(Image.open(BytesIO((ROOT / "shot.png").read_bytes())).convert("RGB"))
         (ROOT / "shot.png").unlink()

@@ -9,9 +9,9 @@ import pytest
 
 from bench.base.results import hash_of
 from bench.base.settings import Settings
-from bench.cameras.calibration import SessionCalibration
-from bench.evaluate import evaluate
-from bench.records.trial import SeenTrial, SeenWhisk
+from bench.cameras.session_cameras import SessionCalibration
+from bench.commands.evaluate import evaluate
+from bench.records.trial_result import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes
 from bench.trials.seen import whisk_record
@@ -37,7 +37,9 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
     touching = table["contact"] == 1
     theta = np.radians(table["motor_deg"]) - touch
     points = np.stack([table[k] for k in ("x_mm", "y_mm", "z_mm")], axis=1)
-    contact = points @ np.array([[np.cos(touch), -np.sin(touch), 0], [np.sin(touch), np.cos(touch), 0], [0, 0, 1]])
+    contact = points @ np.array(
+        [[np.cos(touch), -np.sin(touch), 0], [np.sin(touch), np.cos(touch), 0], [0, 0, 1]]
+    )
     d_y, d_z = np.where(touching, d_x * np.tan(theta) - contact[:, 1], np.nan), contact[:, 2]
     phi = np.arctan2(d_z, d_y)
     values = {
@@ -66,7 +68,10 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
 def _frames(table, theta, touching, points, values) -> FrameTruth:
     """Rows of truth.csv as vision's frames; values: by name, whose sigmas are empty where nothing touches."""
     sigmas = {name: SIGMA_RAD if FIELDS[name].endswith("_rad") else SIGMA_MM for name in values}
-    columns = {FIELDS[k]: Value(column, np.where(touching, sigmas[k], np.nan)) for k, column in values.items()}
+    columns = {
+        FIELDS[k]: Value(column, np.where(touching, sigmas[k], np.nan))
+        for k, column in values.items()
+    }
     return FrameTruth(
         index=table["frame"].astype(int),
         time_s=table["time_s"],

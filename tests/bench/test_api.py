@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bench import api
+from bench.analyses.soft import SEEN_COLUMNS
 from bench.base.errors import BadInput
 from bench.base.tables import TEXT, WHOLE, read_table, write_table
-from bench.friction.soft import SEEN_COLUMNS
 from bench.report.assembly import WHISK_COLUMNS
 from tests.scenes.formats import documented
 
@@ -34,10 +34,17 @@ def test_tables_are_those_of_the_files(exact_run):
         assert list(table.dtype.names) == lines[0].split(",") == always
         assert len(table) == len(lines) - 1 - (name == "explained")  # whose last row is a mean
         for column in table.dtype.names:
-            assert table.dtype[column].kind == ("U" if column in TEXT else "i" if column in WHOLE else "f")
+            assert table.dtype[column].kind == (
+                "U" if column in TEXT else "i" if column in WHOLE else "f"
+            )
     row = run.whisks[run.whisks["trial"] == "b60_4"][0]
-    assert row["d_x_mm"] == pytest.approx(64.949086, abs=1e-5) and np.isnan(run.estimates["beta_est_deg"][0])
-    assert len(run.track("b60_4")) == len((exact_run / "track" / "b60_4.csv").read_text().splitlines()) - 1
+    assert row["d_x_mm"] == pytest.approx(64.949086, abs=1e-5) and np.isnan(
+        run.estimates["beta_est_deg"][0]
+    )
+    assert (
+        len(run.track("b60_4"))
+        == len((exact_run / "track" / "b60_4.csv").read_text().splitlines()) - 1
+    )
 
 
 def test_how_hard_pictures_were_looked_at_is_text(tmp_path):
@@ -71,5 +78,11 @@ def test_a_damaged_table_is_one_line(tmp_path):
 
 def test_figures_are_matplotlibs(exact_run):
     figures = api.read(exact_run).figures()
-    assert set(figures) == {"fig8", "error_against_slope", "explained", "error_map", "against_theta"}
+    assert set(figures) == {
+        "fig8",
+        "error_against_slope",
+        "explained",
+        "error_map",
+        "against_theta",
+    }
     assert all(figure.axes for figure in figures.values())

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.cli import main
-from bench.evaluate import evaluate
+from bench.commands.cli import main
+from bench.commands.evaluate import evaluate
 from tests.scenes.formats import documented, keys
 from tests.scenes.results import table
 
@@ -21,7 +21,10 @@ def check(session, out, trials) -> None:
         row = truth[trial]
         for column, true, most in (("d_x", d_x, 0.10), ("beta", beta, 0.6)):
             unit = "mm" if column == "d_x" else "deg"
-            error, sigma = float(row[f"{column}_{unit}"]) - true, float(row[f"{column}_sigma_{unit}"])
+            error, sigma = (
+                float(row[f"{column}_{unit}"]) - true,
+                float(row[f"{column}_sigma_{unit}"]),
+            )
             assert abs(error) <= min(most, 3 * sigma), (trial, column)
         assert float(row["d_x_sigma_mm"]) <= 0.08 and float(row["slip_sigma_mm"]) <= 0.08
         error = float(estimates[trial, "with_friction"]["error_percent"])
@@ -39,25 +42,46 @@ def _touching(session, out, trial):
 
 def check_keys(out) -> None:
     """docs/formats.md has every key of the JSON files and of cameras.npz, and no other."""
-    for heading, files in (("trials/<trial>.json", "trials/b*.json"), ("calibration/cameras.json",) * 2):
+    for heading, files in (
+        ("trials/<trial>.json", "trials/b*.json"),
+        ("calibration/cameras.json",) * 2,
+    ):
         found = {key for file in out.glob(files) for key in keys(json.loads(file.read_text()))}
-        plain = {re.sub(r"\.(cameras|bar_looks|lines)\.(high|low)\b", r".\1.<camera>", key) for key in found}
+        plain = {
+            re.sub(r"\.(cameras|bar_looks|lines)\.(high|low)\b", r".\1.<camera>", key)
+            for key in found
+        }
         plain = {re.sub(r"\.refinements\.[^.]+", ".refinements.<refinement>", key) for key in plain}
-        assert plain == {key for key in documented(heading) if ".gave." not in key}  # no key where the object stands
+        assert plain == {
+            key for key in documented(heading) if ".gave." not in key
+        }  # no key where the object stands
     with np.load(out / "calibration" / "cameras.npz") as arrays:
         assert sorted(arrays) == sorted(documented("cameras.npz"))
 
 
 def test_small_session(small_session, tmp_path, capsys):
     """Through the command line with two workers, then again: nothing is redone, the same verdict is printed."""
-    command = ["evaluate", str(small_session), "--out", str(tmp_path), "--alpha-est-deg", "10.5", "--workers", "2"]
+    command = [
+        "evaluate",
+        str(small_session),
+        "--out",
+        str(tmp_path),
+        "--alpha-est-deg",
+        "10.5",
+        "--workers",
+        "2",
+    ]
     assert main(command) in (0, 1)
     first = capsys.readouterr().out
-    check(small_session, tmp_path, [("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)])
+    check(
+        small_session, tmp_path, [("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)]
+    )
     whole = (tmp_path / "summary.txt").read_text()
     assert "camera high:" in whole and "camera low:" in whole
     verdict = whole.split("\n\n")[0]
-    assert first == f"{verdict}\n\nAll of it: {tmp_path / 'report.html'}, {tmp_path / 'summary.txt'}\n"
+    assert (
+        first == f"{verdict}\n\nAll of it: {tmp_path / 'report.html'}, {tmp_path / 'summary.txt'}\n"
+    )
     assert (tmp_path / "overlays" / "b60_4_0.png").is_file()
     check_keys(tmp_path)
     kept = [*tmp_path.glob("trials/*"), *tmp_path.glob("calibration/*"), *tmp_path.rglob("*.png")]
@@ -73,8 +97,14 @@ def test_sample_session(steel_sample, tmp_path):
     check(
         steel_sample,
         tmp_path,
-        [("b00_2", 60.122331, -0.552223), ("b30_3", 55.257944, 30.009428), ("b60_4", 64.949086, 60.219624)],
+        [
+            ("b00_2", 60.122331, -0.552223),
+            ("b30_3", 55.257944, 30.009428),
+            ("b60_4", 64.949086, 60.219624),
+        ],
     )
     rows = {(row["trial"], row["estimator"]): row for row in table(tmp_path / "estimates.csv")}
     for trial, ratio in (("b30_3", 1.204), ("b60_4", 3.03)):
-        assert 1 + float(rows[trial, "no_slip"]["error_percent"]) / 100 == pytest.approx(ratio, rel=0.04)
+        assert 1 + float(rows[trial, "no_slip"]["error_percent"]) / 100 == pytest.approx(
+            ratio, rel=0.04
+        )

@@ -8,16 +8,32 @@ from pathlib import Path
 
 import pytest
 
-from bench import robot_trade, tradeoff
+from bench.analyses import (
+    against_theta,
+    curved,
+    error_map,
+    explained,
+    figure_8,
+    gave,
+    ledger,
+    soft,
+    tilted,
+)
+from bench.analyses import back_strokes as both_ways
+from bench.analyses import friction_tables as tables
+from bench.analyses import moving_objects as moving
+from bench.analyses import single_camera as one_camera
+from bench.analyses import table_i_sensors as sensors
+from bench.array import shape_verdict as contacts
 from bench.array import size
-from bench.array import verdict as contacts
 from bench.base.settings import Settings
-from bench.evaluate import evaluate
-from bench.friction import curved, error_map, explained, gave, soft, tables, tilted
+from bench.commands import robot_trade, tradeoff
+from bench.commands.evaluate import evaluate
 from bench.gauges.gauges_file import FileKeys
 from bench.plan import written
-from bench.report import against_theta, assembly, both_ways, compare, figure_8, ledger, moving, one_camera, sensors
-from bench.report.run import BoardFacts, CameraFacts
+from bench.report import assembly
+from bench.report import compare_runs as compare
+from bench.report.run_facts import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
 from bench.theory import model_error_maps
@@ -90,13 +106,17 @@ def test_keys_of_results(steel_signals, exact_vision, tmp_path):
     evaluate(steel_signals, tmp_path, Settings(), workers=0)
     written = keys(json.loads((tmp_path / "trials" / "b60_4.json").read_text()))
     named = set(documented("trials/<trial>.json"))
-    assert {path for path in named if not path.startswith("seen.")} == {p for p in written if not p.startswith("seen.")}
+    assert {path for path in named if not path.startswith("seen.")} == {
+        p for p in written if not p.startswith("seen.")
+    }
 
 
 def test_keys_of_the_run(exact_run):
     record = json.loads((exact_run / "run.json").read_text())
     named = set(documented("run.json"))
-    written = {re.sub(r"^(recordings|results|versions)\.(.*)$", _by_name, key) for key in keys(record)}
+    written = {
+        re.sub(r"^(recordings|results|versions)\.(.*)$", _by_name, key) for key in keys(record)
+    }
     absent = {"board", "cameras"}  # without pictures
     assert {n for n in named if n.split(".")[0].rstrip("[]") not in absent} == written - absent
     fields = {f"cameras[].{f.name}" for f in dataclasses.fields(CameraFacts)}
@@ -109,7 +129,9 @@ def _by_name(match: re.Match) -> str:
 
 
 def test_truth_of_a_simulated_session(tmp_path):
-    protocol = protocol_file(tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\nobject = 'sphere'\n")
+    protocol = protocol_file(
+        tmp_path, "[[trials]]\nbeta_deg = 20\nstiffness_N_mm = 1\nobject = 'sphere'\n"
+    )
     session = simulate(tmp_path / "session", protocol=protocol, seed=1, signals_only=True)
     (folder,) = (session / "trials").iterdir()
     written = {
@@ -123,7 +145,10 @@ def test_truth_of_a_simulated_session(tmp_path):
 
 def test_every_file_is_named():
     """Names of files that a run writes stand as such in the code, or are made of a stem that does."""
-    whole = "\n".join(path.read_text() for path in [*(ROOT / "bench").rglob("*.py"), *(ROOT / "vision").rglob("*.py")])
+    whole = "\n".join(
+        path.read_text()
+        for path in [*(ROOT / "bench").rglob("*.py"), *(ROOT / "vision").rglob("*.py")]
+    )
     section = DOCUMENT.split("## OUT\n")[1].split("###")[0]
     for name in re.findall(r"`([^`]+)`", section):
         stem = re.sub(r"\.(csv|png|json|toml|npz|txt)$", "", name)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli
+from bench.commands import cli
 from estimator.beam import Beam
 from estimator.slip import moments
 from estimator.whisk import EstimatorSettings, Whisk
@@ -20,10 +20,23 @@ def frictionless_whisk() -> Whisk:
     """A whisk of a second to 3° after touch, by equations (13) and (14) with α = 0, with white noise."""
     theta = np.linspace(np.radians(-1.0), np.radians(3.5), 2000)
     noise = NOISE_NMM * np.random.default_rng(1).standard_normal((2, len(theta)))
-    m_y, m_z = np.where(theta > 0, moments(D_X_MM, np.maximum(theta, 1e-9), BETA_RAD, 0.0, C_NMM2), 0.0) + noise
+    m_y, m_z = (
+        np.where(theta > 0, moments(D_X_MM, np.maximum(theta, 1e-9), BETA_RAD, 0.0, C_NMM2), 0.0)
+        + noise
+    )
     at_rad = np.radians(3.0)
     at = moments(D_X_MM, at_rad, BETA_RAD, 0.0, C_NMM2)
-    return Whisk(theta / 0.17, theta, m_y, m_z, at_rad, *at, np.eye(2) * NOISE_NMM**2, 0.0, Beam(C_NMM2, 100.0))
+    return Whisk(
+        theta / 0.17,
+        theta,
+        m_y,
+        m_z,
+        at_rad,
+        *at,
+        np.eye(2) * NOISE_NMM**2,
+        0.0,
+        Beam(C_NMM2, 100.0),
+    )
 
 
 def test_the_estimator_shown_finds_the_distance():

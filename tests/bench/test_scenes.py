@@ -9,7 +9,7 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.base.tables import sigma_name
-from bench.evaluate import evaluate
+from bench.commands.evaluate import evaluate
 from tests.scenes.results import table
 
 SCENES = Path(__file__).resolve().parents[2] / "fixtures" / "scenes"
@@ -31,7 +31,10 @@ def test_a_scene_is_seen_within_what_it_states(name, tmp_path):
     for quantity, most in (("d_x_mm", 0.1), ("touch_deg", 0.025), ("beta_deg", 0.6)):
         error, sigma = float(seen[quantity]) - truth[quantity], float(seen[sigma_name(quantity)])
         assert abs(error) < min(most, 3 * sigma), (quantity, error, sigma)
-    true = {row["frame"]: float(row["slip_mm"]) for row in table(SCENES / name / "trials" / "w" / "truth.csv")}
+    true = {
+        row["frame"]: float(row["slip_mm"])
+        for row in table(SCENES / name / "trials" / "w" / "truth.csv")
+    }
     track = [row for row in table(tmp_path / "out" / "track" / "w.csv") if row["touching"] == "1"]
     errors = np.array([float(row["slip_mm"]) - true[row["frame"]] for row in track])
     assert np.all(np.abs(errors) < 3 * np.array([float(row["slip_sigma_mm"]) for row in track]))

@@ -4,8 +4,8 @@ import pytest
 
 from bench.base.cluster import Cluster
 from bench.base.settings import Settings
-from bench.cli import main
-from bench.evaluate import evaluate
+from bench.commands.cli import main
+from bench.commands.evaluate import evaluate
 from tests.faults.interrupted import contents, differences
 from tests.scenes.deaths import dies
 
@@ -32,7 +32,11 @@ def test_parts_put_together(small_session, by_one, tmp_path):
     parts = {}
     for trial in sorted(path.name for path in (small_session / "trials").iterdir()):
         evaluate(small_session, tmp_path / trial, Settings(trials=trial))
-        parts |= {name: data for name, data in contents(tmp_path / trial).items() if name.startswith("trials/")}
+        parts |= {
+            name: data
+            for name, data in contents(tmp_path / trial).items()
+            if name.startswith("trials/")
+        }
     assert parts == {name: data for name, data in by_one.items() if name.startswith("trials/")}
     for name, data in parts.items():
         (tmp_path / "all" / name).parent.mkdir(parents=True, exist_ok=True)
@@ -46,13 +50,18 @@ def test_parts_put_together(small_session, by_one, tmp_path):
 def cluster():
     """The scheduler's address of two worker processes on this machine, started from another folder."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as made:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as made:
         yield made.scheduler_address
 
 
 @pytest.mark.slow
 def test_a_cluster(small_session, by_one, cluster, tmp_path, capsys):
-    assert main(["evaluate", str(small_session), "--out", str(tmp_path), "--dask", cluster]) in (0, 1)
+    assert main(["evaluate", str(small_session), "--out", str(tmp_path), "--dask", cluster]) in (
+        0,
+        1,
+    )
     assert not differences(contents(tmp_path), by_one)
 
 

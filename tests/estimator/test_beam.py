@@ -29,7 +29,9 @@ def test_nitinol_wire_of_the_paper():
 
 def test_rigidity_and_modulus_make_the_same_beam():
     rigidity = flexural_rigidity(60.0, 1.0)
-    assert Beam.from_rigidity(rigidity, 100.0, "cone") == Beam.from_modulus(60.0, 1.0, 100.0, "cone")
+    assert Beam.from_rigidity(rigidity, 100.0, "cone") == Beam.from_modulus(
+        60.0, 1.0, 100.0, "cone"
+    )
     assert Beam.from_rigidity(rigidity, 100.0).rigidity_Nmm2 == pytest.approx(rigidity, rel=1e-15)
 
 
@@ -42,7 +44,9 @@ def test_taper_runs_from_base_to_tip(taper, tip):
 def test_rigidity_follows_the_local_diameter():
     arc = np.linspace(0, 90, 7)
     local = flexural_rigidity(60.0, diameter_at(arc, 1.0, 100.0, 0.8))
-    np.testing.assert_allclose(rigidity_at(arc, flexural_rigidity(60.0, 1.0), 100.0, 0.8), local, rtol=1e-13)
+    np.testing.assert_allclose(
+        rigidity_at(arc, flexural_rigidity(60.0, 1.0), 100.0, 0.8), local, rtol=1e-13
+    )
 
 
 def test_unit_of_figure_8():
@@ -50,7 +54,9 @@ def test_unit_of_figure_8():
     assert moment_in_EI_per_metre(2.9452, 2945.2) == pytest.approx(1.0, rel=1e-15)
 
 
-@pytest.mark.parametrize("C, length", [(0.0, 100.0), (-1.0, 100.0), (np.inf, 100.0), (np.nan, 100.0), (1.0, 0.0)])
+@pytest.mark.parametrize(
+    "C, length", [(0.0, 100.0), (-1.0, 100.0), (np.inf, 100.0), (np.nan, 100.0), (1.0, 0.0)]
+)
 def test_impossible_beams_are_refused(C, length):
     with pytest.raises(ValueError, match="must be positive and finite"):
         Beam(C, length)

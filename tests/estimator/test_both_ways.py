@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bench.rig.bar import Bar, first_touch
-from bench.rig.friction import Friction
 from bench.rig.marched import MarchedWhisk
+from bench.rig.stick_slip import Friction
 from estimator.both_ways import ALIKE, NO_PUSH, there_and_back
 from estimator.whisk import EstimatorSettings, Whisk
-from tests.ladder.estimates_montecarlo import rod_and_beam
+from tests.studies.accuracy.estimates_montecarlo import rod_and_beam
 
 ROD, BEAM = rod_and_beam("cylinder")
 THETA, ALPHA = np.radians([3.0, 10.0])
@@ -19,14 +19,22 @@ TOLD = EstimatorSettings(0.0, 0.0, 3.5, np.radians(5.0))
 
 def ways(beta_deg):
     """Both ways' whisks at 3° of a push to 4.6°, with a little noise stated and none in them."""
-    place = {"d_x_mm": 60.0, "beta_rad": np.radians(beta_deg), "psi_rad": 0.0, "touch_rad": 0.0, "radius_mm": 3.0}
+    place = {
+        "d_x_mm": 60.0,
+        "beta_rad": np.radians(beta_deg),
+        "psi_rad": 0.0,
+        "touch_rad": 0.0,
+        "radius_mm": 3.0,
+    }
     bar = Bar.placed(**place, whisker_radius_mm=0.5)
     touch, friction = first_touch(ROD, bar, 0.0, 60.0), Friction(np.tan(ALPHA), np.tan(ALPHA))
     end = touch.motor_rad + np.radians(4.6)
     march = MarchedWhisk.run(ROD, bar, friction, touch, end, step_rad=np.radians(0.2), back=True)
     at = np.array([touch.motor_rad + THETA])
     moments = (way.moments_at(at)[0] for way in (march.forward, march.back))
-    return [Whisk(*(np.zeros(0),) * 4, THETA, *felt, 1e-4 * np.eye(2), 1e-4, BEAM) for felt in moments]
+    return [
+        Whisk(*(np.zeros(0),) * 4, THETA, *felt, 1e-4 * np.eye(2), 1e-4, BEAM) for felt in moments
+    ]
 
 
 @pytest.mark.parametrize("beta_deg", [30.0, 50.0, 70.0])
@@ -53,8 +61,18 @@ def test_what_both_ways_share_does_not_turn_the_slope():
     """Gauges that are off by a share in both moments change neither direction nor difference of them."""
     there, back = ways(50.0)
     shared = tuple(0.02 * np.array([[w.m_y_at_Nmm, w.m_z_at_Nmm]]) for w in (there, back))
-    wide = [Whisk(*(np.zeros(0),) * 4, w.theta_at_rad, w.m_y_at_Nmm, w.m_z_at_Nmm, w.covariance_at + s.T @ s,
-                  w.theta_sigma_rad, BEAM) for w, s in zip((there, back), shared)]  # fmt: skip
+    wide = [
+        Whisk(
+            *(np.zeros(0),) * 4,
+            w.theta_at_rad,
+            w.m_y_at_Nmm,
+            w.m_z_at_Nmm,
+            w.covariance_at + s.T @ s,
+            w.theta_sigma_rad,
+            BEAM,
+        )
+        for w, s in zip((there, back), shared)
+    ]
     told, untold = (there_and_back(*wide, TOLD, one) for one in (shared, None))
     plain = there_and_back(there, back, TOLD)
     assert told.beta_sigma_rad == pytest.approx(plain.beta_sigma_rad, rel=1e-3)
@@ -67,7 +85,9 @@ def test_what_the_angle_back_is_off_by_turns_the_slope():
     there, back = ways(50.0)
     off = 1e-3
     surer, unsure, moved = (
-        there_and_back(there, replace(back, theta_at_rad=THETA + shift, theta_sigma_rad=sigma), TOLD)
+        there_and_back(
+            there, replace(back, theta_at_rad=THETA + shift, theta_sigma_rad=sigma), TOLD
+        )
         for shift, sigma in ((0.0, 0.0), (0.0, off), (off, 0.0))
     )
     more = np.sqrt(unsure.beta_sigma_rad**2 - surer.beta_sigma_rad**2)

@@ -23,7 +23,9 @@ PAPER = {name: function for name, function in ESTIMATORS.items() if name != "cor
 def whisk_of(m_y, m_z, *, beam=BEAM, sigma=0.01, theta=THETA):
     samples = np.linspace(-0.02, 0.08, 50)
     covariance = sigma**2 * np.eye(2)
-    return Whisk(samples * 5, samples, m_y * samples, m_z * samples, theta, m_y, m_z, covariance, 1e-4, beam)
+    return Whisk(
+        samples * 5, samples, m_y * samples, m_z * samples, theta, m_y, m_z, covariance, 1e-4, beam
+    )
 
 
 def whisk_at(d_x, beta, alpha=ALPHA, **settings):
@@ -51,7 +53,9 @@ def test_under_slip_no_slip_and_frictionless_are_too_long():
 
 
 def test_no_slip_is_equation_2_whatever_m_y_does():
-    assert ESTIMATORS["no_slip"](whisk_of(5.0, 9.0), SETTINGS).d_x_mm == pytest.approx(BEAM.C_Nmm2 * THETA / 9.0)
+    assert ESTIMATORS["no_slip"](whisk_of(5.0, 9.0), SETTINGS).d_x_mm == pytest.approx(
+        BEAM.C_Nmm2 * THETA / 9.0
+    )
 
 
 def test_sigma_holds_touch_moments_and_friction():
@@ -60,7 +64,9 @@ def test_sigma_holds_touch_moments_and_friction():
     assert touch_alone == pytest.approx(60.0 * 1e-4 / THETA, rel=1e-12)
     doubtful = EstimatorSettings(ALPHA, alpha_est_sigma_rad=np.radians(1.0))
     sensitivity = np.tan(np.radians(60)) - np.tan(ALPHA)
-    friction_alone = np.sqrt(ESTIMATORS["with_friction"](whisk, doubtful).sigma_mm ** 2 - touch_alone**2)
+    friction_alone = np.sqrt(
+        ESTIMATORS["with_friction"](whisk, doubtful).sigma_mm ** 2 - touch_alone**2
+    )
     assert friction_alone == pytest.approx(60.0 * sensitivity * np.radians(1.0), rel=1e-9)
     assert ESTIMATORS["frictionless"](whisk, doubtful).sigma_mm < friction_alone
 
@@ -98,7 +104,9 @@ def test_cone_is_the_cylinder_with_one_over_length_added():
     cone = dataclasses.replace(BEAM, shape="cone")
     moments = slip.moments(80.0, THETA, 0.9, ALPHA, BEAM.C_Nmm2)
     for function in PAPER.values():
-        cylinder, tapered = (function(whisk_of(*moments, beam=beam), SETTINGS) for beam in (BEAM, cone))
+        cylinder, tapered = (
+            function(whisk_of(*moments, beam=beam), SETTINGS) for beam in (BEAM, cone)
+        )
         if not cylinder.status:
             assert 1 / tapered.d_x_mm == pytest.approx(1 / cylinder.d_x_mm + 1 / 100.0, rel=1e-14)
             shrink = tapered.d_x_mm / cylinder.d_x_mm
@@ -140,15 +148,22 @@ def test_17_as_printed_has_its_own_name_and_sigma(shape):
     beam = Beam.from_modulus(60.0, 1.0, 100.0, *shape)
     beta, d_x = np.radians(50.0), 60.0
     moments = np.array(slip.moments(beam.as_cylinder_mm(d_x), THETA, beta, 0.0, beam.C_Nmm2))
-    told, right = (f(whisk_of(*moments, beam=beam), SETTINGS) for f in (builtin.printed_17, builtin.frictionless))
-    assert right.d_x_mm == pytest.approx(d_x) and (told.d_x_mm < 0.95 * d_x) == (shape[0] != "cylinder")
+    told, right = (
+        f(whisk_of(*moments, beam=beam), SETTINGS)
+        for f in (builtin.printed_17, builtin.frictionless)
+    )
+    assert right.d_x_mm == pytest.approx(d_x) and (told.d_x_mm < 0.95 * d_x) == (
+        shape[0] != "cylinder"
+    )
 
     def d(theta, m_y, m_z):
         return builtin.printed_17(whisk_of(m_y, m_z, beam=beam, theta=theta), SETTINGS).d_x_mm
 
     at = np.array([THETA, *moments])
     numeric = [(d(*(at + h)) - d(*(at - h))) / 2e-6 for h in 1e-6 * np.eye(3)]
-    assert told.sigma_mm == pytest.approx(np.linalg.norm(numeric * np.array([1e-4, 0.01, 0.01])), rel=1e-5)
+    assert told.sigma_mm == pytest.approx(
+        np.linalg.norm(numeric * np.array([1e-4, 0.01, 0.01])), rel=1e-5
+    )
 
 
 # ---- where (10) loses its root
@@ -269,14 +284,20 @@ THICK = EstimatorSettings(ALPHA, 0.0, 3.5, np.radians(5.0), 3.0, 0.5)
 
 def test_corrected_takes_out_rolling_where_it_slips():
     """docs/maps.md: 3/8 θ R/d_x cos β, R of bar and whisker together."""
-    plain, better = (f(whisk_at(60.0, np.radians(50)), THICK) for f in (builtin.with_friction, builtin.corrected))
-    assert better.d_x_mm - plain.d_x_mm == pytest.approx(0.375 * THETA * 3.5 * np.cos(np.radians(50)), rel=1e-9)
+    plain, better = (
+        f(whisk_at(60.0, np.radians(50)), THICK) for f in (builtin.with_friction, builtin.corrected)
+    )
+    assert better.d_x_mm - plain.d_x_mm == pytest.approx(
+        0.375 * THETA * 3.5 * np.cos(np.radians(50)), rel=1e-9
+    )
     assert better.sigma_mm < plain.sigma_mm
     assert better.low_mm - plain.low_mm == pytest.approx(better.d_x_mm - plain.d_x_mm, rel=0.3)
 
 
 def test_corrected_takes_out_friction_along_the_whisker_where_it_is_held():
-    plain, better = (f(whisk_at(60.0, 0.0), THICK) for f in (builtin.with_friction, builtin.corrected))
+    plain, better = (
+        f(whisk_at(60.0, 0.0), THICK) for f in (builtin.with_friction, builtin.corrected)
+    )
     expected = THETA * (0.375 * 3.5 + 60.0 * np.pi / 4 * 0.2 * np.tan(ALPHA))
     assert better.d_x_mm - plain.d_x_mm == pytest.approx(expected, rel=1e-9)
 

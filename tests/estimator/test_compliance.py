@@ -33,7 +33,9 @@ def test_two_distances_give_distance_and_stiffness(d_x, stiffness, shift):
 def test_two_distances_of_a_whisker_that_tapers(d_x, stiffness, shift, taper):
     """The same of cones cut off anywhere, the tip at 100 mm; a quartic's root keeps three digits fewer."""
     near, far = (felt_compliance(d, stiffness, taper) for d in (d_x, d_x + shift))
-    assert near == pytest.approx(compliance.compliance_on_soft_object(d_x, stiffness, C, taper), rel=1e-12)
+    assert near == pytest.approx(
+        compliance.compliance_on_soft_object(d_x, stiffness, C, taper), rel=1e-12
+    )
     found, found_stiffness = compliance.two_distances(near, far, shift, C, taper)
     assert found == pytest.approx(d_x, rel=1e-7)
     assert found_stiffness == pytest.approx(stiffness, rel=1e-3)
@@ -41,7 +43,9 @@ def test_two_distances_of_a_whisker_that_tapers(d_x, stiffness, shift, taper):
 
 
 def test_forward_model_is_springs_in_series():
-    assert compliance.compliance_on_soft_object(60.0, 0.3, C) == pytest.approx(felt_compliance(60.0, 0.3), rel=1e-14)
+    assert compliance.compliance_on_soft_object(60.0, 0.3, C) == pytest.approx(
+        felt_compliance(60.0, 0.3), rel=1e-14
+    )
     assert np.isnan(compliance.compliance_on_soft_object(-60.0, 0.3, C))
 
 
@@ -76,9 +80,15 @@ def test_sigma_is_the_sampled_scatter(taper, draws):
     near, far = felt_compliance(60.0, 0.3, taper), felt_compliance(75.0, 0.3, taper)
     near_sigma, far_sigma = 1e-3 * near, 1e-3 * far
     drawn = compliance.two_distances(
-        near + near_sigma * rng.normal(size=draws), far + far_sigma * rng.normal(size=draws), 15.0, C, taper
+        near + near_sigma * rng.normal(size=draws),
+        far + far_sigma * rng.normal(size=draws),
+        15.0,
+        C,
+        taper,
     )
-    d_sigma, give_sigma = compliance.two_distances_spread(60.0, 1 / 0.3, 15.0, C, near_sigma, far_sigma, 0.0, taper)
+    d_sigma, give_sigma = compliance.two_distances_spread(
+        60.0, 1 / 0.3, 15.0, C, near_sigma, far_sigma, 0.0, taper
+    )
     predicted = d_sigma, give_sigma * 0.3**2
     np.testing.assert_allclose([np.std(values) for values in drawn], predicted, rtol=0.07)
 

@@ -47,7 +47,9 @@ def test_missing_samples_stay_missing_and_harm_no_others(stroke):
     filtered = zero_phase_lowpass(s.moments, 2000.0, 5.0)
     assert np.isnan(filtered[100:105, 1]).all()
     assert np.isnan(filtered).sum() == 5
-    np.testing.assert_allclose(filtered[~np.isnan(filtered)], whole[~np.isnan(filtered)], atol=0.0065 * 5 / 200)
+    np.testing.assert_allclose(
+        filtered[~np.isnan(filtered)], whole[~np.isnan(filtered)], atol=0.0065 * 5 / 200
+    )
     assert threshold_touch(*s.arrays, s.time_s, 5.0).status == ""
     assert np.isnan(zero_phase_lowpass(np.full(100, np.nan), 2000.0, 5.0)).all()
 
@@ -64,7 +66,11 @@ def test_threshold_after_5_Hz_is_early_by_what_it_says(stroke, slopes):
     biases = np.degrees([touch.bias_rad for touch in found])
     assert -0.2 < errors.mean() < -0.05
     assert (errors - biases).mean() == pytest.approx(0.0, abs=4 * errors.std() / np.sqrt(40))
-    assert 0.5 < np.std(errors - biases) / np.degrees(np.median([touch.sigma_rad for touch in found])) < 1.5
+    assert (
+        0.5
+        < np.std(errors - biases) / np.degrees(np.median([touch.sigma_rad for touch in found]))
+        < 1.5
+    )
 
 
 def test_a_high_threshold_is_late_by_its_height_over_the_slope(stroke):
@@ -85,10 +91,15 @@ def test_half_height_of_the_rate_has_no_bias(stroke, cutoff_Hz):
     assert 0.5 < errors.std() / np.degrees(np.median([touch.sigma_rad for touch in found])) < 2
 
 
-@pytest.mark.parametrize("settings, status", [({"touch": 99.0}, NO_RISE), ({"touch": 0.0}, NO_FREE_STROKE)])
+@pytest.mark.parametrize(
+    "settings, status", [({"touch": 99.0}, NO_RISE), ({"touch": 0.0}, NO_FREE_STROKE)]
+)
 def test_no_number_where_there_is_no_touch(stroke, settings, status):
     s = stroke(np.random.default_rng(3), **settings)
-    for touch in (threshold_touch(*s.arrays, s.time_s, 5.0), touch_on_rate(*s.arrays, s.time_s, 5.0)):
+    for touch in (
+        threshold_touch(*s.arrays, s.time_s, 5.0),
+        touch_on_rate(*s.arrays, s.time_s, 5.0),
+    ):
         assert touch.status == status
         assert np.isnan(touch.motor_rad)
 
@@ -107,4 +118,6 @@ def test_the_low_pass_is_scipy_s(rng, cutoff_Hz, n):
     each_way = min(cutoff_Hz / (np.sqrt(2) - 1) ** 0.25, 0.499 * 2000.0)
     sections = butter(2, each_way, fs=2000.0, output="sos")
     theirs = sosfiltfilt(sections, x, axis=0, padlen=min(n - 1, int(3 * 2000.0 / cutoff_Hz)))
-    np.testing.assert_allclose(zero_phase_lowpass(x, 2000.0, cutoff_Hz), theirs, atol=1e-9 * np.ptp(x))
+    np.testing.assert_allclose(
+        zero_phase_lowpass(x, 2000.0, cutoff_Hz), theirs, atol=1e-9 * np.ptp(x)
+    )

@@ -13,7 +13,9 @@ pytestmark = pytest.mark.filterwarnings("error")
 EPSILON = 2.0**-52
 radii = st.floats(0.05, 1e3)
 pushes = st.floats(1e-4, 0.1)
-slopes = st.builds(lambda sign, size: sign * size, st.sampled_from([-1, 0, 1]), st.floats(1e-12, 1.4))
+slopes = st.builds(
+    lambda sign, size: sign * size, st.sampled_from([-1, 0, 1]), st.floats(1e-12, 1.4)
+)
 frictions = st.floats(0.0, 1.4)
 
 
@@ -106,7 +108,9 @@ def test_geometry_of_figure_10():
 def test_angle_of_the_virtual_point_has_no_pole():
     """(25) and (29) divide by y_c − θ; ζ runs smoothly through 90° there."""
     theta = 2 * np.cos(1.3)
-    before, at, after = (curvature.virtual_angle(2.0, theta + step, 1.3) for step in (-1e-6, 0.0, 1e-6))
+    before, at, after = (
+        curvature.virtual_angle(2.0, theta + step, 1.3) for step in (-1e-6, 0.0, 1e-6)
+    )
     assert at == pytest.approx(np.pi / 2, abs=1e-15)
     assert before < at < after
 
@@ -154,7 +158,9 @@ def test_numbers_exist_exactly_where_no_reason_is_given(r_n, theta, beta_0, alph
 def test_threshold_is_where_the_error_is(equation, r_n, theta, printed):
     settings = {"equation": equation, "r_n": r_n, "theta": theta, "printed": printed}
     beta = curvature.slope_threshold(0.05, 0.3, 0.2, **settings)
-    assert abs(curvature.distance_error(beta, 0.3, 0.2, **settings)) == pytest.approx(0.05, rel=1e-9)
+    assert abs(curvature.distance_error(beta, 0.3, 0.2, **settings)) == pytest.approx(
+        0.05, rel=1e-9
+    )
     assert abs(curvature.distance_error(0.99 * beta, 0.3, 0.2, **settings)) < 0.05
 
 

@@ -13,7 +13,9 @@ from estimator import distance, slip
 pytestmark = pytest.mark.filterwarnings("error")
 
 EPSILON = 2.0**-52
-slopes = st.builds(lambda sign, size: sign * size, st.sampled_from([-1, 0, 1]), st.floats(1e-12, 1.4))
+slopes = st.builds(
+    lambda sign, size: sign * size, st.sampled_from([-1, 0, 1]), st.floats(1e-12, 1.4)
+)
 frictions = st.floats(0.0, 1.4)
 distances = st.floats(1e-3, 1e4)
 pushes = st.floats(1e-9, 0.35)
@@ -65,7 +67,9 @@ def test_frictionless_surface_by_11_and_12(d_x, theta, beta, C):
     m_y, m_z = slip.moments(d_x, theta, beta, 0.0, C)
     tolerance = inversion_tolerance(beta, beta)
     assert distance.frictionless(theta, m_y, m_z, C) == pytest.approx(d_x, rel=tolerance)
-    assert distance.frictionless_sum(theta, m_y, m_z, C) == distance.frictionless(theta, m_y, m_z, C)
+    assert distance.frictionless_sum(theta, m_y, m_z, C) == distance.frictionless(
+        theta, m_y, m_z, C
+    )
     assert distance.felt_slip_angle(m_y, m_z) == pytest.approx(beta, rel=8 * EPSILON)
 
 
@@ -87,7 +91,9 @@ def test_scale_invariance(theta, phi, alpha_est, C, power):
 def test_the_smallest_slip_is_no_slip(m_y):
     """Even a subnormal m_y leaves the distance of (2), to the last digit."""
     for alpha_est in (0.0, 0.2, 1.5):
-        assert distance.with_friction(0.05, m_y, 9.0, alpha_est, 9000.0) == pytest.approx(50.0, rel=4 * EPSILON)
+        assert distance.with_friction(0.05, m_y, 9.0, alpha_est, 9000.0) == pytest.approx(
+            50.0, rel=4 * EPSILON
+        )
     assert distance.known_slope(0.05, m_y, 9.0, 0.3, 9000.0) == pytest.approx(50.0, rel=4 * EPSILON)
 
 
@@ -95,9 +101,9 @@ def test_the_smallest_slip_is_no_slip(m_y):
 def test_mirrored_moment_gives_the_same_distance(theta, phi, alpha_est, C):
     m_y, m_z = np.sin(phi), np.cos(phi)
     for sign in (1, -1):
-        assert distance.with_friction(theta, sign * m_y, m_z, alpha_est, C) == distance.with_friction(
-            theta, m_y, m_z, alpha_est, C
-        )
+        assert distance.with_friction(
+            theta, sign * m_y, m_z, alpha_est, C
+        ) == distance.with_friction(theta, m_y, m_z, alpha_est, C)
     assert distance.known_slope(theta, -m_y, m_z, -0.3, C) == pytest.approx(
         distance.known_slope(theta, m_y, m_z, 0.3, C), nan_ok=True, rel=0
     )
@@ -157,7 +163,10 @@ def test_reasons_of_the_known_slope_and_of_the_range():
     assert "points up the slope" in distance.why_not(0.05, -1.0, 1.0, beta=1.2)
     assert np.isnan(distance.known_slope(0.05, -1.0, 1.0, 1.2, 1.0))
     assert "range of a float" in distance.why_not(0.05, 0.0, 5e-324, C=1e10)
-    assert distance.why_not([0.05, -1.0], 0.1, 1.0).tolist() == ["", "the pushing angle is not positive"]
+    assert distance.why_not([0.05, -1.0], 0.1, 1.0).tolist() == [
+        "",
+        "the pushing angle is not positive",
+    ]
 
 
 @pytest.mark.parametrize("alpha_est", [-0.1, np.pi / 2, np.nan])
@@ -166,12 +175,15 @@ def test_impossible_alpha_est_is_refused_with_name_and_range(alpha_est):
         distance.with_friction(0.05, 0.1, 1.0, alpha_est, 1.0)
 
 
-@pytest.mark.parametrize("call", [
-    lambda bad: distance.no_slip(0.05, 1.0, bad),
-    lambda bad: distance.known_slope(0.05, 0.1, 1.0, 0.2, bad),
-    lambda bad: distance.cone(0.05, 0.1, 1.0, 0.2, 1.0, bad),
-    lambda bad: distance.clamp_to_length(50.0, bad),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda bad: distance.no_slip(0.05, 1.0, bad),
+        lambda bad: distance.known_slope(0.05, 0.1, 1.0, 0.2, bad),
+        lambda bad: distance.cone(0.05, 0.1, 1.0, 0.2, 1.0, bad),
+        lambda bad: distance.clamp_to_length(50.0, bad),
+    ],
+)
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
 def test_impossible_settings_are_refused(call, bad):
     with pytest.raises(ValueError, match="must be positive and finite"):
@@ -222,7 +234,9 @@ def cone_moments(d_x, theta, beta, alpha, C, length):
     A force F at d_x bends the beam by F ∫ (d_x − s)² / EI(s) ds, and slip leaves cos β / cos(β − φ) of d_x θ of it.
     """
     phi = max(0.0, beta - alpha)
-    give, _ = quad(lambda s: (d_x - s) ** 2 / (C / 3 * (1 - s / length) ** 4), 0, d_x, epsabs=0, epsrel=1e-12)
+    give, _ = quad(
+        lambda s: (d_x - s) ** 2 / (C / 3 * (1 - s / length) ** 4), 0, d_x, epsabs=0, epsrel=1e-12
+    )
     force = d_x * theta * np.cos(beta) / np.cos(beta - phi) / give
     return force * d_x * np.sin(phi), force * d_x * np.cos(phi)
 
@@ -240,16 +254,26 @@ def test_cone_against_the_bending_integral(d_x, beta, alpha):
 def test_general_form_with_the_cylinder_is_10_and_with_the_cone_is_its_own():
     arguments = (0.05, [0.0, 1.0, -2.0], 3.0, 0.18)
     cylinder = distance.general(*arguments, lambda theta, m: distance.no_slip(theta, m, 9000.0))
-    np.testing.assert_allclose(cylinder, distance.with_friction(*arguments, 9000.0), rtol=8 * EPSILON)
-    cone = distance.general(*arguments, lambda theta, m: distance.cone_no_slip(theta, m, 9000.0, 100.0))
+    np.testing.assert_allclose(
+        cylinder, distance.with_friction(*arguments, 9000.0), rtol=8 * EPSILON
+    )
+    cone = distance.general(
+        *arguments, lambda theta, m: distance.cone_no_slip(theta, m, 9000.0, 100.0)
+    )
     np.testing.assert_allclose(cone, distance.cone(*arguments, 9000.0, 100.0), rtol=8 * EPSILON)
 
 
 def test_general_form_as_printed_is_17_on_a_cone_and_12_on_a_cylinder():
     moments = (0.05, [0.0, 1.0, -2.0], 3.0)
-    cone = distance.general_printed(*moments, lambda theta, m: distance.cone_no_slip(theta, m, 9000.0, 100.0))
-    np.testing.assert_allclose(cone, distance.cone_printed(*moments, 9000.0, 100.0), rtol=8 * EPSILON)
-    cylinder = distance.general_printed(*moments, lambda theta, m: distance.no_slip(theta, m, 9000.0))
+    cone = distance.general_printed(
+        *moments, lambda theta, m: distance.cone_no_slip(theta, m, 9000.0, 100.0)
+    )
+    np.testing.assert_allclose(
+        cone, distance.cone_printed(*moments, 9000.0, 100.0), rtol=8 * EPSILON
+    )
+    cylinder = distance.general_printed(
+        *moments, lambda theta, m: distance.no_slip(theta, m, 9000.0)
+    )
     np.testing.assert_allclose(cylinder, distance.frictionless(*moments, 9000.0), rtol=8 * EPSILON)
 
 
@@ -261,7 +285,9 @@ def test_cone_never_reaches_beyond_its_tip(theta, phi, alpha_est, C, length):
 
 def test_taper_turns_a_cylinders_distance_into_a_cones():
     d_x = distance.with_friction(0.05, 1.0, 3.0, 0.18, 9000.0)
-    assert distance.taper(d_x, 100.0) == pytest.approx(distance.cone(0.05, 1.0, 3.0, 0.18, 9000.0, 100.0), rel=1e-15)
+    assert distance.taper(d_x, 100.0) == pytest.approx(
+        distance.cone(0.05, 1.0, 3.0, 0.18, 9000.0, 100.0), rel=1e-15
+    )
 
 
 # ---- section VII: the tip, section II: the contact point
@@ -282,4 +308,7 @@ def test_contact_point_is_radius_touch_and_height():
 
 def test_scalars_give_floats_and_arrays_broadcast():
     assert type(distance.with_friction(0.05, 1, 3, 0.18, 9000)) is float
-    assert distance.with_friction([[0.05], [0.04]], [1.0, 2.0, 3.0], 3.0, 0.18, 9000.0).shape == (2, 3)
+    assert distance.with_friction([[0.05], [0.04]], [1.0, 2.0, 3.0], 3.0, 0.18, 9000.0).shape == (
+        2,
+        3,
+    )

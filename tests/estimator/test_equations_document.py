@@ -36,19 +36,33 @@ def test_table_of_17():
     """A cone's moment without slip is Cθ (1/d_x − 1/L); slip leaves cos β / cos α of θ."""
     for alpha, beta, d_x, printed, scaled in table_after("## How far (17)"):
         theta, phi = np.radians(1.0), np.radians(max(0, beta - alpha))
-        m = 9000.0 * theta * np.cos(np.radians(beta)) / np.cos(np.radians(alpha)) * (1 / d_x - 1 / 100)
+        m = (
+            9000.0
+            * theta
+            * np.cos(np.radians(beta))
+            / np.cos(np.radians(alpha))
+            * (1 / d_x - 1 / 100)
+        )
         moments = (theta, m * np.sin(phi), m * np.cos(phi))
         assert distance.cone_printed(*moments, 9000.0, 100.0) == pytest.approx(printed, abs=0.05)
-        assert distance.cone(*moments, np.radians(alpha), 9000.0, 100.0) == pytest.approx(scaled, abs=0.05)
+        assert distance.cone(*moments, np.radians(alpha), 9000.0, 100.0) == pytest.approx(
+            scaled, abs=0.05
+        )
 
 
 def test_table_of_appendix_b():
-    for r_n, *angles, phi_printed, phi, error_printed, error in table_after("## How far Appendix B"):
+    for r_n, *angles, phi_printed, phi, error_printed, error in table_after(
+        "## How far Appendix B"
+    ):
         theta, alpha, beta = np.radians(angles)
         assert np.degrees(curvature.slip_angle_printed(r_n, theta, beta, alpha)) == pytest.approx(
             phi_printed, abs=0.005
         )
-        assert np.degrees(curvature.slip_angle(r_n, theta, beta, alpha)) == pytest.approx(phi, abs=0.005)
+        assert np.degrees(curvature.slip_angle(r_n, theta, beta, alpha)) == pytest.approx(
+            phi, abs=0.005
+        )
         for printed, expected in ((True, error_printed), (False, error)):
-            found = curvature.distance_error(beta, alpha, alpha, r_n=r_n, theta=theta, printed=printed)
+            found = curvature.distance_error(
+                beta, alpha, alpha, r_n=r_n, theta=theta, printed=printed
+            )
             assert 100 * found == pytest.approx(expected, abs=0.005)

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from estimator import friction, slip
-from estimator.friction import AT_ZERO, NEVER_SLIPPED, Pushes, alpha_from_tilts, confidence, curves, fit_alpha
+from estimator.friction import (
+    AT_ZERO,
+    NEVER_SLIPPED,
+    Pushes,
+    alpha_from_tilts,
+    confidence,
+    curves,
+    fit_alpha,
+)
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -16,7 +24,10 @@ SLOPES = np.radians(np.arange(0, 80, 5))
 def noisy_moments(beta, alpha, noise, rng):
     """Moments of RUNS experiments with 1 % noise: of each moment, or of the largest one; and its sigma."""
     m_y, m_z = slip.moments(D_X, THETA, beta, alpha, C)
-    sigmas = [0.01 * (np.abs(m) if noise == "of each" else np.full(m.shape, m_z.max())) for m in (m_y, m_z)]
+    sigmas = [
+        0.01 * (np.abs(m) if noise == "of each" else np.full(m.shape, m_z.max()))
+        for m in (m_y, m_z)
+    ]
     drawn = [m + s * rng.normal(size=(RUNS, len(beta))) for m, s in zip((m_y, m_z), sigmas)]
     return drawn, sigmas
 
@@ -33,8 +44,12 @@ def test_interval_holds_the_true_angle_in_95_percent(alpha_deg, noise):
     (m_y, m_z), (sigma_y, sigma_z) = noisy_moments(SLOPES, alpha, noise, np.random.default_rng(5))
     fit = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C, sigma_y=sigma_y, sigma_z=sigma_z))
     assert 0.93 <= coverage(fit, alpha) <= 0.97
-    assert fit.alpha_rad.mean() == pytest.approx(alpha, abs=4 * fit.sigma_rad.mean() / np.sqrt(RUNS) + 1e-5)
-    assert fit.alpha_rad.std() == pytest.approx(np.sqrt((fit.sigma_rad**2).mean()), rel=4 / np.sqrt(2 * RUNS))
+    assert fit.alpha_rad.mean() == pytest.approx(
+        alpha, abs=4 * fit.sigma_rad.mean() / np.sqrt(RUNS) + 1e-5
+    )
+    assert fit.alpha_rad.std() == pytest.approx(
+        np.sqrt((fit.sigma_rad**2).mean()), rel=4 / np.sqrt(2 * RUNS)
+    )
 
 
 @pytest.mark.parametrize("noise", ["of each", "of the largest"])
@@ -59,7 +74,9 @@ def test_interval_holds_it_where_each_slope_is_set_up_once():
     m_y, m_z = (m * (1 + 0.005 * rng.normal(size=m.shape)) for m in moments)
     together = fit_alpha(Pushes(SLOPES[recording], m_y, m_z, D_X, THETA, C, recording=recording))
     apart = fit_alpha(Pushes(SLOPES[recording], m_y, m_z, D_X, THETA, C))
-    assert 0.91 <= coverage(together, alpha) <= 0.98  # 400 runs are good to 1.1 %; few slopes weigh most
+    assert (
+        0.91 <= coverage(together, alpha) <= 0.98
+    )  # 400 runs are good to 1.1 %; few slopes weigh most
     assert coverage(apart, alpha) < 0.7
 
 
@@ -69,7 +86,9 @@ def test_a_recording_of_one_point_each_differs_by_the_pairing_of_its_moments():
     plain = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C))
     paired = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C, recording=np.arange(len(SLOPES))))
     assert paired.alpha_rad == pytest.approx(plain.alpha_rad)
-    assert np.sqrt((paired.sigma_rad**2).mean()) == pytest.approx(np.sqrt((plain.sigma_rad**2).mean()), rel=0.03)
+    assert np.sqrt((paired.sigma_rad**2).mean()) == pytest.approx(
+        np.sqrt((plain.sigma_rad**2).mean()), rel=0.03
+    )
 
 
 def test_the_other_reading_is_as_honest_and_much_less_sure():
@@ -77,7 +96,9 @@ def test_the_other_reading_is_as_honest_and_much_less_sure():
     alpha = np.radians(12.3)
     beta = np.repeat(SLOPES, 10)
     (m_y, m_z), _ = noisy_moments(beta, alpha, "of the largest", np.random.default_rng(7))
-    both, alone = (fit_alpha(Pushes(beta, m_y, m_z, D_X, THETA, C), reading=r) for r in friction.READINGS)
+    both, alone = (
+        fit_alpha(Pushes(beta, m_y, m_z, D_X, THETA, C), reading=r) for r in friction.READINGS
+    )
     assert 0.93 <= coverage(alone, alpha) <= 0.97
     assert alone.sigma_rad.mean() > 4 * both.sigma_rad.mean()
 
@@ -97,7 +118,9 @@ def test_mirrored_slopes_and_own_distances_fit_alike():
     beta = np.concatenate([SLOPES, -SLOPES])
     d_x, theta = np.linspace(40, 60, beta.size), np.linspace(0.04, 0.06, beta.size)
     m_y, m_z = slip.moments(d_x, theta, beta, 0.2, C)
-    assert fit_alpha(Pushes(beta, m_y, m_z, d_x, theta, C)).alpha_rad == pytest.approx(0.2, abs=1e-6)
+    assert fit_alpha(Pushes(beta, m_y, m_z, d_x, theta, C)).alpha_rad == pytest.approx(
+        0.2, abs=1e-6
+    )
 
 
 def test_derivative_is_the_difference():
@@ -141,7 +164,14 @@ def test_friction_at_zero_is_flagged():
     ],
 )
 def test_bad_data_are_refused(change, message):
-    arguments = {"beta": [0.1, 0.5], "m_y": [0.0, 1.0], "m_z": [3.0, 2.0], "d_x": D_X, "theta": THETA, "C": C} | change
+    arguments = {
+        "beta": [0.1, 0.5],
+        "m_y": [0.0, 1.0],
+        "m_z": [3.0, 2.0],
+        "d_x": D_X,
+        "theta": THETA,
+        "C": C,
+    } | change
     reading = arguments.pop("reading", "moments")
     with pytest.raises(ValueError, match=message):
         fit_alpha(Pushes(**arguments), reading=reading)
@@ -165,7 +195,10 @@ def test_sigma_from_tilts_is_the_sampled_scatter():
     tilt = np.radians(np.arange(-60, 61, 2.0))
     phi = slip.slip_angle(np.radians(7) + tilt, np.radians(18))
     sigma = np.radians(0.7)
-    fits = [alpha_from_tilts(tilt, phi + sigma * rng.normal(size=tilt.size), phi_sigma=sigma) for _ in range(400)]
+    fits = [
+        alpha_from_tilts(tilt, phi + sigma * rng.normal(size=tilt.size), phi_sigma=sigma)
+        for _ in range(400)
+    ]
     scores = [(fit.alpha_rad - np.radians(18)) / fit.sigma_rad for fit in fits]
     assert np.std(scores) == pytest.approx(1.0, abs=0.14)
     assert abs(np.mean(scores)) < 4 / np.sqrt(400)
@@ -202,4 +235,6 @@ def test_weight_is_the_share_of_variance_not_due_to_friction():
     phi, alpha, alpha_sigma, own = 0.5, 0.2, 0.03, 0.01
     d_x = [with_friction(0.05, np.sin(phi), np.cos(phi), alpha + step, C) for step in (-1e-6, 1e-6)]
     relative = alpha_sigma * (np.log(d_x[1]) - np.log(d_x[0])) / 2e-6
-    assert confidence(phi, alpha, alpha_sigma, own) == pytest.approx(own**2 / (own**2 + relative**2), rel=1e-6)
+    assert confidence(phi, alpha, alpha_sigma, own) == pytest.approx(
+        own**2 / (own**2 + relative**2), rel=1e-6
+    )

@@ -18,7 +18,9 @@ def share(push, beam) -> float:
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "tapered", "cone"])
-@pytest.mark.parametrize("beta_deg, alpha_deg", [(0.0, 0.0), (0.0, 20.0), (30.0, 10.0), (60.0, 0.0), (60.0, 20.0)])
+@pytest.mark.parametrize(
+    "beta_deg, alpha_deg", [(0.0, 0.0), (0.0, 20.0), (30.0, 10.0), (60.0, 0.0), (60.0, 20.0)]
+)
 def test_no_slope_and_no_friction_enters(shape, beta_deg, alpha_deg):
     """A bar of no thickness: within θ⁴ / 6 of w/d, that is 1e-4 of a cone; friction along the whisker has no part."""
     push, beam = pushed(shape, beta_deg=beta_deg, alpha_deg=alpha_deg), beam_of(shape)
@@ -30,8 +32,12 @@ def test_no_slope_and_no_friction_enters(shape, beta_deg, alpha_deg):
 def test_the_contact_rolls_over_a_thick_bar_and_moves_along_one_that_leans():
     """Together to 3e-5; each alone is ten times that and more."""
     thick, leaning = pushed(radius_mm=3.0), pushed(beta_deg=60.0, alpha_deg=10.0, psi_deg=5.0)
-    assert share(thick, beam_of()) == pytest.approx(load_cell.rolling(thick.theta_rad, 3.5, 0.0, 60.0, 1.0), abs=3e-5)
-    moved = load_cell.leaning(leaning.theta_rad, np.radians(5.0), np.radians(50.0), np.radians(10.0))
+    assert share(thick, beam_of()) == pytest.approx(
+        load_cell.rolling(thick.theta_rad, 3.5, 0.0, 60.0, 1.0), abs=3e-5
+    )
+    moved = load_cell.leaning(
+        leaning.theta_rad, np.radians(5.0), np.radians(50.0), np.radians(10.0)
+    )
     rolled = load_cell.rolling(leaning.theta_rad, 0.55, np.radians(60.0), 60.0, 1.0)
     assert moved > 3e-3
     assert share(leaning, beam_of()) == pytest.approx(moved + rolled, abs=3e-5)
@@ -51,7 +57,9 @@ def test_the_gradient_is_that_of_the_distance():
     for k in (0, 1, 3, 4):
         step = np.zeros(5)
         step[k] = 1e-5 * abs(FELT[k])
-        ends = [load_cell.distance(0.05, *(np.array(FELT) + way * step), BEAM) for way in (1.0, -1.0)]
+        ends = [
+            load_cell.distance(0.05, *(np.array(FELT) + way * step), BEAM) for way in (1.0, -1.0)
+        ]
         found = np.log(ends[0] / ends[1]) / (2 * step[k])
         assert by[k] == pytest.approx(found, rel=0.03, abs=0.03 * np.abs(by[k]).max())
     assert by[2] == 0.0

@@ -9,7 +9,7 @@ from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.moving import NOT_TOLD, RUNS_AWAY, held, known_motion
 from estimator.whisk import EstimatorSettings, ObjectMotion, Whisk
-from tests.ladder.moving import errors_percent
+from tests.studies.accuracy.moving import errors_percent
 
 BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
 TOLD = EstimatorSettings(np.radians(10.0), np.radians(4.0), 3.5, np.radians(5.0))
@@ -49,7 +49,9 @@ def test_an_object_that_runs_away_is_felt_alike_at_two_distances():
     estimate = known_motion(whisk((0.0, 15.0, 0.0)), TOLD)
     other = float(estimate.status.split()[1])
     assert other < estimate.d_x_mm and "alike" in estimate.status
-    assert other * estimate.d_x_mm == pytest.approx(15.0 * with_friction(whisk(), TOLD).d_x_mm, rel=0.01)
+    assert other * estimate.d_x_mm == pytest.approx(
+        15.0 * with_friction(whisk(), TOLD).d_x_mm, rel=0.01
+    )
 
 
 def test_how_well_the_speed_is_known_is_in_the_sigma():

@@ -138,10 +138,14 @@ def test_rest_before_and_after_the_stroke_is_not_counted(stroke):
     """The motor's pauses at either end, with the whisker's ring, are no part of the level or the rise."""
     s = stroke(np.random.default_rng(6))
     pause = 400
-    motor = np.concatenate([np.full(pause, s.motor_rad[0]), s.motor_rad, np.full(pause, s.motor_rad[-1])])
+    motor = np.concatenate(
+        [np.full(pause, s.motor_rad[0]), s.motor_rad, np.full(pause, s.motor_rad[-1])]
+    )
     ends = [np.full((pause, 2), 0.5), s.moments, np.full((pause, 2), -0.5)]
     touch = felt_touch(motor, np.concatenate(ends))
-    assert touch.motor_rad == pytest.approx(felt_touch(*s.arrays).motor_rad, abs=0.5 * touch.sigma_rad)
+    assert touch.motor_rad == pytest.approx(
+        felt_touch(*s.arrays).motor_rad, abs=0.5 * touch.sigma_rad
+    )
 
 
 SPOILERS = {
@@ -181,7 +185,9 @@ def test_touches_of_the_sample_session(steel_signals):
     for trial in sorted((steel_signals / "trials").iterdir()):
         table = np.genfromtxt(trial / "signals.csv", delimiter=",", names=True)
         truth = tomllib.loads((trial / "truth.toml").read_text())["touch_deg"]
-        touch = felt_touch(np.radians(table["motor_deg"]), np.c_[table["y_V"], table["z_V"]], table["time_s"])
+        touch = felt_touch(
+            np.radians(table["motor_deg"]), np.c_[table["y_V"], table["z_V"]], table["time_s"]
+        )
         scores.append((np.degrees(touch.motor_rad) - truth) / np.degrees(touch.sigma_rad))
         assert np.degrees(touch.sigma_rad) < 0.01
     assert len(scores) >= 5

@@ -30,7 +30,9 @@ def angle(degrees):
         (10, 45, 20.0, 10, 10.5),
     ],
 )
-def test_section_4a_error_of_10_with_a_wrong_friction_angle(alpha_est, beta, alpha, printed_percent, percent):
+def test_section_4a_error_of_10_with_a_wrong_friction_angle(
+    alpha_est, beta, alpha, printed_percent, percent
+):
     """By the forward model and (10) itself; half a unit of the last digit given, half a percent of the paper's."""
     theta, C = angle(3), 9000.0
     m_y, m_z = slip.moments(60.0, theta, angle(beta), angle(alpha), C)
@@ -56,7 +58,9 @@ def test_section_7_friction_coefficient_of_smooth_surfaces():
 )
 def test_section_4b_curved_surface_without_friction(theta, error, printed_deg, recomputed_deg):
     for printed in (True, False):
-        found = np.degrees(slope_threshold(error, 0.0, 0.0, r_n=1.0, theta=angle(theta), printed=printed))
+        found = np.degrees(
+            slope_threshold(error, 0.0, 0.0, r_n=1.0, theta=angle(theta), printed=printed)
+        )
         assert 0 <= recomputed_deg - found <= 0.1
         assert found == pytest.approx(printed_deg, abs=0.55)
 
@@ -72,9 +76,13 @@ def test_section_4b_curved_surface_without_friction(theta, error, printed_deg, r
         (5, 0.10, False, 69.5),
     ],
 )
-def test_section_4b_curved_surface_with_friction_of_20_degrees(theta, error, printed, recomputed_deg):
+def test_section_4b_curved_surface_with_friction_of_20_degrees(
+    theta, error, printed, recomputed_deg
+):
     """ "Friction has negligible impact" holds for (24) as printed, not for the force at the contact point."""
-    found = np.degrees(slope_threshold(error, angle(20), angle(20), r_n=1.0, theta=angle(theta), printed=printed))
+    found = np.degrees(
+        slope_threshold(error, angle(20), angle(20), r_n=1.0, theta=angle(theta), printed=printed)
+    )
     assert 0 <= recomputed_deg - found <= 0.1
 
 
@@ -90,7 +98,8 @@ def cone_moments(d_x, theta, beta, alpha, C, length):
 
 
 @pytest.mark.parametrize(
-    "alpha, beta, d_x, printed_mm", [(0, 30, 60, 54.9), (0, 60, 30, 23.1), (0, 60, 80, 44.4), (10.5, 60, 80, 57.6)]
+    "alpha, beta, d_x, printed_mm",
+    [(0, 30, 60, 54.9), (0, 60, 30, 23.1), (0, 60, 80, 44.4), (10.5, 60, 80, 57.6)],
 )
 def test_equation_17_as_printed_and_with_the_angle_scaled(alpha, beta, d_x, printed_mm):
     """The table's cone is exact (large deflections); at θ = 1° small deflections give the same to 0.05 mm."""

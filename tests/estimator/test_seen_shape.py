@@ -18,14 +18,20 @@ def answer(one, **changed):
 
 @pytest.mark.parametrize(
     "scene",
-    [{"shape": "cone", "beta_deg": 30.0}, {"shape": "tapered", "d_x_mm": 35.0}, {"stiffness_N_mm": 0.1}],
+    [
+        {"shape": "cone", "beta_deg": 30.0},
+        {"shape": "tapered", "d_x_mm": 35.0},
+        {"stiffness_N_mm": 0.1},
+    ],
     ids=["cone on a slope", "tapered", "soft"],
 )
 def test_touch_distance_force_and_way_are_within_their_sigmas(scene):
     one = shown(np.random.default_rng(1), off_mm=0.01, **scene)
     said = answer(one)
     assert said.status == ""
-    assert abs(said.touch_rad - one.touch_rad) < MOST_SIGMAS * said.touch_sigma_rad < np.radians(0.05)
+    assert (
+        abs(said.touch_rad - one.touch_rad) < MOST_SIGMAS * said.touch_sigma_rad < np.radians(0.05)
+    )
     assert abs(said.d_x_mm - one.d_x_mm) < MOST_SIGMAS * said.d_x_sigma_mm < 0.03 * one.d_x_mm
     assert abs(said.force_N - one.force_N) < MOST_SIGMAS * said.force_sigma_N < 0.1 * one.force_N
     assert abs(said.moved_mm - one.moved_mm) < MOST_SIGMAS * said.moved_sigma_mm < 0.5
@@ -44,7 +50,9 @@ def test_an_object_that_gives_way_has_a_stiffness_and_a_rigid_one_a_least():
 def test_the_rigidity_enters_the_force_alone():
     one = shown(np.random.default_rng(3))
     exact, doubted = answer(one), answer(one, rigidity_share=0.05)
-    assert doubted.force_sigma_N == pytest.approx(np.hypot(exact.force_sigma_N, 0.05 * exact.force_N))
+    assert doubted.force_sigma_N == pytest.approx(
+        np.hypot(exact.force_sigma_N, 0.05 * exact.force_N)
+    )
     assert doubted.d_x_sigma_mm == exact.d_x_sigma_mm
 
 
@@ -61,7 +69,10 @@ def test_what_is_not_seen_is_not_told():
     one = shown(np.random.default_rng(4))
     seen = one.seen
     assert contact_of_shape(seen.until(seen.motor_rad[2]), one.theta_rad, one.beam).status == FEW
-    assert contact_of_shape(seen.until(one.touch_rad + 0.02), one.theta_rad, one.beam).status == NOT_PUSHED
+    assert (
+        contact_of_shape(seen.until(one.touch_rad + 0.02), one.theta_rad, one.beam).status
+        == NOT_PUSHED
+    )
     free = contact_of_shape(seen.until(one.touch_rad - 0.005), 0.01, one.beam)
     assert free.status in (UNTOLD, NOT_PUSHED)
     assert np.isnan(free.d_x_mm)
@@ -72,4 +83,12 @@ def test_impossible_sights_are_refused():
     with pytest.raises(ValueError, match="sigma_rad must be positive"):
         replace(seen, sigma_rad=0 * seen.sigma_rad)
     with pytest.raises(ValueError, match=r"sight and across \(n, 3\)"):
-        SeenShape(seen.motor_rad, seen.frame, np.zeros(2), seen.sight, seen.across, seen.sigma_rad, seen.shared_rad)
+        SeenShape(
+            seen.motor_rad,
+            seen.frame,
+            np.zeros(2),
+            seen.sight,
+            seen.across,
+            seen.sigma_rad,
+            seen.shared_rad,
+        )

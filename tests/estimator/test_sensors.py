@@ -19,8 +19,12 @@ FORCE = np.array([0.0, M_Z, -M_Y]) / D_X
 TOLD = EstimatorSettings(ALPHA)
 
 
-def whisk(*, force=FORCE, force_sigma=1e-4, rate=(M_Y / THETA, M_Z / THETA), scale_sigma=0.0) -> Whisk:
-    others = OtherSensors(np.array(force), force_sigma**2 * np.eye(3), scale_sigma, np.array(rate), np.eye(2) * 1e-2)
+def whisk(
+    *, force=FORCE, force_sigma=1e-4, rate=(M_Y / THETA, M_Z / THETA), scale_sigma=0.0
+) -> Whisk:
+    others = OtherSensors(
+        np.array(force), force_sigma**2 * np.eye(3), scale_sigma, np.array(rate), np.eye(2) * 1e-2
+    )
     return Whisk(*(np.zeros(0),) * 4, THETA, M_Y, M_Z, 1e-6 * np.eye(2), 1e-3, BEAM, others=others)
 
 
@@ -30,7 +34,9 @@ def test_touch_alone_knows_the_whiskers_length(rng):
     places = rng.uniform(0.0, BEAM.length_mm, 4000)
     inside = np.mean((estimate.low_mm <= places) & (places <= estimate.high_mm))
     assert inside == pytest.approx(0.95, abs=3 * np.sqrt(0.95 * 0.05 / 4000))
-    assert np.sqrt(np.mean((places - estimate.d_x_mm) ** 2)) == pytest.approx(estimate.sigma_mm, rel=0.05)
+    assert np.sqrt(np.mean((places - estimate.d_x_mm) ** 2)) == pytest.approx(
+        estimate.sigma_mm, rel=0.05
+    )
 
 
 def test_the_rate_of_the_moment_is_10_without_an_angle_of_touch():
@@ -44,7 +50,9 @@ def test_the_rate_of_the_moment_is_10_without_an_angle_of_touch():
 def test_force_and_moment_need_no_friction():
     """To the deflection's θ²/2: 0.2 %."""
     for alpha in (0.0, 0.3):
-        assert force_and_moment(whisk(), EstimatorSettings(alpha)).d_x_mm == pytest.approx(D_X, rel=2.5e-3)
+        assert force_and_moment(whisk(), EstimatorSettings(alpha)).d_x_mm == pytest.approx(
+            D_X, rel=2.5e-3
+        )
 
 
 def test_newtons_that_disagree_widen_force_and_moment():
@@ -58,7 +66,9 @@ def test_the_interval_of_force_and_moment_is_one_over_the_forces(rng):
     sigma = 0.1 * np.linalg.norm(FORCE)
     held, sides = [], []
     for _ in range(1000):
-        one = force_and_moment(whisk(force=FORCE + sigma * rng.normal(size=3), force_sigma=sigma), TOLD)
+        one = force_and_moment(
+            whisk(force=FORCE + sigma * rng.normal(size=3), force_sigma=sigma), TOLD
+        )
         held.append(one.low_mm <= 1.0014 * D_X <= one.high_mm)
         sides.append(one.high_mm - one.d_x_mm > one.d_x_mm - one.low_mm)
     assert np.mean(held) == pytest.approx(0.95, abs=3 * np.sqrt(0.95 * 0.05 / 1000))
@@ -77,9 +87,15 @@ def test_beyond_the_tip_is_the_tip():
 
 def test_what_was_not_recorded_is_a_reason():
     bare = replace(whisk(), others=None)
-    assert (moment_rate(bare, TOLD).status, force_and_moment(bare, TOLD).status) == (NO_RATE, NO_CELL)
+    assert (moment_rate(bare, TOLD).status, force_and_moment(bare, TOLD).status) == (
+        NO_RATE,
+        NO_CELL,
+    )
     reversed_cell = force_and_moment(whisk(force=-FORCE), TOLD)
-    assert np.isnan(reversed_cell.d_x_mm) and "not the one that its moment asks for" in reversed_cell.status
+    assert (
+        np.isnan(reversed_cell.d_x_mm)
+        and "not the one that its moment asks for" in reversed_cell.status
+    )
 
 
 def test_rate_and_force_scatter_as_stated(stroke, rng):

@@ -135,7 +135,9 @@ def test_a_coarse_encoder_costs_no_more_than_a_fraction_of_its_step(stroke):
     mean over a window of 1° is off by less than the rounding of its ends, 0.1°/10."""
     s = stroke(np.random.default_rng(16), encoder=0.1)
     touch, at = felt(s)
-    assert np.degrees(touch.motor_rad) == pytest.approx(2.3, abs=0.01 + 3 * np.degrees(touch.sigma_rad))
+    assert np.degrees(touch.motor_rad) == pytest.approx(
+        2.3, abs=0.01 + 3 * np.degrees(touch.sigma_rad)
+    )
     np.testing.assert_allclose(at.values, s.slopes * 3.0, rtol=0.01)
 
 
@@ -144,7 +146,9 @@ def test_an_encoder_of_one_step_in_the_window_does_no_harm(stroke):
     s = stroke(np.random.default_rng(17))
     touch = felt_touch(*s.arrays, s.time_s)
     flat = np.where(
-        np.abs(s.motor_rad - touch.motor_rad - THETA) < np.radians(0.5), touch.motor_rad + THETA, s.motor_rad
+        np.abs(s.motor_rad - touch.motor_rad - THETA) < np.radians(0.5),
+        touch.motor_rad + THETA,
+        s.motor_rad,
     )
     at = moment_at(THETA, flat, s.moments, touch, half_window_rad=np.radians(0.4))
     np.testing.assert_allclose(at.values, s.slopes * 3.0, rtol=0.03)

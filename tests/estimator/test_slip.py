@@ -10,7 +10,9 @@ from estimator import slip
 pytestmark = pytest.mark.filterwarnings("error")
 
 EPSILON = 2.0**-52
-slopes = st.builds(lambda sign, size: sign * size, st.sampled_from([-1, 0, 1]), st.floats(1e-12, 1.5))
+slopes = st.builds(
+    lambda sign, size: sign * size, st.sampled_from([-1, 0, 1]), st.floats(1e-12, 1.5)
+)
 frictions = st.floats(0.0, 1.5)
 distances = st.floats(1e-3, 1e4)
 pushes = st.floats(1e-9, 0.35)
@@ -22,7 +24,9 @@ def test_mirrored_slope_mirrors_the_slip_and_m_y(d_x, theta, beta, alpha, C):
     m_y, m_z = slip.moments(d_x, theta, beta, alpha, C)
     assert slip.moments(d_x, theta, -beta, alpha, C) == (-m_y, m_z)
     assert slip.slip_angle(-beta, alpha) == -slip.slip_angle(beta, alpha)
-    assert slip.slip_distance(d_x, theta, -beta, alpha) == -slip.slip_distance(d_x, theta, beta, alpha)
+    assert slip.slip_distance(d_x, theta, -beta, alpha) == -slip.slip_distance(
+        d_x, theta, beta, alpha
+    )
 
 
 @given(distances, pushes, frictions, st.floats(0, 1), rigidities)
@@ -58,7 +62,9 @@ def test_scale_invariance(d_x, theta, beta, alpha, C, power):
 def test_magnitude_and_direction_belong_together(d_x, theta, beta, alpha, C):
     """8 ε for each of two square roots and an arc tangent, whose argument is at most tan 1.4 = 6 times as sensitive."""
     m_y, m_z = slip.moments(d_x, theta, beta, alpha, C)
-    assert np.hypot(m_y, m_z) == pytest.approx(slip.moment_magnitude(d_x, theta, beta, alpha, C), rel=32 * EPSILON)
+    assert np.hypot(m_y, m_z) == pytest.approx(
+        slip.moment_magnitude(d_x, theta, beta, alpha, C), rel=32 * EPSILON
+    )
     assert np.arctan2(m_y, m_z) == pytest.approx(slip.slip_angle(beta, alpha), abs=64 * EPSILON)
 
 
@@ -68,7 +74,9 @@ def test_deflections_hang_together(d_x, theta, beta, alpha, C):
     slid = slip.slip_distance(d_x, theta, beta, alpha)
     d_y, d_z = d_x * theta - slid * np.sin(beta), slid * np.cos(beta)
     np.testing.assert_allclose(
-        slip.moment_from_deflection(d_x, d_y, d_z, C), slip.moments(d_x, theta, beta, alpha, C), rtol=1e-12
+        slip.moment_from_deflection(d_x, d_y, d_z, C),
+        slip.moments(d_x, theta, beta, alpha, C),
+        rtol=1e-12,
     )
     found_beta, found_phi = slip.slope_from_deflection(d_x, theta, d_y, d_z)
     assert found_phi == pytest.approx(slip.slip_angle(beta, alpha), rel=1e-12, abs=1e-15)

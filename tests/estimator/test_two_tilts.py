@@ -15,7 +15,9 @@ BEAMS = {"cylinder": Beam(8835.7, 100.0), "cone": Beam(8835.7, 100.0, "cone")}
 TOLD = EstimatorSettings(np.radians(10.0))
 
 
-def whisk(beta_deg, *, theta=1e-3, alpha=ALPHA, beam=BEAMS["cylinder"], sigma=1e-9, noise=(0.0, 0.0)) -> Whisk:
+def whisk(
+    beta_deg, *, theta=1e-3, alpha=ALPHA, beam=BEAMS["cylinder"], sigma=1e-9, noise=(0.0, 0.0)
+) -> Whisk:
     """By (13), (14); at θ → 0 nothing is left out of (10)."""
     d = beam.as_cylinder_mm(D_X)
     m_y, m_z = np.array(slip.moments(d, theta, np.radians(beta_deg), alpha, beam.C_Nmm2)) + noise
@@ -23,7 +25,9 @@ def whisk(beta_deg, *, theta=1e-3, alpha=ALPHA, beam=BEAMS["cylinder"], sigma=1e
 
 
 @pytest.mark.parametrize("shape", BEAMS)
-@pytest.mark.parametrize("slopes", [(5.0, 60.0), (25.0, 55.0), (-30.0, 60.0), (30.0, -60.0), (0.0, -40.0)])
+@pytest.mark.parametrize(
+    "slopes", [(5.0, 60.0), (25.0, 55.0), (-30.0, 60.0), (30.0, -60.0), (0.0, -40.0)]
+)
 def test_distance_and_friction_come_back_whatever_alpha_est_is(shape, slopes):
     """To θ: 1e-3 of both."""
     told = shared_contact([whisk(beta, beam=BEAMS[shape]) for beta in slopes], TOLD)
@@ -50,7 +54,9 @@ def test_the_covariance_is_that_of_noise(rng):
     scatter = np.cov(np.array(found).T)
     assert np.sqrt(np.diag(told.covariance)) == pytest.approx(np.sqrt(np.diag(scatter)), rel=0.15)
     correlation = scatter[0, 1] / np.sqrt(scatter[0, 0] * scatter[1, 1])
-    assert told.covariance[0, 1] / np.sqrt(np.prod(np.diag(told.covariance))) == pytest.approx(correlation, abs=0.1)
+    assert told.covariance[0, 1] / np.sqrt(np.prod(np.diag(told.covariance))) == pytest.approx(
+        correlation, abs=0.1
+    )
 
 
 def test_what_all_whisks_have_in_common_is_no_noise():
@@ -66,7 +72,9 @@ def test_what_all_whisks_have_in_common_is_no_noise():
 
 def test_distances_that_may_be_apart_widen_both():
     whisks = [whisk(beta) for beta in (20.0, 60.0)]
-    near, apart = (shared_contact(whisks, TOLD, apart_sigma_mm=sigma).covariance for sigma in (0.0, 0.5))
+    near, apart = (
+        shared_contact(whisks, TOLD, apart_sigma_mm=sigma).covariance for sigma in (0.0, 0.5)
+    )
     assert (np.diag(apart) > 10 * np.diag(near)).all()
     twice = shared_contact(2 * whisks, TOLD, apart_sigma_mm=0.5, places=(1, 2, 1, 2)).covariance
     assert twice == pytest.approx(apart, rel=1e-3)  # the same places again tell nothing new of them

@@ -59,7 +59,9 @@ def test_sensitivities_of_10_in_the_closed_forms(theta, phi, alpha_est):
     """∂ln d_x/∂φ = −tan(φ + α_est), ∂ln d_x/∂α_est = −tan(φ + α_est) + tan α_est, for φ > 0 and mirrored."""
     m_y, m_z = 5 * np.sin(phi), 5 * np.cos(phi)
     d_x = distance.with_friction(theta, m_y, m_z, alpha_est, C)
-    by_theta, by_y, by_z, by_alpha = uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C) / d_x
+    by_theta, by_y, by_z, by_alpha = (
+        uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C) / d_x
+    )
     steep = np.tan(abs(phi) + alpha_est)
     assert by_theta == pytest.approx(1 / theta, rel=1e-14)
     assert by_alpha == pytest.approx(np.tan(alpha_est) - steep, rel=1e-11, abs=1e-14)
@@ -68,7 +70,9 @@ def test_sensitivities_of_10_in_the_closed_forms(theta, phi, alpha_est):
 
 
 @pytest.mark.parametrize("beta_deg", [0.0, 20.0, 45.0, 70.0])
-@pytest.mark.parametrize("equation", ["no_slip", "known_slope", "with_friction", "frictionless", "cone"])
+@pytest.mark.parametrize(
+    "equation", ["no_slip", "known_slope", "with_friction", "frictionless", "cone"]
+)
 def test_predicted_sigma_is_the_sampled_scatter(equation, beta_deg):
     """20000 draws give a scatter good to 1/√40000 = 0.5 %; 0.3 % noise leaves curvature below 1 %; 4 · 0.5 % is 2 %.
 
@@ -119,7 +123,13 @@ def test_wrong_modulus_changes_no_distance_where_the_gauges_were_found_with_it()
         m_y, m_z = factor * volts_y, factor * volts_z
         d_x = distance.with_friction(THETA, m_y, m_z, ALPHA, stiffness)
         sigma = uncertainty.sigma_with_friction(
-            THETA, m_y, m_z, ALPHA, stiffness, touch_sigma=1e-4, covariance=(0.002 * factor) ** 2 * np.eye(2)
+            THETA,
+            m_y,
+            m_z,
+            ALPHA,
+            stiffness,
+            touch_sigma=1e-4,
+            covariance=(0.002 * factor) ** 2 * np.eye(2),
         )
         found.append((d_x, sigma))
     np.testing.assert_allclose(found[1], found[0], rtol=16 * 2.0**-52)
@@ -128,8 +138,14 @@ def test_wrong_modulus_changes_no_distance_where_the_gauges_were_found_with_it()
 def test_sigma_functions_are_the_gradients_put_to_use():
     sigmas = {"touch_sigma": 1e-4, "covariance": 1e-4 * np.eye(2), "alpha_est_sigma": 0.01}
     pairs = [
-        (uncertainty.sigma_known_slope(THETA, 2.0, 7.0, 0.7, C, **sigmas), cases()["known_slope"][1]),
-        (uncertainty.sigma_with_friction(THETA, 2.0, 7.0, ALPHA, C, **sigmas), cases()["with_friction"][1]),
+        (
+            uncertainty.sigma_known_slope(THETA, 2.0, 7.0, 0.7, C, **sigmas),
+            cases()["known_slope"][1],
+        ),
+        (
+            uncertainty.sigma_with_friction(THETA, 2.0, 7.0, ALPHA, C, **sigmas),
+            cases()["with_friction"][1],
+        ),
         (uncertainty.sigma_frictionless(THETA, 2.0, 7.0, C, **sigmas), cases()["frictionless"][1]),
         (uncertainty.sigma_cone(THETA, 2.0, 7.0, ALPHA, C, LENGTH, **sigmas), cases()["cone"][1]),
     ]
@@ -140,7 +156,9 @@ def test_sigma_functions_are_the_gradients_put_to_use():
 def test_friction_doubt_counts_even_where_no_slip_was_felt():
     """At m_y = 0 noise in m_y is still rectified by |m_y|: its one-sided derivative counts."""
     gradient = uncertainty.gradient_with_friction(THETA, 0.0, 7.0, ALPHA, C)
-    assert gradient[1] == pytest.approx(-np.tan(ALPHA) / 7.0 * distance.no_slip(THETA, 7.0, C), rel=1e-12)
+    assert gradient[1] == pytest.approx(
+        -np.tan(ALPHA) / 7.0 * distance.no_slip(THETA, 7.0, C), rel=1e-12
+    )
 
 
 def test_no_distance_has_no_sigma():
@@ -149,7 +167,9 @@ def test_no_distance_has_no_sigma():
 
 def test_arrays_broadcast():
     m_y = np.array([0.0, 1.0, 2.0])
-    found = uncertainty.sigma_with_friction(THETA, m_y, 7.0, ALPHA, C, touch_sigma=1e-4, covariance=np.eye(2) * 1e-4)
+    found = uncertainty.sigma_with_friction(
+        THETA, m_y, 7.0, ALPHA, C, touch_sigma=1e-4, covariance=np.eye(2) * 1e-4
+    )
     assert found.shape == (3,)
     assert found[1] == uncertainty.sigma_with_friction(
         THETA, 1.0, 7.0, ALPHA, C, touch_sigma=1e-4, covariance=np.eye(2) * 1e-4

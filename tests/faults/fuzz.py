@@ -31,7 +31,23 @@ SESSION = Path(__file__).resolve().parents[2] / "fixtures" / "small-session"
 TRIAL, FRAMES, EVERY, SHRINK = "b60_4", 5, 4, 8  # of the frames, samples and pixels that there are
 MOST_S, MOST_WAIT_S, MOST_BYTES = 10, 60.0, 2 << 30
 TOO_LONG = "too long"
-ODD = ["nan", "inf", "-1", "0", "1e308", "-1e-308", "99999999999999999999", "", "'", '"', "[", "]]", "=", ",", "\0"]
+ODD = [
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "1e308",
+    "-1e-308",
+    "99999999999999999999",
+    "",
+    "'",
+    '"',
+    "[",
+    "]]",
+    "=",
+    ",",
+    "\0",
+]
 
 CAMERA = """[cameras.{name}]
 size_px = [160, 90]
@@ -52,20 +68,26 @@ def small_base(folder: Path) -> Path:
         for k, picture in enumerate(sorted((source / camera).iterdir())[:FRAMES]):
             _shrunk(picture, trial / camera / f"{k}{('.png', '.jpg')[k % 2]}")
         (base / "boards" / "rig").mkdir(parents=True, exist_ok=True)
-        _shrunk(SESSION / "boards" / "rig" / f"{camera}.png", base / "boards" / "rig" / f"{camera}.png")
+        _shrunk(
+            SESSION / "boards" / "rig" / f"{camera}.png", base / "boards" / "rig" / f"{camera}.png"
+        )
     for name, rows in (("frames.csv", slice(FRAMES)), ("signals.csv", slice(None, None, EVERY))):
         head, *lines = (source / name).read_text().splitlines()
         (trial / name).write_text("\n".join([head, *lines[rows]]) + "\n")
     shutil.copyfile(source / "trial.toml", trial / "trial.toml")
     shutil.copyfile(SESSION / "session.toml", base / "session.toml")
-    (base / "cameras.toml").write_text("".join(CAMERA.format(name=name) for name in ("high", "low")))
+    (base / "cameras.toml").write_text(
+        "".join(CAMERA.format(name=name) for name in ("high", "low"))
+    )
     (base / "gauges.toml").write_text(GAUGES)
     return base
 
 
 def _shrunk(source: Path, target: Path) -> None:
     grey = cv2.imread(str(source), cv2.IMREAD_GRAYSCALE)
-    small = cv2.resize(grey, (grey.shape[1] // SHRINK, grey.shape[0] // SHRINK), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(
+        grey, (grey.shape[1] // SHRINK, grey.shape[0] // SHRINK), interpolation=cv2.INTER_AREA
+    )
     assert cv2.imwrite(str(target), small)
 
 
@@ -75,13 +97,18 @@ def with_films(base: Path) -> Path:
     shutil.copytree(base, films)
     trial = films / "trials" / TRIAL
     for camera in ("high", "low"):
-        greys = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted((trial / camera).iterdir())]
+        greys = [
+            cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+            for file in sorted((trial / camera).iterdir())
+        ]
         shutil.rmtree(trial / camera)
         if camera == "low":
             assert cv2.imwritemulti(str(trial / "low.tif"), greys)
             continue
         fourcc = cv2.VideoWriter_fourcc(*"MJPG")
-        writer = cv2.VideoWriter(str(trial / f"{camera}.avi"), fourcc, 20.0, greys[0].shape[::-1], False)
+        writer = cv2.VideoWriter(
+            str(trial / f"{camera}.avi"), fourcc, 20.0, greys[0].shape[::-1], False
+        )
         for grey in greys:
             writer.write(grey)
         writer.release()
@@ -150,7 +177,11 @@ def number(data: bytes, rng) -> bytes:
     if not places:
         return data
     found = places[int(rng.integers(len(places)))]
-    odd = ODD[int(rng.integers(len(ODD)))] if rng.random() < 0.6 else f"{rng.normal() * 10.0 ** rng.integers(-9, 10)}"
+    odd = (
+        ODD[int(rng.integers(len(ODD)))]
+        if rng.random() < 0.6
+        else f"{rng.normal() * 10.0 ** rng.integers(-9, 10)}"
+    )
     return (text[: found.start()] + odd + text[found.end() :]).encode()
 
 
@@ -191,12 +222,22 @@ def tried(base: Path, seed: int, work: Path, verb: str) -> tuple[str, str]:
         return TOO_LONG, f"seed {seed}: {what}"
     _, status = os.waitpid(child, 0)
     text = said.read_text(errors="replace")
-    how = f"exit {os.WEXITSTATUS(status)}" if os.WIFEXITED(status) else f"signal {os.WTERMSIG(status)}"
-    return ("traceback" if "Traceback" in text else how), f"seed {seed}: {what}: {text.strip()[-300:]}"
+    how = (
+        f"exit {os.WEXITSTATUS(status)}"
+        if os.WIFEXITED(status)
+        else f"signal {os.WTERMSIG(status)}"
+    )
+    return (
+        "traceback" if "Traceback" in text else how
+    ), f"seed {seed}: {what}: {text.strip()[-300:]}"
 
 
 def _arguments(verb: str, session: Path, out: Path) -> list[str]:
-    return [verb, str(session), *(["--out", str(out), "--no-figures"] if verb == "evaluate" else [])]
+    return [
+        verb,
+        str(session),
+        *(["--out", str(out), "--no-figures"] if verb == "evaluate" else []),
+    ]
 
 
 def _ends(child: int) -> bool:
@@ -204,7 +245,10 @@ def _ends(child: int) -> bool:
     handle = os.pidfd_open(child)
     try:
         while not select.select([handle], [], [], MOST_WAIT_S)[0]:
-            threads = [one.read_text().rpartition(") ")[2] for one in Path(f"/proc/{child}/task").glob("*/stat")]
+            threads = [
+                one.read_text().rpartition(") ")[2]
+                for one in Path(f"/proc/{child}/task").glob("*/stat")
+            ]
             if not any(state.startswith("R") for state in threads):
                 return False
         return True
@@ -222,7 +266,7 @@ def _run(arguments: list[str], said: Path) -> None:
         used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
         resource.setrlimit(resource.RLIMIT_AS, (used + MOST_BYTES, used + MOST_BYTES))
         resource.setrlimit(resource.RLIMIT_CPU, (MOST_S, MOST_S))
-        from bench import cli
+        from bench.commands import cli
 
         code = cli.main(arguments)
         sys.stdout.flush()
@@ -240,8 +284,8 @@ def _sound() -> None:
 
 def fuzz(first: int, count: int, verb: str = "check") -> tuple[Counter, list[str]]:
     """How many mutations ended how, and a line for each that should not have ended so."""
-    from bench import cli
     from bench.base import environment
+    from bench.commands import cli
 
     environment.check_environment()
     environment.check_environment, cli.make_parser = _sound, cache(cli.make_parser)

@@ -33,9 +33,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import cli
 from bench.base import atomic, workers
 from bench.base.digests import KEPT
+from bench.commands import cli
 from tests.faults.fuzz import GAUGES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,12 +49,24 @@ _OWN = (".lock", KEPT)  # the run's process id; which files of the session were 
 
 def command(session: Path, out: Path) -> list[str]:
     """An evaluation with two workers."""
-    return [sys.executable, "-m", "bench.cli", "evaluate", str(session), "--out", str(out), "--workers", "2"]
+    return [
+        sys.executable,
+        "-m",
+        "bench.commands.cli",
+        "evaluate",
+        str(session),
+        "--out",
+        str(out),
+        "--workers",
+        "2",
+    ]
 
 
 def started(session: Path, out: Path) -> subprocess.Popen:
     where = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(command(session, out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=where)
+    return subprocess.Popen(
+        command(session, out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=where
+    )
 
 
 class Fork:
@@ -69,7 +81,11 @@ class Fork:
     def _run(self, session: Path, out: Path) -> None:
         code = 99
         try:
-            with self._said.open("w") as file, redirect_stdout(io.StringIO()), redirect_stderr(file):
+            with (
+                self._said.open("w") as file,
+                redirect_stdout(io.StringIO()),
+                redirect_stderr(file),
+            ):
                 code = cli.main(command(session, out)[3:])
         finally:
             os._exit(code)
@@ -96,7 +112,9 @@ class Fork:
 def felt_session(folder: Path) -> Path:
     """The small session's signals, with gauges brought along."""
     session = folder / "felt"
-    shutil.copytree(SESSION, session, ignore=shutil.ignore_patterns("boards", "low", "high", "frames.csv"))
+    shutil.copytree(
+        SESSION, session, ignore=shutil.ignore_patterns("boards", "low", "high", "frames.csv")
+    )
     (session / "gauges.toml").write_text(GAUGES)
     return session
 
@@ -130,16 +148,24 @@ def contents(out: Path) -> dict[str, bytes]:
 
 def differences(found: dict[str, bytes], wanted: dict[str, bytes]) -> list[str]:
     """Names of files that are missing, too many or others."""
-    return sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
+    return sorted(
+        name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name)
+    )
 
 
 def _workers(pid: int) -> list[int]:
     """Processes that a run works by (Linux)."""
     children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return [int(child) for child in children if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()]
+    return [
+        int(child)
+        for child in children
+        if b"resource_tracker" not in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
 
 
-def killed(start: Callable, session: Path, out: Path, after_s: float, rng: np.random.Generator) -> str:
+def killed(
+    start: Callable, session: Path, out: Path, after_s: float, rng: np.random.Generator
+) -> str:
     """What was killed so long after the start, the run or one of its workers; nothing where the run had ended."""
     begin, run = time.monotonic(), start(session, out)
     while run.poll() is None and time.monotonic() < begin + after_s:
@@ -186,7 +212,10 @@ def kill(count: int, session: Path = SESSION, start: Callable = started) -> int:
             told = f"differ: {wrong}" if wrong else "resumed to the same bytes"
             when = f"after {after_s:.2f} of {takes_s:.2f} s, {stood} of {len(wanted)} files stood"
             print(f"{alive.total()}: killed {what} {when}; {told}", flush=True)
-    print(f"killed alive: {dict(alive)}, {bad} not resumed to the same bytes; {ended} had ended before", flush=True)
+    print(
+        f"killed alive: {dict(alive)}, {bad} not resumed to the same bytes; {ended} had ended before",
+        flush=True,
+    )
     return bad
 
 

@@ -5,7 +5,7 @@ import shutil
 import cv2
 import pytest
 
-from bench import cli
+from bench.commands import cli
 
 
 def no_manifest(session):
@@ -52,11 +52,17 @@ def other_size(session):
 FAULTS = {
     "no session.toml": (no_manifest, "there is no session.toml"),
     "a misspelt key": (misspelt_key, "did you mean 'square_mm'?"),
-    "a camera without frames": (camera_without_frames, "trials/b30_3: camera low has no frames here"),
+    "a camera without frames": (
+        camera_without_frames,
+        "trials/b30_3: camera low has no frames here",
+    ),
     "text": (row_of_signals("0.02,0.87,abc,0.1"), "signals.csv, row 42, column y_V: 'abc'"),
     "NaN": (row_of_signals("0.02,0.87,nan,0.1"), "signals.csv, row 42, column y_V: 'nan'"),
     "decimal commas": (row_of_signals("0,02,0,87,0,1,0,1"), "signals.csv, row 42: has 8 values"),
-    "time running backwards": (row_of_signals("0.001,0.87,0.1,0.1"), "signals.csv, row 42, column time_s: goes back"),
+    "time running backwards": (
+        row_of_signals("0.001,0.87,0.1,0.1"),
+        "signals.csv, row 42, column time_s: goes back",
+    ),
     "radians for degrees": (radians, "Is it in radians?"),
     "no trials": (no_trials, "there is no trial to evaluate"),
     "another picture size": (other_size, "boards/rig/high.png: is 640 x 360 px"),
@@ -87,7 +93,11 @@ def test_bad_session(small_copy, tmp_path, capsys, fault):
         ("--theta-deg", "nan", "--theta-deg nan"),
         ("--alpha-est-deg", "95", "--alpha-est-deg 95: must be"),
         ("--cutoff-Hz", "-5", "--cutoff-Hz -5: must be above 0"),
-        ("--estimator", "nowhere:nothing", "--estimator nowhere:nothing: No module named 'nowhere'"),
+        (
+            "--estimator",
+            "nowhere:nothing",
+            "--estimator nowhere:nothing: No module named 'nowhere'",
+        ),
     ],
 )
 def test_bad_option(small_session, tmp_path, capsys, option, value, expected):

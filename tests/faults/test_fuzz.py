@@ -9,12 +9,16 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "faults" / "fuzz.py"
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="each mutation runs in a forked process")
+pytestmark = pytest.mark.skipif(
+    not hasattr(os, "fork"), reason="each mutation runs in a forked process"
+)
 
 
 def fuzzed(first: int, count: int, verb: str = "check") -> subprocess.CompletedProcess:
     """In a process of its own: forks of one with many threads may hang."""
-    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1") | {"PYTHONPATH": str(ROOT)}
+    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1") | {
+        "PYTHONPATH": str(ROOT)
+    }
     command = [sys.executable, str(SCRIPT), str(first), str(count), verb]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ | one)
 

@@ -6,7 +6,10 @@ import pytest
 
 from tests.faults.interrupted import full, kill
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="looks up processes in /proc")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="looks up processes in /proc"),
+]
 
 
 def test_a_killed_run_goes_on_to_the_same_bytes():

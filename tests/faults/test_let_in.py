@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli
 from bench.base import environment
 from bench.base.errors import BadInput
 from bench.base.packages import PACKAGES
-from bench.session.check import checked_session
+from bench.commands import cli
+from bench.session.session_check import checked_session
 from tests.scenes.faults import FAULTS, TRIAL
 from vision.calibration.cameras_file import read_cameras
 from vision.calibration.cameras_import import import_cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.pictures.files import picture_size, read_picture
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +31,10 @@ def refusal(session) -> str:
 
 def test_a_pipe_in_place_of_a_picture(session):
     FAULTS["FIFO for a picture"](session)
-    assert refusal(session) == f"trials/{TRIAL}/low/000003.jpg: is no regular file (a pipe, socket or device)"
+    assert (
+        refusal(session)
+        == f"trials/{TRIAL}/low/000003.jpg: is no regular file (a pipe, socket or device)"
+    )
 
 
 def test_a_pipe_is_not_waited_for(tmp_path):
@@ -42,7 +45,9 @@ def test_a_pipe_is_not_waited_for(tmp_path):
 
 def test_a_link_out_of_the_session(session):
     FAULTS["folder is a link out"](session)
-    assert refusal(session).startswith(f"trials/{TRIAL}/low: is a link that leads out of the session")
+    assert refusal(session).startswith(
+        f"trials/{TRIAL}/low: is a link that leads out of the session"
+    )
 
 
 def test_footage_elsewhere_is_followed_where_the_user_says_so(session, tmp_path):
@@ -133,7 +138,11 @@ def test_a_place_that_cannot_be_written_is_a_line(session, tmp_path, capsys):
     (tmp_path / "file").write_text("x")
     assert cli.main(["evaluate", str(session), "--out", str(tmp_path / "file" / "out")]) == 2
     said = capsys.readouterr().err
-    assert said.startswith("whisker-bench: ") and str(tmp_path / "file") in said and said.count("\n") == 1
+    assert (
+        said.startswith("whisker-bench: ")
+        and str(tmp_path / "file") in said
+        and said.count("\n") == 1
+    )
 
 
 def test_no_forward_stroke_in_any_trial(session, tmp_path, capsys):
@@ -160,7 +169,11 @@ def test_every_verb_tells_of_another_opencv(small_session, verb, monkeypatch, ca
 
 
 @pytest.mark.parametrize(
-    "problem", [ImportError("libGL.so.1: cannot open shared object file"), AttributeError("no attribute 'DictValue'")]
+    "problem",
+    [
+        ImportError("libGL.so.1: cannot open shared object file"),
+        AttributeError("no attribute 'DictValue'"),
+    ],
 )
 def test_a_cv2_that_cannot_be_imported(monkeypatch, problem):
     """The second is what two OpenCVs in one place say."""
@@ -178,10 +191,14 @@ def test_a_package_of_our_name_is_told_before_it_is_imported(tmp_path, name):
     (tmp_path / name).mkdir()
     (tmp_path / name / "__init__.py").write_text("raise RuntimeError")
     path = [str(tmp_path), str(ROOT)]
-    start = f"import sys; sys.path[:0] = {path!r}; import whisker_bench; sys.exit(whisker_bench.main())"
+    start = (
+        f"import sys; sys.path[:0] = {path!r}; import whisker_bench; sys.exit(whisker_bench.main())"
+    )
     done = subprocess.run([sys.executable, "-c", start, "info"], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
-    assert done.stderr.startswith(f"whisker-bench: the package '{name}' comes from {tmp_path}, not from whisker-bench")
+    assert done.stderr.startswith(
+        f"whisker-bench: the package '{name}' comes from {tmp_path}, not from whisker-bench"
+    )
 
 
 def test_tables_and_manifests_of_absurd_size(session, monkeypatch):

@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 from bench.base.doubts import Doubts
-from bench.session.check import checked_session
 from bench.session.session import load_session
+from bench.session.session_check import checked_session
 from tests.scenes.refusals import refusal
 
 
@@ -35,24 +35,56 @@ def test_no_manifest(session):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("square_mm", "sqare_mm", r"session.toml: \[board\] sqare_mm is not a key.*did you mean 'square_mm'"),
+        (
+            "square_mm",
+            "sqare_mm",
+            r"session.toml: \[board\] sqare_mm is not a key.*did you mean 'square_mm'",
+        ),
         ("[whisker]", "[wisker]", r"session.toml: wisker is not a key.*did you mean 'whisker'"),
-        ('name = "high"', 'nmae = "high"', r"\[\[cameras\]\] nmae is not a key.*did you mean 'name'"),
-        ("[bar]", "[bar]\nshape = 'cylinder'", r"\[bar\] shape is not a key.*it belongs in \[whisker\]"),
+        (
+            'name = "high"',
+            'nmae = "high"',
+            r"\[\[cameras\]\] nmae is not a key.*did you mean 'name'",
+        ),
+        (
+            "[bar]",
+            "[bar]\nshape = 'cylinder'",
+            r"\[bar\] shape is not a key.*it belongs in \[whisker\]",
+        ),
         ("diameter_mm = 6.0", "", r"\[bar\] diameter_mm is missing"),
-        ("length_mm = 100.0", "length_mm = '100'", r"\[whisker\] length_mm: expected a number, found text"),
-        ("length_mm = 100.0", "length_mm = 0.1", r"\[whisker\] length_mm is 0.1;.*metres.*write 100\b"),
+        (
+            "length_mm = 100.0",
+            "length_mm = '100'",
+            r"\[whisker\] length_mm: expected a number, found text",
+        ),
+        (
+            "length_mm = 100.0",
+            "length_mm = 0.1",
+            r"\[whisker\] length_mm is 0.1;.*metres.*write 100\b",
+        ),
         ("length_mm = 100.0", "length_mm = nan", r"\[whisker\] length_mm is nan"),
         ("length_mm = 100.0", "length_mm = 100,0", r"session.toml, row \d+: found .*decimal comma"),
         ("length_mm = 100.0", "length_mm = -100.0", r"\[whisker\] length_mm is -100;"),
-        ("length_mm = 100.0", "length_mm = 100\nlength_sigma_mm = -1", r"length_sigma_mm is -1; 0 or more is allowed"),
-        ("diameter_mm = 6.0", "diameter_mm = 0.006", r"\[bar\] diameter_mm is 0.006;.*metres.*write 6\b"),
+        (
+            "length_mm = 100.0",
+            "length_mm = 100\nlength_sigma_mm = -1",
+            r"length_sigma_mm is -1; 0 or more is allowed",
+        ),
+        (
+            "diameter_mm = 6.0",
+            "diameter_mm = 0.006",
+            r"\[bar\] diameter_mm is 0.006;.*metres.*write 6\b",
+        ),
         (
             "youngs_modulus_GPa = 60.0",
             "youngs_modulus_GPa = 60e9",
             r"youngs_modulus_GPa.*pascals.*write 60\b",
         ),
-        ("youngs_modulus_GPa = 60.0", "", r"\[whisker\] give either youngs_modulus_GPa or flexural"),
+        (
+            "youngs_modulus_GPa = 60.0",
+            "",
+            r"\[whisker\] give either youngs_modulus_GPa or flexural",
+        ),
         (
             "youngs_modulus_GPa = 60.0",
             "flexural_rigidity_Nmm2 = 0.0029452",
@@ -93,13 +125,29 @@ def test_fault_in_session_toml(session, old, new, expected):
             "betta_deg",
             r"trials/b30_3/trial.toml: betta_deg is not a key.*did you mean 'beta_deg'",
         ),
-        ("beta_deg = 30.0", "beta_deg = 0.5236", r"beta_deg is 0.5236. Is it in radians\? Then write 30"),
+        (
+            "beta_deg = 30.0",
+            "beta_deg = 0.5236",
+            r"beta_deg is 0.5236. Is it in radians\? Then write 30",
+        ),
         ("beta_deg = 30.0", "beta_deg = 130.0", r"beta_deg is 130; from -90 to 90"),
         ("beta_deg = 30.0", "d_x_mm = 0.055", r"d_x_mm is 0.055;.*metres.*write 55"),
-        ('"measure"', '"mesure"', r"'mesure' is none of its values; allowed are 'measure', 'gauge', 'weight'"),
+        (
+            '"measure"',
+            '"mesure"',
+            r"'mesure' is none of its values; allowed are 'measure', 'gauge', 'weight'",
+        ),
         ('"measure"', '"weight"', r'purpose = "weight" needs force_N and at_mm'),
-        ("speed_deg_s = 10.0", "speed_deg_s = 0.174533", r"speed_deg_s is 0.174533.*rad/s.*write 10"),
-        ("speed_deg_s = 10.0", "speed_deg_s = true", r"speed_deg_s: expected a number, found true or false"),
+        (
+            "speed_deg_s = 10.0",
+            "speed_deg_s = 0.174533",
+            r"speed_deg_s is 0.174533.*rad/s.*write 10",
+        ),
+        (
+            "speed_deg_s = 10.0",
+            "speed_deg_s = true",
+            r"speed_deg_s: expected a number, found true or false",
+        ),
         ("beta_deg = 30.0", "frame_rate_Hz = 30.0", r"frames.csv: frames come at 20 Hz, .* 30;"),
     ],
 )
@@ -141,7 +189,11 @@ def test_camera_twice_in_one_trial(session):
 
 
 def test_session_without_any_picture_is_taken(session):
-    for folder in [session / "boards", *session.glob("trials/*/high"), *session.glob("trials/*/low")]:
+    for folder in [
+        session / "boards",
+        *session.glob("trials/*/high"),
+        *session.glob("trials/*/low"),
+    ]:
         shutil.rmtree(folder)
     loaded = checked_session(session)
     assert loaded.camera_names == ()
@@ -190,7 +242,13 @@ def refusals(session) -> list[str]:
 
 
 def test_check_names_every_missing_key(session):
-    for text in ("format = 1", "length_mm = 100.0", "[bar]\ndiameter_mm = 6.0", "squares = [8, 6]", 'name = "high"'):
+    for text in (
+        "format = 1",
+        "length_mm = 100.0",
+        "[bar]\ndiameter_mm = 6.0",
+        "squares = [8, 6]",
+        'name = "high"',
+    ):
         edit(session / "session.toml", text, "")
     assert refusals(session) == [
         "session.toml: [bar] is missing",
@@ -211,9 +269,14 @@ def test_check_names_every_implausible_value(session):
 def test_check_names_what_does_not_go_together(session):
     edit(session / "session.toml", "youngs_modulus_GPa = 60.0", "")
     edit(session / "session.toml", "marker_mm = 11.0", "marker_mm = 16.0")
-    assert ["[whisker] give either" in refusals(session)[0], "marker_mm = 16.0" in refusals(session)[1]] == [True, True]
+    assert [
+        "[whisker] give either" in refusals(session)[0],
+        "marker_mm = 16.0" in refusals(session)[1],
+    ] == [True, True]
 
 
 def test_implausible_value_of_one_camera(session):
     edit(session / "session.toml", 'name = "high"', 'name = "high"\nexposure_s = 2.0')
-    assert re.search(r"\[\[cameras\]\] exposure_s is 2;.*milliseconds\? Then write 0.002", refusal(session))
+    assert re.search(
+        r"\[\[cameras\]\] exposure_s is 2;.*milliseconds\? Then write 0.002", refusal(session)
+    )

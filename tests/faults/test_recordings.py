@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from bench.base.doubts import Doubts
-from bench.session.check import checked_session, find_damage
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
+from bench.session.session_check import checked_session, find_damage
 from bench.session.signals import forward_strokes, read_signals
 from tests.scenes.refusals import refusal
 
@@ -50,13 +50,19 @@ def with_column(file, name: str, change) -> None:
     rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
     at = header.split(",").index(name)
     rows[:, at] = change(rows[:, at])
-    file.write_text("\n".join([header, *(",".join(f"{cell:.9g}" for cell in row) for row in rows)]) + "\n")
+    file.write_text(
+        "\n".join([header, *(",".join(f"{cell:.9g}" for cell in row) for row in rows)]) + "\n"
+    )
 
 
 @pytest.mark.parametrize(
     ("row", "text", "expected"),
     [
-        (7, "0.0025,0.775,text,0.1", r"signals.csv, row 7, column y_V: 'text' is not a finite number"),
+        (
+            7,
+            "0.0025,0.775,text,0.1",
+            r"signals.csv, row 7, column y_V: 'text' is not a finite number",
+        ),
         (7, "0.0025,0.775,nan,0.1", r"row 7, column y_V: 'nan' is not a finite number"),
         (7, "0.0025,0.775,0.1,inf", r"row 7, column z_V: 'inf' is not a finite number"),
         (7, "0.0025,0.775,,0.1", r"row 7, column y_V: is empty"),
@@ -81,7 +87,9 @@ def with_column(file, name: str, change) -> None:
 )
 def test_fault_in_a_row_of_signals(session, signals, row, text, expected):
     with_row(signals, row, text)
-    assert re.search(rf"^trials/{TRIAL}/signals.csv.*{expected.removeprefix('signals.csv')}", refusal(session))
+    assert re.search(
+        rf"^trials/{TRIAL}/signals.csv.*{expected.removeprefix('signals.csv')}", refusal(session)
+    )
 
 
 @pytest.mark.parametrize(
@@ -150,7 +158,9 @@ def test_times_in_milliseconds_are_refused_with_a_hint(session, signals):
 def test_another_speed_than_stated_is_a_note(session):
     manifest = session / "trials" / TRIAL / "trial.toml"
     manifest.write_text(manifest.read_text().replace("speed_deg_s = 10.0", "speed_deg_s = 90.0"))
-    assert notes(session) == [f"trials/{TRIAL}/signals.csv: the motor goes at 10°/s, speed_deg_s says 90"]
+    assert notes(session) == [
+        f"trials/{TRIAL}/signals.csv: the motor goes at 10°/s, speed_deg_s says 90"
+    ]
 
 
 def test_a_motor_that_stands_still_is_a_note(session, signals):
@@ -170,7 +180,9 @@ def test_encoder_wraps_are_mended_and_counted(session, signals):
 def test_frames_and_rows_differ_in_number(session, frames):
     lines = frames.read_text().splitlines()
     frames.write_text("\n".join(lines[:-1]) + "\n")
-    assert re.search(rf"trials/{TRIAL}/frames.csv: has 10 rows, camera high has 11 frames", refusal(session))
+    assert re.search(
+        rf"trials/{TRIAL}/frames.csv: has 10 rows, camera high has 11 frames", refusal(session)
+    )
 
 
 @pytest.mark.parametrize(
@@ -199,7 +211,9 @@ def test_frame_times_of_another_clock(session, frames):
 
 def test_no_frame_times_at_all(session, frames):
     frames.unlink()
-    assert re.search(rf"trials/{TRIAL}/frames.csv: there are no frame times; write frames.csv", refusal(session))
+    assert re.search(
+        rf"trials/{TRIAL}/frames.csv: there are no frame times; write frames.csv", refusal(session)
+    )
 
 
 def replace_picture(file, grey: np.ndarray) -> None:
@@ -208,8 +222,12 @@ def replace_picture(file, grey: np.ndarray) -> None:
 
 
 def test_pictures_of_another_size(session):
-    replace_picture(session / "trials" / TRIAL / "low" / "000003.jpg", np.zeros((480, 640), np.uint8))
-    expected = rf"trials/{TRIAL}/low/000003.jpg: is 640 x 480 px, but boards/low/00.jpg is 1280 x 720 px"
+    replace_picture(
+        session / "trials" / TRIAL / "low" / "000003.jpg", np.zeros((480, 640), np.uint8)
+    )
+    expected = (
+        rf"trials/{TRIAL}/low/000003.jpg: is 640 x 480 px, but boards/low/00.jpg is 1280 x 720 px"
+    )
     assert re.search(expected, refusal(session))
 
 

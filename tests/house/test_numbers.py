@@ -1,19 +1,38 @@
-"""Every number at the top of a module of bench that decides something says its unit and where it comes from."""
+"""Every number at the top of a module that decides something says its unit and where it comes from."""
 
 import pytest
 
-from docs.list_thresholds import ROOT, numbers_of
+from docs.thresholds import ROOT, thresholds_of
 
-# How reports, films and theory's figures look is taste; vision's numbers have a table (docs/thresholds.md).
-FOLDERS = ("base", "session", "cameras", "gauges", "trials", "friction", "rig")
+# How reports, films and figures of theory look is taste.
+BENCH_FOLDERS = ("base", "session", "cameras", "gauges", "trials", "analyses", "rig")
 # Windows of what is plausible say what they are by their names and units.
-SELF_EXPLAINING = {"session/plausible.py"}
+SELF_EXPLAINING = {"plausible.py"}
+VISION_FOLDERS = sorted(
+    path.name
+    for path in (ROOT / "vision").iterdir()
+    if path.is_dir() and path.name != "__pycache__"
+)
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_every_number_has_a_comment(folder):
-    paths = sorted((ROOT / "bench" / folder).glob("*.py"))
-    chosen = [path for path in paths if f"{folder}/{path.name}" not in SELF_EXPLAINING]
-    found = [number for path in chosen for number in numbers_of(path, ROOT / "bench")]
+@pytest.mark.parametrize("folder", VISION_FOLDERS)
+def test_every_number_of_vision_says_its_unit(folder):
+    found = [
+        number
+        for path in sorted((ROOT / "vision" / folder).glob("*.py"))
+        for number in thresholds_of(path, ROOT / "vision")
+    ]
+    assert found
+    assert not [f"{number.place}: {number.name}" for number in found if not number.unit]
+
+
+@pytest.mark.parametrize("folder", BENCH_FOLDERS)
+def test_every_number_of_bench_has_a_comment(folder):
+    paths = [
+        path
+        for path in sorted((ROOT / "bench" / folder).glob("*.py"))
+        if path.name not in SELF_EXPLAINING
+    ]
+    found = [number for path in paths for number in thresholds_of(path, ROOT / "bench")]
     assert found
     assert not [f"{number.place}: {number.name}" for number in found if not number.comment]

@@ -25,14 +25,23 @@ def public(body: list[ast.stmt], of: str = "") -> Iterator[tuple[str, ast.Functi
 def lacks(function: ast.FunctionDef) -> Iterator[str]:
     """What is not said of a function."""
     given = function.args
-    named = [*given.posonlyargs, *given.args, *given.kwonlyargs, *filter(None, (given.vararg, given.kwarg))]
-    yield from (one.arg for one in named if one.annotation is None and one.arg not in ("self", "cls"))
+    named = [
+        *given.posonlyargs,
+        *given.args,
+        *given.kwonlyargs,
+        *filter(None, (given.vararg, given.kwarg)),
+    ]
+    yield from (
+        one.arg for one in named if one.annotation is None and one.arg not in ("self", "cls")
+    )
     if function.returns is None:
         yield "->"
     text = ast.get_docstring(function) or ""
     if not text:
         yield "docstring"
-    raises = (node for node in ast.walk(function) if isinstance(node, ast.Raise) and node.exc is not None)
+    raises = (
+        node for node in ast.walk(function) if isinstance(node, ast.Raise) and node.exc is not None
+    )
     if any(raises) and not re.search("[Rr]aise|[Rr]efuse", text):
         yield "what it raises"
 

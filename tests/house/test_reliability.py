@@ -17,7 +17,10 @@ def test_every_fault_names_a_test_that_there_is():
     assert len(rows()) > 40
     for fault, _, _, named in rows():
         path, name = re.fullmatch(r"`(tests/[\w/]+\.py)::(test_\w+)`", named).groups()
-        assert re.search(rf"^def {name}\(", (ROOT / path).read_text(), flags=re.MULTILINE), (fault, named)
+        assert re.search(rf"^def {name}\(", (ROOT / path).read_text(), flags=re.MULTILINE), (
+            fault,
+            named,
+        )
 
 
 def test_every_fault_says_what_the_run_does():

@@ -13,7 +13,11 @@ TESTS = sorted((ROOT / "tests").rglob("test_*.py"))
 @pytest.mark.parametrize("package", PACKAGES)
 def test_folders_are_those_of_the_code(package):
     ours, theirs = (
-        {path.relative_to(folder).parts[0] for path in folder.rglob(pattern) if path.parent != folder}
+        {
+            path.relative_to(folder).parts[0]
+            for path in folder.rglob(pattern)
+            if path.parent != folder
+        }
         for folder, pattern in ((ROOT / "tests" / package, "test_*.py"), (ROOT / package, "*.py"))
     )
     assert ours == theirs
@@ -21,7 +25,11 @@ def test_folders_are_those_of_the_code(package):
 
 def imported(path: Path) -> list[str]:
     """Dotted names of what a module imports from."""
-    return [node.module or "" for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)]
+    return [
+        node.module or ""
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom)
+    ]
 
 
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))

@@ -14,7 +14,9 @@ def number(text: str) -> tuple[int, ...]:
 def test_lowest_versions_are_those_allowed():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     allowed = dict(re.match(r"([\w-]+)>=([\d.]+)", one).groups() for one in project["dependencies"])
-    tried = dict(line.split("==") for line in (ROOT / "constraints-lowest.txt").read_text().splitlines())
+    tried = dict(
+        line.split("==") for line in (ROOT / "constraints-lowest.txt").read_text().splitlines()
+    )
     assert {name.replace("_", "-") for name in tried} == set(allowed)
     for name, version in tried.items():
         lowest = number(allowed[name.replace("_", "-")])

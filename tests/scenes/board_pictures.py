@@ -13,7 +13,9 @@ BLUR_PX = 1.1
 
 
 def true_px(board):
-    squares = np.column_stack([board.corners_mm[:, :2] / board.square_mm, np.ones(len(board.corners_mm))])
+    squares = np.column_stack(
+        [board.corners_mm[:, :2] / board.square_mm, np.ones(len(board.corners_mm))]
+    )
     mapped = squares @ H.T
     return mapped[:, :2] / mapped[:, 2:]
 
@@ -21,11 +23,15 @@ def true_px(board):
 @cache
 def clean_picture(board):
     """The board through H, float32: each pixel the mean of 4 x 4 looks at the print, then blurred."""
-    printed = board.opencv().generateImage(tuple(PX_PER_SQUARE_PRINTED * n for n in board.squares), marginSize=0)
+    printed = board.opencv().generateImage(
+        tuple(PX_PER_SQUARE_PRINTED * n for n in board.squares), marginSize=0
+    )
     grid = np.stack(np.meshgrid(*((np.arange(4 * n) - 1.5) / 4.0 for n in SIZE_PX)), axis=-1)
     squares = np.concatenate([grid, np.ones((*grid.shape[:2], 1))], axis=-1) @ np.linalg.inv(H).T
     place = (squares[..., :2] / squares[..., 2:] * PX_PER_SQUARE_PRINTED - 0.5).astype(np.float32)
-    fine = cv2.remap(printed, place[..., 0], place[..., 1], cv2.INTER_NEAREST, borderValue=255).astype(np.float32)
+    fine = cv2.remap(
+        printed, place[..., 0], place[..., 1], cv2.INTER_NEAREST, borderValue=255
+    ).astype(np.float32)
     grey = fine.reshape(SIZE_PX[1], 4, SIZE_PX[0], 4).mean(axis=(1, 3))
     return 40 + 0.6 * cv2.GaussianBlur(grey, (0, 0), BLUR_PX)
 

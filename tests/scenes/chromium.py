@@ -17,7 +17,14 @@ os.dup2(read, 3)
 os.dup2(write, 4)
 os.execvp(sys.argv[3], sys.argv[3:])
 """
-_CODES = {"Escape": 27, "Home": 36, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
+_CODES = {
+    "Escape": 27,
+    "Home": 36,
+    "ArrowLeft": 37,
+    "ArrowUp": 38,
+    "ArrowRight": 39,
+    "ArrowDown": 40,
+}
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -35,25 +42,54 @@ class Page:
         self._number, self._unread = 0, b""
 
     def __enter__(self) -> "Page":
-        self._profile = TemporaryDirectory(ignore_cleanup_errors=True)  # its children may still write
+        self._profile = TemporaryDirectory(
+            ignore_cleanup_errors=True
+        )  # its children may still write
         to_read, self._write = os.pipe()
         self._read, to_write = os.pipe()
-        options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe"]
-        command = [chromium(), *options, "--allow-file-access-from-files", f"--user-data-dir={self._profile.name}"]
-        launch = [sys.executable, "-c", _LAUNCH, str(to_read), str(to_write), *command, "about:blank"]
-        quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        options = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--hide-scrollbars",
+            "--remote-debugging-pipe",
+        ]
+        command = [
+            chromium(),
+            *options,
+            "--allow-file-access-from-files",
+            f"--user-data-dir={self._profile.name}",
+        ]
+        launch = [
+            sys.executable,
+            "-c",
+            _LAUNCH,
+            str(to_read),
+            str(to_write),
+            *command,
+            "about:blank",
+        ]
+        quiet = {
+            "stdin": subprocess.DEVNULL,
+            "stdout": subprocess.DEVNULL,
+            "stderr": subprocess.DEVNULL,
+        }
         self._browser = subprocess.Popen(launch, pass_fds=(to_read, to_write), **quiet)
         os.close(to_read)
         os.close(to_write)
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._session = self.ask("Target.attachToTarget", targetId=target, flatten=True)[
+            "sessionId"
+        ]
         for domain in ("Page", "Runtime", "Log"):
             self.ask(f"{domain}.enable")
         self.resize(*self.size)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if self.dark else "light"}
         self.ask("Emulation.setEmulatedMedia", features=[scheme])
         self.ask("Page.navigate", url=self.path.resolve().as_uri())
-        self.run("new Promise(done => document.readyState === 'complete' ? done(1) : addEventListener('load', done))")
+        self.run(
+            "new Promise(done => document.readyState === 'complete' ? done(1) : addEventListener('load', done))"
+        )
         return self
 
     def __exit__(self, *_) -> None:
@@ -91,7 +127,10 @@ class Page:
             self.messages.append(message["params"]["exceptionDetails"]["text"])
         if message.get("method") == "Log.entryAdded":
             self.messages.append(message["params"]["entry"]["text"])
-        if message.get("method") == "Runtime.consoleAPICalled" and message["params"]["type"] == "error":
+        if (
+            message.get("method") == "Runtime.consoleAPICalled"
+            and message["params"]["type"] == "error"
+        ):
             self.messages.append(str(message["params"]["args"]))
 
     def run(self, script: str):
@@ -99,7 +138,9 @@ class Page:
         how = {"returnByValue": True, "awaitPromise": True, "userGesture": True}
         answer = self.ask("Runtime.evaluate", expression=script, **how)
         if "exceptionDetails" in answer:
-            raise RuntimeError(answer["exceptionDetails"].get("exception", {}).get("description", str(answer)))
+            raise RuntimeError(
+                answer["exceptionDetails"].get("exception", {}).get("description", str(answer))
+            )
         return answer["result"].get("value")
 
     def resize(self, width: int, height: int) -> None:

@@ -32,7 +32,9 @@ def manifest(prefix: str, file: str) -> str:
     lines = ["", "[signals]", f'file = "{file}"', f"rate_Hz = {RATE}"]
     lines += [f'motor_deg = {{ channel = "{prefix}enc", scale = {SCALE}, offset = {OFFSET} }}']
     gauges = ("y_V", "ai1"), ("z_V", "ai2")
-    lines += [f'{name} = {{ channel = "{prefix}{channel}", scale = 0.001 }}' for name, channel in gauges]
+    lines += [
+        f'{name} = {{ channel = "{prefix}{channel}", scale = 0.001 }}' for name, channel in gauges
+    ]
     return "\n".join([*lines, f'frame_V = {{ channel = "{prefix}trigger" }}', ""])
 
 
@@ -77,5 +79,7 @@ def as_tdms(folder, channels) -> Written:
     """Channels of a group of LabVIEW's."""
     nptdms = pytest.importorskip("nptdms")
     with nptdms.TdmsWriter(folder / "daq.tdms") as writer:
-        writer.write_segment([nptdms.ChannelObject("Main", name, series) for name, series in channels.items()])
+        writer.write_segment(
+            [nptdms.ChannelObject("Main", name, series) for name, series in channels.items()]
+        )
     return "daq.tdms", "Main/"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy import optimize, special
 
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
 
 CYLINDER = Rod("cylinder", 100.0, 1.0, 60.0)
 CONE = Rod("cone", 100.0, 1.0, 60.0)

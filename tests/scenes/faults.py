@@ -41,7 +41,9 @@ def _trial(session: Path) -> Path:
     return session / "trials" / TRIAL
 
 
-def change_table(path: Path, change: Callable[[dict[str, np.ndarray]], None], digits: int = 5) -> None:
+def change_table(
+    path: Path, change: Callable[[dict[str, np.ndarray]], None], digits: int = 5
+) -> None:
     """Columns of a CSV file, by name, changed in place."""
     with path.open(newline="") as file:
         names, *rows = csv.reader(file)
@@ -115,7 +117,14 @@ def _dead(columns) -> None:
 
 
 def _another_trials_signals(session: Path) -> None:
-    other = Path(__file__).resolve().parents[2] / "fixtures" / "small-session" / "trials" / "b30_3" / "signals.csv"
+    other = (
+        Path(__file__).resolve().parents[2]
+        / "fixtures"
+        / "small-session"
+        / "trials"
+        / "b30_3"
+        / "signals.csv"
+    )
     shutil.copyfile(other, _trial(session) / "signals.csv")
 
 
@@ -128,10 +137,14 @@ def change_picture(path: Path, change: Callable[[np.ndarray], np.ndarray]) -> No
     """A grey picture replaced by a changed one, as fine as it was (JPEG 97)."""
     grey = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     path.unlink()
-    assert cv2.imwrite(str(path), np.ascontiguousarray(change(grey)), [cv2.IMWRITE_JPEG_QUALITY, 97])
+    assert cv2.imwrite(
+        str(path), np.ascontiguousarray(change(grey)), [cv2.IMWRITE_JPEG_QUALITY, 97]
+    )
 
 
-def _camera(change: Callable[[np.ndarray], np.ndarray], camera: str = "low", first: int = 0) -> Fault:
+def _camera(
+    change: Callable[[np.ndarray], np.ndarray], camera: str = "low", first: int = 0
+) -> Fault:
     def spoil(session: Path) -> None:
         for path in pictures(session, camera)[first:]:
             change_picture(path, change)
@@ -177,7 +190,9 @@ def _dropped(session: Path) -> None:
     file = _trial(session) / "frames.csv"
     lines = file.read_text().splitlines()
     kept = [line.split(",")[1] for line in lines[1:5] + lines[6:]]
-    file.write_text("\n".join(["frame,time_s", *(f"{k},{time}" for k, time in enumerate(kept))]) + "\n")
+    file.write_text(
+        "\n".join(["frame,time_s", *(f"{k},{time}" for k, time in enumerate(kept))]) + "\n"
+    )
 
 
 def _damaged(session: Path) -> None:
@@ -196,11 +211,15 @@ def _huge_png(session: Path) -> None:
     path.unlink()
 
     def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
 
     header = struct.pack(">IIBBBBB", 60000, 60000, 8, 0, 0, 0, 0)
     body = zlib.compress(bytes(60001))
-    packed = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+    packed = (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+    )
     path.with_suffix(".png").write_bytes(packed)
 
 
@@ -251,7 +270,9 @@ FAULTS: dict[str, Fault] = {
     "bar 5.2 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 5.2"),
     "bar 4 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 4.0"),
     "wire 1.5 mm for 1": _manifest("diameter_mm = 1.0", "diameter_mm = 1.5"),
-    "board 10 % too large": _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 16.5\nmarker_mm = 12.1"),
+    "board 10 % too large": _manifest(
+        "square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 16.5\nmarker_mm = 12.1"
+    ),
     "wrong dictionary": _manifest("DICT_5X5_100", "DICT_4X4_100"),
     "wrong squares": _manifest("squares = [8, 6]", "squares = [7, 5]"),
     "whisker 90 mm for 100": _manifest("length_mm = 100.0", "length_mm = 90.0"),

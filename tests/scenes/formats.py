@@ -10,7 +10,9 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "formats.md").read_te
 @cache
 def documented(heading: str) -> list[str]:
     """Names in backticks in the first column of the table below a heading; '.b' after 'a.c' is 'a.b'."""
-    (section,) = re.findall(rf"^### {re.escape(heading)}\n(.*?)(?=^#|\Z)", DOCUMENT, flags=re.DOTALL | re.MULTILINE)
+    (section,) = re.findall(
+        rf"^### {re.escape(heading)}\n(.*?)(?=^#|\Z)", DOCUMENT, flags=re.DOTALL | re.MULTILINE
+    )
     names = []
     for row in re.findall(r"^\| (`.*?) \|", section, flags=re.MULTILINE):
         for name in re.findall(r"`([^`]+)`", row):
@@ -21,7 +23,11 @@ def documented(heading: str) -> list[str]:
 def keys(value, path: str = "") -> set[str]:
     """Paths of all keys of a JSON value that hold no other table; 'a[].b' of a list of tables."""
     if isinstance(value, dict) and value:
-        return {key for name, inner in value.items() for key in keys(inner, f"{path}.{name}".lstrip("."))}
+        return {
+            key
+            for name, inner in value.items()
+            for key in keys(inner, f"{path}.{name}".lstrip("."))
+        }
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return {key for inner in value for key in keys(inner, f"{path}[]")}
     return {path}

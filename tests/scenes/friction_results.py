@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from bench.analyses import direction
 from bench.base.results import plain
-from bench.friction import direction
 from bench.records.plain import from_plain
-from bench.records.trial import TrialResult, WhiskerFacts
+from bench.records.trial_result import TrialResult, WhiskerFacts
 from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.distance import with_friction
@@ -14,7 +14,9 @@ WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
 C, THETA, ALPHA = WHISKER.C_Nmm2, np.radians(3.0), np.radians(14.0)
 WHISKER_FACTS = WhiskerFacts("cylinder", 100.0, 1.0, WHISKER.EI_Nmm2)
 # A whisk whose only frame is one before touch.
-FREE_FRAME = {name: [np.nan] for name in ("index", "time_s", "motor_rad", "theta_rad", "arc_mm", "slip_mm")} | {
+FREE_FRAME = {
+    name: [np.nan] for name in ("index", "time_s", "motor_rad", "theta_rad", "arc_mm", "slip_mm")
+} | {
     **{"touching": [False], "status": [""], "point_mm": [[np.nan] * 3], "slip_sigma_mm": [np.nan]},
     **{name: [np.nan] for name in ("d_y_mm", "d_z_mm", "alpha_rad", "alpha_sigma_rad")},
 }
@@ -39,16 +41,53 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
     """One whisk, (13) and (14) exactly, seen and felt."""
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(d_x, THETA, beta, alpha, C)
-    felt = {"m_y_Nmm": m_y, "m_z_Nmm": m_z, "m_y_sigma_Nmm": 0.02, "m_z_sigma_Nmm": 0.02, "touch_felt_rad": 0.0}
+    felt = {
+        "m_y_Nmm": m_y,
+        "m_z_Nmm": m_z,
+        "m_y_sigma_Nmm": 0.02,
+        "m_z_sigma_Nmm": 0.02,
+        "touch_felt_rad": 0.0,
+    }
     felt |= {"touch_felt_sigma_rad": 1e-4, "theta_sigma_rad": 1e-4}
-    felt |= {"phi_felt_rad": np.arctan2(m_y, m_z), "phi_felt_sigma_rad": PHI_SIGMA, "one_factor": [], "status": ""}
+    felt |= {
+        "phi_felt_rad": np.arctan2(m_y, m_z),
+        "phi_felt_sigma_rad": PHI_SIGMA,
+        "one_factor": [],
+        "status": "",
+    }
     felt |= {"covariance_at": 4e-4 * np.eye(2), "theta_moment_covariance_at": np.zeros(2)}
     felt |= {"shared_Nmm": np.zeros((1, 2))}
-    given = {"estimator": "with_friction", "alpha_est_rad": np.radians(10.0), "d_x_est_sigma_mm": 0.1, "status": ""}
-    given |= {"d_x_est_mm": with_friction(THETA, m_y, m_z, np.radians(10.0), C), "beta_est_rad": 0.0}
-    seen = {"whisk": 0, "d_x_mm": d_x, "d_x_sigma_mm": 0.01, "beta_rad": beta, "beta_sigma_rad": np.radians(0.1)}
+    given = {
+        "estimator": "with_friction",
+        "alpha_est_rad": np.radians(10.0),
+        "d_x_est_sigma_mm": 0.1,
+        "status": "",
+    }
+    given |= {
+        "d_x_est_mm": with_friction(THETA, m_y, m_z, np.radians(10.0), C),
+        "beta_est_rad": 0.0,
+    }
+    seen = {
+        "whisk": 0,
+        "d_x_mm": d_x,
+        "d_x_sigma_mm": 0.01,
+        "beta_rad": beta,
+        "beta_sigma_rad": np.radians(0.1),
+    }
     seen |= {"deflection": deflection(d_x, beta), "frames": FREE_FRAME, "status": ""}
-    trial = {"name": name or f"b{beta_deg:g}", "surface": "steel", "speed_deg_s": 10.0, "purpose": "measure"}
+    trial = {
+        "name": name or f"b{beta_deg:g}",
+        "surface": "steel",
+        "speed_deg_s": 10.0,
+        "purpose": "measure",
+    }
     trial |= {"beta_nominal_deg": beta_deg, "d_x_nominal_mm": nominal_mm}
-    whole = {"trial": trial, "whisker": vars(WHISKER_FACTS), "theta_deg": 3.0, "seen": {"whisks": [seen]}}
-    return from_plain(TrialResult, plain(whole | {"felt": {"whisks": [felt | {"estimates": [given]}]}}))
+    whole = {
+        "trial": trial,
+        "whisker": vars(WHISKER_FACTS),
+        "theta_deg": 3.0,
+        "seen": {"whisks": [seen]},
+    }
+    return from_plain(
+        TrialResult, plain(whole | {"felt": {"whisks": [felt | {"estimates": [given]}]}})
+    )

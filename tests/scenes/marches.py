@@ -5,17 +5,28 @@ import math
 import numpy as np
 
 from bench.rig.bar import Bar, first_touch
-from bench.rig.contact import moments_Nmm
-from bench.rig.friction import Friction, March
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
+from bench.rig.rod_contact import moments_Nmm
+from bench.rig.stick_slip import Friction, March
 
 WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
 C = 3 * WIRE.rigidity_Nmm2
 MU_10 = math.tan(math.radians(10))
 
 
-def whisk(thetas_deg, *, rod=WIRE, d_x=65.0, beta=60.0, psi=0.0, mu=MU_10, static=None, radius=3.0, touch_deg=0.0,
-          rests=(1.0,)):  # fmt: skip
+def whisk(
+    thetas_deg,
+    *,
+    rod=WIRE,
+    d_x=65.0,
+    beta=60.0,
+    psi=0.0,
+    mu=MU_10,
+    static=None,
+    radius=3.0,
+    touch_deg=0.0,
+    rests=(1.0,),
+):
     """(march, touch, states) along pushing angles."""
     touch_rad = math.radians(touch_deg)
     bar = Bar.placed(

@@ -11,7 +11,7 @@ from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.rounded import Rounded
 from vision.geometry.silhouette import normals, outline
-from vision.lines.points import LinePoints, Observed
+from vision.wire.points import LinePoints, Observed
 
 WIRE = Wire("cylinder", 100.0, 1.0)
 REACH = 3.5
@@ -26,7 +26,9 @@ def camera(name, centre, target=(55.0, 5.0, 0.0), focal=2000.0):
     x /= np.linalg.norm(x)
     R = np.stack([x, np.cross(z, x), z])
     matrix = np.array([[focal, 0, 640.0], [0, focal, 360.0], [0, 0, 1]])
-    return Camera(name, (1280, 720), matrix, np.array([-0.1, 0.1, 0, 0, 0]), np.column_stack([R, -R @ centre]))
+    return Camera(
+        name, (1280, 720), matrix, np.array([-0.1, 0.1, 0, 0, 0]), np.column_stack([R, -R @ centre])
+    )
 
 
 CAMERAS = Cameras((camera("one", (38, -175, 335)), camera("two", (130, -325, 120))))
@@ -38,8 +40,10 @@ def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7, motion=None):
     motor = np.radians(0.7 + 0.9 * np.arange(frames))
     touch, beta = np.radians(touch_deg), np.radians(beta_deg)
     turn = rotation_z(touch)
-    axis = BarAxis(turn @ (np.array([d_x, 0, 0]) + REACH * np.array([0, np.cos(beta), -np.sin(beta)])),
-                   turn @ np.array([0.0, np.sin(beta), np.cos(beta)]))
+    axis = BarAxis(
+        turn @ (np.array([d_x, 0, 0]) + REACH * np.array([0, np.cos(beta), -np.sin(beta)])),
+        turn @ np.array([0.0, np.sin(beta), np.cos(beta)]),
+    )
     touching = motor > touch
     problem = Problem(CAMERAS, RODS, axis, motor, touching, touching, [], motion=motion)
     vector = np.zeros(problem.size)
@@ -56,9 +60,11 @@ def _bent_until_touching(problem, state, slope=0.35):
     for _ in range(60):
         middle = 0.5 * (low + high)
         vector = state.vector.copy()
-        vector[problem.first_bend:] = np.stack([middle, -slope * middle], axis=1).ravel()
+        vector[problem.first_bend :] = np.stack([middle, -slope * middle], axis=1).ravel()
         curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=6)
-        gap = (clearance(curves, bar_axes(problem, vector))[0] - problem.rods.reach_mm(arcs))[problem.bent]
+        gap = (clearance(curves, bar_axes(problem, vector))[0] - problem.rods.reach_mm(arcs))[
+            problem.bent
+        ]
         low, high = np.where(gap < 0, middle, low), np.where(gap < 0, high, middle)
     return State(vector, arcs)
 
@@ -67,14 +73,19 @@ def rounded_scene(form, thick_mm, stands):
     """As `scene`, of an object that is no straight bar. stands: where it does, from the point (3,) that is touched, the
     way (3,) from the whisker into it and the direction (3,) of the bar that the contact sees."""
     turn, beta = rotation_z(np.radians(2.3)), np.radians(40.0)
-    inwards, along = turn @ [0, np.cos(beta), -np.sin(beta)], turn @ [0.0, np.sin(beta), np.cos(beta)]
+    inwards, along = (
+        turn @ [0, np.cos(beta), -np.sin(beta)],
+        turn @ [0.0, np.sin(beta), np.cos(beta)],
+    )
     spot = turn @ [60.0, 0.0, 0.0] + 0.5 * WIRE.diameter_mm * inwards
     axis = Rounded(*stands(spot, inwards, along), form, spot)
     problem, state = scene()
     problem = replace(problem, axis=axis, rods=Rods(WIRE, Bar(thick_mm, 0.0, form)))
     vector = np.zeros(problem.size)
     vector[4:12] = state.vector[4:12]
-    return problem, _bent_until_touching(problem, State(vector, np.full(len(problem.motor_rad), 60.0)), 0.9)
+    return problem, _bent_until_touching(
+        problem, State(vector, np.full(len(problem.motor_rad), 60.0)), 0.9
+    )
 
 
 def with_outline(problem, state, rng=None, sigma=0.05):
@@ -88,7 +99,11 @@ def with_outline(problem, state, rng=None, sigma=0.05):
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         noise = 0.0 if rng is None else sigma * rng.standard_normal(len(px))[:, None]
         far = np.linalg.norm(points - view.centre_mm, axis=1)
-        seen.append(Observed(-1, number, LinePoints(px + noise * normal, normal, np.full(len(px), sigma), far), 1))
+        seen.append(
+            Observed(
+                -1, number, LinePoints(px + noise * normal, normal, np.full(len(px), sigma), far), 1
+            )
+        )
     return replace(problem, seen=seen)
 
 
@@ -100,7 +115,9 @@ def with_points(problem, state, rng=None, sigma=0.05):
         for frame in range(len(problem.motor_rad)):
             place = np.linspace(8.0, 95.0, 30)
             one = Curves(curves.arc_mm, curves.points_mm[frame], curves.tangents[frame])
-            seen.append(Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng)))
+            seen.append(
+                Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng))
+            )
         if problem.is_rounded:
             continue
         place = np.linspace(-25.0, 25.0, 20)
@@ -114,7 +131,9 @@ def bar_middle(problem, camera, vector, place_mm, frame=0):
     """Middle (n, 2) of the bar's outline in a camera, at places (n,) along its axis; frame: of a bar that moves."""
     axis = bar_axis(problem, vector)
     points = axis.point_mm + shifts_mm(problem, vector)[frame] + place_mm[:, None] * axis.direction
-    return outline(camera, points, np.broadcast_to(axis.direction, points.shape), problem.rods.bar.radius_mm)[0]
+    return outline(
+        camera, points, np.broadcast_to(axis.direction, points.shape), problem.rods.bar.radius_mm
+    )[0]
 
 
 def _points(px, place, sigma, rng):
@@ -126,6 +145,6 @@ def _points(px, place, sigma, rng):
 def begun(problem, state):
     """A start that knows the bends to a fifth and nothing of bar and rest shape but the expected axis."""
     vector = state.vector.copy()
-    vector[:problem.first_bend] = 0.0
-    vector[problem.first_bend:] *= 0.8
+    vector[: problem.first_bend] = 0.0
+    vector[problem.first_bend :] *= 0.8
     return State(vector, state.arcs_mm)

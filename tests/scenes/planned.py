@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.plan.calibration import seen_camera
+from bench.plan.planned_cameras import seen_camera
 from bench.plan.staged import Staged, of_run
 from bench.rig import build
 from bench.rig.protocol import Protocol, load
@@ -35,5 +35,3 @@ def staged_of(protocol: Protocol) -> Staged:
 def cameras_of(protocol: Protocol) -> Cameras:
     """Its cameras, exact."""
     return Cameras(tuple(seen_camera(camera) for camera in build.cameras(protocol)))
-
-

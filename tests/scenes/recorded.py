@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.rods import Bar, Rods, Wire
-from vision.geometry.settings import VisionSettings
+from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.files import read_picture
 from vision.pictures.frames import Frames
 from vision.truth.observe import observe_trial
@@ -25,7 +25,9 @@ def exact_cameras(session):
 
 
 def _camera(c):
-    return Camera(c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]]))
+    return Camera(
+        c["name"], (c["width"], c["height"]), c["K"], c["dist"], np.column_stack([c["R"], c["t"]])
+    )
 
 
 class Recorded:
@@ -38,16 +40,22 @@ class Recorded:
         rows = list(csv.DictReader((folder / "truth.csv").open()))
         self.rows = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
         self.frames = {c.name: dict(Frames.open(folder / c.name).read()) for c in self.cameras}
-        self.background = {c.name: read_picture(session / "boards" / "rig" / f"{c.name}.png").astype(float)
-                           for c in self.cameras}
+        self.background = {
+            c.name: read_picture(session / "boards" / "rig" / f"{c.name}.png").astype(float)
+            for c in self.cameras
+        }
 
     def see(self, keep=slice(None), **settings):
         """The truth of the frames in `keep`, renumbered from 0."""
         chosen = range(len(self.rows["time_s"]))[keep]
-        frames = {name: {k: pictures[f] for k, f in enumerate(chosen) if f in pictures}
-                  for name, pictures in self.frames.items()}
+        frames = {
+            name: {k: pictures[f] for k, f in enumerate(chosen) if f in pictures}
+            for name, pictures in self.frames.items()
+        }
         motor, time = np.radians(self.rows["motor_deg"][keep]), self.rows["time_s"][keep]
-        return self.see_frames(TrialPictures(frames, time, motor, self.background), VisionSettings(**settings))
+        return self.see_frames(
+            TrialPictures(frames, time, motor, self.background), VisionSettings(**settings)
+        )
 
     def see_frames(self, pictures, settings=VisionSettings()):  # noqa: B008
         """The truth of these pictures, taken as one whisk."""

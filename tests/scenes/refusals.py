@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bench.base.errors import BadInput
-from bench.session.check import checked_session
+from bench.session.session_check import checked_session
 
 
 def refusal(session: Path) -> str:

@@ -45,7 +45,11 @@ def protocol_file(folder: Path, text: str) -> Path:
 
 
 def contents(folder):
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+    return {
+        p.relative_to(folder).as_posix(): p.read_bytes()
+        for p in sorted(folder.rglob("*"))
+        if p.is_file()
+    }
 
 
 def rows(path):
@@ -59,4 +63,8 @@ def bar_of(truth, both_radii_mm):
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     axis = turn @ [math.sin(psi), math.cos(psi) * math.sin(beta), math.cos(psi) * math.cos(beta)]
     p0 = turn @ [truth["d_x_mm"], 0, 0]
-    return axis, p0, p0 + turn @ [0, both_radii_mm * math.cos(beta), -both_radii_mm * math.sin(beta)]
+    return (
+        axis,
+        p0,
+        p0 + turn @ [0, both_radii_mm * math.cos(beta), -both_radii_mm * math.sin(beta)],
+    )

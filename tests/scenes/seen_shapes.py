@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rig.bar import Bar, first_touch
-from bench.rig.friction import Friction
+from bench.rig.elastic_rod import Rest, Rod
 from bench.rig.marched import MarchedWhisk
-from bench.rig.rod import Rest, Rod
+from bench.rig.stick_slip import Friction
 from estimator.beam import Beam
 from estimator.seen_shape import SeenShape
 
@@ -46,23 +46,48 @@ def shown(
 ) -> Shown:
     """A stroke of 24 frames, a point each 3 mm. sigma_mm: of a point; off_mm: of what all points share, an offset and
     a tilt. Raises ArithmeticError where the whisker finds no hold."""
-    rod = Rod(shape, LENGTH_MM, 1.0, E_GPA, rest=Rest(LENGTH_MM, 0.2, rng.normal(), rng.normal()),
-              **({"tip_diameter_mm": 0.4} if shape == "tapered" else {}))  # fmt: skip
-    beta, psi, theta, mu = *np.radians([beta_deg, psi_deg, theta_deg]), np.tan(np.radians(alpha_deg))
-    bar = Bar.placed(d_x_mm=d_x_mm, beta_rad=beta, psi_rad=psi, touch_rad=0.05, radius_mm=0.5 * bar_mm,
-                     whisker_radius_mm=float(rod.radius_mm(d_x_mm)), stiffness_N_mm=stiffness_N_mm)  # fmt: skip
+    rod = Rod(
+        shape,
+        LENGTH_MM,
+        1.0,
+        E_GPA,
+        rest=Rest(LENGTH_MM, 0.2, rng.normal(), rng.normal()),
+        **({"tip_diameter_mm": 0.4} if shape == "tapered" else {}),
+    )
+    beta, psi, theta, mu = (
+        *np.radians([beta_deg, psi_deg, theta_deg]),
+        np.tan(np.radians(alpha_deg)),
+    )
+    bar = Bar.placed(
+        d_x_mm=d_x_mm,
+        beta_rad=beta,
+        psi_rad=psi,
+        touch_rad=0.05,
+        radius_mm=0.5 * bar_mm,
+        whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
+        stiffness_N_mm=stiffness_N_mm,
+    )
     touch = first_touch(rod, bar, 0.05, d_x_mm)
     wanted = touch.motor_rad + theta
     motor = np.append(np.linspace(touch.motor_rad - 0.05, wanted + 0.01, 23), wanted)
     motor.sort()
-    whisk = MarchedWhisk.run(rod, bar, Friction(mu, mu), touch, motor.max(), step_rad=0.004,
-                             stops_rad=motor[motor > touch.motor_rad])  # fmt: skip
+    whisk = MarchedWhisk.run(
+        rod,
+        bar,
+        Friction(mu, mu),
+        touch,
+        motor.max(),
+        step_rad=0.004,
+        stops_rad=motor[motor > touch.motor_rad],
+    )
     arc = np.arange(4.0, LENGTH_MM - 1.0, 3.0)
     arc = arc[np.abs(arc - d_x_mm) > _CLEAR_MM]
     curves = [whisk.centreline_mm(m, whisk.forward.state_between(m), arc) for m in motor]
     seen = _sights(rng, motor, np.array(curves), eye_mm, sigma_mm, off_mm)
     row = whisk.forward.row_at(wanted)
-    moved = _towards(whisk.forward.point_mm[row], touch.motor_rad) - _towards(touch.point_mm, touch.motor_rad)
+    moved = _towards(whisk.forward.point_mm[row], touch.motor_rad) - _towards(
+        touch.point_mm, touch.motor_rad
+    )
     beam = Beam.from_modulus(E_GPA, 1.0, LENGTH_MM, shape, *[0.4] * (shape == "tapered"))
     force = whisk.forward.force_N[row, 1]
     return Shown(seen, beam, theta, touch.motor_rad, touch.d_x_mm, float(force), moved)
@@ -80,7 +105,10 @@ def _sights(rng, motor, curves, eye, sigma_mm, off_mm) -> SeenShape:
     across = np.cross(tangents, points - eye)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     place = np.linspace(-1.0, 1.0, curves.shape[1])
-    shared = np.tile(np.stack([np.ones(len(place)), place], axis=1), (len(motor), 1)) * (off_mm / ranges)[:, None]
+    shared = (
+        np.tile(np.stack([np.ones(len(place)), place], axis=1), (len(motor), 1))
+        * (off_mm / ranges)[:, None]
+    )
     off = sigma_mm * rng.normal(size=len(points)) + ranges * (shared @ rng.normal(size=2))
     sight = points + off[:, None] * across - eye
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rig.bar import Bar, first_touch, turned
-from bench.rig.contact import moments_Nmm
-from bench.rig.friction import Friction, March
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
+from bench.rig.rod_contact import moments_Nmm
+from bench.rig.stick_slip import Friction, March
 from estimator.beam import Beam
 
 E_GPA, LENGTH_MM = 60.0, 100.0
@@ -40,10 +40,21 @@ def pushed(
     theta_deg: float = 3.0,
 ) -> Push:
     """A straight whisker pushed against a bar. Raises ArithmeticError where it finds no hold."""
-    rod = Rod(shape, LENGTH_MM, 1.0, E_GPA, **({"tip_diameter_mm": 0.4} if shape == "tapered" else {}))
-    beta, psi, theta, mu = *np.radians([beta_deg, psi_deg, theta_deg]), np.tan(np.radians(alpha_deg))
-    bar = Bar.placed(d_x_mm=d_x_mm, beta_rad=beta, psi_rad=psi, touch_rad=0.0, radius_mm=radius_mm,
-                     whisker_radius_mm=float(rod.radius_mm(d_x_mm)))  # fmt: skip
+    rod = Rod(
+        shape, LENGTH_MM, 1.0, E_GPA, **({"tip_diameter_mm": 0.4} if shape == "tapered" else {})
+    )
+    beta, psi, theta, mu = (
+        *np.radians([beta_deg, psi_deg, theta_deg]),
+        np.tan(np.radians(alpha_deg)),
+    )
+    bar = Bar.placed(
+        d_x_mm=d_x_mm,
+        beta_rad=beta,
+        psi_rad=psi,
+        touch_rad=0.0,
+        radius_mm=radius_mm,
+        whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
+    )
     touch = first_touch(rod, bar, 0.0, d_x_mm)
     march = March(rod, bar, Friction(mu, mu), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, 7) / 6)[1]

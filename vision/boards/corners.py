@@ -12,17 +12,20 @@ import numpy as np
 
 from vision.boards.saddle import fit_saddles
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
-# Fewer corners than these fix no plane, so that nothing can be said about edges at a corner.
+# [corners] Fewer fix no plane, so that nothing can be said of edges at a corner. Derived.
 MIN_CORNERS = 4
-# A saddle is disturbed (wire, bar, glare beside it) where the picture misses the model by this many times
-# the board's usual miss: over 500 pixels the ratio of two clean corners stays within 1.2.
+# [1] A wire, bar or glare beside a corner: the picture misses the model by this many times the
+# board's usual miss; over 500 pixels the ratio of two clean corners stays within 1.2. Moves
+# nothing on the fixtures between 1.4 and 4. Study: thresholds.py boards.corners _DISTURBED_RATIO
+# ….
 _DISTURBED_RATIO = 1.8
-# Blur or contrast away from the board's median by more than this factor is another thing than a printed
-# corner.
+# [1] Blur or contrast this far from the board's median is no printed corner. Set by eye; moves
+# nothing on the fixtures between 1.5 and 3. Study: thresholds.py boards.corners _ODD_FACTOR ….
 _ODD_FACTOR = 2.0
-_BRIGHTEST_PERCENT = 99.9  # of the pixels: what is beyond are glints, not the board's white
+# [%] Of the pixels: beyond are glints, not the board's white. Set by eye.
+_BRIGHTEST_PERCENT = 99.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,11 @@ def edge_blur_px(grey: np.ndarray, board: Board) -> float:
     if frames is None:
         return float("nan")
     saddles = fit_saddles(grey, px, frames, _border(board))
-    return float(np.median(saddles.blur_px[saddles.converged])) if np.any(saddles.converged) else float("nan")
+    return (
+        float(np.median(saddles.blur_px[saddles.converged]))
+        if np.any(saddles.converged)
+        else float("nan")
+    )
 
 
 def detect(grey: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +100,9 @@ def to_8_bit(grey: np.ndarray) -> np.ndarray:
     return np.clip(grey * (255.0 / max(brightest, 1.0)), 0, 255).astype(np.uint8)
 
 
-def refine_corners(grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray, board: Board) -> Corners:
+def refine_corners(
+    grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray, board: Board
+) -> Corners:
     """Corners near known places px_guess (n, 2) of the board's corners ids (n,): no detection, only the
     saddle fit.
 

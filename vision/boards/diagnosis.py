@@ -9,10 +9,16 @@ import numpy as np
 from vision.boards.corners import MIN_CORNERS, detect, to_8_bit
 from vision.geometry.board import Board
 
-# A setting is believed where it finds at least this share of the board's corners, and far more than the one entered.
+# [1] Share of the board's corners by which a setting is believed. Set by eye: chance finds none,
+# a sound view all; names a cause in a refusal, enters no number. Study:
+# tests/vision/boards/test_board_settings.py.
 _LEAST_SHARE = 0.3
+# [1] And so many times what the setting entered finds. Set by eye, as above. Study:
+# tests/vision/boards/test_board_settings.py.
 _CLEARLY_MORE = 2.0
-_NEARLY_MOST, _SEVERAL = 0.7, 2  # of the markers of the best dictionary; markers. Set by eye
+# [1, markers] A dictionary may be the one entered wrongly where it shows so large a part of the
+# most markers, and more than so many. Set by eye.
+_NEARLY_MOST, _SEVERAL = 0.7, 2
 
 
 def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
@@ -76,7 +82,9 @@ def _other_dictionary(greys: Sequence[np.ndarray], board: Board) -> Iterable[Boa
 
 def _dictionaries_seen(greys: Sequence[np.ndarray], board: Board) -> list[str]:
     """Dictionaries of which several markers are seen, the smallest of each kind that holds the board's markers."""
-    counts = {name: _marker_count(greys, name) for name in _dictionaries() if name != board.dictionary}
+    counts = {
+        name: _marker_count(greys, name) for name in _dictionaries() if name != board.dictionary
+    }
     most = max(counts.values(), default=0)
     plain = [name for name, count in counts.items() if count > _NEARLY_MOST * most > _SEVERAL]
     return sorted((name for name in plain if _size(name) >= board.marker_count), key=_size)[:3]
@@ -115,7 +123,9 @@ def _named(board: Board) -> str:
 
 def _difference(entered: Board, other: Board) -> str:
     before = _settings(entered)
-    return ", ".join(f"{key} = {value}" for key, value in _settings(other).items() if before[key] != value)
+    return ", ".join(
+        f"{key} = {value}" for key, value in _settings(other).items() if before[key] != value
+    )
 
 
 def _settings(board: Board) -> dict[str, str]:

@@ -11,10 +11,13 @@ import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, to_8_bit
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
+# [markers] A median of fewer may be two spoilt ones. Origin not known. Study:
+# tests/vision/boards/test_marker_size.py.
 _FEWEST_MARKERS = 6
-# Print and rounding; and blur, which eats or feeds a marker's rim by up to a pixel a side (0.7 px in the webcams).
+# [1, px] Print and rounding; and blur, which eats or feeds a marker's rim by up to a pixel a side
+# (0.7 px in the webcams). Study: tests/vision/boards/test_marker_size.py.
 _TOLERANCE, _RIM_PX = 0.04, 2.0
 
 
@@ -47,4 +50,9 @@ def _sides(grey: np.ndarray, board: Board) -> np.ndarray:
         return np.zeros((0, 2))
     outlines = [marker.reshape(-1, 1, 2).astype(np.float32) for marker in markers]
     flat = [cv2.perspectiveTransform(outline, H) for outline in outlines]
-    return np.sqrt([[cv2.contourArea(a.astype(np.float32)), cv2.contourArea(b)] for a, b in zip(flat, outlines)])
+    return np.sqrt(
+        [
+            [cv2.contourArea(a.astype(np.float32)), cv2.contourArea(b)]
+            for a, b in zip(flat, outlines)
+        ]
+    )

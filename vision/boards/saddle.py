@@ -16,28 +16,50 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.special import erf
 
-# Reach along the edges: half a square, so that no two corners share a pixel's noise, and at most this. A
-# lens bends an edge by k1 x t² / f over the distance t, which moves the corner by a third of that at the
-# end of the arm: at 24 px 0.003 px for k1 = -0.1, f = 2000 px, x = 0.3, and 0.03 px in the corners of a
-# webcam with k1 = -0.33.
+# [px] Reach along the edges. A lens bends an edge by k1 x t²/f over the distance t, which moves
+# the corner by a third of that at the arm's end: at 24 px 0.003 px for k1 = −0.1, f = 2000 px, x
+# = 0.3, and 0.03 px in the corners of a webcam with k1 = −0.33. Shorter is noisier: drawn corners
+# err by 0.024, 0.019 and 0.016 px at 16, 24 and 32. Study: thresholds.py boards.saddle REACH_PX
+# ….
 REACH_PX = 24
+# [squares] Half a square, so that no two corners share a pixel's noise. Derived.
 _ARM_SQUARES = 0.5
-# Pixels nearer to a marker than this hold its blur; pixels farther from an edge than the band say nothing
-# of it.
+# [px] Pixels nearer to a marker hold its blur. Rig corners err by 0.035 px at 0.75, by 0.034 from
+# 1.0 to 3.0. Study: thresholds.py boards.saddle _CLEAR_OF_MARKER_PX ….
 _CLEAR_OF_MARKER_PX = 1.5
+# [px] Pixels farther from an edge say nothing of it: drawn corners err by 0.026 px at 3, 0.019 at
+# 6, 0.017 at 8 and 12. Study: thresholds.py boards.saddle _BAND_PX ….
 _BAND_PX = 6.0
+# [px] A fit that runs farther than this from OpenCV's corner found another. moves nothing on the
+# fixtures between 2 and 8. Study: thresholds.py boards.saddle _MAX_SHIFT_PX ….
 _MAX_SHIFT_PX = 4.0
+# [squares] The same on small boards. moves nothing on the fixtures between 0.15 and 0.6. Study:
+# thresholds.py boards.saddle _MAX_SHIFT_SQUARES ….
 _MAX_SHIFT_SQUARES = 1.0 / 3.0
+# [pixels] Over four times the nine parameters. moves nothing on the fixtures between 10 and 160.
+# Study: thresholds.py boards.saddle _MIN_PIXELS ….
 _MIN_PIXELS = 40
-# Contrast against what the model leaves over, and against the rounding to whole grey levels.
+# [1] Against what the model leaves over, and against rounding. Origin not known; moves nothing on
+# the fixtures between 1.5 and 6. Study: thresholds.py boards.saddle _LEAST_CONTRAST ….
 _LEAST_CONTRAST = 3.0
+# [grey levels] Sigma of rounding to whole levels, 1/√12. Derived.
 _ROUNDING = 0.3
+# [steps] The fit ends before. Corners are the same with 8 and with 30. Study: thresholds.py
+# boards.saddle _ITERATIONS ….
 _ITERATIONS = 15
+# [px] A tenth of a good corner's sigma. moves nothing on the fixtures between 0.0005 and 0.01.
+# Study: thresholds.py boards.saddle _CONVERGED_PX ….
 _CONVERGED_PX = 2e-3
+# [px] Where the fit starts. moves nothing on the fixtures between 0.6 and 2. Study: thresholds.py
+# boards.saddle _FIRST_BLUR_PX ….
 _FIRST_BLUR_PX = 1.0
+# [px] Sharper is a pixel's edge, softer no edge. Origin not known; (0.4, 4) and (0.1, 12) leave
+# the fixtures as they are. Study: thresholds.py boards.saddle _BLUR_LIMITS_PX ….
 _BLUR_LIMITS_PX = (0.2, 8.0)
-# How far apart two pixels' noise still goes together.
+# [px] How far apart two pixels' noise still goes together. z of rig corners 1.18, 1.13, 1.15 with
+# 1, 3, 5. Study: thresholds.py boards.saddle LAGS ….
 LAGS = 3
+# [px] Keeps a step of the fit within twice the limits above. Derived.
 _BLUR_SEARCH_PX = (0.1, 20.0)
 
 X, Y, TURN_1, TURN_2, BLUR_1, BLUR_2, CONTRAST, LEVEL, SLOPE_X, SLOPE_Y = range(10)
@@ -70,7 +92,9 @@ class _Windows:
         return _Windows(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
-def fit_saddles(grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float) -> Saddles:
+def fit_saddles(
+    grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
+) -> Saddles:
     """Fits the corner nearest each guess.
 
     grey: (height, width). px_guess: (n, 2). frames: (n, 2, 2) px, one square along board x and y as seen at
@@ -82,9 +106,13 @@ def fit_saddles(grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, bord
     return _report(windows, parameters, settled, px_guess, frames)
 
 
-def _cut_windows(grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float) -> _Windows:
+def _cut_windows(
+    grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
+) -> _Windows:
     reach = int(np.ceil(min(REACH_PX, _ARM_SQUARES * np.linalg.norm(frames, axis=1).max())))
-    grid = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))).reshape(2, -1)
+    grid = np.stack(
+        np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
+    ).reshape(2, -1)
     anchor = np.round(px_guess).astype(int)
     off = grid + (anchor - px_guess)[:, :, None]
     place = anchor[:, :, None] + grid
@@ -107,7 +135,9 @@ def _packed(grey: np.ndarray, anchor: np.ndarray, grid: np.ndarray, taken: np.nd
 def _along_edges(off: np.ndarray, frames: np.ndarray, border: float) -> np.ndarray:
     """Which pixels, offset `off` (n, 2, k) from the guess, see the two edges and no marker. (n, k) bool."""
     in_squares = np.abs(np.linalg.solve(frames, off))
-    px_per_square = np.abs(np.linalg.det(frames))[:, None] / np.linalg.norm(frames[:, :, ::-1], axis=1)
+    px_per_square = np.abs(np.linalg.det(frames))[:, None] / np.linalg.norm(
+        frames[:, :, ::-1], axis=1
+    )
     band_px = np.clip(border * px_per_square - _CLEAR_OF_MARKER_PX, _CLEAR_OF_MARKER_PX, _BAND_PX)
     beside = in_squares * px_per_square[:, :, None] < band_px[:, :, None]
     return beside.any(axis=1) & np.all(in_squares < _ARM_SQUARES, axis=1)
@@ -142,7 +172,12 @@ def _model(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     J[:, TURN_1], J[:, TURN_2] = contrast * by_1[2] * f2, contrast * by_2[2] * f1
     J[:, BLUR_1], J[:, BLUR_2] = contrast * by_1[3] * f2, contrast * by_2[3] * f1
     J[:, CONTRAST], J[:, LEVEL], J[:, SLOPE_X], J[:, SLOPE_Y] = f1 * f2, 1.0, dx, dy
-    grey = contrast * J[:, CONTRAST] + p[:, LEVEL, None] + p[:, SLOPE_X, None] * dx + p[:, SLOPE_Y, None] * dy
+    grey = (
+        contrast * J[:, CONTRAST]
+        + p[:, LEVEL, None]
+        + p[:, SLOPE_X, None] * dx
+        + p[:, SLOPE_Y, None] * dy
+    )
     return grey, J
 
 
@@ -163,7 +198,9 @@ def _edge(dx, dy, turn, log_blur) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     )
 
 
-def _normal_equations(J: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _normal_equations(
+    J: np.ndarray, residual: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """JᵀWJ (n, m, m) and JᵀWr (n, m) for J (n, m, k)."""
     JW = J * weight[:, None, :]
     return JW @ J.transpose(0, 2, 1), (JW @ residual[:, :, None])[:, :, 0]
@@ -235,9 +272,13 @@ def _spread_per_grey(windows: _Windows, J: np.ndarray, unit_residual: np.ndarray
     """
     normal, _ = _normal_equations(J, unit_residual, windows.weight)
     influence = np.linalg.pinv(normal, hermitian=True)[:, :2] @ (J * windows.weight[:, None, :])
-    along_x, along_y = (_correlation(_on_grid(windows, unit_residual[:, None])[:, 0], axis) for axis in (2, 1))
+    along_x, along_y = (
+        _correlation(_on_grid(windows, unit_residual[:, None])[:, 0], axis) for axis in (2, 1)
+    )
     a = _on_grid(windows, influence)
-    Ca = convolve1d(convolve1d(a, along_x, axis=3, mode="constant"), along_y, axis=2, mode="constant")
+    Ca = convolve1d(
+        convolve1d(a, along_x, axis=3, mode="constant"), along_y, axis=2, mode="constant"
+    )
     return np.sqrt(np.maximum(0.5 * np.sum(a * Ca, axis=(1, 2, 3)), 0.0))
 
 

@@ -12,12 +12,16 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
-# Beyond this many sigmas from the rig picture's corner, a frame's corner is another thing.
+# [sigma] Beyond, a frame's corner is another thing than the rig picture's: one Gaussian corner in
+# 8000 is, on either axis. Derived.
 _DISTURBED_SIGMA = 4.0
-_DISTURBED_MEDIANS = 2.5  # of the median miss, where that is the larger. Set by eye
-_FEWEST_CORNERS = 6  # twelve coordinates for the six parameters of a motion
+# [1] Of the median miss, where that is larger than the sigmas: a corner beyond was hidden or
+# disturbed. Set by eye.
+_DISTURBED_MEDIANS = 2.5
+# [corners] Twelve coordinates for the six parameters of a motion. Derived.
+_FEWEST_CORNERS = 6
 
 
 def mean_view(rig_view: Corners, frames: Sequence[Corners]) -> Corners:
@@ -35,7 +39,9 @@ def mean_view(rig_view: Corners, frames: Sequence[Corners]) -> Corners:
 
 def _mean_corner(px: np.ndarray, sigma: np.ndarray, first_is_rig: bool) -> tuple[np.ndarray, float]:
     reference, its_sigma = (px[0], sigma[0]) if first_is_rig else (np.median(px, axis=0), 0.0)
-    near = np.all(np.abs(px - reference) < _DISTURBED_SIGMA * np.hypot(sigma, its_sigma)[:, None], axis=1)
+    near = np.all(
+        np.abs(px - reference) < _DISTURBED_SIGMA * np.hypot(sigma, its_sigma)[:, None], axis=1
+    )
     if not near.any():
         return px[0], sigma[0]
     weight = 1.0 / sigma[near] ** 2
@@ -68,14 +74,20 @@ def camera_moved(
     return _rms_and_sigma(J, motion, covariance)
 
 
-def _least_squares(J: np.ndarray, off: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _least_squares(
+    J: np.ndarray, off: np.ndarray, sigma: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     J, off = (J / sigma[:, None, None]).reshape(-1, J.shape[2]), (off / sigma[:, None]).ravel()
     scale = np.linalg.norm(J, axis=0)
-    covariance = np.linalg.pinv((J / scale).T @ (J / scale), hermitian=True) / np.outer(scale, scale)
+    covariance = np.linalg.pinv((J / scale).T @ (J / scale), hermitian=True) / np.outer(
+        scale, scale
+    )
     return covariance @ (J.T @ off), covariance
 
 
-def _rms_and_sigma(J: np.ndarray, motion: np.ndarray, covariance: np.ndarray) -> tuple[float, float]:
+def _rms_and_sigma(
+    J: np.ndarray, motion: np.ndarray, covariance: np.ndarray
+) -> tuple[float, float]:
     """Of the displacements J motion: RMS length, and its sigma (the RMS that noise alone would give)."""
     displacement = J @ motion
     spread = np.einsum("nij,jk,nik->n", J, covariance, J)

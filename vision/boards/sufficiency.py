@@ -8,35 +8,51 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.errors import Refused
 from vision.geometry.lens import fold_radius
+from vision.geometry.refusals import Refused
 
-# Six corners over at least two rows and columns give a pose with something left over.
+# [corners] Six over at least two rows and columns give a pose with something left over. Derived.
 MIN_VIEW_CORNERS = 6
-# Each view adds 6 unknowns to the lens's 9; below this the lens rests on three or four independent
-# directions.
+# [views] Each adds 6 unknowns to the lens's 9; below, the lens rests on three or four independent
+# directions. Derived.
 MIN_VIEWS = 5
-# Of a homography's directions the weakest must be felt by this share of the strongest: 0.4 for a whole board, 0.16 for
-# two rows of seven corners, 0 for a line, or for a line and one corner beside it.
+# [1] Weakest over strongest of a homography's directions: 0.4 for a whole board, 0.16 for two
+# rows of seven corners, 0 for a line, or a line and one corner beside it. Study:
+# tests/vision/calibration/test_calibrate.py.
 _LEAST_STRENGTH = 0.05
-# A lens bends a board out of a plane's picture by less than this share of its size, or these px.
+# [1, px] A lens bends a board out of a plane's picture by less than this share of its size, or
+# these px. Study: tests/vision/calibration/test_calibrate.py.
 _STRAY_SHARE, _STRAY_PX = 0.04, 3.0
-# Below this tilt the foreshortening that tells focal length from distance, 1 - cos, is under 1.5 %.
+# [deg] Below, the foreshortening that tells focal length from distance, 1 − cos, is under 1.5 %.
+# Derived.
 _LEAST_TILT_DEG = 10.0
+# [1] Farthest over nearest corner. Origin not known; the lab's views have 1.76 and 1.86. Study:
+# calibrate cameras, its notes.
 _LEAST_DEPTH_RATIO = 1.15
+# [1] Share of the focal length. Origin not known; the lab's is 0.0003. Study: calibrate cameras,
+# its notes.
 _MOST_FOCAL_SIGMA = 0.02
-_MOST_REACH = 20.0  # focal lengths from the middle of a picture to its corner: 87 degrees, more than any lens here has
+# [focal lengths] From the middle of a picture to its corner: 87°, more than any lens here has.
+# Stated.
+_MOST_REACH = 20.0
+# [1] Fx over fy: real ones differ by less than 1 %; three times that. Stated.
 _MOST_ASPECT = 0.03
-# Decentring of a lens shifts the picture's rim by p r² f, some 1e-3 f at most.
+# [1] Decentring shifts the picture's rim by p r² f, some 1e-3 f at most; fifty times that.
+# Stated.
 _MOST_DECENTRING = 0.05
+# [1] The rim of the picture against its middle. Origin not known.
 _MOST_STRETCH = 2.0
-# What corners may be off by beside their own sigma, px an axis. Boards waved before webcams that nobody triggered leave
-# 0.18 once their instants are fitted, cameras by themselves 0.0 to 0.06 (tests/vision/calibration/test_held_out.py).
+# [px] Model error an axis beside the corners' own sigma: webcams that nobody triggered leave 0.18
+# once instants are fitted (multi4_b), cameras by themselves 0.0 to 0.06; twice that. Study:
+# tests/vision/calibration/test_held_out.py, calibrate cameras, its notes.
 MOST_ERROR_PX = 0.4
-# A lens may fold in the very corners, where no board is ever seen, but not before this share of the way there.
+# [1] Share of the way to the picture's corner: a lens may fold in the very corners, where no
+# board is ever seen, but not before. Stated.
 _LEAST_REACH = 0.7
-# Outside the hull of all corners by more than this share of the picture's width, a lens is extrapolated.
+# [1] Share of the picture's width beyond all corners from which a lens is extrapolated. Origin
+# not known.
 _HULL_MARGIN = 0.05
+# [1] Share of where whisker and bar will be that may lie outside. Origin not known.
 _MOST_UNCOVERED = 0.2
 
 
@@ -56,10 +72,12 @@ def fixes_pose(view: Corners, board: Board) -> bool:
     x, y = _centred(board.corners_mm[view.ids, :2]).T
     one, none = np.ones_like(x), np.zeros_like(x)
     # The direct linear transform of these points onto themselves: eight of its nine directions must be felt.
-    rows = np.concatenate([
-        np.column_stack([x, y, one, none, none, none, -x * x, -x * y, -x]),
-        np.column_stack([none, none, none, x, y, one, -y * x, -y * y, -y]),
-    ])  # fmt: skip
+    rows = np.concatenate(
+        [
+            np.column_stack([x, y, one, none, none, none, -x * x, -x * y, -x]),
+            np.column_stack([none, none, none, x, y, one, -y * x, -y * y, -y]),
+        ]
+    )
     strength = np.linalg.svd(rows, compute_uv=False)
     return bool(strength[7] > _LEAST_STRENGTH * strength[0])
 
@@ -88,7 +106,9 @@ def check_rig_view(name: str, view: Corners | None, board: Board) -> None:
         )
 
 
-def check_lenses(cameras: Cameras, reports: Sequence, views: Mapping[str, Iterable[Corners]]) -> None:
+def check_lenses(
+    cameras: Cameras, reports: Sequence, views: Mapping[str, Iterable[Corners]]
+) -> None:
     """Refuses what the views could not settle: no tilt, no depth, a lens that diverged."""
     for camera, report in zip(cameras, reports):
         _check_geometry(camera.name, report.tilt_deg, report.depth_ratio)
@@ -137,7 +157,11 @@ def check_lens(camera: Camera, covered: float | None = None) -> None:
         found = f"fx = {fx:.0f} and fy = {fy:.0f} differ by {100 * abs(fx / fy - 1):.0f} %, real ones by less than 1 %"
         raise Refused(_over_fitted(camera, found))
     if np.abs(camera.distortion[2:4]).max() > _MOST_DECENTRING:
-        raise Refused(_over_fitted(camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"))
+        raise Refused(
+            _over_fitted(
+                camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"
+            )
+        )
     radius = _LEAST_REACH * _picture_radius(camera) if covered is None else covered
     if not radius < _MOST_REACH:
         found = f"the picture's farthest corner is {radius:.3g} focal lengths from its middle"
@@ -145,11 +169,17 @@ def check_lens(camera: Camera, covered: float | None = None) -> None:
     if fold_radius(camera.distortion) < radius:
         raise Refused(_over_fitted(camera, "the distortion folds the picture onto itself"))
     if _stretch(camera.distortion, radius) > _MOST_STRETCH:
-        raise Refused(_over_fitted(camera, f"the distortion stretches the rim {_MOST_STRETCH:.0f}-fold or more"))
+        raise Refused(
+            _over_fitted(
+                camera, f"the distortion stretches the rim {_MOST_STRETCH:.0f}-fold or more"
+            )
+        )
 
 
 def _over_fitted(camera: Camera, found: str) -> str:
-    terms = ", ".join(f"{n} {v:.3g}" for n, v in zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion))
+    terms = ", ".join(
+        f"{n} {v:.3g}" for n, v in zip(("k1", "k2", "p1", "p2", "k3"), camera.distortion)
+    )
     return (
         f"camera {camera.name}: {found} ({terms}): the lens diverged or was over-fitted; calibrate again with 15 views "
         "or more that fill the picture, tilted to all sides"
@@ -175,13 +205,18 @@ def _reach(camera: Camera, px: np.ndarray) -> float:
 
 
 def check_work(
-    cameras: Cameras, alone: Mapping, standing: Mapping[str, Corners], work_points_mm: np.ndarray | None
+    cameras: Cameras,
+    alone: Mapping,
+    standing: Mapping[str, Corners],
+    work_points_mm: np.ndarray | None,
 ) -> None:
     """Refuses a camera whose board views leave out where whisker and bar will be, saying on which side."""
     if work_points_mm is None:
         return
     for camera in cameras:
-        corners = [v.px for v in alone[camera.name].views.values()] + [standing[camera.name].px] * bool(standing)
+        corners = [v.px for v in alone[camera.name].views.values()] + [
+            standing[camera.name].px
+        ] * bool(standing)
         work_px = camera.project(work_points_mm)
         in_picture = work_px[np.all((work_px >= 0) & (work_px < camera.size_px), axis=1)]
         if not len(in_picture):
@@ -202,7 +237,9 @@ def _outside(corners_px: np.ndarray, work_px: np.ndarray, size_px: tuple[int, in
     """Which points lie farther outside the corners' hull than a margin, (n,) bool."""
     hull = cv2.convexHull(corners_px.astype(np.float32))
     margin = -_HULL_MARGIN * max(size_px)
-    return np.array([cv2.pointPolygonTest(hull, tuple(map(float, p)), True) for p in work_px]) < margin
+    return (
+        np.array([cv2.pointPolygonTest(hull, tuple(map(float, p)), True) for p in work_px]) < margin
+    )
 
 
 def _side(corners_px: np.ndarray, missed_px: np.ndarray) -> str:
@@ -227,7 +264,9 @@ def coverage(views: Sequence[Corners], size_px: tuple[int, int]) -> float:
 
 def depth_ratio(poses: Sequence[np.ndarray], views: Sequence[Corners], board: Board) -> float:
     """Distance of the farthest corner over that of the nearest, along the optical axis."""
-    depths = np.concatenate([board.corners_mm[v.ids] @ T[2, :3] + T[2, 3] for T, v in zip(poses, views)])
+    depths = np.concatenate(
+        [board.corners_mm[v.ids] @ T[2, :3] + T[2, 3] for T, v in zip(poses, views)]
+    )
     return float(depths.max() / depths.min())
 
 

@@ -11,17 +11,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, N_VIEW, BundleState, Priors, Sightings, predict
+from vision.calibration.bundle import (
+    CLOCK,
+    N_BOARD,
+    N_CAMERA,
+    N_VIEW,
+    BundleState,
+    Priors,
+    Sightings,
+    predict,
+)
 from vision.geometry.rotation import pose_difference
 
 _GLOBAL = N_CAMERA + N_BOARD
-# Keeps a view whose few corners fix no pose solvable; of what is fixed it changes the tenth digit.
+# [1] Keeps a view whose few corners fix no pose solvable; of what is fixed it changes the tenth
+# digit. Study: thresholds.py calibration.adjust _RIDGE ….
 _RIDGE = 1e-10
-# Where iterations run out while the cost still falls, but by less than this share a step, the rest is below a tenth of
-# a sigma.
+# [1] Share of the cost a step: where iterations run out while it falls by less, the rest is below
+# a tenth of a sigma. Study: thresholds.py calibration.adjust _NEARLY_AT_REST ….
 _NEARLY_AT_REST = 1e-4
-# Levenberg–Marquardt: damping at first, the least and the most; what a step that helps, or not, makes of it.
+# [1] Of the normal matrix's diagonal, at first, at least and at most (Levenberg–Marquardt); the
+# solution does not hang on them. Derived.
 _DAMPED, _LEAST_DAMPED, _MOST_DAMPED = 1e-4, 1e-12, 1e8
+# [1] What a step that helps, or does not, makes of the damping. Derived.
 _EASED, _STIFFENED = 0.1, 10.0
 
 
@@ -103,7 +115,9 @@ def _shot_blocks(weighed: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """
     count = np.diff(np.append(starts, len(weighed)))
     padded = np.zeros((len(starts), count.max(), *weighed.shape[1:]))
-    padded[np.repeat(np.arange(len(starts)), count), np.arange(len(weighed)) - np.repeat(starts, count)] = weighed
+    padded[
+        np.repeat(np.arange(len(starts)), count), np.arange(len(weighed)) - np.repeat(starts, count)
+    ] = weighed
     padded = padded.reshape(len(starts), -1, weighed.shape[2])
     return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
 
@@ -115,7 +129,11 @@ def _without_instants(blocks: np.ndarray, state: BundleState, seen: Sightings, p
     columns, poses = _columns(state, camera, view)
     if state.trajectory is None or priors.late_sigma_s is None:
         nothing = np.zeros(len(starts))
-        return _Shots(camera, view, columns, poses, nothing + 1, nothing, 0 * blocks[:, :, 0]), blocks, 0.0
+        return (
+            _Shots(camera, view, columns, poses, nothing + 1, nothing, 0 * blocks[:, :, 0]),
+            blocks,
+            0.0,
+        )
     information, late = priors.late_sigma_s[camera] ** -2.0, state.instants[view, camera]
     loose = ~state.trajectory.is_reference(view, camera)
     weight = blocks[:, CLOCK, CLOCK] + information
@@ -126,7 +144,9 @@ def _without_instants(blocks: np.ndarray, state: BundleState, seen: Sightings, p
     return shots, blocks - lost / weight[:, None, None], float(np.sum(information * late**2))
 
 
-def _columns(state: BundleState, camera: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _columns(
+    state: BundleState, camera: np.ndarray, view: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Where a picture's parameters stand among the globals (s, 19) and among the views' (s, 6 or 18)."""
     size = N_CAMERA * len(state.lens)
     own = N_CAMERA * camera[:, None] + np.arange(N_CAMERA)
@@ -149,12 +169,18 @@ def _assemble(blocks: np.ndarray, shots: _Shots, state: BundleState) -> tuple[np
     np.add.at(a, columns, blocks[:, :m, -1])
     np.add.at(B, (columns[:, :, None], poses[:, None, :]), blocks[:, :m, m:-1])
     lower = apart >= 0
-    np.add.at(C, (apart[lower], np.broadcast_to(poses[:, None, :], apart.shape)[lower]), blocks[:, m:, m:-1][lower])
+    np.add.at(
+        C,
+        (apart[lower], np.broadcast_to(poses[:, None, :], apart.shape)[lower]),
+        blocks[:, m:, m:-1][lower],
+    )
     np.add.at(c, poses, blocks[:, m:, -1])
     return A, a, B, C, c
 
 
-def _with_priors(parts, shots: _Shots, cost: float, residual, state: BundleState, priors: Priors) -> _Normal:
+def _with_priors(
+    parts, shots: _Shots, cost: float, residual, state: BundleState, priors: Priors
+) -> _Normal:
     """Adds the observations beside the pictures, and takes out what is held."""
     A, a, B, C, c = parts
     weight = 1.0 / priors.sigma**2
@@ -182,7 +208,9 @@ def _hold(B: np.ndarray, C: np.ndarray, c: np.ndarray, held: np.ndarray) -> None
     C[0, held] = 1.0
 
 
-def _solve_step(normal: _Normal, priors: Priors, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _solve_step(
+    normal: _Normal, priors: Priors, damping: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C)."""
     free = priors.free
     C = normal.C.copy()
@@ -196,7 +224,9 @@ def _solve_step(normal: _Normal, priors: Priors, damping: float) -> tuple[np.nda
     return step, views.reshape(-1, N_VIEW), instants
 
 
-def _instant_steps(shots: _Shots, step: np.ndarray, views: np.ndarray, n_cameras: int) -> np.ndarray:
+def _instant_steps(
+    shots: _Shots, step: np.ndarray, views: np.ndarray, n_cameras: int
+) -> np.ndarray:
     with_others = np.concatenate([step[shots.columns], views[shots.poses]], axis=1)
     instants = np.zeros((len(views) // N_VIEW, n_cameras))
     instants[shots.view, shots.camera] = (
@@ -265,7 +295,9 @@ def adjust_bundle(
     return _solution(state, normal, priors, iteration, done or fall < _NEARLY_AT_REST)
 
 
-def _solution(state: BundleState, normal: _Normal, priors: Priors, iterations: int, done: bool) -> Solution:
+def _solution(
+    state: BundleState, normal: _Normal, priors: Priors, iterations: int, done: bool
+) -> Solution:
     covariance = np.zeros((len(priors.free),) * 2)
     if np.isfinite(normal.cost) and priors.free.any():
         reduced, *_ = _eliminate(normal, normal.C, priors.free)

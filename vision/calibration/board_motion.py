@@ -13,7 +13,8 @@ import numpy as np
 
 from vision.geometry.rotation import log_rotation
 
-# Neighbours farther away than this many frame intervals say nothing of the motion now.
+# [frame intervals] Neighbours farther away say nothing of the motion now. Origin not known; it
+# reaches two neighbours to either side. Study: cameras.py.
 _REACH_INTERVALS = 2.6
 
 

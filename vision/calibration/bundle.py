@@ -20,11 +20,21 @@ from vision.geometry import lens as lens_model
 from vision.geometry.rotation import exp_rotation, left_jacobian, skew
 
 CAMERA_COLUMNS = (
-    *lens_model.LENS_TERMS, "w_x", "w_y", "w_z", "v_x", "v_y", "v_z", "clock_offset_s",
-)  # fmt: skip
+    *lens_model.LENS_TERMS,
+    "w_x",
+    "w_y",
+    "w_z",
+    "v_x",
+    "v_y",
+    "v_z",
+    "clock_offset_s",
+)
 BOARD_COLUMNS = ("scale", "warp_x_mm", "warp_y_mm")
+# [parameters] A layout, no threshold.
 N_CAMERA, N_BOARD, N_VIEW = len(CAMERA_COLUMNS), len(BOARD_COLUMNS), 6
+# [columns] A layout, no threshold.
 POSE = slice(9, 15)
+# [column] A layout, no threshold.
 CLOCK = 15
 
 
@@ -76,7 +86,9 @@ class BundleState:
         if self.clock is None:
             object.__setattr__(self, "clock", np.zeros(len(self.lens)))
         if self.instants is None:
-            object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), len(self.lens))))
+            object.__setattr__(
+                self, "instants", np.zeros((len(self.T_world_board), len(self.lens)))
+            )
 
     def globals(self) -> np.ndarray:
         """The values that priors speak of, (16 C + 3,); poses stand as 0."""
@@ -84,7 +96,9 @@ class BundleState:
         per_camera[:, :9], per_camera[:, CLOCK] = self.lens, self.clock
         return np.concatenate([per_camera.ravel(), self.board])
 
-    def stepped(self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray) -> "BundleState":
+    def stepped(
+        self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray
+    ) -> "BundleState":
         """Moved by (16 C + 3,), (V, 6) and (V, C)."""
         cameras = global_step[:-N_BOARD].reshape(-1, N_CAMERA)
         return replace(
@@ -124,7 +138,9 @@ class Priors:
     late_sigma_s: np.ndarray | None = None
 
 
-def predict(state: BundleState, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def predict(
+    state: BundleState, seen: Sightings, corners_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Pixels (n, 2) and their Jacobian (n, 2, 25 or 37).
 
     Its columns: the seeing camera's 16, the board's 3, the view's 6; with a trajectory also the 6 of the view before
@@ -136,11 +152,15 @@ def predict(state: BundleState, seen: Sightings, corners_mm: np.ndarray) -> tupl
     paths = _Paths.of(state)
     for camera in np.unique(seen.camera):
         rows = np.flatnonzero(seen.camera == camera)
-        px[rows], J[rows] = _predict_one(state, camera, seen.chosen(rows), points[rows], by_board[rows], paths)
+        px[rows], J[rows] = _predict_one(
+            state, camera, seen.chosen(rows), points[rows], by_board[rows], paths
+        )
     return px, J
 
 
-def _printed(state: BundleState, seen: Sightings, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _printed(
+    state: BundleState, seen: Sightings, corners_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Board points (n, 3) in the board frame and d point / d (scale, warp_x, warp_y) (n, 3, 3).
 
     Warp after mrcal: z = warp_x (1 − x²) + warp_y (1 − y²), x and y from −1 to 1 over the corners.
@@ -161,13 +181,19 @@ def _predict_one(state: BundleState, camera: int, seen: Sightings, points, by_bo
     moved = np.einsum("nij,nj->ni", motion.turn, turned)
     R = T_camera[:, :3]
     in_camera = (moved + T_board[:, :, 3] + motion.shift_mm) @ R.T
-    px, by_x, by_lens = lens_model.project_with_jacobians(in_camera + T_camera[:, 3], state.lens[camera])
+    px, by_x, by_lens = lens_model.project_with_jacobians(
+        in_camera + T_camera[:, 3], state.lens[camera]
+    )
     by_world = by_x @ R
     by_turn = -by_world @ skew(moved)
     columns = [by_lens, -by_x @ skew(in_camera), by_x]
-    columns.append(by_turn @ motion.turn_rate[:, :, None] + by_world @ motion.shift_rate_mm_s[:, :, None])
+    columns.append(
+        by_turn @ motion.turn_rate[:, :, None] + by_world @ motion.shift_rate_mm_s[:, :, None]
+    )
     columns.append(by_world @ motion.turn @ T_board[:, :, :3] @ by_board)
-    columns += [by_turn @ w for w in motion.turn_by_poses] + [by_world * v for v in motion.shift_by_poses]
+    columns += [by_turn @ w for w in motion.turn_by_poses] + [
+        by_world * v for v in motion.shift_by_poses
+    ]
     order = [*range(5), *(5 + k + side for k in range(motion.poses) for side in (0, motion.poses))]
     return px, np.concatenate([columns[k] for k in order], axis=2)
 

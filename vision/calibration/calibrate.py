@@ -39,12 +39,14 @@ from vision.calibration.tied import Tied, Timing, lens_priors, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 __all__ = ["Calibration", "CameraReport", "calibrate_cameras", "camera_moved"]
 
-# The board's warp enters where it lowers the cost by more than chance does once in 10 000 (two parameters).
+# [chi²] Two parameters gain more once in 10 000: −2 ln 1e-4. Derived.
 _WARP_GAIN = 18.4
+# [mm] A prior, wider than any print bows. moves nothing on the fixtures between 0.5 and 10 (they
+# do not call for a warp). Study: thresholds.py calibration.calibrate _WARP_SIGMA_MM ….
 _WARP_SIGMA_MM = 2.0
 
 
@@ -104,8 +106,14 @@ def calibrate_cameras(
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
     alone = {n: _alone(n, views, board, on_rig is not None) for n in views.boards}
-    standing = {n: _standing(views.rig[n], views.trials.get(n, ()), board) for n in alone} if on_rig else None
-    layout, settled, timing, notes = Tied(alone, standing, board, on_rig, views.times_s, triggered).adjusted()
+    standing = (
+        {n: _standing(views.rig[n], views.trials.get(n, ()), board) for n in alone}
+        if on_rig
+        else None
+    )
+    layout, settled, timing, notes = Tied(
+        alone, standing, board, on_rig, views.times_s, triggered
+    ).adjusted()
     together = layout.trajectory is not None
     settled, warp = _settle_with_warp(layout, settled, board)
     notes = [*notes, *warp]
@@ -116,8 +124,12 @@ def calibrate_cameras(
     calibration = _calibration(alone, views.sizes_px, settled, board, notes, timing, together)
     if on_rig is not None:
         placement = by_board(on_rig.T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad).covariance
-        calibration = replace(calibration, cameras=replace(calibration.cameras, placement=placement))
-    check_lenses(calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()})
+        calibration = replace(
+            calibration, cameras=replace(calibration.cameras, placement=placement)
+        )
+    check_lenses(
+        calibration.cameras, calibration.report, {n: a.views.values() for n, a in alone.items()}
+    )
     check_work(calibration.cameras, alone, standing, work_points_mm)
     return calibration
 
@@ -134,7 +146,9 @@ def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:
         check_rig_view(name, None if rig_view is None else without_strays(rig_view, board), board)
     settled = calibrate_alone(list(usable.values()), board, size_px, rough=True)
     state = settled.solution.state
-    return Alone(state.lens[0], float(settled.error_px[0]), usable, dict(zip(usable, state.T_world_board)))
+    return Alone(
+        state.lens[0], float(settled.error_px[0]), usable, dict(zip(usable, state.T_world_board))
+    )
 
 
 def _standing(rig_view: Corners, frames: Sequence[Corners], board: Board) -> Corners:
@@ -158,12 +172,18 @@ def calibrate_alone(
 def _settle_with_warp(layout: Layout, flat: Settled, board: Board) -> tuple[Settled, list[str]]:
     """With a warped board where that lowers the cost, at the flat board's noise, by more than chance would."""
     priors = allow_warp(flat.priors)
-    warped = adjust_bundle(flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, priors, tolerance=1e-6)
+    warped = adjust_bundle(
+        flat.solution.state, flat.seen.chosen(flat.kept), board.corners_mm, priors, tolerance=1e-6
+    )
     if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []
-    settled = settle(warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1)
+    settled = settle(
+        warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1
+    )
     x, y = settled.solution.state.board[1:]
-    return settled, [f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."]
+    return settled, [
+        f"The board is bent by {x:+.3f} mm along x and {y:+.3f} mm along y; taken into account."
+    ]
 
 
 def allow_warp(priors: Priors) -> Priors:
@@ -173,7 +193,9 @@ def allow_warp(priors: Priors) -> Priors:
     return replace(priors, free=free, sigma=sigma)
 
 
-def as_cameras(names: Sequence[str], sizes_px: Mapping[str, tuple[int, int]], settled: Settled) -> Cameras:
+def as_cameras(
+    names: Sequence[str], sizes_px: Mapping[str, tuple[int, int]], settled: Settled
+) -> Cameras:
     """The cameras of a settled adjustment with the covariance of their 15 parameters each."""
     state = settled.solution.state
     cameras = tuple(
@@ -188,12 +210,18 @@ def _matrix(lens: np.ndarray) -> np.ndarray:
     return np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
 
 
-def _calibration(alone, sizes_px, settled: Settled, board: Board, notes, timing, together: bool) -> Calibration:
+def _calibration(
+    alone, sizes_px, settled: Settled, board: Board, notes, timing, together: bool
+) -> Calibration:
     cameras = as_cameras(alone, sizes_px, settled)
     if not settled.solution.converged:
-        raise Refused("the adjustment of the cameras did not come to rest: record more views, well spread and tilted")
+        raise Refused(
+            "the adjustment of the cameras did not come to rest: record more views, well spread and tilted"
+        )
     reports = tuple(_report(c, cameras, a, settled, board) for c, a in enumerate(alone.values()))
-    return Calibration(cameras, reports, tuple(notes), timing, settled.solution.state.board, together)
+    return Calibration(
+        cameras, reports, tuple(notes), timing, settled.solution.state.board, together
+    )
 
 
 def _report(c: int, cameras: Cameras, alone: Alone, settled: Settled, board: Board) -> CameraReport:
@@ -209,5 +237,7 @@ def _report(c: int, cameras: Cameras, alone: Alone, settled: Settled, board: Boa
         coverage=coverage(views, camera.size_px),
         depth_ratio=depth_ratio(poses, views, board),
         tilt_deg=tilt_deg(poses),
-        intrinsics_sigma=np.sqrt(np.diag(cameras.covariance)[cameras.parameters_of(camera.name)][:9]),
+        intrinsics_sigma=np.sqrt(
+            np.diag(cameras.covariance)[cameras.parameters_of(camera.name)][:9]
+        ),
     )

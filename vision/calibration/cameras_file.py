@@ -11,7 +11,7 @@ import tomli_w
 
 from vision.boards.sufficiency import check_lens
 from vision.geometry.camera import PARAMETERS, Camera, Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
 
@@ -83,15 +83,22 @@ def _camera(name: str, table: dict) -> Camera:
             f"cameras.{name} is as caliscope and aniposelib write it, in a world of its own: place it in the rig with "
             "`whisker-bench calibrate cameras SESSION --lenses FILE --out cameras.toml`"
         )
-    missing, unknown = sorted(set(_KEYS) - set(table)), sorted(set(table) - set(_KEYS) - {"covariance"})
+    missing, unknown = (
+        sorted(set(_KEYS) - set(table)),
+        sorted(set(table) - set(_KEYS) - {"covariance"}),
+    )
     if missing:
         raise Refused(f"cameras.{name}: {', '.join(missing)} missing")
     if unknown:
-        raise Refused(f"cameras.{name}: unknown key {', '.join(unknown)}; allowed are {', '.join(_KEYS)}")
+        raise Refused(
+            f"cameras.{name}: unknown key {', '.join(unknown)}; allowed are {', '.join(_KEYS)}"
+        )
     try:
         return Camera(name, **{key: table[key] for key in _KEYS})
     except (TypeError, ValueError) as error:
-        raise error if isinstance(error, Refused) else Refused(f"cameras.{name}: {error}") from error
+        raise (
+            error if isinstance(error, Refused) else Refused(f"cameras.{name}: {error}")
+        ) from error
 
 
 def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) -> tuple:
@@ -103,7 +110,9 @@ def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) ->
         raise Refused(f"names {name!r} for its covariance; a plain file name beside it is allowed")
     companion = path.parent / name
     if not companion.is_file():
-        raise Refused(f"names {name} for its covariance, but there is no such file beside it: copy both")
+        raise Refused(
+            f"names {name} for its covariance, but there is no such file beside it: copy both"
+        )
     packed = companion.read_bytes()
     if hashlib.sha256(packed).hexdigest() != document.get("covariance_sha256"):
         raise Refused(
@@ -123,5 +132,9 @@ def _in_order(stored: "np.lib.npyio.NpzFile", cameras: tuple[Camera, ...]) -> np
     names, parameters = stored["cameras"].tolist(), stored["parameters"].tolist()
     if sorted(names) != sorted(c.name for c in cameras) or sorted(parameters) != sorted(PARAMETERS):
         raise Refused("covariance is of other cameras or other parameters than the ones listed")
-    rows = [len(parameters) * names.index(c.name) + parameters.index(p) for c in cameras for p in PARAMETERS]
+    rows = [
+        len(parameters) * names.index(c.name) + parameters.index(p)
+        for c in cameras
+        for p in PARAMETERS
+    ]
     return stored["covariance"][np.ix_(rows, rows)]

@@ -22,7 +22,7 @@ from vision.calibration.layout import gather
 from vision.calibration.tied import lens_priors
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, exp_rotation, invert_transform
 
 _NEEDED = ("size", "matrix", "distortions", "rotation", "translation")
@@ -35,7 +35,9 @@ def import_cameras(path: Path | str, *, unit_mm: float | None = None) -> Cameras
     Raises Refused where the file is neither, a camera is a fisheye or unplaced, or its lens cannot be.
     """
     tables = _tables(Path(path))
-    unit_mm = unit_mm or (1000.0 if any("cam_id" in t or "port" in t for t in tables.values()) else 1.0)
+    unit_mm = unit_mm or (
+        1000.0 if any("cam_id" in t or "port" in t for t in tables.values()) else 1.0
+    )
     cameras = Cameras(tuple(_camera(name, table, unit_mm) for name, table in tables.items()))
     for camera in cameras:
         check_lens(camera)
@@ -65,18 +67,26 @@ def _name(key: str, table: dict) -> str:
 def _camera(name: str, table: dict, unit_mm: float) -> Camera:
     missing = [key for key in _NEEDED if not table.get(key)]
     if missing:
-        raise Refused(f"camera {name}: {', '.join(missing)} missing, so it is not calibrated or not placed")
+        raise Refused(
+            f"camera {name}: {', '.join(missing)} missing, so it is not calibrated or not placed"
+        )
     if table.get("fisheye"):
-        raise Refused(f"camera {name} has a fisheye lens, which the five-term lens here does not describe")
+        raise Refused(
+            f"camera {name} has a fisheye lens, which the five-term lens here does not describe"
+        )
     rotation = np.array(table["rotation"], dtype=float)
     R = rotation if rotation.shape == (3, 3) else exp_rotation(rotation.ravel())
     shift = unit_mm * np.array(table["translation"], dtype=float).ravel()
     distortion = np.array(table["distortions"], dtype=float).ravel()
     if len(distortion) > 5 and np.any(distortion[5:]):
-        raise Refused(f"camera {name} has {len(distortion)} distortion terms; up to five (k1 k2 p1 p2 k3) are read")
+        raise Refused(
+            f"camera {name} has {len(distortion)} distortion terms; up to five (k1 k2 p1 p2 k3) are read"
+        )
     terms = np.append(distortion, np.zeros(5))[:5]
     rms = float(table.get("error", np.nan))
-    return Camera(name, tuple(table["size"]), table["matrix"], terms, np.column_stack([R, shift]), rms)
+    return Camera(
+        name, tuple(table["size"]), table["matrix"], terms, np.column_stack([R, shift]), rms
+    )
 
 
 def place_on_rig(
@@ -92,8 +102,13 @@ def place_on_rig(
     for camera in cameras:
         check_rig_view(camera.name, rig_views.get(camera.name), board)
     T_board_rig = invert_transform(T_rig_board)
-    poses = [compose(board_pose(rig_views[c.name], board.corners_mm, c.lens), T_board_rig) for c in cameras]
-    state = BundleState(np.array([c.lens for c in cameras]), np.array(poses), np.asarray(T_rig_board)[None])
+    poses = [
+        compose(board_pose(rig_views[c.name], board.corners_mm, c.lens), T_board_rig)
+        for c in cameras
+    ]
+    state = BundleState(
+        np.array([c.lens for c in cameras]), np.array(poses), np.asarray(T_rig_board)[None]
+    )
     seen = gather([(k, 0, rig_views[c.name]) for k, c in enumerate(cameras)])
     settled = settle(state, seen, board.corners_mm, _poses_only(len(cameras)))
     return as_cameras(cameras.names, {c.name: c.size_px for c in cameras}, settled)
@@ -104,4 +119,9 @@ def _poses_only(n_cameras: int):
     free = np.zeros_like(priors.free)
     for k in range(n_cameras):
         free[N_CAMERA * k + 9 : N_CAMERA * k + 15] = True
-    return replace(priors, free=free, sigma=np.full_like(priors.sigma, np.inf), view_free=np.zeros(1, dtype=bool))
+    return replace(
+        priors,
+        free=free,
+        sigma=np.full_like(priors.sigma, np.inf),
+        view_free=np.zeros(1, dtype=bool),
+    )

@@ -13,25 +13,36 @@ import numpy as np
 
 from vision.calibration.adjust import Solution, adjust_bundle
 from vision.calibration.bundle import BundleState, Priors, Sightings, predict
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
-# One Gaussian corner in 25 000 lies beyond (two axes): exp(-4.5² / 2).
+# [sigma] One Gaussian corner in 25 000 lies beyond (two axes): exp(−4.5²/2). Points of the rig
+# err by 0.017 px at 3.5, by 0.016 at 4.5 and 6. Study: thresholds.py calibration.corner_noise
+# REJECT_SIGMA ….
 REJECT_SIGMA = 4.5
-# Width of Cauchy's loss, in sigmas, while outliers are still in: 95 % efficient on Gaussian noise at 2.4.
+# [sigma] Of Cauchy's loss while outliers are still in: 95 % efficient on Gaussian noise at 2.4.
+# moves nothing on the fixtures between 2 and 5. Study: thresholds.py calibration.corner_noise
+# _ROBUST_WIDTH ….
 _ROBUST_WIDTH = 3.0
-# Before anything is known about the residuals.
+# [px] Before anything is known of the residuals. moves nothing on the fixtures between 0.1 and
+# 1.0. Study: thresholds.py calibration.corner_noise _FIRST_ERROR_PX ….
 _FIRST_ERROR_PX = 0.3
-# Median of the squared length of a two-dimensional Gaussian of unit sigma, 2 ln 2.
+# [1] Median of the squared length of a two-dimensional Gaussian of unit sigma. Derived.
 _MEDIAN_SQUARED = 2 * np.log(2)
-# Rounds of adjusting and learning the noise anew; instants and their scatter settle more slowly.
+# [rounds] Of adjusting and learning the noise anew; instants and their scatter settle more
+# slowly. Study: cameras.py.
 _ROUNDS, _ROUNDS_MOVING = 2, 5
-# A shot with fewer corners left says less than the six parameters of its pose.
+# [corners] A shot with fewer says less than the six parameters of its pose. Derived.
 _MIN_SHOT = 4
-# Fewer instants than these give no scatter.
+# [instants] Fewer give no scatter. Derived.
 _MIN_LATE = 8
-_LEAST_LATE_SHARE = 0.02  # of all cameras' lateness: a camera is never taken as exactly on time
-_LEAST_FREEDOM = 0.1  # of the residuals, however many parameters are fitted
-_HALVINGS = 50  # of a bisection: beyond rounding
+# [1] Of all cameras' lateness, below which none is taken: no camera is exactly on time. Set by
+# eye.
+_LEAST_LATE_SHARE = 0.02
+# [1] Of the residuals' number, left over however many parameters are fitted: keeps the model
+# error finite. Stated.
+_LEAST_FREEDOM = 0.1
+# [steps] Of a bisection: 2⁻⁵⁰ is rounding. Derived.
+_HALVINGS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +61,11 @@ class Settled:
     def rms_px(self, camera: int) -> float:
         """Root mean square length of the kept residuals of one camera, as OpenCV counts it."""
         rows = self.kept & (self.seen.camera == camera)
-        return float(np.sqrt(np.mean(np.sum(self.residual_px[rows] ** 2, axis=1)))) if rows.any() else np.nan
+        return (
+            float(np.sqrt(np.mean(np.sum(self.residual_px[rows] ** 2, axis=1))))
+            if rows.any()
+            else np.nan
+        )
 
 
 def settle(
@@ -74,12 +89,21 @@ def settle(
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
     for _ in range(rounds or (_ROUNDS_MOVING if moving else _ROUNDS)):
         weighed = _weighed(seen, error)
-        solution = adjust_bundle(state, weighed, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4)
+        solution = adjust_bundle(
+            state, weighed, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
+        )
         _require_finite(solution)
         state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
         priors = _with_lateness(priors, state, seen) if moving else priors
         if rough:
-            return Settled(solution, weighed, np.ones(len(seen), dtype=bool), solution.residual_px, error, priors)
+            return Settled(
+                solution,
+                weighed,
+                np.ones(len(seen), dtype=bool),
+                solution.residual_px,
+                error,
+                priors,
+            )
     kept = _inliers(solution.residual_px, _weighed(seen, error))
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
@@ -94,7 +118,9 @@ def settle(
 
 def _require_finite(solution: Solution) -> None:
     if not np.isfinite(solution.cost):
-        raise Refused("the views contradict each other from the start: is this the board as described?")
+        raise Refused(
+            "the views contradict each other from the start: is this the board as described?"
+        )
 
 
 def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Priors:
@@ -119,7 +145,8 @@ def _weighed(seen: Sightings, error_px: np.ndarray) -> Sightings:
 def _error_by_median(residual: np.ndarray, seen: Sightings, n_cameras: int) -> np.ndarray:
     excess = np.sum(residual**2, axis=1) / _MEDIAN_SQUARED - seen.sigma_px**2
     medians = [
-        np.median(excess[seen.camera == c]) if (seen.camera == c).any() else 0.0 for c in range(n_cameras)
+        np.median(excess[seen.camera == c]) if (seen.camera == c).any() else 0.0
+        for c in range(n_cameras)
     ]
     return np.sqrt(np.maximum(medians, 0.0))
 
@@ -140,7 +167,10 @@ def _error_by_mean(
     parameters += len(seen.shot_starts()) if priors.late_sigma_s is not None else 0
     left = max(1.0 - parameters / max(2 * kept.sum(), 1), _LEAST_FREEDOM)
     return np.array(
-        [_match(squared[rows] / left, seen.sigma_px[rows]) for rows in _by_camera(seen, kept, len(error))]
+        [
+            _match(squared[rows] / left, seen.sigma_px[rows])
+            for rows in _by_camera(seen, kept, len(error))
+        ]
     )
 
 

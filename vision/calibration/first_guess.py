@@ -12,14 +12,16 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.geometry import lens as lens_model
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
 
-# Focal lengths, in picture widths, between which a camera on a bench lies: 150° to 3° across.
+# [picture widths] 150° to 3° across: where a camera on a bench lies. Derived.
 _FOCAL_LIMITS = (0.15, 20.0)
 
 
-def focal_length_px(views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]) -> float:
+def focal_length_px(
+    views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
+) -> float:
     """Focal length from the homographies of plane views (Zhang 2000), the principal point taken as the
     middle.
 
@@ -38,7 +40,11 @@ def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     """Half of the weight lies on either side; one view gone wrong cannot carry it off."""
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(reached, 0.5 * reached[-1])]) if reached[-1] > 0 else 0.0
+    return (
+        float(values[order][np.searchsorted(reached, 0.5 * reached[-1])])
+        if reached[-1] > 0
+        else 0.0
+    )
 
 
 def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
@@ -52,7 +58,9 @@ def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, 
     return np.array([[a * b + c * d, -e * f], [a * a + c * c - b * b - d * d, f * f - e * e]])
 
 
-def first_lens(views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
+def first_lens(
+    views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
+) -> np.ndarray:
     """Nine lens parameters to begin with: one focal length, principal point in the middle, no distortion."""
     focal = focal_length_px(views, corners_mm, size_px)
     return np.array([focal, focal, 0.5 * (size_px[0] - 1), 0.5 * (size_px[1] - 1), 0, 0, 0, 0, 0])
@@ -97,15 +105,21 @@ def chain_cameras(poses: Mapping[str, Sequence[np.ndarray | None]]) -> dict[str,
         )
         relative = _shared(poses[a], poses[b])
         if not relative:
-            raise Refused(f"camera {b} never sees the board at the same time as another: record such views")
+            raise Refused(
+                f"camera {b} never sees the board at the same time as another: record such views"
+            )
         placed[b] = compose(most_central(relative), placed[a])
     return placed
 
 
-def _shared(poses_a: Sequence[np.ndarray | None], poses_b: Sequence[np.ndarray | None]) -> list[np.ndarray]:
+def _shared(
+    poses_a: Sequence[np.ndarray | None], poses_b: Sequence[np.ndarray | None]
+) -> list[np.ndarray]:
     """T_b_a from each view that both cameras have."""
     return [
-        compose(b, invert_transform(a)) for a, b in zip(poses_a, poses_b) if a is not None and b is not None
+        compose(b, invert_transform(a))
+        for a, b in zip(poses_a, poses_b)
+        if a is not None and b is not None
     ]
 
 

@@ -26,7 +26,8 @@ from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.triangulate import triangulate
 
-# Board poses and instants are fitted robustly, in the corners' sigmas; residuals are then counted whole.
+# [sigma] Board poses and instants are fitted robustly; residuals are then counted whole. Study:
+# cameras.py.
 _ROBUST_WIDTH = 3.0
 
 
@@ -91,13 +92,21 @@ def held_out(
     if calibration.timing is None:
         return HeldOut(alone, at_once, views=views_held, corners=corners)
     offsets, instants = (
-        _agreement(cameras, layout, _fit_moving_board(layout, calibration, board, fit_instants=fitted), rows, board)
+        _agreement(
+            cameras,
+            layout,
+            _fit_moving_board(layout, calibration, board, fit_instants=fitted),
+            rows,
+            board,
+        )
         for fitted in (False, True)
     )
     return HeldOut(alone, at_once, offsets, instants, views_held, corners)
 
 
-def _agreement(cameras: Cameras, layout: Layout, fitted: Solution, rows: np.ndarray, board: Board) -> Agreement:
+def _agreement(
+    cameras: Cameras, layout: Layout, fitted: Solution, rows: np.ndarray, board: Board
+) -> Agreement:
     off = _pitch_errors_mm(cameras, layout, _still(layout, fitted, board), rows, board)
     mean = float(off.mean()) if len(off) else np.nan
     return Agreement(_rms(fitted.residual_px[rows]), _rms(off[:, None]), mean, len(off))
@@ -148,12 +157,16 @@ def _fit_boards(layout: Layout, calibration: Calibration, board: Board) -> Solut
     return adjust_bundle(first, even, board.corners_mm, priors)
 
 
-def _fit_moving_board(layout: Layout, calibration: Calibration, board: Board, *, fit_instants: bool) -> Solution:
+def _fit_moving_board(
+    layout: Layout, calibration: Calibration, board: Board, *, fit_instants: bool
+) -> Solution:
     """One pose a view for all cameras, on the board's path, each camera late by its offset; with or without each
     picture's own instant."""
     timing = calibration.timing
     priors = _held(lens_priors(len(layout.first.lens), len(layout.index)))
-    first = replace(layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory)
+    first = replace(
+        layout.first, board=calibration.board, clock=timing.offset_s, trajectory=layout.trajectory
+    )
     if not fit_instants:
         even = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
         return adjust_bundle(first, even, board.corners_mm, priors)
@@ -170,7 +183,9 @@ def _still(layout: Layout, fitted: Solution, board: Board) -> np.ndarray:
     return layout.seen.px + now - then
 
 
-def _pitch_errors_mm(cameras: Cameras, layout: Layout, px: np.ndarray, rows: np.ndarray, board: Board) -> np.ndarray:
+def _pitch_errors_mm(
+    cameras: Cameras, layout: Layout, px: np.ndarray, rows: np.ndarray, board: Board
+) -> np.ndarray:
     """Distances of neighbouring corners, each brought into space by all cameras that see it, less the pitch."""
     seen, count = layout.seen, len(board.corners_mm)
     where = {name: np.full((len(layout.index) * count, 2), np.nan) for name in cameras.names}
@@ -179,15 +194,23 @@ def _pitch_errors_mm(cameras: Cameras, layout: Layout, px: np.ndarray, rows: np.
         where[name][seen.view[own] * count + seen.corner[own]] = px[own]
     sigma = {name: np.ones(len(where[name])) for name in cameras.names}
     points = triangulate(cameras, where, sigma).mm.reshape(len(layout.index), count, 3)
-    off = np.concatenate([np.linalg.norm(points[:, a] - points[:, b], axis=1) - board.square_mm
-                          for a, b in _neighbours(board)])  # fmt: skip
+    off = np.concatenate(
+        [
+            np.linalg.norm(points[:, a] - points[:, b], axis=1) - board.square_mm
+            for a, b in _neighbours(board)
+        ]
+    )
     return off[np.isfinite(off)]
 
 
 def _neighbours(board: Board) -> list[tuple[int, int]]:
     columns, rows = board.squares[0] - 1, board.squares[1] - 1
-    across = [(r * columns + c, r * columns + c + 1) for r in range(rows) for c in range(columns - 1)]
-    down = [(r * columns + c, (r + 1) * columns + c) for r in range(rows - 1) for c in range(columns)]
+    across = [
+        (r * columns + c, r * columns + c + 1) for r in range(rows) for c in range(columns - 1)
+    ]
+    down = [
+        (r * columns + c, (r + 1) * columns + c) for r in range(rows - 1) for c in range(columns)
+    ]
     return across + down
 
 

@@ -14,14 +14,17 @@ from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import BundleState, Sightings
 from vision.calibration.first_guess import board_pose, chain_cameras, most_central
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
 
-# Cameras looked at once if most views of one index agree on how two cameras stand to each other. Views that have
-# nothing to do with each other agree as loosely as this once in a hundred.
+# [rad] Views that have nothing to do with each other agree as loosely as this and the next once
+# in a hundred. Derived.
 _SAME_TURN_RAD = np.radians(10.0)
+# [1] Share of the distance; see above. Derived.
 _SAME_SHIFT = 0.1
+# [1] Most views of one index must agree. Origin not known beyond *most*. Study: cameras.py.
 _SAME_SHARE = 0.6
+# [views] Fewer views of one index tell no share. Origin not known. Study: cameras.py.
 _MIN_SHARED = 5
 
 
@@ -102,14 +105,19 @@ def lay_out(
 
 def _own_groups(cameras: Mapping[str, Alone]) -> list[list[tuple]]:
     """A group a view: (camera, index, corners, pose) of the one camera that has it."""
-    return [[(c, k, view, a.poses[k])] for c, a in enumerate(cameras.values()) for k, view in a.views.items()]
+    return [
+        [(c, k, view, a.poses[k])]
+        for c, a in enumerate(cameras.values())
+        for k, view in a.views.items()
+    ]
 
 
 def _shared_groups(cameras: Mapping[str, Alone]) -> list[list[tuple]]:
     """A group an index: (camera, index, corners, pose) of every camera that has it."""
     indices = sorted(set().union(*(a.views for a in cameras.values())))
     return [
-        [(c, k, a.views[k], a.poses[k]) for c, a in enumerate(cameras.values()) if k in a.views] for k in indices
+        [(c, k, a.views[k], a.poses[k]) for c, a in enumerate(cameras.values()) if k in a.views]
+        for k in indices
     ]
 
 
@@ -118,7 +126,10 @@ def _times(groups, names: list[str], times_s, rank: np.ndarray) -> list[tuple[fl
 
     A view's own time is that of the picture whose camera ranks first: it sees the board where the view has it.
     """
-    each = [[float(times_s[names[c]][k]) if times_s else float(k) for c, k, _, _ in group] for group in groups]
+    each = [
+        [float(times_s[names[c]][k]) if times_s else float(k) for c, k, _, _ in group]
+        for group in groups
+    ]
     firsts = [int(np.argmin([rank[c] for c, *_ in group])) for group in groups]
     return [(times[first], times) for first, times in zip(firsts, each)]
 
@@ -137,14 +148,21 @@ def place_cameras(
     """
     if standing is not None:
         T_board_rig = invert_transform(T_rig_board)
-        poses = {name: board_pose(standing[name], board.corners_mm, alone.lens) for name, alone in cameras.items()}
+        poses = {
+            name: board_pose(standing[name], board.corners_mm, alone.lens)
+            for name, alone in cameras.items()
+        }
         return np.array([compose(poses[name], T_board_rig) for name in cameras])
     if len(cameras) == 1:
         return np.eye(3, 4)[None]
     if not together:
-        raise Refused("there is no picture of the board on the rig, so the cameras cannot be placed in one frame")
+        raise Refused(
+            "there is no picture of the board on the rig, so the cameras cannot be placed in one frame"
+        )
     last = max(max(a.poses) for a in cameras.values())
-    chained = chain_cameras({n: [a.poses.get(k) for k in range(last + 1)] for n, a in cameras.items()})
+    chained = chain_cameras(
+        {n: [a.poses.get(k) for k in range(last + 1)] for n, a in cameras.items()}
+    )
     return np.array([chained[name] for name in cameras])
 
 

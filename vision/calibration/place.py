@@ -14,18 +14,24 @@ import numpy as np
 from scipy.special import chdtri
 
 from vision.geometry.camera import Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, exp_rotation, skew
 
-# Chance by which swing and board, both right, would disagree as much as calls for an alarm.
+# [chance] By which swing and board, both right, would disagree as much as calls for an alarm.
+# Study: chosen.
 FALSE_ALARM = 1e-3
-# Where the swing alone places the rig it must fix the centre along the whisker as well as a ruler would.
+# [mm] Where the swing alone places the rig it must fix the centre along the whisker as well as a
+# ruler would, for d_x has it whole (`_BY_RULER_MM` of `bench/trials/placing.py`). Study: chosen.
 _MOST_ALONG_SIGMA_MM = 1.0
-# Beyond this it is the most of d_x's sigma, and a wider stroke would help: nine in ten of d_x's errors are below it.
+# [mm] Beyond, the centre along the whisker is most of d_x's sigma, and a doubt asks for a wider
+# stroke: nine in ten of d_x's errors with an exact board are below 0.044 mm. Study:
+# path_traced.py.
 _HELPED_ALONG_SIGMA_MM = 0.05
-# Beyond this a swing's word on the axis is none: a narrow fan may lean any way about the whisker.
+# [deg] Beyond, a swing's word on the axis is none: a narrow fan may lean any way about the
+# whisker. Origin not known. Study: docs/cameras.md.
 _MOST_AXIS_SIGMA_DEG = 3.0
-_OVER = 1.2  # of what is asked for: a fifth over
+# [1] Of the free strokes' width that is asked for: a fifth over what the sigma needs. Stated.
+_OVER = 1.2
 _COMPONENTS = ("w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
 
 
@@ -60,7 +66,9 @@ class Placement:
         sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         across = np.hypot(sigma[4], sigma[5]) / np.sqrt(2)
         axis = np.degrees(max(sigma[0], sigma[1]))
-        lean = f"axis ± {axis:.3f} degrees" if axis < _MOST_AXIS_SIGMA_DEG else "axis not observable"
+        lean = (
+            f"axis ± {axis:.3f} degrees" if axis < _MOST_AXIS_SIGMA_DEG else "axis not observable"
+        )
         return (
             f"centre of rotation ± {across:.4f} mm across and ± {sigma[3]:.4f} mm along the whisker, {lean}, "
             f"encoder's zero {np.degrees(self.step[2]):+.3f} ± "
@@ -75,7 +83,9 @@ def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Plac
     """
     lever = np.eye(6)
     lever[3:, :3] = skew(T_rig_board[:, 3])
-    return Placement(np.zeros(6), lever @ np.diag(np.repeat([sigma_rad**2, sigma_mm**2], 3)) @ lever.T)
+    return Placement(
+        np.zeros(6), lever @ np.diag(np.repeat([sigma_rad**2, sigma_mm**2], 3)) @ lever.T
+    )
 
 
 def combine(board: Placement, swing: Placement) -> Placement:
@@ -106,7 +116,9 @@ def check_swing_suffices(made: Placement) -> str:
     asked = f"record free strokes of about {needed:.0f} degrees, or measure T_rig_board better"
     fixed = f"the free strokes are what places the rig, and {width:.1f} degrees fix the centre of rotation"
     if along > _MOST_ALONG_SIGMA_MM:
-        raise Refused(f"{fixed} to {along:.2f} mm along the whisker; {_MOST_ALONG_SIGMA_MM:g} mm is needed: {asked}")
+        raise Refused(
+            f"{fixed} to {along:.2f} mm along the whisker; {_MOST_ALONG_SIGMA_MM:g} mm is needed: {asked}"
+        )
     return f"{fixed} to {along:.3f} mm along the whisker only, which every d_x is off by: {asked}"
 
 
@@ -114,10 +126,13 @@ def _alarm(apart: np.ndarray, sigma: np.ndarray) -> str:
     """The component that disagrees most, in words."""
     worst = int(np.argmax(np.abs(apart) / sigma))
     words = {
-        "w_x": "the axis leans about rig x", "w_y": "the axis leans about rig y", "w_z": "the encoder's zero is off",
-        "v_x": "the centre lies along the whisker", "v_y": "the centre lies across the whisker",
+        "w_x": "the axis leans about rig x",
+        "w_y": "the axis leans about rig y",
+        "w_z": "the encoder's zero is off",
+        "v_x": "the centre lies along the whisker",
+        "v_y": "the centre lies across the whisker",
         "v_z": "the centre lies along the axis",
-    }  # fmt: skip
+    }
     scale, unit = (np.degrees(1.0), "degrees") if worst < 3 else (1.0, "mm")
     return (
         f"board and free stroke disagree: by the stroke {words[_COMPONENTS[worst]]} by {scale * apart[worst]:+.3f} ± "
@@ -133,12 +148,15 @@ def placed(cameras: Cameras, before: Placement, after: Placement) -> Cameras:
     The swing is seen by the same cameras; that link is left out, which errs to the wide side.
     """
     moved = tuple(
-        replace(camera, T_camera_rig=compose(camera.T_camera_rig, after.T_board_rig)) for camera in cameras
+        replace(camera, T_camera_rig=compose(camera.T_camera_rig, after.T_board_rig))
+        for camera in cameras
     )
     shared = cameras.by_placement
     change = shared @ (after.covariance - before.covariance) @ shared.T
     covariance = _positive(cameras.covariance + change, np.sqrt(np.diag(cameras.covariance)))
-    turned = np.kron(np.eye(2), after.T_board_rig[:, :3])  # `after` counts along the old axes, the cameras along theirs
+    turned = np.kron(
+        np.eye(2), after.T_board_rig[:, :3]
+    )  # `after` counts along the old axes, the cameras along theirs
     return Cameras(moved, covariance, turned.T @ after.covariance @ turned)
 
 

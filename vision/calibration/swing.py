@@ -14,9 +14,10 @@ from scipy.special import chdtri
 
 from vision.calibration.place import FALSE_ALARM, Placement
 from vision.geometry.base_lines import BaseLines
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
 
+# [frames] Six unknowns, four numbers a frame, and something left over. Derived.
 _MIN_FRAMES = 4
 _NO_LINES = BaseLines(np.zeros(0), *(np.zeros((0, 3)), np.zeros((0, 3, 3))) * 2)
 
@@ -26,7 +27,9 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
 
     What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it as one.
     """
-    usable = [lines for lines in strokes if len(lines.motor_rad) >= _MIN_FRAMES and lines.width_rad > 0]
+    usable = [
+        lines for lines in strokes if len(lines.motor_rad) >= _MIN_FRAMES and lines.width_rad > 0
+    ]
     if not usable:
         by_swing(max(strokes, key=lambda lines: len(lines.motor_rad), default=_NO_LINES))
     each = [by_swing(lines) for lines in usable]
@@ -34,9 +37,15 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
     whole = np.linalg.inv(sum(information))
     gains = [whole @ own for own in information]
     step = sum(gain @ one.step for gain, one in zip(gains, each))
-    own = sum(g @ (one.covariance - lines.shared_covariance) @ g.T for g, one, lines in zip(gains, each, usable))
+    own = sum(
+        g @ (one.covariance - lines.shared_covariance) @ g.T
+        for g, one, lines in zip(gains, each, usable)
+    )
     covariance = own + np.mean([lines.shared_covariance for lines in usable], axis=0)
-    widths, rise = [lines.width_rad for lines in usable], float(np.mean([one.rise_rad for one in each]))
+    widths, rise = (
+        [lines.width_rad for lines in usable],
+        float(np.mean([one.rise_rad for one in each])),
+    )
     made = Placement(step, 0.5 * (covariance + covariance.T), rise, max(widths))
     return replace(made, notes=(_learnt(widths, made),))
 
@@ -68,7 +77,9 @@ def _first(lines: BaseLines) -> np.ndarray:
 def _predicted(p: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
     """Directions (n, 3) of the whisker's base at these motor angles, for p = w, v, rise."""
     cosine, sine = np.cos(motor_rad), np.sin(motor_rad)
-    fan = np.column_stack([np.cos(p[6]) * cosine, np.cos(p[6]) * sine, np.full(len(cosine), np.sin(p[6]))])
+    fan = np.column_stack(
+        [np.cos(p[6]) * cosine, np.cos(p[6]) * sine, np.full(len(cosine), np.sin(p[6]))]
+    )
     return fan @ exp_rotation(p[:3]).T
 
 

@@ -13,22 +13,35 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import MOST_ERROR_PX
 from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import CAMERA_COLUMNS, CLOCK, N_BOARD, N_CAMERA, POSE, BundleState, Priors
+from vision.calibration.bundle import (
+    CAMERA_COLUMNS,
+    CLOCK,
+    N_BOARD,
+    N_CAMERA,
+    POSE,
+    BundleState,
+    Priors,
+)
 from vision.calibration.corner_noise import Settled, settle
 from vision.calibration.layout import Alone, Layout, lay_out, looked_at_once, place_cameras
 from vision.calibration.views import MeasuredPose
 from vision.geometry.board import Board
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 # One sigma about zero of the distortion terms, for lenses of 3 to 100 mm; wider than any that is not a
 # fisheye.
 LENS_PRIOR = {"k1": 0.5, "k2": 0.5, "p1": 0.005, "p2": 0.005, "k3": 0.3}
-# Cameras that share views were not triggered together where they agree this many times worse than each with itself.
+# [1] Cameras that share views were not triggered together where they agree this many times worse
+# than each with itself. Origin not known; webcams without a trigger disagree by several times.
+# Study: cameras.py.
 _DISAGREE = 1.5
-# Clock offsets and scatter of instants to begin with, in frame intervals.
+# [frame intervals] A prior. Origin not known: twice the 0.29 of cameras that start at random
+# within an interval. Study: cameras.py.
 _CLOCK_SIGMA = 0.6
+# [frame intervals] Where the fit of instants starts; learnt anew from the residuals. Study:
+# cameras.py.
 _FIRST_LATENESS = 0.2
-# What cameras may disagree by, px, before instants have been found.
+# [px] Where the fit of instants starts; learnt anew. Study: cameras.py.
 _FIRST_EXCESS_PX = 0.1
 
 
@@ -71,8 +84,12 @@ class Tied:
             return *tied, []
         said = f"views of one index look as if the cameras saw one board at once, but they did not: {doubt}"
         if self.standing is None:
-            raise Refused(f"{said}; record views that all cameras see at once, or a picture of the board on the rig")
-        return *self._settled(False), [f"{said[0].upper()}{said[1:]}. Each camera's views count as its own."]
+            raise Refused(
+                f"{said}; record views that all cameras see at once, or a picture of the board on the rig"
+            )
+        return *self._settled(False), [
+            f"{said[0].upper()}{said[1:]}. Each camera's views count as its own."
+        ]
 
     def _far_worse(self, settled: Settled) -> str:
         """In which camera the adjustment explains the views far worse than the camera by itself does; '' in none."""
@@ -98,7 +115,9 @@ class Tied:
             times_s=self.times_s,
         )
         priors = _priors(layout.first, self.board, self.on_rig)
-        return layout, *_settle(layout, self.board, priors, _errors(self.alone, self.triggered), self.times_s is None)
+        return layout, *_settle(
+            layout, self.board, priors, _errors(self.alone, self.triggered), self.times_s is None
+        )
 
 
 def _errors(alone: Mapping[str, Alone], triggered: bool) -> np.ndarray | None:
@@ -106,7 +125,9 @@ def _errors(alone: Mapping[str, Alone], triggered: bool) -> np.ndarray | None:
     return None if triggered or len(alone) < 2 else np.array([a.error_px for a in alone.values()])
 
 
-def _settle(layout: Layout, board: Board, priors: Priors, error_alone: np.ndarray | None, in_frames: bool):
+def _settle(
+    layout: Layout, board: Board, priors: Priors, error_alone: np.ndarray | None, in_frames: bool
+):
     """With pictures of one view at one instant, unless cameras agree far worse with each other than with themselves."""
     if layout.trajectory is None or error_alone is None:
         return settle(layout.first, layout.seen, board.corners_mm, priors), None
@@ -115,7 +136,9 @@ def _settle(layout: Layout, board: Board, priors: Priors, error_alone: np.ndarra
         return settle(rough.solution.state, layout.seen, board.corners_mm, priors), None
     state = replace(rough.solution.state, trajectory=layout.trajectory)
     priors = allow_lateness(priors, layout.trajectory)
-    settled = settle(state, layout.seen, board.corners_mm, priors, error_px=error_alone + _FIRST_EXCESS_PX)
+    settled = settle(
+        state, layout.seen, board.corners_mm, priors, error_px=error_alone + _FIRST_EXCESS_PX
+    )
     return settled, Timing(settled.solution.state.clock, settled.priors.late_sigma_s, in_frames)
 
 

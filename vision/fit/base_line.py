@@ -10,22 +10,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import BAR, REST, REST_PRIOR_MM, WANDER_PX, Problem, State, point_rows, wandering
+from vision.fit.problem import (
+    BAR,
+    REST,
+    REST_PRIOR_MM,
+    WANDER_PX,
+    Problem,
+    State,
+    point_rows,
+    wandering,
+)
 from vision.fit.solve import linear_at
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.centreline import REST_POWERS, rotation_z
-from vision.lines.points import Observed
+from vision.wire.points import Observed
 
-# Offsets and slopes, y then z, among the rest shape's parameters.
+# [columns] A layout, no threshold: offsets and slopes, y then z, among the rest shape's
+# parameters.
 _LINE = np.array([0, REST_POWERS, 1, REST_POWERS + 1])
-# Nearer to the hub its shade and its edge are read as the wire's.
+# [mm] Nearer to the hub its shade and its edge are read as the wire's. Set by eye. Study:
+# tests/vision/fit/test_base_line.py.
 _CLEAR_OF_HUB_MM = 15.0
-# A whisker's sag and set: what is more than this is seen, what is less cannot be told from a wandering line.
+# [mm] Prior sigmas of a whisker's sag and set: what is more is seen, what is less cannot be told
+# from a wandering line. Study: tests/vision/fit/test_base_line.py.
 _STRAIGHT_MM = np.array([1.0, 0.4])
-# Part of what a whole line is off by that changes as the whisker turns by a radian before its lamp: it passes for a
-# centre elsewhere along the whisker. Strokes of 24 degrees erred by 0.04 mm so.
+# [rad⁻¹] Part of what a whole line is off by that changes as the whisker turns by a radian before
+# its lamp: it passes for a centre elsewhere along the whisker. Strokes of 24° erred by 0.04 mm
+# so. Study: tests/vision/fit/test_base_line.py.
 _DRIFT_PER_RAD = 0.5
-_FEWEST_POINTS = 8  # in a frame: twice the numbers that they give
+# [points] In a frame: twice the numbers that they give. Derived.
+_FEWEST_POINTS = 8
 
 
 @dataclass(frozen=True)
@@ -55,7 +69,9 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
         _in_space(shape[_LINE], *_own_line([r for r in rows if r.frame == f], shape), m, length)
         for f, m in zip(frames, motor)
     ]
-    return BaseLines(motor, *map(np.array, zip(*lines)), _shared(covariance, float(motor.mean()), length))
+    return BaseLines(
+        motor, *map(np.array, zip(*lines)), _shared(covariance, float(motor.mean()), length)
+    )
 
 
 def _count(rows: list[_Rows], frame: int) -> int:
@@ -76,7 +92,11 @@ def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian)
     clear = seen.points.place > _CLEAR_OF_HUB_MM
     offsets = problem.wire_off(seen.camera)
     by_rest = jacobian[:, BAR : BAR + REST]
-    away = residual - jacobian[:, offsets] @ state.vector[offsets] - by_rest @ state.vector[BAR : BAR + REST]
+    away = (
+        residual
+        - jacobian[:, offsets] @ state.vector[offsets]
+        - by_rest @ state.vector[BAR : BAR + REST]
+    )
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
     return _Rows(seen.frame, away[clear], by_rest[clear], nuisance[clear])
 
@@ -105,7 +125,9 @@ def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndar
     return -covariance @ (J.T @ left), covariance
 
 
-def _in_space(shape: np.ndarray, step: np.ndarray, covariance: np.ndarray, motor_rad: float, length_mm: float):
+def _in_space(
+    shape: np.ndarray, step: np.ndarray, covariance: np.ndarray, motor_rad: float, length_mm: float
+):
     """Point, its covariance, direction and its covariance, of offsets and slopes shape + step.
 
     The point is taken where offset and slope err independently of each other.
@@ -134,5 +156,8 @@ def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.nd
     to_rig = np.kron(np.eye(2), rotation_z(motor_rad)) @ hub
     along = np.append(np.zeros(3), rotation_z(motor_rad)[:, 0])
     lean = np.append(along[3:], np.zeros(3)) / (0.5 * length_mm)
-    drift = [_DRIFT_PER_RAD**2 * covariance[k, k] * np.outer(way, way) for k, way in zip(_LINE[:2], (along, lean))]
+    drift = [
+        _DRIFT_PER_RAD**2 * covariance[k, k] * np.outer(way, way)
+        for k, way in zip(_LINE[:2], (along, lean))
+    ]
     return to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T + sum(drift)

@@ -17,20 +17,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from vision.fit.covariance import camera_rows
 from vision.fit.problem import WANDER_PX, Problem, State, bends, curves_of, wandering
 from vision.fit.quantities import Jacobians, Measured
 from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
-from vision.fit.uncertainty import camera_rows
 from vision.geometry.centreline import Curves, rotation_z
 
-# Chance by which a wire that is a beam departs from it so far, a whisk.
+# [chance] By which a wire that is a beam departs from it so far, a whisk. Study: chosen.
 FALSE_ALARM = 1e-3
-# A shift of so many stated sigmas matters: less adds no more than an eighth to an error.
+# [sigma] A shift of so many stated sigmas matters: less adds no more than an eighth to an error,
+# √(1 + 0.5²). Derived.
 _MATTERS = 0.5
-KNOTS = 5  # beside the one at the base: 20 mm apart on a wire of 100 mm
-# As much as the beam itself deflects at a contact 50 mm out: nothing is believed of the departure beforehand.
+# [knots] Beside the one at the base: 20 mm apart on a wire of 100 mm. Set by eye. Study:
+# broken_beams.py.
+KNOTS = 5
+# [mm/rad] Prior sigma of the departure: as much as the beam itself deflects at a contact 50 mm
+# out, so that nothing is believed beforehand. Derived.
 _DEPARTURE_MM_PER_RAD = 50.0
+# [mm/rad] Of differences: far above rounding, far below what bends. Derived.
 _STEP_MM_PER_RAD = 1e-4
 _NAMES = ("d_x", "touch", "slip")
 
@@ -80,17 +85,25 @@ class BeamCheck:
         )
 
 
-def check_beam(problem: Problem, state: State, covariance: np.ndarray, measured: Measured, by: Jacobians) -> BeamCheck:
+def check_beam(
+    problem: Problem, state: State, covariance: np.ndarray, measured: Measured, by: Jacobians
+) -> BeamCheck:
     """The check of a whisk that touches. covariance (size, size): of the parameters, by the fit and by the cameras."""
     last = np.flatnonzero(problem.touching)[-1]
     departure, spread, follows, slip_by = _departure(problem, state, last)
     gradients = {"d_x": by.whisk["d_x"], "touch": by.whisk["touch"], "slip": by.frame["slip"][last]}
-    values = {"d_x": measured.whisk["d_x"], "touch": measured.whisk["touch"], "slip": measured.frame["slip"][last]}
+    values = {
+        "d_x": measured.whisk["d_x"],
+        "touch": measured.whisk["touch"],
+        "slip": measured.frame["slip"][last],
+    }
     found = {}
     for name, gradient in gradients.items():
         row = gradient @ follows + (slip_by if name == "slip" else 0.0)
         sigma, beam = np.sqrt(gradient @ covariance @ gradient), float(values[name])
-        found[name] = Compared(beam, beam + float(row @ departure), float(np.sqrt(row @ spread @ row)), float(sigma))
+        found[name] = Compared(
+            beam, beam + float(row @ departure), float(np.sqrt(row @ spread @ row)), float(sigma)
+        )
     theta = float(problem.motor_rad[last] - measured.whisk["touch"])
     return BeamCheck(**found, theta_rad=theta, chance=_chance(departure, spread))
 
@@ -117,7 +130,10 @@ def _departure(problem: Problem, state: State, frame: int):
 
     own = np.hstack([linear.jacobian * root, fill(_wander_rows(problem))])
     prior = np.eye(own.shape[1])[problem.size :] / WANDER_PX
-    rows, cameras = fill(by_lines(problem, curves, moves), on_bar), fill(camera_rows(problem, state))
+    rows, cameras = (
+        fill(by_lines(problem, curves, moves), on_bar),
+        fill(camera_rows(problem, state)),
+    )
     residual, of_cameras = linear.residual * root[:, 0], problem.cameras.covariance
     departure, spread, follows = _beside(own, prior, rows, residual, cameras, of_cameras)
     return departure, spread, follows[: problem.size], slip_by
@@ -146,20 +162,29 @@ def _beside(own, prior, rows, residual, cameras, covariance):
 
 def _moves(problem: Problem, state: State, curves: Curves) -> Curves:
     """What a unit of each departure moves the centrelines by: points and tangents (k, f, m, 3) per mm/rad."""
-    from scipy.interpolate import CubicSpline  # with all of scipy.optimize: a look at a session does without
+    from scipy.interpolate import (
+        CubicSpline,
+    )  # with all of scipy.optimize: a look at a session does without
 
     knots = np.linspace(0.0, problem.wire.length_mm, KNOTS + 1)
     spline = CubicSpline(knots, np.eye(KNOTS + 1)[:, 1:], bc_type="natural")
-    bent = np.concatenate([np.zeros((len(problem.motor_rad), 1)), bends(problem, state.vector)], axis=1)
+    bent = np.concatenate(
+        [np.zeros((len(problem.motor_rad), 1)), bends(problem, state.vector)], axis=1
+    )
     way = np.einsum("fij,fj->fi", rotation_z(problem.motor_rad), bent)
-    points, tangents = (np.einsum("mk,fi->kfmi", spline(curves.arc_mm, order), way) for order in (0, 1))
+    points, tangents = (
+        np.einsum("mk,fi->kfmi", spline(curves.arc_mm, order), way) for order in (0, 1)
+    )
     return Curves(curves.arc_mm, points, tangents)
 
 
 def _wander_rows(problem: Problem) -> np.ndarray:
     """Derivatives (n, w) of the line points' residuals by each camera's wandering."""
-    return np.concatenate([
-        np.kron(np.arange(len(problem.cameras)) == seen.camera, wandering(problem, seen)) * (seen.frame >= 0)
-        / seen.points.sigma_px[:, None]
-        for seen in problem.seen
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            np.kron(np.arange(len(problem.cameras)) == seen.camera, wandering(problem, seen))
+            * (seen.frame >= 0)
+            / seen.points.sigma_px[:, None]
+            for seen in problem.seen
+        ]
+    )

@@ -14,8 +14,11 @@ from vision.fit.problem import Problem, State, point_rows
 from vision.fit.solve import Linear, linear_at
 from vision.geometry.robust import robust_sigma
 
-_SURE_SIGMAS = 4.0  # one sound frame in 30 000
-_FEWEST = 3  # frames: of fewer the median may be that of a jump
+# [sigma] A frame blurred along the bar by more than the median one: one sound frame in 30 000.
+# Derived.
+_SURE_SIGMAS = 4.0
+# [frames] That touch: of fewer the median may be that of a jump. Derived.
+_FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +34,9 @@ def slip_in_exposure(problem: Problem, state: State, slip_by: np.ndarray) -> Exp
     """What the blur of the lines says of slip while the shutter was open; slip_by (f, size): derivatives of slip."""
     linear, frames = linear_at(problem, state), np.flatnonzero(problem.touching)
     moves = _along_bar(problem, linear, slip_by[frames])
-    excess = np.array([_excess(problem, linear, frame, move) for frame, move in zip(frames, moves)]).reshape(-1, 2)
+    excess = np.array(
+        [_excess(problem, linear, frame, move) for frame, move in zip(frames, moves)]
+    ).reshape(-1, 2)
     sure = np.zeros(len(frames)) if len(frames) < _FEWEST else _surely_above(*excess.T)
     variance = np.zeros(len(problem.motor_rad))
     variance[frames] = sure
@@ -42,7 +47,9 @@ def _along_bar(problem: Problem, linear: Linear, slip_by) -> np.ndarray:
     """How the parameters (t, size) of each touching frame's bend change as it slips by 1 mm and keeps touching."""
     moves = np.zeros(slip_by.shape)
     first = int(np.sum(linear.is_point))
-    for move, frame, slip, touch in zip(moves, np.flatnonzero(problem.touching), slip_by, linear.jacobian[first:]):
+    for move, frame, slip, touch in zip(
+        moves, np.flatnonzero(problem.touching), slip_by, linear.jacobian[first:]
+    ):
         own = problem.bend_of(frame)
         move[own] = np.linalg.solve(np.stack([slip[own], touch[own]]), [1.0, 0.0])
     return moves

@@ -13,26 +13,44 @@ from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines, one_curve
 from vision.geometry.contact import Axis, closest_arc, outline_of_bar
-from vision.geometry.errors import Refused
 from vision.geometry.newton import cauchy_weights
+from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.silhouette import outline
-from vision.lines.coarse import Votes, likely_curve, votes
-from vision.lines.points import LinePoints, Observed
-from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 from vision.pictures.view import View, median_of
+from vision.wire.coarse import Votes, likely_curve, votes
+from vision.wire.points import LinePoints, Observed
+from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 
+# [px] Length of a piece of the first look. Set by eye. Study: thresholds.py fit.first_bends
+# _PIECE_PX ….
 _PIECE_PX = 16
-_REACH_PX = 26  # from where the last two frames lead to
-_STEP_PX = 2  # from curve to curve: half a wire's width
-_REST_SIGMAS = 2.0  # of the rest shape's prior within which a wire is looked for
-_BEND_PX = 1.0  # from bend to bend, RMS along the wire
-_MEDIAN_OF = 11  # frames: more would not make what stands still clearer
-_STILL_RAD = 1e-4  # a hundredth of a millimetre at the tip
+# [px] How far to either side of where the last two frames lead to a wire is looked for. Set by
+# eye. Study: thresholds.py fit.first_bends _REACH_PX ….
+_REACH_PX = 26
+# [px] From curve to curve that is tried: half of a wire's width. Derived.
+_STEP_PX = 2
+# [sigma] Of the rest shape's prior (`fit/problem.py`) within which a wire is looked for: 95 % of
+# what is believed. Derived.
+_REST_SIGMAS = 2.0
+# [px] RMS along the wire, from bend to bend that is tried: 2 px at the tip. Derived.
+_BEND_PX = 1.0
+# [frames] More would not make what stands still clearer: its noise is 0.38 of a frame's. Derived.
+_MEDIAN_OF = 11
+# [rad] A round that moves bends by less is the last: a hundredth of a millimetre at the tip.
+# Derived.
+_STILL_RAD = 1e-4
+# [rad] Priors of a frame's bend, and of its part along the bar where one camera sees it: only
+# friction pushes there. Set by eye. Study: coverage.py alone.
 _PULL_RAD, _ALONG_BAR_RAD = 0.2, 0.02
+# [px] Pieces nearer to the bar's outline show its edge. Set by eye. Study: thresholds.py
+# fit.first_bends _BESIDE_BAR_PX ….
 _BESIDE_BAR_PX = 8.0
-_REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)  # sigmas: of the Cauchy weights, round by round
-_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 1.2  # of a frame's points; pushed by 45 degrees a whisker bends so far
+# [sigmas] Of the Cauchy weights of the rest shape's coarse points, round by round. Set by eye.
+_REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)
+# [px, rad] Scale of the Cauchy weights of a frame's coarse points, half a wire's width; and a
+# whisker that is pushed by 45° bends so far, by 1.5 times the push. Set by eye.
+_CAUCHY_PX, _MOST_BEND_RAD = 2.0, 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +64,18 @@ class Sight:
     bar_px: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, view: View, rods: Rods, axis: Axis, frames: Sequence[int],
-           bar_mm: float) -> "Sight":
+    def of(
+        cls, view: View, rods: Rods, axis: Axis, frames: Sequence[int], bar_mm: float
+    ) -> "Sight":
         """frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is."""
-        frames = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))]
+        frames = [
+            frames[k]
+            for k in np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))
+        ]
         still = median_of([view.frames[frame] for frame in frames])
-        return cls(view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, bar_mm))
+        return cls(
+            view, rods, still, 0.5 * np.pi / len(frames), outline_of_bar(view.camera, axis, bar_mm)
+        )
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Where the wire may be beside predicted curves by frame, clear of hub and bar."""
@@ -60,14 +84,19 @@ class Sight:
         return votes(pieces.select(clear), self.still_share, reach_px)
 
 
-def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: Axis, motor_rad: Mapping[int, float]) -> np.ndarray:
+def find_rest(
+    sights: Sequence[Sight], cameras: Cameras, axis: Axis, motor_rad: Mapping[int, float]
+) -> np.ndarray:
     """Rest shape (2, 4) in mm from frames {index: motor angle} in which nothing touches.
 
     Raises Refused where no whisker is seen to swing.
     """
     motor, rods, seen = np.array(list(motor_rad.values())), sights[0].rods, []
     straight = np.zeros((2, REST_POWERS))
-    curves = {f: one_curve(straight, np.zeros(2), rods.wire.length_mm, m, rods.wire) for f, m in motor_rad.items()}
+    curves = {
+        f: one_curve(straight, np.zeros(2), rods.wire.length_mm, m, rods.wire)
+        for f, m in motor_rad.items()
+    }
     for number, sight in enumerate(sights):
         points, source = _resting_points(sight, curves)
         seen += [Observed(k, number, points.select(source == f)) for k, f in enumerate(motor_rad)]
@@ -76,7 +105,7 @@ def find_rest(sights: Sequence[Sight], cameras: Cameras, axis: Axis, motor_rad: 
     nothing = np.zeros(len(motor), dtype=bool)
     problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
     state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=_REST_SCALES)
-    return state.vector[BAR:BAR + REST].reshape(2, REST_POWERS)
+    return state.vector[BAR : BAR + REST].reshape(2, REST_POWERS)
 
 
 def _resting_points(sight: Sight, curves: Mapping[int, Curves]) -> tuple[LinePoints, np.ndarray]:
@@ -94,8 +123,9 @@ def _resting_points(sight: Sight, curves: Mapping[int, Curves]) -> tuple[LinePoi
     return points.select(keep), seen.pieces.source[keep]
 
 
-def follow_bends(sights: Sequence[Sight], axis: Axis, rest_mm: np.ndarray,
-                 motor_rad: Mapping[int, float]) -> dict[int, np.ndarray]:
+def follow_bends(
+    sights: Sequence[Sight], axis: Axis, rest_mm: np.ndarray, motor_rad: Mapping[int, float]
+) -> dict[int, np.ndarray]:
     """Bend (2,) in rad of every frame in order, each looked for near where the last two lead to."""
     bend_rad: dict[int, np.ndarray] = {}
     pull, wire = _pull(axis, len(sights)), sights[0].rods.wire
@@ -103,7 +133,9 @@ def follow_bends(sights: Sequence[Sight], axis: Axis, rest_mm: np.ndarray,
     for frame, motor in motor_rad.items():
         guess = 2 * last - before
         arc = contact_arc(rest_mm, guess, motor, axis, wire)
-        seen = [sight.votes({frame: one_curve(rest_mm, guess, arc, motor, wire)}) for sight in sights]
+        seen = [
+            sight.votes({frame: one_curve(rest_mm, guess, arc, motor, wire)}) for sight in sights
+        ]
         model = _Model([sight.view for sight in sights], rest_mm, arc, motor, wire)
         before, last = last, _fit_bend(model, *_likely_bend(model, seen, guess), pull)
         bend_rad[frame] = last
@@ -123,27 +155,41 @@ class _Model:
     def px(self, bend, seen: Sequence[LinePoints]) -> np.ndarray:
         """Distances (…, n) in px from line points of all cameras to the predicted lines; bend (…, 2)."""
         shape = np.shape(bend)[:-1]
-        curves = centrelines(np.broadcast_to(self.rest_mm, (*shape, 2, REST_POWERS)), bend,
-                             np.full(shape, self.arc_mm), np.full(shape, self.motor_rad), self.wire)
+        curves = centrelines(
+            np.broadcast_to(self.rest_mm, (*shape, 2, REST_POWERS)),
+            bend,
+            np.full(shape, self.arc_mm),
+            np.full(shape, self.motor_rad),
+            self.wire,
+        )
         off = []
         for view, points in zip(self.views, seen):
-            expected = view.camera.project(curves.at(points.place)[0].reshape(-1, 3)).reshape(*shape, -1, 2)
+            expected = view.camera.project(curves.at(points.place)[0].reshape(-1, 3)).reshape(
+                *shape, -1, 2
+            )
             off.append(np.sum(points.normal * (expected - points.px), axis=-1))
         return np.concatenate(off, axis=-1)
 
-    def slopes(self, bend, seen: Sequence[LinePoints], step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+    def slopes(
+        self, bend, seen: Sequence[LinePoints], step: float = 1e-5
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The same of one bend (2,), and its derivatives (n, 2) by the bend."""
         left, *moved = self.px(bend + step * np.eye(3, 2, -1), seen)
         return left, (np.stack(moved, axis=1) - left[:, None]) / step
 
 
-def _likely_bend(model: _Model, seen: Sequence[Votes], guess) -> tuple[np.ndarray, list[LinePoints]]:
+def _likely_bend(
+    model: _Model, seen: Sequence[Votes], guess
+) -> tuple[np.ndarray, list[LinePoints]]:
     """The bend with most votes of all cameras, or the guess where none surely has more than noise; points near it."""
     none = np.zeros(sum(len(one.pieces) for one in seen))
     _, slopes = model.slopes(guess, _points_of(seen, none))
     _, px_per_rad, turned = np.linalg.svd(slopes / np.sqrt(max(len(none), 1)), full_matrices=False)
     count = np.minimum(_REACH_PX / _BEND_PX, 2.0 * _PULL_RAD * px_per_rad / _BEND_PX)
-    grids = [np.arange(-n, n + 1) * _BEND_PX / max(scale, 1e-9) for n, scale in zip(np.floor(count), px_per_rad)]
+    grids = [
+        np.arange(-n, n + 1) * _BEND_PX / max(scale, 1e-9)
+        for n, scale in zip(np.floor(count), px_per_rad)
+    ]
     best, sure = likely_curve(seen, slopes @ turned.T, grids)
     change = best @ turned if sure else np.zeros(2)
     return guess + change, _points_of(seen, slopes @ change)
@@ -178,7 +224,9 @@ def _pull(axis: Axis, views: int) -> np.ndarray:
     return np.eye(2) / _PULL_RAD**2 + np.outer(along, along) / _ALONG_BAR_RAD**2
 
 
-def contact_arc(rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: Axis, wire: Wire) -> float:
+def contact_arc(
+    rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: Axis, wire: Wire
+) -> float:
     """Arc length in mm at which a whisker of this rest shape (2, 4), mm, and bend (2,), rad, is nearest to the axis."""
     straight = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
     arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)

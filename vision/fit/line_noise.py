@@ -25,16 +25,24 @@ class LineNoise:
 def line_noise(problem: Problem) -> dict[str, LineNoise]:
     """By camera, from the line points of a fit; of many sigmas that which has the same information."""
     alike = [*problem.alike, *[0.0] * (len(problem.cameras) - len(problem.alike))]
-    return {name: LineNoise(_of_wire(problem, camera), alike[camera], _of_bar(problem, camera))
-            for camera, name in enumerate(problem.cameras.names)}
+    return {
+        name: LineNoise(_of_wire(problem, camera), alike[camera], _of_bar(problem, camera))
+        for camera, name in enumerate(problem.cameras.names)
+    }
 
 
 def _of_wire(problem: Problem, camera: int) -> float:
-    sigmas = [seen.points.sigma_px for seen in problem.seen if seen.camera == camera and seen.frame >= 0]
+    sigmas = [
+        seen.points.sigma_px for seen in problem.seen if seen.camera == camera and seen.frame >= 0
+    ]
     return float(np.mean(np.concatenate(sigmas) ** -2.0) ** -0.5) if sigmas else float("nan")
 
 
 def _of_bar(problem: Problem, camera: int) -> np.ndarray:
-    bars = () if problem.is_rounded else [one for one in problem.seen if one.camera == camera and one.frame < 0]
+    bars = (
+        ()
+        if problem.is_rounded
+        else [one for one in problem.seen if one.camera == camera and one.frame < 0]
+    )
     lines = [[seen.side, *seen.points.sigma_px] for seen in bars]
     return np.array(lines, dtype=float).reshape(-1, 3)

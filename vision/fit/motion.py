@@ -82,11 +82,15 @@ class Yielding:
     def shift_mm(self, values: np.ndarray) -> np.ndarray:
         """How far (…, f, 3) the bar is from its place, by parameters (…, k)."""
         ways = values[..., 1:].reshape(*values.shape[:-1], 2, _POWERS)
-        return np.einsum("...fp,...wp,wi->...fi", self._powers(values[..., :1]), ways, axis_frame(self.direction))
+        return np.einsum(
+            "...fp,...wp,wi->...fi", self._powers(values[..., :1]), ways, axis_frame(self.direction)
+        )
 
     def values(self, shift_mm: np.ndarray) -> np.ndarray:
         """Parameters (k,) that meet shifts (f, 3) best, with touch as said."""
-        ways = np.linalg.lstsq(self._powers(np.zeros(1)), shift_mm @ axis_frame(self.direction).T, rcond=None)[0]
+        ways = np.linalg.lstsq(
+            self._powers(np.zeros(1)), shift_mm @ axis_frame(self.direction).T, rcond=None
+        )[0]
         return np.append(0.0, ways.T)
 
     def by_values(self, values: np.ndarray) -> np.ndarray:
@@ -99,12 +103,16 @@ class Yielding:
         return (pushed / self.gives.span_rad)[..., None] ** np.arange(1, _POWERS + 1)
 
 
-# Force, and so the way that a spring gives, over the pushing angle: in proportion, and what large bending and friction
-# add to that.
+# [terms] Force, and so the way that a spring gives, over the pushing angle: in proportion, and
+# what large bending and friction add to that. Study: soft.py.
 _POWERS = 3
-_ANYWHERE_MM, _ANY_TOUCH_DEG = 50.0, 50.0  # nothing is believed of how far a bar gives way, as of where it is
-_STEP = 1e-5  # mm and degrees, of differences
-_EXACT_MM_S = 1e-6  # a prior that is none would leave the fit no parameter to move
+# [mm, deg] Nothing is believed of how far a bar gives way, nor of when. Stated.
+_ANYWHERE_MM, _ANY_TOUCH_DEG = 50.0, 50.0
+# [mm, deg] Of differences: far above rounding, far below what curves. Derived.
+_STEP = 1e-5
+# [mm/s] A velocity that is stated as exact: a prior that is none would leave the fit no parameter
+# to move. Study: chosen.
+_EXACT_MM_S = 1e-6
 
 
 def between(motor_rad: np.ndarray, shift_mm: np.ndarray, at_rad: np.ndarray) -> np.ndarray:
@@ -112,5 +120,8 @@ def between(motor_rad: np.ndarray, shift_mm: np.ndarray, at_rad: np.ndarray) -> 
     steadily as the bar does."""
     first = np.clip(np.searchsorted(motor_rad, at_rad) - 1, 0, len(motor_rad) - 2)
     part = ((at_rad - motor_rad[first]) / (motor_rad[first + 1] - motor_rad[first]))[..., None]
-    before, after = (np.take_along_axis(shift_mm, k[..., None, None], axis=-2)[..., 0, :] for k in (first, first + 1))
+    before, after = (
+        np.take_along_axis(shift_mm, k[..., None, None], axis=-2)[..., 0, :]
+        for k in (first, first + 1)
+    )
     return (1.0 - part) * before + part * after

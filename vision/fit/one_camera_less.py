@@ -16,19 +16,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
+from vision.fit.covariance import Uncertainty, alike, camera_rows
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.quantities import Jacobians
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
-from vision.fit.uncertainty import Uncertainty, alike, camera_rows
 
+# [cameras] With one fewer nothing is left over to compare. Derived.
 FEWEST_CAMERAS = 3
-# Chance by which cameras that agree fail, a whisk.
+# [chance] By which cameras that agree fail, a whisk. Study: chosen.
 FALSE_ALARM = 1e-3
-# So many stated sigmas matter: less adds no more than an eighth to an error.
+# [sigma] A shift of so many stated sigmas, or one as unsure, matters: less adds no more than an
+# eighth to an error, √(1 + 0.5²). Derived.
 _MATTERS = 0.5
-# Of its belief's variance: ways in which a camera's lines may be off and of which no more is told are not asked.
+# [1] Of its belief's variance: a way in which a camera's lines may be off, and of which no more
+# is told by the others, is not asked; rounding and where the fit stood still are less. Derived.
 _TOLD = 1e-3
-_UNITS = {"d_x": (1.0, "mm"), "touch": (np.degrees(1.0), "deg"), "beta": (np.degrees(1.0), "deg"), "slip": (1.0, "mm")}
+_UNITS = {
+    "d_x": (1.0, "mm"),
+    "touch": (np.degrees(1.0), "deg"),
+    "beta": (np.degrees(1.0), "deg"),
+    "slip": (1.0, "mm"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +101,15 @@ class _Observations:
     def spread(self, rows: np.ndarray) -> np.ndarray:
         """Covariance (k, k) of what these rows (k, n) make of all that observations and cameras err by."""
         of_cameras = rows @ self.by_camera
-        return alike(self.problem, rows) @ rows.T + of_cameras @ self.problem.cameras.covariance @ of_cameras.T
+        return (
+            alike(self.problem, rows) @ rows.T
+            + of_cameras @ self.problem.cameras.covariance @ of_cameras.T
+        )
 
 
-def leave_out_each(problem: Problem, state: State, fitted: Uncertainty, by: Jacobians) -> list[OneLess]:
+def leave_out_each(
+    problem: Problem, state: State, fitted: Uncertainty, by: Jacobians
+) -> list[OneLess]:
     """The fit without each of its cameras; none where there are fewer than three."""
     if len(problem.cameras) < FEWEST_CAMERAS:
         return []
@@ -112,14 +125,20 @@ def leave_out_each(problem: Problem, state: State, fitted: Uncertainty, by: Jaco
         moved, spread = asked @ step, seen.spread(rows)
         beside, beside_sigma, by_lines = _lines_beside(seen, state, fitted.answer, number)
         chance = min(1.0, 2 * len(problem.cameras) * min(_chance(moved, spread), by_lines))
-        one = OneLess(name, step, moved, np.sqrt(np.diag(spread)), sigma, beside, beside_sigma, chance)
+        one = OneLess(
+            name, step, moved, np.sqrt(np.diag(spread)), sigma, beside, beside_sigma, chance
+        )
         if one.contradicts:
-            one = replace(one, spread=seen.spread(answer @ kept.T - fitted.answer @ seen.jacobian.T))
+            one = replace(
+                one, spread=seen.spread(answer @ kept.T - fitted.answer @ seen.jacobian.T)
+            )
         found.append(one)
     return found
 
 
-def _lines_beside(seen: _Observations, state: State, answer: np.ndarray, camera: int) -> tuple[float, float, float]:
+def _lines_beside(
+    seen: _Observations, state: State, answer: np.ndarray, camera: int
+) -> tuple[float, float, float]:
     """By how many px, and its sigma, that of a camera's lines which is off most lies beside where the other cameras
     have it, and the chance of all: offset and tilt of its lines of wire and bar.
 
@@ -129,19 +148,29 @@ def _lines_beside(seen: _Observations, state: State, answer: np.ndarray, camera:
     """
     problem = seen.problem
     off = np.r_[problem.wire_off(camera)][:2].tolist() + np.r_[problem.bar_off(camera)].tolist()
-    belief = len(seen.residual) - problem.size - (problem.onset is not None) + np.array(off)  # rows of what is believed
+    belief = (
+        len(seen.residual) - problem.size - (problem.onset is not None) + np.array(off)
+    )  # rows of what is believed
     sigma_px = 1.0 / seen.jacobian[belief, off]
-    told, ways = np.linalg.eigh(np.eye(len(off)) - answer[np.ix_(off, off)] / np.outer(sigma_px, sigma_px))
+    told, ways = np.linalg.eigh(
+        np.eye(len(off)) - answer[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
+    )
     told, ways = told[told > _TOLD], ways[:, told > _TOLD]
     if not len(told):
         return 0.0, 0.0, 1.0
     rows = -(answer[off] @ seen.jacobian.T) / sigma_px[:, None]
     rows[np.arange(len(off)), belief] += 1.0
-    value = ways.T @ ((state.vector[off] - answer[off] @ (seen.jacobian.T @ seen.residual)) / sigma_px)
+    value = ways.T @ (
+        (state.vector[off] - answer[off] @ (seen.jacobian.T @ seen.residual)) / sigma_px
+    )
     spread = seen.spread(ways.T @ rows)
     freely = sigma_px[:, None] * ways / told  # as they are without that belief
     beside, sigma = freely @ value, np.sqrt(np.diag(freely @ spread @ freely.T))
-    worst = int(np.argmax(np.where(np.sum(ways**2, axis=1) > 0.5, np.abs(beside) / np.maximum(sigma, 1e-300), 0.0)))
+    worst = int(
+        np.argmax(
+            np.where(np.sum(ways**2, axis=1) > 0.5, np.abs(beside) / np.maximum(sigma, 1e-300), 0.0)
+        )
+    )
     return float(beside[worst]), float(sigma[worst]), _chance(value, spread)
 
 
@@ -149,7 +178,9 @@ def _chance(moved: np.ndarray, spread: np.ndarray) -> float:
     """That what has this covariance (k, k) is so far (k,) from 0."""
     sigma = np.sqrt(np.maximum(np.diag(spread), 1e-300))  # 0 of a camera that shows nothing
     z = moved / sigma
-    return float(chdtrc(len(z), z @ np.linalg.pinv(spread / np.outer(sigma, sigma), hermitian=True) @ z))
+    return float(
+        chdtrc(len(z), z @ np.linalg.pinv(spread / np.outer(sigma, sigma), hermitian=True) @ z)
+    )
 
 
 def contradiction(found: list[OneLess]) -> str:

@@ -6,40 +6,56 @@ from functools import cached_property
 
 import numpy as np
 
+from vision.fit.bend_onset import Onset
 from vision.fit.motion import Motion, Yielding, between
-from vision.fit.onset import Onset
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import Axis, axis_frame, closest_arc, shifted_axis
 from vision.geometry.rods import Rods, Wire
-from vision.lines.points import SHARED, Observed
+from vision.wire.points import SHARED, Observed
 
+# [parameters] A layout, no threshold.
 BAR, REST = 4, 2 * REST_POWERS
 REACH = BAR + REST  # index of the reach's error
-# Of the bar from where it was found, mm and rad: nothing is believed of it.
+# [mm, rad] Of the bar from where it was found: nothing is believed of it. Stated.
 BAR_PRIOR = np.array([50.0, 50.0, 1.0, 1.0])
-# One sigma of what a lab's whisker may have at its tip (mm): clamped off centre; encoder zero and clamp angle;
-# set and sag; change of curvature. Wide: they only keep what no picture shows from running away.
+# [mm] One sigma of what a lab's whisker may have at its tip: clamped off centre; encoder zero and
+# clamp angle; set and sag; change of curvature. Wide: they only keep what no picture shows from
+# running away. Stated.
 REST_PRIOR_MM = np.array([1.0, 8.0, 5.0, 2.0])
+# [rad] One sigma of a frame's bend, 17°: strokes push by less, so that it only keeps what no
+# picture shows from running away. Stated.
 BEND_PRIOR_RAD = 0.3
-# Friction along the whisker over the force across it: all of it where the contact does not slip along the bar.
+# [1] One sigma of friction along the whisker over the force across it: Coulomb's coefficients,
+# less where the contact slips along the bar. Study: exactness.py.
 PULL_PRIOR = 0.2
-# How far a traced line may be off as a whole beyond what light and lens are said to move it by: shadows, reflections.
-# By the offset the true wires of 65 path-traced views are most probable, the tilt is the RMS of 72 (docs/proof.md).
+# [px] What a wire's line is off by as a whole beyond what light and lens are said to move it by:
+# shadows, reflections. With the first the true wires of 65 path-traced views are most probable;
+# the second is the RMS of 72 (docs/proof.md). Study: wire_scenes.py.
 WIRE_OFFSET_PX, WIRE_TILT_PX = 0.08, 0.09
-# As the whisker swings before light and background it is off a little differently, by its ends and in the middle.
+# [px] As the whisker swings before light and background it is off a little differently, by its
+# ends and in the middle: 0.020 to 0.034 px in path-traced views, 0.012 to 0.021 in painted ones
+# (docs/proof.md). Besides, what moves a line by so much moves it by as much over a radian of the
+# swing. Study: no script.
 WIRE_DRIFT_PX = 0.02
+# [px] The three above, in the order of the parameters.
 WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
-# It also wanders with what is behind it, over this length of wire.
+# [px, mm] A line also wanders with what is behind it, so far over this length of wire; for the
+# check of the beam. Set by eye. Study: broken_beams.py.
 WANDER_PX, WANDER_MM = 0.25, 12.0
-# The same of a bar whose line says nothing of its light.
+# [px] What a bar's line is off by as a whole beyond its own sigma where it says nothing of its
+# light (points drawn in studies); of the second over `BAR_TILT_ARM_MM`. Study: bar_scenes.py.
 BAR_OFFSET_PX, BAR_TILT_PX = 0.05, 0.025
+# [mm] As `bar/pieces.py` has it: a layout.
 BAR_TILT_ARM_MM = 20.0
-# By so much an outline is read too far out, or in, as a whole: by the wrong transfer curve some 0.5 px, else hardly.
+# [px] By so much an outline is read too far out, or in, as a whole: by the wrong transfer curve
+# 0.5, else 0.05; the object's size tells. Study: rounded_seen.py.
 OUTWARD_PX = 0.3
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
 # Sigmas of all that a camera's lines are off by as a whole.
 LIGHT_PX = np.array([*WIRE_MODES_PX, *np.ones(SHARED), *BAR_MODES_PX])
+# [mm] How far axis and centreline may be from reach: a tenth of what 0.1 px is on the bench, so
+# that touching holds as a condition. Derived.
 CONTACT_SIGMA_MM = 0.002
 
 
@@ -99,7 +115,9 @@ class Problem:
     @property
     def outline_prior(self) -> np.ndarray:
         """Sigmas of what a rounded object has in the place of a bar's motion; none of a bar."""
-        return np.array([BAR_PRIOR[0], *[OUTWARD_PX] * len(self.cameras)] if self.is_rounded else [])
+        return np.array(
+            [BAR_PRIOR[0], *[OUTWARD_PX] * len(self.cameras)] if self.is_rounded else []
+        )
 
     @property
     def is_rounded(self) -> bool:
@@ -117,10 +135,15 @@ class Problem:
             shared = [row for points in wire for row in points.shared_px]
             common = np.linalg.norm(np.mean(shared, axis=0)) if shared else 0.0
             still = np.hypot(own[:2], [common, 0.0])
-            bar = [one.points.shared_px for one in self.seen if one.camera == camera and one.frame < 0]
+            bar = [
+                one.points.shared_px for one in self.seen if one.camera == camera and one.frame < 0
+            ]
             if bar and np.any(bar):
                 own[-2:] = np.sqrt(np.mean(np.concatenate(bar)[:, :2] ** 2, axis=0))
-            own[2:4], own[4:6] = np.hypot(own[2:4], half * still), np.hypot(own[4:6], 0.5 * half**2 * still)
+            own[2:4], own[4:6] = (
+                np.hypot(own[2:4], half * still),
+                np.hypot(own[4:6], 0.5 * half**2 * still),
+            )
         return sigma
 
     def bend_of(self, frame: int) -> slice:
@@ -153,7 +176,11 @@ def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
     axis = shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
     if not problem.is_rounded:
         return axis
-    return replace(axis, point_mm=axis.point_mm + vector[..., problem.bar_moves.start, None] * problem.axis.direction)
+    return replace(
+        axis,
+        point_mm=axis.point_mm
+        + vector[..., problem.bar_moves.start, None] * problem.axis.direction,
+    )
 
 
 def shifts_mm(problem: Problem, vector: np.ndarray) -> np.ndarray:
@@ -182,17 +209,21 @@ def shift_at_mm(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> 
 
 def rest_shape(vector: np.ndarray) -> np.ndarray:
     """Rest polynomials (…, 2, 4) in mm."""
-    return vector[..., BAR:BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
+    return vector[..., BAR : BAR + REST].reshape(*vector.shape[:-1], 2, REST_POWERS)
 
 
 def bends(problem: Problem, vector: np.ndarray) -> np.ndarray:
     """Tangent angles at the contact (…, f, 2); zero in frames that may not bend."""
     angles = np.zeros((*vector.shape[:-1], len(problem.motor_rad), 2))
-    angles[..., problem.bent, :] = vector[..., problem.first_bend:].reshape(*vector.shape[:-1], -1, 2)
+    angles[..., problem.bent, :] = vector[..., problem.first_bend :].reshape(
+        *vector.shape[:-1], -1, 2
+    )
     return angles
 
 
-def curves_of(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds: int = 1) -> tuple[Curves, np.ndarray]:
+def curves_of(
+    problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds: int = 1
+) -> tuple[Curves, np.ndarray]:
     """Centrelines (…, f) of all frames, and their contact arcs (…, f), found from each other by turns."""
     rest = rest_shape(vector)[..., None, :, :]
     axis = bar_axes(problem, vector)
@@ -224,7 +255,9 @@ def wire_lever(length_mm: float, place_mm: np.ndarray) -> np.ndarray:
     return 2.0 * place_mm / length_mm - 1.0
 
 
-def wire_modes(length_mm: float, place_mm: np.ndarray, motor_rad: np.ndarray, swing_rad: np.ndarray) -> np.ndarray:
+def wire_modes(
+    length_mm: float, place_mm: np.ndarray, motor_rad: np.ndarray, swing_rad: np.ndarray
+) -> np.ndarray:
     """Shapes (n, 6) by which lines of the wire are off: all alike, from end to end, and both of these changing with the
     motor angle, steadily and by its square.
 
@@ -233,7 +266,9 @@ def wire_modes(length_mm: float, place_mm: np.ndarray, motor_rad: np.ndarray, sw
     lever = wire_lever(length_mm, place_mm)
     turned = (motor_rad - np.min(swing_rad)) / max(np.ptp(swing_rad), 1e-9) * 2.0 - 1.0
     by_turn = np.stack([np.ones(len(lever)), turned, turned**2 - 1.0 / 3.0], axis=1)
-    return (by_turn[:, :, None] * np.stack([np.ones(len(lever)), lever], axis=1)[:, None]).reshape(len(lever), 6)
+    return (by_turn[:, :, None] * np.stack([np.ones(len(lever)), lever], axis=1)[:, None]).reshape(
+        len(lever), 6
+    )
 
 
 def wandering(problem: Problem, seen: Observed) -> np.ndarray:

@@ -9,7 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.differences import perturbed
-from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, rest_shape, shift_at_mm, shifts_mm
+from vision.fit.problem import (
+    Problem,
+    State,
+    bar_axes,
+    bar_axis,
+    curves_of,
+    rest_shape,
+    shift_at_mm,
+    shifts_mm,
+)
 from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, bar_at, clearance, contact_frame_angles
@@ -32,15 +41,29 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     _, arc, point = clearance(curves, each)
     touched = bar_at(axis, touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
-    whisk = {"touch": touch.motor_rad, "d_x": np.linalg.norm(touch.point_mm, axis=-1), "beta": beta, "psi": psi,
-             **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")}}
+    whisk = {
+        "touch": touch.motor_rad,
+        "d_x": np.linalg.norm(touch.point_mm, axis=-1),
+        "beta": beta,
+        "psi": psi,
+        **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")},
+    }
     came = shifts_mm(problem, vector) - shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
-    slip = np.sum((point - touch.point_mm[..., None, :] - came) * touched.direction[..., None, :], axis=-1)
+    slip = np.sum(
+        (point - touch.point_mm[..., None, :] - came) * touched.direction[..., None, :], axis=-1
+    )
     d_y, d_z = _deflection(problem, vector, touch, point)
     alpha = _angle_to_normal(_force(curves, touch, arc, d_y, d_z), bar_at(each, point), point, beta)
-    frame = {"slip": slip, "longitudinal_slip": arc - touch.arc_mm[..., None], "d_y": d_y, "d_z": d_z, "arc": arc,
-             "phi": np.arctan2(d_z, d_y), "alpha": alpha,
-             **{name: point[..., k] for k, name in enumerate("xyz")}}
+    frame = {
+        "slip": slip,
+        "longitudinal_slip": arc - touch.arc_mm[..., None],
+        "d_y": d_y,
+        "d_z": d_z,
+        "arc": arc,
+        "phi": np.arctan2(d_z, d_y),
+        "alpha": alpha,
+        **{name: point[..., k] for k, name in enumerate("xyz")},
+    }
     return Measured(whisk, frame)
 
 
@@ -49,7 +72,9 @@ def _deflection(problem: Problem, vector, touch: FirstTouch, point):
     shape = point.shape[:-1]
     rest = np.broadcast_to(rest_shape(vector)[..., None, :, :], (*shape, 2, REST_POWERS))
     motor = np.broadcast_to(problem.motor_rad, shape)
-    unbent = centrelines(rest, np.zeros((*shape, 2)), np.full(shape, problem.wire.length_mm / 2), motor, problem.wire)
+    unbent = centrelines(
+        rest, np.zeros((*shape, 2)), np.full(shape, problem.wire.length_mm / 2), motor, problem.wire
+    )
     cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
 
     def forward(v):
@@ -105,9 +130,13 @@ def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
                 whisk[name][columns[0]] = (values[number] - values[0]) / step
         for name, values in all_rows.frame.items():
             use = np.flatnonzero(columns >= 0)
-            frame[name][use, columns[use]] = _difference(name, values[number, use], values[0, use]) / step
-    here = Measured({name: v[0] for name, v in all_rows.whisk.items()},
-                    {name: v[0] for name, v in all_rows.frame.items()})
+            frame[name][use, columns[use]] = (
+                _difference(name, values[number, use], values[0, use]) / step
+            )
+    here = Measured(
+        {name: v[0] for name, v in all_rows.whisk.items()},
+        {name: v[0] for name, v in all_rows.frame.items()},
+    )
     return here, Jacobians(whisk, frame)
 
 

@@ -10,17 +10,20 @@ import numpy as np
 from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axes
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import bar_at, clearance
-from vision.lines.points import Observed
+from vision.wire.points import Observed
 
 
 def by_lines(problem: Problem, curves: Curves, moves: Curves) -> np.ndarray:
     """Change (n, k) of the line points' residuals; the bar's do not change."""
     nothing = np.zeros(len(moves.points_mm))
-    return np.concatenate([
-        _across_line(problem, seen, curves, moves) / seen.points.sigma_px[:, None] if seen.frame >= 0
-        else np.broadcast_to(nothing, (len(seen.points), len(nothing)))
-        for seen in problem.seen
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            _across_line(problem, seen, curves, moves) / seen.points.sigma_px[:, None]
+            if seen.frame >= 0
+            else np.broadcast_to(nothing, (len(seen.points), len(nothing)))
+            for seen in problem.seen
+        ]
+    )
 
 
 def _across_line(problem: Problem, seen: Observed, curves: Curves, moves: Curves) -> np.ndarray:
@@ -42,7 +45,9 @@ def by_contacts(
         np.concatenate([still[None], still + step * moved])
         for still, moved in ((curves.points_mm, moves.points_mm), (curves.tangents, moves.tangents))
     )
-    point, direction = (np.broadcast_to(part, (*points.shape[:2], 3)) for part in (axis.point_mm, axis.direction))
+    point, direction = (
+        np.broadcast_to(part, (*points.shape[:2], 3)) for part in (axis.point_mm, axis.direction)
+    )
     wide = replace(axis, point_mm=point, direction=direction)
     distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), wide)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM

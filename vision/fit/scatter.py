@@ -13,12 +13,18 @@ import numpy as np
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.solve import linear_at
 from vision.geometry.robust import robust_sigma
-from vision.lines.points import Observed
+from vision.wire.points import Observed
 
-_CLIP_SIGMAS = 3.0  # of the camera's scatter: an outlier is not what all share
-_NO_MORE = 0.05  # a correlation that is less is the noise of some hundred points
+# [sigma] Of the camera's scatter: an outlier is not what all share. Study: coverage.py points.
+_CLIP_SIGMAS = 3.0
+# [1] A correlation that is less is the noise of some hundred points. Derived.
+_NO_MORE = 0.05
+# [points, 1] How far apart neighbours are compared, and the most that a variance grows by for
+# them. Set by eye. Study: coverage.py points.
 _MOST_STEPS, _MOST_ALIKE = 8, 8.0
-_BIN_MM = 2.5  # about a piece of the wire
+# [mm] Of the place along the wire, for the same place in other frames: about a piece. Study:
+# coverage.py points.
+_BIN_MM = 2.5
 
 
 @dataclass(frozen=True)
@@ -42,17 +48,25 @@ def inflated_by_residuals(problem: Problem, state: State, least_shared: float = 
     residuals, cameras = _residuals_px(problem, state), range(len(problem.cameras))
     scatter = [_scatter(problem, residuals, camera) for camera in cameras]
     own = [_own_sigma_px(problem, camera) for camera in cameras]
-    excess = [float(np.sqrt(max(seen.sigma_px**2 - few**2, 0.0))) for seen, few in zip(scatter, own)]
+    excess = [
+        float(np.sqrt(max(seen.sigma_px**2 - few**2, 0.0))) for seen, few in zip(scatter, own)
+    ]
     wider = [float(np.sqrt(max(one.along * one.over_frames, least_shared))) for one in scatter]
-    seen = [_inflated(one, excess[one.camera], wider[one.camera]) if one.frame >= 0 else one
-            for one in problem.seen]
-    return replace(problem, seen=seen, alike=[(one.along - 1.0) / (one.along + 1.0) for one in scatter])
+    seen = [
+        _inflated(one, excess[one.camera], wider[one.camera]) if one.frame >= 0 else one
+        for one in problem.seen
+    ]
+    return replace(
+        problem, seen=seen, alike=[(one.along - 1.0) / (one.along + 1.0) for one in scatter]
+    )
 
 
 def scatter_px(problem: Problem, state: State) -> list[float]:
     """Standard deviation in px of each camera's wire points about the fit, by their median; 0 where it has none."""
     residuals = _residuals_px(problem, state)
-    return [_sigma_px(_of_wire(problem, residuals, camera)) for camera in range(len(problem.cameras))]
+    return [
+        _sigma_px(_of_wire(problem, residuals, camera)) for camera in range(len(problem.cameras))
+    ]
 
 
 def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
@@ -63,7 +77,11 @@ def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
 
 def _of_wire(problem: Problem, values: Sequence, camera: int) -> list:
     """Those of the values, one for each observation, that are of the wire in one camera, frame by frame."""
-    return [value for value, seen in zip(values, problem.seen) if seen.camera == camera and seen.frame >= 0]
+    return [
+        value
+        for value, seen in zip(values, problem.seen)
+        if seen.camera == camera and seen.frame >= 0
+    ]
 
 
 def _sigma_px(residuals: Sequence[np.ndarray]) -> float:
@@ -85,7 +103,7 @@ def _padded(rows: Sequence[np.ndarray]) -> np.ndarray:
     """Rows of unequal length as one array (k, n), NaN where a row has ended."""
     padded = np.full((len(rows), max(map(len, rows))), np.nan)
     for row, values in zip(padded, rows):
-        row[:len(values)] = values
+        row[: len(values)] = values
     return padded
 
 

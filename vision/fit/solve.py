@@ -13,8 +13,8 @@ from itertools import groupby
 
 import numpy as np
 
+from vision.fit.bend_onset import Onset
 from vision.fit.differences import perturbed, steps
-from vision.fit.onset import Onset
 from vision.fit.problem import (
     BAR,
     BAR_MODES_PX,
@@ -41,13 +41,21 @@ from vision.geometry.contact import clearance
 from vision.geometry.grazing import sights_beside
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.silhouette import edges
-from vision.lines.points import LinePoints, Observed
+from vision.wire.points import LinePoints, Observed
 
-LAST_SCALE = 4.0  # sigmas: of the Cauchy weights once the state is near
-_ALIKE = 1000.0  # steps of differences (0.1 mm, 1 mrad; bends 10 mrad): so near the slopes are what they were
-_STILL_SIGMA = 0.01  # a step that moves all parameters together by less than this part of their sigma is the last
-_SCALES = (30.0, 10.0, *[LAST_SCALE] * 4)  # sigmas: wide while the state is still off by many of them
-_LONGEST_RAD = 0.3  # bend in one step: the rod's shape is not linear beyond
+# [sigma] Width of the Cauchy weights once the state is near: 95 % efficient on Gaussian noise at
+# 2.4, more at 4. Study: coverage.py points.
+LAST_SCALE = 4.0
+# [steps] Of differences (0.1 mm, 1 mrad; bends 10 mrad): so near, slopes are taken to be what
+# they were. Study: gradients.py.
+_ALIKE = 1000.0
+# [sigma] A step that moves all parameters together by less is the last. Derived.
+_STILL_SIGMA = 0.01
+# [sigmas] Of the Cauchy weights, round by round: wide while the state is still off by many. Set
+# by eye.
+_SCALES = 30.0, 10.0, *[LAST_SCALE] * 4
+# [rad] Of bend in one step: the rod's shape is not linear beyond. Stated.
+_LONGEST_RAD = 0.3
 
 
 @dataclass(frozen=True)
@@ -59,25 +67,38 @@ class Linear:
     is_point: np.ndarray
 
 
-def linearise(problem: Problem, state: State, jacobian: np.ndarray | None = None) -> tuple[Linear, State]:
+def linearise(
+    problem: Problem, state: State, jacobian: np.ndarray | None = None
+) -> tuple[Linear, State]:
     """Residuals and Jacobian at a state; the state comes back with its contact arcs brought up to date.
 
     jacobian: that of a state nearby, taken as it is, which saves nine tenths of the work.
     """
-    moved, columns = perturbed(problem, state.vector) if jacobian is None else (state.vector[None], [])
+    moved, columns = (
+        perturbed(problem, state.vector) if jacobian is None else (state.vector[None], [])
+    )
     curves, arcs = curves_of(problem, moved, state.arcs_mm)
     alike = groupby(problem.seen, key=lambda seen: (seen.camera, seen.frame >= 0))
-    blocks = [_wire_block(problem, camera, list(seen), curves, columns, state.vector) if on_wire
-              else _bar_block(problem, camera, list(seen), columns, state.vector) for (camera, on_wire), seen in alike]
+    blocks = [
+        _wire_block(problem, camera, list(seen), curves, columns, state.vector)
+        if on_wire
+        else _bar_block(problem, camera, list(seen), columns, state.vector)
+        for (camera, on_wire), seen in alike
+    ]
     count = sum(len(block[0]) for block in blocks)
-    blocks += [_contact_block(problem, moved, curves, arcs, columns, state.vector), _prior_block(problem, state.vector)]
+    blocks += [
+        _contact_block(problem, moved, curves, arcs, columns, state.vector),
+        _prior_block(problem, state.vector),
+    ]
     if problem.onset is not None:
         blocks.append(_onset_block(problem, problem.onset, moved, columns, state.vector))
     residual = np.concatenate([block[0] for block in blocks])
     if jacobian is None:
         jacobian = np.concatenate([block[1] for block in blocks])
-    return (Linear(residual, jacobian, np.arange(len(residual)) < count),
-            replace(state, arcs_mm=arcs[0]))
+    return (
+        Linear(residual, jacobian, np.arange(len(residual)) < count),
+        replace(state, arcs_mm=arcs[0]),
+    )
 
 
 @lru_cache(maxsize=1)
@@ -88,13 +109,22 @@ def linear_at(problem: Problem, state: State) -> Linear:
 
 def _together(group: Sequence[Observed]) -> LinePoints:
     """The line points of all of them."""
-    return LinePoints(*(np.concatenate([getattr(seen.points, name) for seen in group])
-                        for name in LinePoints.__dataclass_fields__))
+    return LinePoints(
+        *(
+            np.concatenate([getattr(seen.points, name) for seen in group])
+            for name in LinePoints.__dataclass_fields__
+        )
+    )
 
 
-def _wire_block(problem: Problem, number: int, group: Sequence[Observed], curves: Curves, columns, vector):
+def _wire_block(
+    problem: Problem, number: int, group: Sequence[Observed], curves: Curves, columns, vector
+):
     """Residuals and Jacobian rows of one camera's points of the wire, all frames."""
-    frame, points = np.repeat([s.frame for s in group], [len(s.points) for s in group]), _together(group)
+    frame, points = (
+        np.repeat([s.frame for s in group], [len(s.points) for s in group]),
+        _together(group),
+    )
     positions = curves.at_one_each(frame, points.place)
     px, by_point, _ = problem.cameras.cameras[number].project_with_jacobians(positions[0])
     along_normal = np.einsum("ni,nij->nj", points.normal, by_point)
@@ -103,7 +133,9 @@ def _wire_block(problem: Problem, number: int, group: Sequence[Observed], curves
     for (step, names), by_step in zip(columns, moved):
         bent = names[frame] >= 0
         jacobian[row[bent], names[frame][bent]] = by_step[bent] / step
-    modes = wire_modes(problem.wire.length_mm, points.place, problem.motor_rad[frame], problem.motor_rad)
+    modes = wire_modes(
+        problem.wire.length_mm, points.place, problem.motor_rad[frame], problem.motor_rad
+    )
     modes = np.hstack([modes, points.shared_px])
     return _over_sigma(points, px, jacobian, problem.wire_off(number), modes, vector)
 
@@ -116,11 +148,15 @@ def _over_sigma(points: LinePoints, px, jacobian, off: slice, modes, vector):
     return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
 
 
-def _bar_edges(problem: Problem, camera, vector, place_mm, wider_mm, frame) -> tuple[np.ndarray, np.ndarray]:
+def _bar_edges(
+    problem: Problem, camera, vector, place_mm, wider_mm, frame
+) -> tuple[np.ndarray, np.ndarray]:
     """Both edges (…, n, 2) of the bar's outline; wider_mm (…, n) or a number: added to the bar's radius; frame (n,): in
     which it is seen, of a bar that moves."""
     axis = bar_axis(problem, vector)
-    points = axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
+    points = (
+        axis.point_mm[..., None, :] + np.asarray(place_mm)[:, None] * axis.direction[..., None, :]
+    )
     if problem.motion is not None:
         points = points + shifts_mm(problem, vector)[..., frame, :]
     directions = np.broadcast_to(axis.direction[..., None, :], points.shape)
@@ -134,12 +170,17 @@ def _bar_block(problem: Problem, number: int, group: Sequence[Observed], columns
     points = _together(group)
     if problem.is_rounded:
         return _limb_block(problem, number, points, bool(columns), vector)
-    side, frame = (np.repeat(of, [len(s.points) for s in group]) for of in zip(*((s.side, s.bar_in) for s in group)))
+    side, frame = (
+        np.repeat(of, [len(s.points) for s in group])
+        for of in zip(*((s.side, s.bar_in) for s in group))
+    )
     moves = range(problem.size)[problem.bar_moves]
     moving = [*range(BAR), *([REACH] if np.any(side) else []), *moves] if columns else []
     step = steps(problem)[moving]
     moved = vector + step[:, None] * np.eye(problem.size)[moving]
-    px = _bar_px(problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side, frame)
+    px = _bar_px(
+        problem, problem.cameras.cameras[number], np.vstack([vector, moved]), points, side, frame
+    )
     jacobian = np.zeros((len(points), problem.size))
     jacobian[:, moving] = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal) / step
     modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
@@ -154,20 +195,30 @@ def _limb_block(problem: Problem, number: int, points: LinePoints, by_all: bool,
     moved = np.vstack([vector, vector + step[:, None] * np.eye(problem.size)[moving]])
     camera, radius_mm = problem.cameras.cameras[number], problem.rods.bar.radius_mm
     grazing = sights_beside(camera, bar_axis(problem, moved), points.px, points.place)
-    off_px = grazing.px_per_mm(camera, points.normal) * (grazing.outside_mm - radius_mm - vector[REACH])
+    off_px = grazing.px_per_mm(camera, points.normal) * (
+        grazing.outside_mm - radius_mm - vector[REACH]
+    )
     jacobian = np.zeros((len(points), problem.size))
     jacobian[:, moving] = -(off_px[1:] - off_px[0]).T / step
     jacobian[:, REACH] = grazing.px_per_mm(camera, points.normal)
     outward = along + 1 + number
     jacobian[:, outward] = 1.0
     off_px[0] -= vector[outward]
-    return _over_sigma(points, points.px - off_px[0][:, None] * points.normal, jacobian, problem.bar_off(number),
-                       points.normal * (BAR_OFFSET_PX / BAR_MODES_PX), vector)  # moved along rows and columns alike
+    return _over_sigma(
+        points,
+        points.px - off_px[0][:, None] * points.normal,
+        jacobian,
+        problem.bar_off(number),
+        points.normal * (BAR_OFFSET_PX / BAR_MODES_PX),
+        vector,
+    )  # moved along rows and columns alike
 
 
 def _bar_px(problem: Problem, camera, vector, points: LinePoints, side, frame) -> np.ndarray:
     """Where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's error is taken for the bar's."""
-    one, other = _bar_edges(problem, camera, vector, points.place, vector[..., REACH, None] * (side != 0), frame)
+    one, other = _bar_edges(
+        problem, camera, vector, points.place, vector[..., REACH, None] * (side != 0), frame
+    )
     half = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
     return 0.5 * (one + other) + side[:, None] * half * points.normal
 
@@ -180,7 +231,9 @@ def _contact_block(problem: Problem, moved, curves: Curves, arcs_mm, columns, ve
     jacobian = np.zeros((len(frames), problem.size))
     for (step, names), row in zip(columns, distance[1:]):
         held = names[frames] >= 0
-        jacobian[np.flatnonzero(held), names[frames[held]]] = (row - distance[0])[frames[held]] / step
+        jacobian[np.flatnonzero(held), names[frames[held]]] = (row - distance[0])[
+            frames[held]
+        ] / step
     jacobian[:, REACH] = -1.0
     residual = distance[0, frames] - vector[REACH]
     return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
@@ -190,8 +243,13 @@ def _onset_block(problem: Problem, onset: Onset, moved, columns, vector):
     """At the onset of bending the unbent whisker is the reach away from the axis."""
     rest, axis = rest_shape(moved), bar_axis(problem, moved)
     count = len(moved)
-    curves = centrelines(rest, np.zeros((count, 2)), np.full(count, problem.wire.length_mm / 2),
-                         np.full(count, onset.motor_rad) + _later_rad(problem, moved), problem.wire)
+    curves = centrelines(
+        rest,
+        np.zeros((count, 2)),
+        np.full(count, problem.wire.length_mm / 2),
+        np.full(count, onset.motor_rad) + _later_rad(problem, moved),
+        problem.wire,
+    )
     distance, arc, _ = clearance(curves, axis)
     distance, sigma_mm = distance - problem.rods.reach_mm(arc), onset.sigma_rad * arc[0]
     jacobian = np.zeros((1, problem.size))
@@ -211,10 +269,19 @@ def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
 
 
 def _prior_block(problem: Problem, vector):
-    sigma = np.concatenate([BAR_PRIOR, REST_PRIOR_MM, REST_PRIOR_MM,
-                            [max(problem.rods.reach_sigma_mm, 1e-6)], problem.light_px.ravel(),
-                            [] if problem.motion is None else problem.motion.sigma, problem.outline_prior, [PULL_PRIOR],
-                            np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD)])
+    sigma = np.concatenate(
+        [
+            BAR_PRIOR,
+            REST_PRIOR_MM,
+            REST_PRIOR_MM,
+            [max(problem.rods.reach_sigma_mm, 1e-6)],
+            problem.light_px.ravel(),
+            [] if problem.motion is None else problem.motion.sigma,
+            problem.outline_prior,
+            [PULL_PRIOR],
+            np.full(problem.size - problem.first_bend, BEND_PRIOR_RAD),
+        ]
+    )
     return vector / sigma, np.diag(1.0 / sigma)
 
 
@@ -223,33 +290,43 @@ def robust_weights(linear: Linear, scale: float) -> np.ndarray:
     return np.where(linear.is_point, cauchy_weights(linear.residual, scale), 1.0)
 
 
-def solve(problem: Problem, state: State, *,
-          scales: Sequence[float] = _SCALES) -> tuple[State, np.ndarray]:
+def solve(
+    problem: Problem, state: State, *, scales: Sequence[float] = _SCALES
+) -> tuple[State, np.ndarray]:
     """Gauss–Newton with Cauchy weights that narrow as `scales` (in sigmas) say; ends early once it stands still.
 
     Returns the state and its covariance (size, size) from noise and priors alone.
     """
-    near_jacobian, geometry = None, np.r_[:BAR + REST, problem.bar_moves.start:problem.size]
+    near_jacobian, geometry = None, np.r_[: BAR + REST, problem.bar_moves.start : problem.size]
     for scale in scales:
         linear, state = linearise(problem, state, near_jacobian)
         root = np.sqrt(robust_weights(linear, scale))
         jacobian = linear.jacobian * root[:, None]
         step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
-        step = step * min(1.0, _LONGEST_RAD / max(np.max(np.abs(step[problem.first_bend:]), initial=0.0), 1e-9))
+        step = step * min(
+            1.0, _LONGEST_RAD / max(np.max(np.abs(step[problem.first_bend :]), initial=0.0), 1e-9)
+        )
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
-        near_jacobian = linear.jacobian if np.all(np.abs(step[geometry]) < _ALIKE * steps(problem)[geometry]) else None
+        near_jacobian = (
+            linear.jacobian
+            if np.all(np.abs(step[geometry]) < _ALIKE * steps(problem)[geometry])
+            else None
+        )
     else:
         jacobian = weighted_jacobian(problem, state, scales[-1], near_jacobian)
     return state, np.linalg.inv(jacobian.T @ jacobian)
 
 
-def weighted_jacobian(problem: Problem, state: State, scale: float = LAST_SCALE,
-                      jacobian: np.ndarray | None = None) -> np.ndarray:
+def weighted_jacobian(
+    problem: Problem, state: State, scale: float = LAST_SCALE, jacobian: np.ndarray | None = None
+) -> np.ndarray:
     """All observations' rows (n, size) over their sigma and robustly weighted: line points, touching, priors.
 
     jacobian: see `linearise`.
     """
-    linear = linear_at(problem, state) if jacobian is None else linearise(problem, state, jacobian)[0]
+    linear = (
+        linear_at(problem, state) if jacobian is None else linearise(problem, state, jacobian)[0]
+    )
     return linear.jacobian * np.sqrt(robust_weights(linear, scale))[:, None]

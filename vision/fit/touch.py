@@ -9,13 +9,28 @@ from vision.geometry.centreline import centrelines
 from vision.geometry.contact import Axis, clearance
 from vision.geometry.rods import Rods
 
-FEWEST_FREE = 2  # frames before touch: one gives the rest shape, two tell that it swings with the motor
+# [frames] Before touch: one gives the rest shape, two tell that it swings with the motor.
+# Derived.
+# frames before touch: one gives the rest shape, two tell that it swings with the motor
+FEWEST_FREE = 2
+# [rad] A frame that bends by more surely touches; where no two in a row do, none does. Set by
+# eye. Study: thresholds.py fit.touch _SURE_BEND_RAD ….
 _SURE_BEND_RAD = np.radians(0.25)
-_STEP = 1e-5  # mm and rad, of differences
-_TOUCH_GAP_MM = 1e-10  # secant steps below this would divide rounding by rounding
-_SCAN_RAD = np.radians(0.5)  # half a millimetre at the contact, when a rounded object's touch is looked for
-_STARTS_PER_FRAME = 10  # of the hinge: finer than frames tell
-_SURE_SIGMAS, _LEAST_MARGIN_RAD = 3.0, np.radians(0.02)  # from touch, within which frames are left undecided
+# [mm, rad] Of differences, of the sigma of touch: far above rounding (1e-10 mm), far below what
+# curves. Derived.
+_STEP = 1e-5
+# [mm] Secant steps below this would divide rounding by rounding. Derived.
+_TOUCH_GAP_MM = 1e-10
+# [rad] Half a millimetre at the contact, when a rounded object's touch is looked for. Stated.
+_SCAN_RAD = np.radians(0.5)
+# [1] Starts of the hinge that are tried between frames: finer than frames tell. Derived.
+_STARTS_PER_FRAME = 10
+# [1, rad] From touch, within which a frame is left undecided: three sigma, and never less than a
+# motor's step. Stated.
+_SURE_SIGMAS, _LEAST_MARGIN_RAD = (
+    3.0,
+    np.radians(0.02),
+)
 
 
 @dataclass(frozen=True)
@@ -56,12 +71,16 @@ def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:
     first = vector.reshape(-1, vector.shape[-1])[0]
     low, high = float(np.min(problem.motor_rad)), float(np.max(problem.motor_rad))
     angles = np.linspace(low, high, 2 + int((high - low) / _SCAN_RAD))
-    gaps, _, _ = _gap(rest_shape(first), angles, bar_axis(problem, first), first[REACH], problem.rods)
+    gaps, _, _ = _gap(
+        rest_shape(first), angles, bar_axis(problem, first), first[REACH], problem.rods
+    )
     touches = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
     return (angles[touches[0]], angles[touches[0] + 1]) if len(touches) else (low, high)
 
 
-def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) -> tuple[float, float]:
+def touch_and_sigma(
+    problem: Problem, vector: np.ndarray, answer: np.ndarray
+) -> tuple[float, float]:
     """Motor angle of first touch and its sigma, rad, by noise and priors alone: what it takes to part the frames.
 
     answer (size, size): covariance that the fit gives.
@@ -76,7 +95,9 @@ def touch_and_sigma(problem: Problem, vector: np.ndarray, answer: np.ndarray) ->
 def _gap(rest_mm, motor_rad, axis: Axis, wider_mm, rods: Rods):
     """How far the resting whisker still is from touching, mm; contact arc and point. wider_mm: the reach's error."""
     none = np.zeros((*motor_rad.shape, 2))
-    curves = centrelines(rest_mm, none, np.full(motor_rad.shape, rods.wire.length_mm / 2), motor_rad, rods.wire)
+    curves = centrelines(
+        rest_mm, none, np.full(motor_rad.shape, rods.wire.length_mm / 2), motor_rad, rods.wire
+    )
     distance, arc, point = clearance(curves, axis)
     return distance - rods.reach_mm(arc) - wider_mm, arc, point
 
@@ -100,12 +121,15 @@ def begins_free(motor_rad: np.ndarray, bend_rad: np.ndarray) -> bool:
     """Whether coarse bends (f, 2) show that the first frames come before touch: by more than the motor turns until a
     bend is sure. Where none is, there is no touch."""
     touching, _ = frames_that_touch(motor_rad, bend_rad)
-    return not np.any(touching) or motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
+    return (
+        not np.any(touching)
+        or motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
+    )
 
 
 def _hinge(motor_rad, bend_rad) -> float:
     """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
-    towards = np.median(bend_rad[-max(2, len(bend_rad) // 3):], axis=0)
+    towards = np.median(bend_rad[-max(2, len(bend_rad) // 3) :], axis=0)
     bend = bend_rad @ (towards / max(np.linalg.norm(towards), 1e-12))
     starts = np.linspace(motor_rad[0], motor_rad[-2], _STARTS_PER_FRAME * len(motor_rad))
     rises = np.maximum(motor_rad - starts[:, None], 0.0)
@@ -113,7 +137,9 @@ def _hinge(motor_rad, bend_rad) -> float:
     return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
 
 
-def frames_by_touch(motor_rad: np.ndarray, touch_rad: float, sigma_rad: float) -> tuple[np.ndarray, np.ndarray]:
+def frames_by_touch(
+    motor_rad: np.ndarray, touch_rad: float, sigma_rad: float
+) -> tuple[np.ndarray, np.ndarray]:
     """The same once touch is known to sigma: frames within three sigma of it are left undecided, but for the first two:
     they are free if touch comes after them."""
     margin = max(_SURE_SIGMAS * sigma_rad, _LEAST_MARGIN_RAD)

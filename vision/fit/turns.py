@@ -12,8 +12,10 @@ import numpy as np
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
 
-_STEP_RAD = 1e-4  # of differences: the tip moves by 0.01 mm
-_PRIOR_RAD = 0.3  # keeps a frame without points from running away
+# [rad] Of differences: the tip moves by 0.01 mm. Derived.
+_STEP_RAD = 1e-4
+# [rad] Keeps a frame without points from running away. Stated.
+_PRIOR_RAD = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +32,18 @@ class Turns:
 def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
     """Turns of the frames (f,) of a fit that is done."""
     linear = linear_at(problem, state)
-    turned = linearise(replace(problem, motor_rad=problem.motor_rad + _STEP_RAD), state, linear.jacobian)[0]
-    by_turn, of_row = (turned.residual - linear.residual) / _STEP_RAD, _frame_of_row(problem, len(linear.residual))
+    turned = linearise(
+        replace(problem, motor_rad=problem.motor_rad + _STEP_RAD), state, linear.jacobian
+    )[0]
+    by_turn, of_row = (
+        (turned.residual - linear.residual) / _STEP_RAD,
+        _frame_of_row(problem, len(linear.residual)),
+    )
     count = len(problem.motor_rad)
     columns = np.where(of_row[:, None] == np.arange(count), by_turn[:, None], 0.0)
-    rows = np.hstack([linear.jacobian, columns]) * np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
+    rows = (
+        np.hstack([linear.jacobian, columns]) * np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
+    )
     residual = linear.residual * np.sqrt(robust_weights(linear, LAST_SCALE))
     prior = np.append(np.zeros(problem.size), np.full(count, _PRIOR_RAD**-2.0))
     covariance = np.linalg.inv(rows.T @ rows + np.diag(prior))

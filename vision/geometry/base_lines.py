@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,11 @@ class BaseLines:
     def __post_init__(self):
         n = len(self.motor_rad)
         vectors, matrices = ("point_mm", "direction"), ("point_covariance", "direction_covariance")
-        shapes = dict.fromkeys(vectors, (n, 3)) | dict.fromkeys(matrices, (n, 3, 3)) | {"shared_covariance": (6, 6)}
+        shapes = (
+            dict.fromkeys(vectors, (n, 3))
+            | dict.fromkeys(matrices, (n, 3, 3))
+            | {"shared_covariance": (6, 6)}
+        )
         for name, shape in shapes.items():
             found = np.shape(getattr(self, name))
             if found != shape:

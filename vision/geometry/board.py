@@ -67,7 +67,9 @@ class Board:
         """Inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the ChArUco id."""
         x = np.arange(1, self.squares[0]) * self.square_mm
         y = np.arange(1, self.squares[1]) * self.square_mm
-        corners = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x)), np.zeros(len(x) * len(y))])
+        corners = np.column_stack(
+            [np.tile(x, len(y)), np.repeat(y, len(x)), np.zeros(len(x) * len(y))]
+        )
         corners.setflags(write=False)
         return corners
 
@@ -76,7 +78,11 @@ class Board:
 def _opencv_board(board: Board) -> cv2.aruco.CharucoBoard:
     """Made once: OpenCV warns of narrow borders each time."""
     whole = board._opencv_dictionary()
-    own = cv2.aruco.Dictionary(whole.bytesList[: board.marker_count], whole.markerSize, whole.maxCorrectionBits)
-    made = cv2.aruco.CharucoBoard(board.squares, float(board.square_mm), float(board.marker_mm), own)
+    own = cv2.aruco.Dictionary(
+        whole.bytesList[: board.marker_count], whole.markerSize, whole.maxCorrectionBits
+    )
+    made = cv2.aruco.CharucoBoard(
+        board.squares, float(board.square_mm), float(board.marker_mm), own
+    )
     made.setLegacyPattern(board.legacy)
     return made

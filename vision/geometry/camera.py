@@ -13,9 +13,10 @@ from vision.geometry import lens as lens_model
 from vision.geometry.checks import require
 from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew
 
+# [parameters] A layout, no threshold: nine of the lens, six of the pose.
 N_PARAMETERS = 15
 PARAMETERS = (*lens_model.LENS_TERMS, "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
-# Written-out rotations carry rounding; beyond this the matrix is no rotation at all.
+# [1] Written-out rotations carry rounding; beyond this the matrix is none at all. Stated.
 _ROTATION_TOLERANCE = 1e-4
 
 
@@ -40,7 +41,8 @@ class Camera:
         for name, shape in (("matrix", (3, 3)), ("distortion", (5,)), ("T_camera_rig", (3, 4))):
             object.__setattr__(self, name, self._checked(name, shape))
         require(
-            len(self.size_px) == 2 and all(n > 0 and n % 1 == 0 for n in self.size_px),  # NaN and infinity are not
+            len(self.size_px) == 2
+            and all(n > 0 and n % 1 == 0 for n in self.size_px),  # NaN and infinity are not
             f"camera {self.name}: size_px = {list(self.size_px)}, must be two counts above 0",
         )
         object.__setattr__(self, "size_px", tuple(int(n) for n in self.size_px))
@@ -89,9 +91,13 @@ class Camera:
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
         """Pixels (n, 2) of points in the rig frame (n, 3); NaN behind the camera."""
-        return lens_model.project(apply(self.T_camera_rig, np.asarray(points_mm, dtype=float)), self.lens)
+        return lens_model.project(
+            apply(self.T_camera_rig, np.asarray(points_mm, dtype=float)), self.lens
+        )
 
-    def project_with_jacobians(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def project_with_jacobians(
+        self, points_mm: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pixels (n, 2) of rig points (n, 3), d px / d point (n, 2, 3), d px / d parameters (n, 2, 15)."""
         R = self.T_camera_rig[:, :3]
         turned = np.asarray(points_mm, dtype=float) @ R.T
@@ -114,7 +120,9 @@ class Camera:
             self,
             matrix=np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]),
             distortion=self.distortion + step[4:9],
-            T_camera_rig=np.column_stack([exp_rotation(step[9:12]) @ T[:, :3], T[:, 3] + step[12:15]]),
+            T_camera_rig=np.column_stack(
+                [exp_rotation(step[9:12]) @ T[:, :3], T[:, 3] + step[12:15]]
+            ),
         )
 
 
@@ -134,10 +142,13 @@ class Cameras:
     def __post_init__(self):
         object.__setattr__(self, "cameras", tuple(self.cameras))
         require(
-            len(set(self.names)) == len(self.cameras), f"two cameras share a name: {', '.join(self.names)}"
+            len(set(self.names)) == len(self.cameras),
+            f"two cameras share a name: {', '.join(self.names)}",
         )
         n = N_PARAMETERS * len(self.cameras)
-        covariance = np.zeros((n, n)) if self.covariance is None else np.array(self.covariance, dtype=float)
+        covariance = (
+            np.zeros((n, n)) if self.covariance is None else np.array(self.covariance, dtype=float)
+        )
         require(
             covariance.shape == (n, n),
             f"covariance of {len(self.cameras)} cameras must be {n} x {n}, found "
@@ -205,8 +216,12 @@ class Cameras:
 
     def subset(self, names: Sequence[str]) -> "Cameras":
         """These cameras in this order, with their share of the covariance."""
-        rows = np.concatenate([np.arange(N_PARAMETERS) + self.parameters_of(n).start for n in names])
-        return Cameras(tuple(self[n] for n in names), self.covariance[np.ix_(rows, rows)], self.placement)
+        rows = np.concatenate(
+            [np.arange(N_PARAMETERS) + self.parameters_of(n).start for n in names]
+        )
+        return Cameras(
+            tuple(self[n] for n in names), self.covariance[np.ix_(rows, rows)], self.placement
+        )
 
     def moved(self, step: np.ndarray) -> "Cameras":
         """The cameras with all parameters changed by `step` (15 n,), in the same order; same covariance."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 
 def require(condition: bool, complaint: str) -> None:
@@ -14,10 +14,16 @@ def require(condition: bool, complaint: str) -> None:
 def require_sigma(owner: str, **sigmas_mm: float) -> None:
     """Raises Refused where a standard deviation is negative or not finite."""
     for name, value in sigmas_mm.items():
-        require(np.isfinite(value) and value >= 0, f"{owner} {name} = {value}: must be 0 or more, and finite")
+        require(
+            np.isfinite(value) and value >= 0,
+            f"{owner} {name} = {value}: must be 0 or more, and finite",
+        )
 
 
 def require_length(owner: str, **lengths_mm: float) -> None:
     """Raises Refused where a length is not above 0 mm, or not finite."""
     for name, value in lengths_mm.items():
-        require(np.isfinite(value) and value > 0, f"{owner} {name} = {value}: must be above 0 mm, and finite")
+        require(
+            np.isfinite(value) and value > 0,
+            f"{owner} {name} = {value}: must be above 0 mm, and finite",
+        )

@@ -62,9 +62,15 @@ def drawn_as_bar(axis: Axis) -> BarAxis:
     return bar_at(axis, axis.spot_mm) if isinstance(axis, Rounded) else axis
 
 
+# [rounds] Newton's steps, which double the digits: from 1.25 mm, or from nearly there, to
+# rounding. Study: exactness.py.
 _ROUNDS_FROM_NODE, _ROUNDS_FROM_NEAR = 4, 2
-_MORE_ROUNDS = 3  # on an object whose axis turns with the contact
-_OUTLINE_MM = 60.0  # to either side of its point, where a bar may hide the wire
+# [rounds] Newton's, more than on a bar: an object's axis turns with the contact, so that each
+# divides what is left by ten and not by its square. Derived.
+_MORE_ROUNDS = 3
+# [mm] To either side of its point, where a bar may hide the wire: longer than whiskers reach
+# across. Stated.
+_OUTLINE_MM = 60.0
 
 
 def closest_arc(curves: Curves, axis: Axis, near_mm: np.ndarray | None = None) -> np.ndarray:
@@ -76,7 +82,9 @@ def closest_arc(curves: Curves, axis: Axis, near_mm: np.ndarray | None = None) -
         return _closest_to_rounded(curves, axis, near_mm)
     arc = near_mm
     if near_mm is None:
-        arc = curves.arc_mm[np.argmin(np.sum(_from_axis(curves.points_mm, axis) ** 2, axis=-1), axis=-1)]
+        arc = curves.arc_mm[
+            np.argmin(np.sum(_from_axis(curves.points_mm, axis) ** 2, axis=-1), axis=-1)
+        ]
     for _ in range(_ROUNDS_FROM_NODE if near_mm is None else _ROUNDS_FROM_NEAR):
         point, tangent = curves.at(arc[..., None])
         away = _from_axis(point, axis)[..., 0, :]
@@ -89,9 +97,14 @@ def closest_arc(curves: Curves, axis: Axis, near_mm: np.ndarray | None = None) -
 def _closest_to_rounded(curves: Curves, axis: Rounded, near_mm: np.ndarray | None) -> np.ndarray:
     arc, rounds = near_mm, _ROUNDS_FROM_NEAR
     if near_mm is None:
-        arc, rounds = curves.arc_mm[np.argmin(axis.outside_mm(curves.points_mm)[0], axis=-1)], _ROUNDS_FROM_NODE
+        arc, rounds = (
+            curves.arc_mm[np.argmin(axis.outside_mm(curves.points_mm)[0], axis=-1)],
+            _ROUNDS_FROM_NODE,
+        )
     for _ in range(rounds + _MORE_ROUNDS):
-        arc = np.clip(arc + nearer_by(axis, *curves.at(arc[..., None]))[..., 0], 0.0, curves.arc_mm[-1])
+        arc = np.clip(
+            arc + nearer_by(axis, *curves.at(arc[..., None]))[..., 0], 0.0, curves.arc_mm[-1]
+        )
     return arc
 
 
@@ -114,12 +127,16 @@ def clearance(
     return np.sum(away * normal, axis=-1) * side, arc, point[..., 0, :]
 
 
-_ALONG_X = 0.9  # of a direction: no bar's, but that of the plane of a ring
+# [1] X of a direction from which on its frame is taken from z: no bar's, but that of the plane of
+# a ring. Stated.
+_ALONG_X = 0.9
 
 
 def axis_frame(direction: np.ndarray) -> np.ndarray:
     """Two unit vectors (2, 3) at right angles to a direction and to each other."""
-    e1 = cross(direction, np.array([1.0, 0.0, 0.0] if abs(direction[0]) < _ALONG_X else [0.0, 0.0, 1.0]))
+    e1 = cross(
+        direction, np.array([1.0, 0.0, 0.0] if abs(direction[0]) < _ALONG_X else [0.0, 0.0, 1.0])
+    )
     e1 = e1 / np.linalg.norm(e1)
     return np.stack([e1, cross(direction, e1)])
 
@@ -127,8 +144,11 @@ def axis_frame(direction: np.ndarray) -> np.ndarray:
 def shifted_axis(axis: Axis, across: np.ndarray, vector: np.ndarray) -> Axis:
     """An axis (batch of vectors (…, ≥ 4) allowed) moved by two shifts in mm and two tilts across itself."""
     direction = axis.direction + vector[..., 2:4] @ across
-    return replace(axis, point_mm=axis.point_mm + vector[..., 0:2] @ across,
-                   direction=direction / np.linalg.norm(direction, axis=-1, keepdims=True))
+    return replace(
+        axis,
+        point_mm=axis.point_mm + vector[..., 0:2] @ across,
+        direction=direction / np.linalg.norm(direction, axis=-1, keepdims=True),
+    )
 
 
 def outline_of_bar(camera: Camera, axis: Axis, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:

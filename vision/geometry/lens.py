@@ -10,7 +10,8 @@ The nine lens parameters are fx fy cx cy k1 k2 p1 p2 k3. With a = x/z, b = y/z, 
 import numpy as np
 
 LENS_TERMS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-_MOST_STEPS = 30  # Newton's, which end before
+# [steps] Newton's, which end before; where they do not, the pixel has no direction. Derived.
+_MOST_STEPS = 30
 
 
 def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
@@ -21,7 +22,10 @@ def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     ab2 = 2.0 * a * b
     return np.column_stack(
-        [a * radial + p1 * ab2 + p2 * (r2 + 2 * a * a), b * radial + p1 * (r2 + 2 * b * b) + p2 * ab2]
+        [
+            a * radial + p1 * ab2 + p2 * (r2 + 2 * a * a),
+            b * radial + p1 * (r2 + 2 * b * b) + p2 * ab2,
+        ]
     )
 
 

@@ -4,12 +4,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+# [steps] Ends before. Not measured.
 _MOST_STEPS = 12
-_LEAST_CURVATURE = 4.0  # px⁻²: what the pictures do not tell is told to half a pixel by nothing
+# [px⁻²] What the pictures do not tell is told to half a pixel by nothing. Stated.
+_LEAST_CURVATURE = 4.0
 
 
-def descend(function: Callable, begin: np.ndarray, steps: np.ndarray, longest: np.ndarray, settled: float,
-            parts: Sequence[float] = (1.0, 0.3)) -> tuple[np.ndarray, float, np.ndarray]:
+def descend(
+    function: Callable,
+    begin: np.ndarray,
+    steps: np.ndarray,
+    longest: np.ndarray,
+    settled: float,
+    parts: Sequence[float] = (1.0, 0.3),
+) -> tuple[np.ndarray, float, np.ndarray]:
     """Where the function is least near `begin` (n,), its value there, and its second derivatives (n, n).
 
     steps (n,): of the differences; longest (n,): a Newton step goes no farther. Ends when no part of a step is more

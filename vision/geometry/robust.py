@@ -2,7 +2,8 @@
 
 import numpy as np
 
-_MEDIAN = 0.6745  # of |x| of the standard normal distribution
+# [1] Median of the size of a standard normal deviate. Derived.
+_MEDIAN = 0.6745
 
 
 def robust_sigma(deviations: np.ndarray) -> float:

@@ -25,12 +25,23 @@ class Wire:
     tip_diameter_mm: float | None = None
 
     def __post_init__(self):
-        require(self.shape in SHAPES, f"wire shape {self.shape!r}: must be one of {', '.join(SHAPES)}")
+        require(
+            self.shape in SHAPES, f"wire shape {self.shape!r}: must be one of {', '.join(SHAPES)}"
+        )
         require_length("wire", length_mm=self.length_mm, diameter_mm=self.diameter_mm)
         tip = self.tip_diameter_mm
-        tips = (tip is not None and 0 < tip < self.diameter_mm) if self.shape == "tapered" else tip is None
-        require(tips, f"wire tip_diameter_mm {tip}: a tapered wire, and no other, has one between 0 and its diameter")
-        require_sigma("wire", length_sigma_mm=self.length_sigma_mm, diameter_sigma_mm=self.diameter_sigma_mm)
+        tips = (
+            (tip is not None and 0 < tip < self.diameter_mm)
+            if self.shape == "tapered"
+            else tip is None
+        )
+        require(
+            tips,
+            f"wire tip_diameter_mm {tip}: a tapered wire, and no other, has one between 0 and its diameter",
+        )
+        require_sigma(
+            "wire", length_sigma_mm=self.length_sigma_mm, diameter_sigma_mm=self.diameter_sigma_mm
+        )
 
     def radius_mm(self, arc_mm: np.ndarray | float) -> np.ndarray:
         """Radius at arc length `arc_mm` from the base, mm; the shape of `arc_mm`; 0 beyond a cone's point."""
@@ -59,7 +70,10 @@ class Bar:
             require_length("bar", diameter_mm=self.diameter_mm)
         if self.form is not None and self.form.shape == "ring":
             wide = self.form.ring_diameter_mm
-            require(wide > self.diameter_mm, f"ring of {wide:g} mm: its bar is {self.diameter_mm:g} mm thick")
+            require(
+                wide > self.diameter_mm,
+                f"ring of {wide:g} mm: its bar is {self.diameter_mm:g} mm thick",
+            )
         require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
 
     @property

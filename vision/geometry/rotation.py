@@ -39,7 +39,8 @@ def log_rotation(R: np.ndarray) -> np.ndarray:
     """The vector w of smallest length with exp_rotation(w) = R. (..., 3, 3) → (..., 3)."""
     R = np.asarray(R, dtype=float)
     axis_sine = 0.5 * np.stack(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
+        axis=-1,
     )
     sine = np.linalg.norm(axis_sine, axis=-1)
     cosine = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0)

@@ -12,12 +12,20 @@ import numpy as np
 
 from vision.geometry.checks import require, require_length
 
+# [—] A layout: the way in which slopes count.
 _UP = np.array([0.0, 0.0, 1.0])
+# [1] In place of none, where it is divided by. Stated.
 _TINY = 1e-12
-_MOST_TURN_RAD = np.radians(60.0)  # of a ring to either side of the contact: farther round it hides itself
-_LEAST_RADIUS_MM = 0.3  # of a cone: nearer to its tip its two edges are one
-_LEAST_BEND, _LONGEST_MM = 0.02, 10.0  # of a Newton step, where a sight runs along a ring
-_ROUNDS = 8  # from one mm off: each divides what is left by ten and more
+# [rad] Of a ring to either side of the contact: farther round it is another side of it. Set by
+# eye. Study: rounded_seen.py.
+_MOST_TURN_RAD = np.radians(60.0)
+# [mm] Of a cone: nearer to its tip its two edges are one, 2 px apart. Stated.
+_LEAST_RADIUS_MM = 0.3
+# [1, mm] Of a Newton step, where a sight runs along a ring: it stays finite. Stated.
+_LEAST_BEND, _LONGEST_MM = 0.02, 10.0
+# [steps] Newton's along a sight, from some mm off to rounding. Study:
+# tests/vision/geometry/test_rounded.py.
+_ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -37,7 +45,10 @@ class Form:
         if self.shape == "ring":
             require_length("ring", ring_diameter_mm=self.ring_diameter_mm)
         if self.shape == "cone":
-            require(0.0 < self.half_angle_rad < 0.5 * np.pi, f"cone half_angle_rad {self.half_angle_rad:g}: 0 to pi/2")
+            require(
+                0.0 < self.half_angle_rad < 0.5 * np.pi,
+                f"cone half_angle_rad {self.half_angle_rad:g}: 0 to pi/2",
+            )
 
 
 @dataclass(frozen=True)
@@ -64,7 +75,10 @@ class Rounded:
 
     def near(self, points_mm: np.ndarray) -> Local:
         """What points (…, k, 3) see."""
-        centre, axis = np.asarray(self.point_mm)[..., None, :], np.asarray(self.direction)[..., None, :]
+        centre, axis = (
+            np.asarray(self.point_mm)[..., None, :],
+            np.asarray(self.direction)[..., None, :],
+        )
         apart = points_mm - centre
         if self.form.shape == "sphere":
             normal = _unit(apart)
@@ -79,7 +93,9 @@ class Rounded:
             return Local(foot, _upwards(np.cross(axis, outward)), np.zeros(apart.shape[:-1]))
         sin, cos = np.sin(self.form.half_angle_rad), np.cos(self.form.half_angle_rad)
         down = far * sin / cos - high
-        return Local(centre - down * axis, _upwards(cos * axis - sin * outward), (down * sin)[..., 0])
+        return Local(
+            centre - down * axis, _upwards(cos * axis - sin * outward), (down * sin)[..., 0]
+        )
 
     def outside_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, Local]:
         """How far points (…, k, 3) are from the middle, beyond what `Local.wider_mm` is: (…, k), positive; the normals
@@ -98,32 +114,44 @@ class Rounded:
         outward = (local.foot_mm - np.asarray(self.point_mm)[..., None, :]) / radius
         return radius / np.maximum(radius + np.sum(away * outward, axis=-1), 0.1 * radius)
 
-    def hides_itself(self, centre_mm: np.ndarray, points_mm: np.ndarray, radius_mm: float) -> np.ndarray:
+    def hides_itself(
+        self, centre_mm: np.ndarray, points_mm: np.ndarray, radius_mm: float
+    ) -> np.ndarray:
         """Whether (…,) a sight from a camera (3,) through points (…, 3) beside the surface meets it elsewhere."""
         if self.form.shape != "ring":
             return np.zeros(points_mm.shape[:-1], dtype=bool)
         sight = points_mm - centre_mm
         far = np.linalg.norm(sight, axis=-1, keepdims=True)
-        steps = np.arange(-1.0, 1.0, radius_mm / self.form.ring_diameter_mm) * (self.form.ring_diameter_mm + radius_mm)
+        steps = np.arange(-1.0, 1.0, radius_mm / self.form.ring_diameter_mm) * (
+            self.form.ring_diameter_mm + radius_mm
+        )
         axis, batch = np.asarray(self.direction), self.point_mm.shape[:-1]
-        start = (points_mm.reshape(*batch, -1, 3) - np.asarray(self.point_mm)[..., None, :])
+        start = points_mm.reshape(*batch, -1, 3) - np.asarray(self.point_mm)[..., None, :]
         ahead = (sight / far).reshape(*batch, -1, 3)
-        high, climbs = (np.einsum("...kj,...j->...k", one, axis)[..., None] for one in (start, ahead))
-        far2 = np.sum(start**2, axis=-1)[..., None] + 2.0 * steps * np.sum(start * ahead, axis=-1)[..., None] + steps**2
+        high, climbs = (
+            np.einsum("...kj,...j->...k", one, axis)[..., None] for one in (start, ahead)
+        )
+        far2 = (
+            np.sum(start**2, axis=-1)[..., None]
+            + 2.0 * steps * np.sum(start * ahead, axis=-1)[..., None]
+            + steps**2
+        )
         high = high + steps * climbs
         across = np.sqrt(np.maximum(far2 - high**2, 0.0)) - 0.5 * self.form.ring_diameter_mm
         return np.any(across**2 + high**2 < radius_mm**2, axis=-1).reshape(points_mm.shape[:-1])
 
-    def nearest_on_lines(self, begin_mm: np.ndarray, towards: np.ndarray, at_mm: np.ndarray,
-                         rounds: int = _ROUNDS) -> np.ndarray:
+    def nearest_on_lines(
+        self, begin_mm: np.ndarray, towards: np.ndarray, at_mm: np.ndarray, rounds: int = _ROUNDS
+    ) -> np.ndarray:
         """Where (…, k), mm from begin, straight lines (…, k, 3) come nearest, from near there."""
         for _ in range(rounds):
             points = begin_mm + at_mm[..., None] * towards
             at_mm = at_mm + nearer_by(self, points, towards)
         return at_mm
 
-    def limb(self, centre_mm: np.ndarray, radius_mm: float, reach_mm: float, stations: int
-             ) -> tuple[np.ndarray, np.ndarray]:
+    def limb(
+        self, centre_mm: np.ndarray, radius_mm: float, reach_mm: float, stations: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Points (…, 2, m, 3) of the surface that sights from a camera (3,) graze, to both sides, and the normals
         (…, 2, m, 3) there, NaN where none does: before its tip a cone has no outline but that of its base; of
         ring and cone up to reach_mm of the middle from where it is touched, of a ring all round it if that is
@@ -140,7 +168,10 @@ class Rounded:
         cosine = (grows * along - radius) / (root * distance)
         cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
         aside = np.sqrt(1.0 - cosine**2) * np.cross(ahead, towards)
-        normals = np.stack([root * (cosine * towards + side * aside) - grows * ahead for side in (1.0, -1.0)], axis=-3)
+        normals = np.stack(
+            [root * (cosine * towards + side * aside) - grows * ahead for side in (1.0, -1.0)],
+            axis=-3,
+        )
         return middle[..., None, :, :] + radius[..., None, :, :] * normals, normals
 
     def _round_limb(self, centre_mm, radius_mm, stations):
@@ -159,7 +190,10 @@ class Rounded:
     def _stations(self, radius_mm, reach_mm, stations):
         """Of ring and cone: points (…, m, 3) of the middle, directions (…, m, 3) along it, radii (…, m, 1) of the balls
         there, and how those grow along it."""
-        point, axis = np.asarray(self.point_mm)[..., None, :], np.asarray(self.direction)[..., None, :]
+        point, axis = (
+            np.asarray(self.point_mm)[..., None, :],
+            np.asarray(self.direction)[..., None, :],
+        )
         foot = self.near(np.broadcast_to(self.spot_mm, self.point_mm.shape)[..., None, :]).foot_mm
         if self.form.shape == "ring":
             across = 0.5 * self.form.ring_diameter_mm
@@ -186,7 +220,9 @@ def nearer_by(axis: Rounded, points_mm: np.ndarray, towards: np.ndarray) -> np.n
     away = points_mm - local.foot_mm
     follows = axis.follows(local, away) * np.sum(towards * local.direction, axis=-1) ** 2
     bends = np.sum(towards**2, axis=-1) - follows
-    return np.clip(-np.sum(away * towards, axis=-1) / np.maximum(bends, _LEAST_BEND), -_LONGEST_MM, _LONGEST_MM)
+    return np.clip(
+        -np.sum(away * towards, axis=-1) / np.maximum(bends, _LEAST_BEND), -_LONGEST_MM, _LONGEST_MM
+    )
 
 
 def _unit(vectors):

@@ -22,7 +22,9 @@ def edges(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The two edges (n, 2) each of a rod's outline at points (n, 3) of its axis; directions (n, 3), unit."""
-    one, other = np.split(camera.project(np.concatenate(grazed(camera, points_mm, directions, radius_mm))), 2)
+    one, other = np.split(
+        camera.project(np.concatenate(grazed(camera, points_mm, directions, radius_mm))), 2
+    )
     return one, other
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from vision.geometry.camera import N_PARAMETERS, Cameras
 
-# Gauss–Newton from the meeting of rays converges quadratically; rays meet to a percent.
+# [steps] Gauss–Newton from the meeting of rays converges quadratically; rays meet to a percent.
+# Derived.
 _STEPS = 6
 
 
@@ -26,7 +27,9 @@ class Points:
         return self.noise_covariance + J @ cameras.covariance @ np.swapaxes(J, 1, 2)
 
 
-def triangulate(cameras: Cameras, px: Mapping[str, np.ndarray], sigma_px: Mapping[str, np.ndarray]) -> Points:
+def triangulate(
+    cameras: Cameras, px: Mapping[str, np.ndarray], sigma_px: Mapping[str, np.ndarray]
+) -> Points:
     """Least squares of the reprojection. px: per camera (n, 2), NaN where it does not see the point; sigma_px (n,)."""
     seen = {name: np.isfinite(px[name]).all(axis=1) for name in cameras.names}
     enough = np.sum([seen[name] for name in cameras.names], axis=0) > 1
@@ -43,7 +46,9 @@ def _meet(cameras: Cameras, px, seen) -> np.ndarray:
     """Where rays come nearest to each other, (n, 3)."""
     A, b = np.zeros((len(px[cameras.names[0]]), 3, 3)), np.zeros((len(px[cameras.names[0]]), 3))
     for camera in cameras:
-        rays = np.where(seen[camera.name][:, None], camera.rays(np.nan_to_num(px[camera.name])), 0.0)
+        rays = np.where(
+            seen[camera.name][:, None], camera.rays(np.nan_to_num(px[camera.name])), 0.0
+        )
         across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
         across = across * np.any(np.nan_to_num(rays) != 0, axis=1)[:, None, None]
         A, b = A + np.nan_to_num(across), b + np.nan_to_num(across) @ camera.centre_mm

@@ -6,8 +6,10 @@ from scipy.ndimage import uniform_filter
 from vision.geometry.robust import robust_sigma
 from vision.pictures.pixel_noise import Noise
 
-HALF = 2  # a coarse look needs no more
-_NOISE_SIGMAS, _SURE_SIGMAS = 3.0, 6.0  # no change up to here; and so much more is sure
+# [px] Every second pixel: a coarse look needs no more. Stated.
+HALF = 2
+# [sigmas] A difference up to here is no change, and by so much more it is a sure one. Set by eye.
+_NOISE_SIGMAS, _SURE_SIGMAS = 3.0, 6.0
 
 
 def changed(grey: np.ndarray, background: np.ndarray, noise: Noise) -> np.ndarray:

@@ -27,24 +27,42 @@ warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
 AS_STORED = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
 # What Pillow raises on headers that are damaged or absurd.
-_NO_HEADER = (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError, struct.error)
+_NO_HEADER = (
+    UnidentifiedImageError,
+    Image.DecompressionBombError,
+    OSError,
+    ValueError,
+    SyntaxError,
+    struct.error,
+)
 
-MOST_PIXELS = 2 * Image.MAX_IMAGE_PIXELS  # what Pillow takes for sound in a single picture
-_MOST_BYTES = 1 << 30  # a colour picture of 16 bit with as many pixels as Pillow takes for sound
+# [pixels] No larger page of a TIFF stack is decoded: what Pillow takes for sound in a single
+# picture. Stated.
+MOST_PIXELS = 2 * Image.MAX_IMAGE_PIXELS
+# [bytes] No larger file is read as a picture: a colour one of 16 bit with as many pixels as
+# Pillow takes for sound. Stated.
+_MOST_BYTES = 1 << 30
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
-_JPEG_TAIL_BYTES = 1024  # cameras pad the file after the end marker
+# [bytes] Cameras pad the file after the end marker. Stated.
+_JPEG_TAIL_BYTES = 1024
 
 
 def pictures_in(folder: Path) -> list[Path]:
     """The folder's pictures in natural order, without hidden files."""
-    files = (f for f in folder.iterdir() if f.suffix.lower() in PICTURE_SUFFIXES and f.name[0] != ".")
+    files = (
+        f for f in folder.iterdir() if f.suffix.lower() in PICTURE_SUFFIXES and f.name[0] != "."
+    )
     return sorted(files, key=natural_order)
 
 
 def natural_order(path: Path) -> list[tuple[int, int | str]]:
     """Sort key under which `img_2` comes before `img_10`."""
-    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"([0-9]+)", path.name) if part]
+    return [
+        (0, int(part)) if part.isdigit() else (1, part)
+        for part in re.split(r"([0-9]+)", path.name)
+        if part
+    ]
 
 
 def read_picture(path: Path) -> np.ndarray | None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.pictures.files import (
     AS_STORED,
     MOST_PIXELS,
@@ -31,7 +31,9 @@ from vision.pictures.files import (
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 # Pixel formats whose first plane is the grey picture, as OpenCV names them when asked not to convert.
-_PLANAR_GREY = frozenset({b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"})
+_PLANAR_GREY = frozenset(
+    {b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"}
+)
 
 
 class Frames(ABC):
@@ -68,7 +70,9 @@ class Frames(ABC):
     def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
         """Frames first to last − 1 as stored."""
 
-    def read(self, first: int = 0, last: int | None = None) -> Iterator[tuple[int, np.ndarray | None]]:
+    def read(
+        self, first: int = 0, last: int | None = None
+    ) -> Iterator[tuple[int, np.ndarray | None]]:
         """(index, grey) for frames first to last − 1 in order; grey is (height, width), uint8 or uint16.
 
         A damaged frame gives (index, None). Raises Refused where a frame has another size than `size_px`.
@@ -172,7 +176,9 @@ class Video(Frames):
             capture = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG)
             try:
                 if not capture.isOpened():
-                    raise Refused(f"{self.path.name} cannot be opened as a video: truncated, or not a video")
+                    raise Refused(
+                        f"{self.path.name} cannot be opened as a video: truncated, or not a video"
+                    )
                 yield capture
             finally:
                 capture.release()
@@ -208,7 +214,9 @@ class Video(Frames):
 
 def _grey_reader(capture: cv2.VideoCapture):
     """How to fetch the grabbed frame as grey: its first plane where that is grey, else from colour."""
-    pixel_format = _whole(capture, cv2.CAP_PROP_CODEC_PIXEL_FORMAT).to_bytes(4, "little", signed=True)
+    pixel_format = _whole(capture, cv2.CAP_PROP_CODEC_PIXEL_FORMAT).to_bytes(
+        4, "little", signed=True
+    )
     planar = pixel_format in _PLANAR_GREY
     capture.set(cv2.CAP_PROP_CONVERT_RGB, 0 if planar else 1)
     return _retrieve if planar else _retrieve_colour

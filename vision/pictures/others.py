@@ -6,11 +6,14 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vision.pictures.scale import shrunk_px
+from vision.pictures.pyramid import shrunk_px
 
-# Beside another rod's outline, px: two by which a first look is off, and three of a lens blur of a pixel.
+# [px] Beside another whisker's wire no pixel counts: the last of the first looks is off by 2 px
+# at most (six wires of a 2 × 3 array), and three of a lens blur of a pixel. With 4 or 9 a base
+# line moves by less than its sigma. Study: arrays_seen.py.
 BESIDE_ROD_PX = 5.0
-_PARTS, _PARTS_AS_SHIFT = 16, 4  # of a pixel, in which a line's nodes are drawn
+# [parts of a pixel, bits] A layout: how OpenCV takes fractions of a pixel. Derived.
+_PARTS, _PARTS_AS_SHIFT = 16, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +28,9 @@ class RodLines:
         """The same in shrunk pictures."""
         if scale == 1:
             return self
-        return replace(self, middle_px=shrunk_px(self.middle_px, scale), half_px=self.half_px / scale)
+        return replace(
+            self, middle_px=shrunk_px(self.middle_px, scale), half_px=self.half_px / scale
+        )
 
     def within(self, frame: int) -> np.ndarray:
         """Which rows (f,) are of a frame."""

@@ -6,8 +6,10 @@ import numpy as np
 
 from vision.geometry.robust import robust_sigma
 
-_CLASSES = 12  # of grey levels: enough for a line over them
-_LEAST_VARIANCE = 0.1  # grey levels²: that of rounding is 1/12
+# [classes] Of grey levels, of whose medians a line is made: enough for one. Stated.
+_CLASSES = 12
+# [grey levels²] That of rounding is 1/12. Derived.
+_LEAST_VARIANCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,20 @@ def noise_by_level(level: np.ndarray, deviation: np.ndarray) -> Noise:
     """Noise from absolute deviations at grey levels (both of any one shape), by medians in classes of equal grey."""
     edges = np.unique(np.quantile(level, np.linspace(0, 1, _CLASSES + 1)))
     classes = np.digitize(level, edges[1:-1])
-    rows = [(np.median(level[classes == k]), robust_sigma(deviation[classes == k]) ** 2, np.sum(classes == k))
-            for k in range(max(len(edges) - 1, 1)) if np.any(classes == k)]
+    rows = [
+        (
+            np.median(level[classes == k]),
+            robust_sigma(deviation[classes == k]) ** 2,
+            np.sum(classes == k),
+        )
+        for k in range(max(len(edges) - 1, 1))
+        if np.any(classes == k)
+    ]
     middle, variance, count = np.array(rows).T
     if len(middle) > 1 and np.ptp(middle) >= 1.0:
-        gain, floor = np.polyfit(middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, _LEAST_VARIANCE))
+        gain, floor = np.polyfit(
+            middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, _LEAST_VARIANCE)
+        )
         if gain > 0:
             return Noise(max(float(floor), _LEAST_VARIANCE), float(gain))
     return Noise(max(float(np.average(variance, weights=count)), _LEAST_VARIANCE), 0.0)

@@ -10,10 +10,18 @@ from vision.geometry.camera import Camera
 from vision.pictures.others import Others, RodLines, covered
 from vision.pictures.pixel_noise import Noise
 
-_SCALE_OF = 3  # frames: what is saturated is so in all of them
-SATURATED = 250.0 / 255.0  # of full scale: what the sensor cut off is not known
-MEAN_OF = 40  # frames: more would not make a still thing clearer
-_LEAST_CLEAR = 2  # frames that show a pixel without a rod: one is as noisy as a frame
+# [frames] Whose brightest pixel tells how many bits the sensor has: what is saturated is so in
+# all of them. Stated.
+_SCALE_OF = 3
+# [1] Of full scale: above, the sensor cut off and what it saw is not known. Five levels of 255
+# for a picture's compression; set by eye. Study: bar_scenes.py.
+SATURATED = 250.0 / 255.0
+# [frames] More would not make a still thing clearer: noise is down by 6.3. Derived.
+MEAN_OF = 40
+# [frames] That show a pixel of the bar clear of all wires: of a stroke that begins 3° before
+# touch, in steps of 0.5°, two to three show all of it. The noise of all pixels is taken to be
+# that of two. Study: arrays_seen.py.
+_LEAST_CLEAR = 2
 
 
 @dataclass(frozen=True)
@@ -31,7 +39,9 @@ class View:
     def some(self, most: int) -> list[np.ndarray]:
         """At most so many of the pictures, spread over all of them."""
         pictures = list(self.frames.values())
-        return [pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())]
+        return [
+            pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())
+        ]
 
     @cached_property
     def full_scale(self) -> float:
@@ -61,7 +71,10 @@ class View:
     def _mean_of_clear(self, rods: Others) -> np.ndarray:
         """Of pixels that a rod passes the median of clear frames, for where a rod is may be wrong in one of them."""
         frames = list(self.frames)
-        chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))]
+        chosen = [
+            frames[k]
+            for k in np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))
+        ]
         hidden = np.stack([covered(rods, frame, self.frames[frame].shape) for frame in chosen])
         passed = np.any(hidden, axis=0)
         mean = np.mean([self.frames[frame] for frame in chosen], axis=0, dtype=np.float32)

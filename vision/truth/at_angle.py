@@ -13,14 +13,30 @@ from scipy.special import chdtri, stdtrit
 
 from vision.truth.value import FIELDS, Value, WhileTouching
 
+# [rad] To either side of the wanted angle, of the local fit. Set by eye. Study: thresholds.py
+# truth.at_angle _WINDOW_RAD ….
 _WINDOW_RAD = np.radians(1.6)
-_JUMP_MM = 0.025  # a slip record that leaves its local fit by more is not smooth
+# [mm] A slip record that leaves its local fit by more is not smooth: stick and slip. Set by eye.
+# Study: thresholds.py truth.at_angle _JUMP_MM ….
+_JUMP_MM = 0.025
+# [rad] Past the last frame a value is still given. Set by eye. Study: thresholds.py
+# truth.at_angle _BEYOND_RAD ….
 _BEYOND_RAD = np.radians(0.3)
-_SURE_SIGMAS = 4.0  # of touch: which frames surely come before a wanted angle, one of 30 000 does not
-_CHANCE = 1e-3  # of frames that scatter as far as their sigmas let them
-Z_95 = 1.959964  # half an interval of 95 % of the normal distribution, in sigmas
-_FEWEST_FOR_PARABOLA = 5  # frames: two more than it has coefficients
-_FEWEST_FOR_SCATTER = 12  # frames: nine more than a parabola has coefficients, Student's t is 15 % above the normal
+# [sigma] Of touch: which frames surely come before a wanted angle; one in 30 000 does not.
+# Derived.
+# of touch: which frames surely come before a wanted angle, one of 30 000 does not
+_SURE_SIGMAS = 4.0
+# [share] Of frames that scatter so far about the local fit as their sigmas let them; beyond it is
+# small jumps, told by Student's t. Derived.
+_CHANCE = 1e-3
+# [sigma] Half an interval of 95 %. Derived.
+Z_95 = 1.959964
+# [frames] Two more than a parabola has coefficients; fewer get a line. Derived.
+_FEWEST_FOR_PARABOLA = 5
+# [frames] Nine more than a parabola has coefficients: Student's t is within 15 % of the normal
+# distribution there. Derived.
+# frames: nine more than a parabola has coefficients, Student's t is 15 % above the normal
+_FEWEST_FOR_SCATTER = 12
 
 
 _ANGLES = ("phi", "alpha")  # of FIELDS; the others are lengths
@@ -57,8 +73,12 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: str) -> TruthAtAn
         return TruthAtAngle(theta_rad=theta_rad, status=f"pushed to {reached:.2f} deg only")
     between = _about(smooth, theta_rad)
     jumps = _jumps(smooth, theta_rad)
-    values = {field: _between(smooth, name, theta_rad, between) if jumps else _value(smooth, name, theta_rad)
-              for name, field in FIELDS.items()}
+    values = {
+        field: _between(smooth, name, theta_rad, between)
+        if jumps
+        else _value(smooth, name, theta_rad)
+        for name, field in FIELDS.items()
+    }
     first, last = np.degrees(smooth.theta_rad[between][[0, -1]])
     status = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg" if jumps else ""
     return TruthAtAngle(theta_rad=theta_rad, **values, status=status)
@@ -85,8 +105,11 @@ def _about(smooth: Smooth, theta_rad: float) -> np.ndarray:
     order, count = np.argsort(smooth.theta_rad), len(smooth.theta_rad)
     rising, touch = smooth.theta_rad[order], smooth.touch_jacobian
     doubt = _SURE_SIGMAS * float(np.sqrt(max(touch @ smooth.covariance @ touch, 0.0)))
-    first, last = np.searchsorted(rising, theta_rad - doubt) - 1, np.searchsorted(rising, theta_rad + doubt)
-    return order[max(min(first, count - 2), 0):max(last, 1) + 1]
+    first, last = (
+        np.searchsorted(rising, theta_rad - doubt) - 1,
+        np.searchsorted(rising, theta_rad + doubt),
+    )
+    return order[max(min(first, count - 2), 0) : max(last, 1) + 1]
 
 
 def _between(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarray) -> Value:
@@ -98,8 +121,10 @@ def _between(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarray) ->
     half, freedom = 0.5 * float(np.ptp(slip[frames])), max(len(rows) - rows.shape[1], 1)
     left = np.sum((values[near] - rows @ by) ** 2) / freedom
     sigma = np.max(_sigmas(smooth, name, frames, by[1]))
-    return Value(float(by @ [1.0, 0.0, np.min(slip[frames]) + half]),
-                 float(np.sqrt((by[2] * half) ** 2 + left + sigma**2)))
+    return Value(
+        float(by @ [1.0, 0.0, np.min(slip[frames]) + half]),
+        float(np.sqrt((by[2] * half) ** 2 + left + sigma**2)),
+    )
 
 
 def _local_fit(theta, at):
@@ -120,7 +145,10 @@ def _scatter(smooth: Smooth, name: str, theta_rad: float) -> float:
     hardly leaves them that far, small jumps do: each frame's own moves the fit, too, and so few frames tell their size
     by Student's t only."""
     found = scatter(smooth, name, theta_rad)
-    if not found.freedom or found.freedom * found.left**2 <= chdtri(found.freedom, _CHANCE) * found.expected**2:
+    if (
+        not found.freedom
+        or found.freedom * found.left**2 <= chdtri(found.freedom, _CHANCE) * found.expected**2
+    ):
         return found.left
     weights = _local_fit(smooth.theta_rad, theta_rad)[0] * _share(smooth, name, theta_rad)
     of_jumps = (found.left**2 - found.expected**2) * (1.0 + weights @ weights)
@@ -155,11 +183,18 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
     weights = 1.0 / np.sqrt(np.diag(covariance))
     design = weights[:, None] * np.vander(smooth.theta_rad[near] / theta_rad - 1.0, degree + 1)
     off = np.eye(len(design)) - design @ np.linalg.pinv(design)
-    left, by_noise = off @ (weights * grows * smooth.values[name][near]), off * np.outer(weights, weights) * covariance
+    left, by_noise = (
+        off @ (weights * grows * smooth.values[name][near]),
+        off * np.outer(weights, weights) * covariance,
+    )
     alike = off * weights**2
     total = np.trace(alike)
     freedom = total**2 / np.sum(alike * alike.T)
-    return Scatter(float(np.sqrt(left @ left / total)), float(np.sqrt(np.sum(by_noise) / total)), float(freedom))
+    return Scatter(
+        float(np.sqrt(left @ left / total)),
+        float(np.sqrt(np.sum(by_noise) / total)),
+        float(freedom),
+    )
 
 
 def _share(smooth: Smooth, name: str, theta_rad: float) -> np.ndarray:

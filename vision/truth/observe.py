@@ -12,8 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.bar.search import SeenBar, see_bar
-from vision.bar.width import seen_over_given
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.first_bends import contact_arc
@@ -25,31 +23,39 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
 from vision.geometry.contact import drawn_as_bar
 from vision.geometry.counted import counted
-from vision.geometry.errors import Misled, Refused, TooFewFrames
+from vision.geometry.refusals import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire
-from vision.geometry.settings import VisionSettings
-from vision.lines.one_sided import one_sided_lines
-from vision.lines.trace import lines_of
+from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.others import RodLines
-from vision.pictures.scale import shrunk_cameras
+from vision.pictures.pyramid import shrunk_cameras
 from vision.pictures.view import View
+from vision.touched.search import SeenBar, see_bar
+from vision.touched.width import seen_over_given
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
-from vision.truth.rows import to_whisk
 from vision.truth.trial_pictures import TrialPictures
+from vision.truth.truth_rows import to_whisk
 from vision.truth.value import Value
-from vision.truth.whisk import coarse_shapes, fit_whisk, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_truth import coarse_shapes, fit_whisk, free_stroke
 from vision.truth.wire_end import wire_ends
 from vision.truth.wire_width import wire_looks
+from vision.wire.one_sided import one_sided_lines
+from vision.wire.trace import lines_of
 
+# [frames] Of a whisk that every camera sees: two of free stroke, two that touch. Derived.
 _FEWEST_FRAMES = 4
 
 _USUAL = VisionSettings()
 
 
-def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
-                  settings: VisionSettings = _USUAL) -> TrialTruth:
+def observe_trial(
+    pictures: TrialPictures,
+    whisks: Sequence[slice],
+    cameras: Cameras,
+    rods: Rods,
+    settings: VisionSettings = _USUAL,
+) -> TrialTruth:
     """Truth of a trial: bar, first touch, contact and slip in each whisk.
 
     whisks: slices of frame indices, one a forward stroke. What keeps a whisk from having a truth is its status; raises
@@ -66,12 +72,21 @@ def observe_trial(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cam
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 
 
-def wire_lines(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
-               settings: VisionSettings = _USUAL) -> dict[str, RodLines]:
+def wire_lines(
+    pictures: TrialPictures,
+    whisks: Sequence[slice],
+    cameras: Cameras,
+    rods: Rods,
+    settings: VisionSettings = _USUAL,
+) -> dict[str, RodLines]:
     """Where the wire is in the pictures of each camera, by a first look, to a pixel or two; straight, as the motor has
     it, in whisks in which it is not seen. Arguments and errors as of `observe_trial`."""
     seen, _, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
-    curves = {frame: curve for whisk in seen for frame, curve in _first_curves(whisk.without_gaps()).items()}
+    curves = {
+        frame: curve
+        for whisk in seen
+        for frame, curve in _first_curves(whisk.without_gaps()).items()
+    }
     return {view.camera.name: lines_of(view.camera, rods.wire, curves) for view in stands if curves}
 
 
@@ -86,36 +101,69 @@ def _first_curves(whisk: WhiskPictures) -> dict[int, Curves]:
     return {f: one_curve(rest, bends[f], arcs[f], motor, wire) for f, motor in whisk.motor.items()}
 
 
-def _whisks_of(pictures: TrialPictures, whisks: Sequence[slice], cameras: Cameras, rods: Rods,
-               settings: VisionSettings) -> tuple[list[WhiskPictures], SeenBar, Sequence[View]]:
+def _whisks_of(
+    pictures: TrialPictures,
+    whisks: Sequence[slice],
+    cameras: Cameras,
+    rods: Rods,
+    settings: VisionSettings,
+) -> tuple[list[WhiskPictures], SeenBar, Sequence[View]]:
     """The whisks with all that is known before a wire is looked for, the bar, and views in which it stands. Raises
     Refused."""
-    pictures, cameras = pictures.shrunk(settings.picture_scale), shrunk_cameras(cameras, settings.picture_scale)
-    time_s, motor_rad = (np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad))
+    pictures, cameras = (
+        pictures.shrunk(settings.picture_scale),
+        shrunk_cameras(cameras, settings.picture_scale),
+    )
+    time_s, motor_rad = (
+        np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad)
+    )
     cameras, behind = _that_face_it(cameras, rods.wire, motor_rad)
     views = pictures.views(cameras)
     used = cameras.subset([view.camera.name for view in views])
-    strokes = [range(*where.indices(len(time_s)))[::settings.every_frame] for where in whisks]
+    strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
     told, stands = _told(pictures, strokes, views, rods.bar.form is not None)
     bar_seen = see_bar(stands, used, rods, motor_rad, settings)
     gives = Gives() if pictures.object_gives_way else None
-    return [WhiskPictures(number, stroke, time_s, motor_rad, views, used, rods, bar_seen, settings,
-                          left_out=tuple(behind), told=told, gives=gives)
-            for number, stroke in enumerate(strokes)], bar_seen, stands
+    return (
+        [
+            WhiskPictures(
+                number,
+                stroke,
+                time_s,
+                motor_rad,
+                views,
+                used,
+                rods,
+                bar_seen,
+                settings,
+                left_out=tuple(behind),
+                told=told,
+                gives=gives,
+            )
+            for number, stroke in enumerate(strokes)
+        ],
+        bar_seen,
+        stands,
+    )
 
 
-def _told(pictures: TrialPictures, strokes, views: Sequence[View],
-          is_rounded: bool) -> tuple[Told | None, Sequence[View]]:
+def _told(
+    pictures: TrialPictures, strokes, views: Sequence[View], is_rounded: bool
+) -> tuple[Told | None, Sequence[View]]:
     """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
     stands: of that frame alone. Raises Refused for what is not told of it."""
     if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):
-        raise Refused("an object that moves or gives way is seen where it is a straight bar; this one is none")
+        raise Refused(
+            "an object that moves or gives way is seen where it is a straight bar; this one is none"
+        )
     if pictures.object_gives_way:
         return None, _at_first(views, strokes)
     if pictures.object_velocity_mm_s is None:
         return None, views
     if len(strokes) != 1:
-        raise Refused("an object that moves is seen in recordings of one whisk; record each by itself")
+        raise Refused(
+            "an object that moves is seen in recordings of one whisk; record each by itself"
+        )
     both = [frame for frame in strokes[0] if all(frame in view.frames for view in views)]
     if not both:
         raise Refused("no frame is seen by every camera")
@@ -140,8 +188,11 @@ def _nothing(whisks, reason: str) -> TrialTruth:
 def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, list[str]]:
     """The cameras that have the whisker before them, and lines on the others. Raises Refused where none has."""
     faces = {camera.name: is_before(camera, wire, motor_rad) for camera in cameras}
-    lines = [f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig"
-             for name, faced in faces.items() if not faced]
+    lines = [
+        f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig"
+        for name, faced in faces.items()
+        if not faced
+    ]
     if not any(faces.values()):
         raise Refused("; ".join(lines))
     return cameras.subset([name for name, faced in faces.items() if faced]), lines
@@ -172,14 +223,22 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
 
 
 def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
-    return WhiskTruth(whisk.number, None, cameras=len(whisk.views), frames_used=len(whisk.frames),
-                      status="; ".join([status, *whisk.left_out]))
+    return WhiskTruth(
+        whisk.number,
+        None,
+        cameras=len(whisk.views),
+        frames_used=len(whisk.frames),
+        status="; ".join([status, *whisk.left_out]),
+    )
 
 
 def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
     whisk = whisk.yielding_as(fitted.problem, fitted.state)
-    truth, unexplained = to_whisk(whisk, fitted), [looks.doubt(name) for name, looks in whisk.light.items()]
+    truth, unexplained = (
+        to_whisk(whisk, fitted),
+        [looks.doubt(name) for name, looks in whisk.light.items()],
+    )
     beam = _beam(fitted) if whisk.settings.check_beam else None
     without = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
     stroke = fitted.problem, fitted.state
@@ -190,13 +249,26 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
     looks = wire_looks(whisk, fitted) if whisk.settings.check_beam and whisk.number == 0 else {}
-    told = {"base": base, "beam": beam, "turns": turns, "refinements": without, "ends": ends, "looks": looks}
+    told = {
+        "base": base,
+        "beam": beam,
+        "turns": turns,
+        "refinements": without,
+        "ends": ends,
+        "looks": looks,
+    }
     return replace(truth, **told, status=status)
 
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:
     """What the truth would be without each; nothing where the fit does not tell."""
-    fit = Fit(fitted.problem, fitted.state, fitted.uncertainty.answer, fitted.measured, fitted.by_parameter)
+    fit = Fit(
+        fitted.problem,
+        fitted.state,
+        fitted.uncertainty.answer,
+        fitted.measured,
+        fitted.by_parameter,
+    )
     try:
         return left_out(fit, whisk.light)
     except np.linalg.LinAlgError:
@@ -204,4 +276,6 @@ def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut
 
 
 def _beam(fitted: FittedWhisk) -> BeamCheck:
-    return check_beam(fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter)
+    return check_beam(
+        fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter
+    )

@@ -9,33 +9,49 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vision.bar.edges import measure_edges
-from vision.bar.limb import Limb, measure_limbs
-from vision.bar.line import BarLine, measure_bars
-from vision.bar.one_view import seen_from_one_side
 from vision.fit.problem import Problem, State
 from vision.fit.solve import solve
-from vision.fit.touch import FEWEST_FREE, bends_tell_more, frames_by_touch, frames_that_touch, touch_and_sigma
+from vision.fit.touch import (
+    FEWEST_FREE,
+    bends_tell_more,
+    frames_by_touch,
+    frames_that_touch,
+    touch_and_sigma,
+)
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rounded import Rounded
-from vision.geometry.settings import VisionSettings
-from vision.lines.points import LinePoints
+from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
+from vision.touched.edges import measure_edges
+from vision.touched.limb import Limb, measure_limbs
+from vision.touched.line import BarLine, measure_bars
+from vision.touched.one_view import seen_from_one_side
 from vision.truth.whisk_pictures import WhiskPictures
+from vision.wire.points import LinePoints
 
-# Frames from so far before touch on make the truth, four at least: light on a whisker that stands farther away is
-# another, and what its line is off by does not cancel in the differences. Those frames tell where the rig is.
+# [rad, frames] Frames from so far before touch on make the truth, four at least: a whisker that
+# stands farther away is lit otherwise, and what its line is off by does not cancel in the
+# differences. Strokes of 24° taken whole erred in slip by 0.02 mm, ten of its sigmas. Study:
+# thresholds.py truth.strategies _NEAR_TOUCH_RAD ….
 _NEAR_TOUCH_RAD, _FEWEST_NEAR = np.radians(3.5), 4
-_EARLY_PARTS = 7.0  # the first of so many parts of a stroke is taken as free before anything is known
-_OFF_PX = 3.0  # how far off an outline may be that was settled by rough edges
-# Logarithm of how much more probable an outline's edges are than edges anywhere: places that are none say 2 (once, of a
-# ring seen from its edge), others 3.8 and more (tests/ladder/rounded_seen.py).
+# [1] The first of so many parts of a stroke, two frames at least, is taken as free before
+# anything is known. Set by eye. Study: thresholds.py truth.strategies _EARLY_PARTS ….
+# the first of so many parts of a stroke is taken as free before anything is known
+_EARLY_PARTS = 7.0
+# [px] How far off an outline may be that was settled by rough edges. Stated.
+_OFF_PX = 3.0
+# [nats] How much more probable an outline's edges are than edges anywhere, in all cameras: a
+# wrong place said 2, true ones 3.8 to 7.9. Study: rounded_seen.py.
 _LEAST_SAID = 3.0
-_ASKED = 4  # stretches: of fewer none may stand out
-_LEAST_SIGHTS_RAD = np.radians(8.0)  # two sights nearer to each other tell no place along them
+# [stretches] Of an outline: a camera that is asked for so many and shows none contradicts the
+# others, as one did that had a cone upside down. Study: rounded_seen.py.
+_ASKED = 4
+# [rad] Two sights nearer to each other tell no place along them, as planes through a bar do
+# (`_NARROW_RAD`). Stated.
+_LEAST_SIGHTS_RAD = np.radians(8.0)
 NEVER_TOUCHES = "the whisker never touches"
 STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
 
@@ -51,8 +67,9 @@ class BarMiddles:
     lines: dict[str, BarLine] = field(default_factory=dict)
     are_fine: bool = False
 
-    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *,
-               last: bool) -> dict[str, dict[int, LinePoints]]:
+    def points(
+        self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *, last: bool
+    ) -> dict[str, dict[int, LinePoints]]:
         """By camera and side of the bar (0: its middle, see `Observed`), about an axis. See `measure_bars`.
 
         last: nothing is measured after it, so it is finely, too, where it is the first.
@@ -60,15 +77,26 @@ class BarMiddles:
         looks = 0 if self.are_fine else 2 if last and not self.lines else 1
         for _ in range(looks):
             self.are_fine = bool(self.lines)
-            self.lines = measure_bars(self.views, axis, self.radius_mm, wires_px, self.settings, self.lines)
+            self.lines = measure_bars(
+                self.views, axis, self.radius_mm, wires_px, self.settings, self.lines
+            )
         return {name: {0: line.points} for name, line in self.lines.items() if line.is_bar}
 
-    def observed(self, axis: BarAxis, came_mm: np.ndarray, frames: Sequence[int],
-                 wires_px: Mapping[str, Sequence[np.ndarray]], *,
-                 last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
+    def observed(
+        self,
+        axis: BarAxis,
+        came_mm: np.ndarray,
+        frames: Sequence[int],
+        wires_px: Mapping[str, Sequence[np.ndarray]],
+        *,
+        last: bool,
+    ) -> dict[str, list[tuple[int, int, LinePoints]]]:
         """By camera (frame of the fit, side, points) of the bar's lines; one that stands is seen in no frame alone."""
         seen = self.points(axis, wires_px, last=last)
-        return {name: [(0, side, points) for side, points in sides.items()] for name, sides in seen.items()}
+        return {
+            name: [(0, side, points) for side, points in sides.items()]
+            for name, sides in seen.items()
+        }
 
 
 @dataclass
@@ -81,28 +109,42 @@ class Outline:
     settings: VisionSettings
     limbs: dict[str, Limb] = field(default_factory=dict)
 
-    def observed(self, axis: Rounded, came_mm: np.ndarray, frames: Sequence[int],
-                 wires_px: Mapping[str, Sequence[np.ndarray]], *,
-                 last: bool) -> dict[str, list[tuple[int, int, LinePoints]]]:
+    def observed(
+        self,
+        axis: Rounded,
+        came_mm: np.ndarray,
+        frames: Sequence[int],
+        wires_px: Mapping[str, Sequence[np.ndarray]],
+        *,
+        last: bool,
+    ) -> dict[str, list[tuple[int, int, LinePoints]]]:
         """As `BarMiddles.observed`; all points are of an edge, against what lies within. Raises Refused where no
         outline is clear, or a camera contradicts the others."""
         for _ in range(2 if last and not self.limbs else 1):
-            self.limbs = measure_limbs(self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX,
-                                       self.limbs)
+            self.limbs = measure_limbs(
+                self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX, self.limbs
+            )
         for name, limb in self.limbs.items():
             if limb.asked >= _ASKED and not len(limb.points):
-                raise Refused(f"camera {name} shows no edge of the object where the other cameras have it")
+                raise Refused(
+                    f"camera {name} shows no edge of the object where the other cameras have it"
+                )
         if sum(limb.said for limb in self.limbs.values()) < _LEAST_SAID:
-            raise Refused("no clear outline of the object is seen: too little of its edges stands out")
-        return {name: [(0, 1, limb.points)] for name, limb in self.limbs.items() if len(limb.points)}
+            raise Refused(
+                "no clear outline of the object is seen: too little of its edges stands out"
+            )
+        return {
+            name: [(0, 1, limb.points)] for name, limb in self.limbs.items() if len(limb.points)
+        }
 
 
 class BarEdges(BarMiddles):
     """The bar by its two edges (sides -1 and 1), which tell how far away it is; by its middle where these are not
     seen."""
 
-    def points(self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *,
-               last: bool) -> dict[str, dict[int, LinePoints]]:
+    def points(
+        self, axis: BarAxis, wires_px: Mapping[str, Sequence[np.ndarray]], *, last: bool
+    ) -> dict[str, dict[int, LinePoints]]:
         """See `BarMiddles.points`."""
         found = super().points(axis, wires_px, last=last)
         for view in self.views:
@@ -125,7 +167,9 @@ class TouchByClearance:
         if not np.any(touching):
             return list(motor)
         first = int(np.argmax(touching))
-        begin = min(int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0))
+        begin = min(
+            int(np.argmax(angles > angles[first] - _NEAR_TOUCH_RAD)), max(first - _FEWEST_NEAR, 0)
+        )
         return list(motor)[begin:]
 
     def first(self, motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -135,11 +179,15 @@ class TouchByClearance:
             raise Refused(NEVER_TOUCHES)
         return touching, free
 
-    def settled(self, problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
+    def settled(
+        self, problem: Problem, state: State, covariance: np.ndarray
+    ) -> tuple[Problem, State]:
         """Problem and state with what the fit tells of touch, from its covariance (size, size)."""
         return problem, state
 
-    def parted(self, problem: Problem, state: State, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def parted(
+        self, problem: Problem, state: State, answer: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """`first` once more, by a fit. answer (size, size): how its parameters answer. Raises Refused."""
         touch_rad, sigma_rad = touch_and_sigma(problem, state.vector, answer)
         touching, free = frames_by_touch(problem.motor_rad, touch_rad, sigma_rad)
@@ -168,12 +216,16 @@ class TouchByOnset:
         free = early(motor_rad)
         return frames_that_touch(motor_rad, bend_rad)[0] & ~free, free
 
-    def settled(self, problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
+    def settled(
+        self, problem: Problem, state: State, covariance: np.ndarray
+    ) -> tuple[Problem, State]:
         """The fit with the onset of bending in place of the frames that were taken to touch."""
         problem, state = touch_by_onset(problem, state, covariance)
         return problem, solve(problem, state)[0]
 
-    def parted(self, problem: Problem, state: State, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def parted(
+        self, problem: Problem, state: State, answer: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The frames after the onset, and again the first part of the stroke."""
         return problem.touching, early(problem.motor_rad)
 
@@ -190,14 +242,20 @@ def ways_to_see(whisk: WhiskPictures) -> list[tuple[BarMiddles, Touch]]:
     cameras, radius_mm = whisk.cameras, whisk.rods.bar.radius_mm
     if isinstance(whisk.bar.axis, Rounded):
         if widest_sights_rad(cameras, whisk.bar.axis.spot_mm) < _LEAST_SIGHTS_RAD:
-            raise Refused("an object that is no straight bar is seen by two cameras or more, from different sides")
-        return [(Outline(whisk.views, radius_mm, whisk.settings), TouchByClearance(fewest_cameras=2))]
+            raise Refused(
+                "an object that is no straight bar is seen by two cameras or more, from different sides"
+            )
+        return [
+            (Outline(whisk.views, radius_mm, whisk.settings), TouchByClearance(fewest_cameras=2))
+        ]
     seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
     if seen_from_one_side(cameras, whisk.bar.axis):
         return [(BarEdges(seeing or whisk.views, radius_mm, whisk.settings), TouchByOnset())]
     if len(seeing) == 1:
-        return [(BarEdges(seeing, radius_mm, whisk.settings), touch)
-                for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())]
+        return [
+            (BarEdges(seeing, radius_mm, whisk.settings), touch)
+            for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())
+        ]
     return [(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
 
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vision.geometry.camera import Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.pictures.others import Others, RodLines
 from vision.pictures.pixel_noise import measure_noise
-from vision.pictures.scale import shrunk_frames, shrunk_picture
+from vision.pictures.pyramid import shrunk_frames, shrunk_picture
 from vision.pictures.view import View
 
-_FEWEST_PICTURES = 3  # two tell the noise, a third what moves
+# [pictures] Of a camera that is asked: two tell the noise, a third what moves. Derived.
+_FEWEST_PICTURES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +37,24 @@ class TrialPictures:
     def shrunk(self, scale: int) -> "TrialPictures":
         """The same with pixels `scale` times as wide."""
         behind = self.background.items()
-        background = {name: None if empty is None else shrunk_picture(empty, scale) for name, empty in behind}
-        others = {name: {rod: lines.shrunk(scale) for rod, lines in some.items()} for name, some in self.others.items()}
+        background = {
+            name: None if empty is None else shrunk_picture(empty, scale) for name, empty in behind
+        }
+        others = {
+            name: {rod: lines.shrunk(scale) for rod, lines in some.items()}
+            for name, some in self.others.items()
+        }
         itself = {name: lines.shrunk(scale) for name, lines in self.itself.items()}
         frames = shrunk_frames(self.frames, scale)
         return replace(self, frames=frames, background=background, others=others, itself=itself)
 
     def views(self, cameras: Cameras) -> tuple[View, ...]:
         """What each camera that has three pictures or more shows. Raises Refused where none has."""
-        views = tuple(self._view(camera) for camera in cameras
-                      if len(self.frames.get(camera.name, ())) >= _FEWEST_PICTURES)
+        views = tuple(
+            self._view(camera)
+            for camera in cameras
+            if len(self.frames.get(camera.name, ())) >= _FEWEST_PICTURES
+        )
         if not views:
             raise Refused("no camera has three frames or more")
         return views

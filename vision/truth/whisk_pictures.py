@@ -6,25 +6,31 @@ from functools import cached_property
 
 import numpy as np
 
-from vision.bar.search import SeenBar
+from vision.fit.bend_onset import Onset
+from vision.fit.covariance import Uncertainty, uncertainty
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, Told, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.onset import Onset
 from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.touch import first_touch
-from vision.fit.uncertainty import Uncertainty, uncertainty
 from vision.geometry.camera import Cameras
 from vision.geometry.rods import Rods
-from vision.geometry.settings import VisionSettings
-from vision.lines.one_sided import WireAppearance
+from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
+from vision.touched.search import SeenBar
 from vision.truth.value import Value
+from vision.wire.one_sided import WireAppearance
 
-_EXACT_RAD = 1e-6  # a tenth of a micrometre where it touches: less than the contact's own sigma
-_LEAST_SPAN_RAD = 1e-4  # of a whisk that ends at touch: there is nothing to divide by
-_FEWEST_SHARE = 0.7  # of the frames that the best camera has: a camera with fewer costs more than it tells
+# [rad] A bar begins to give way at touch: a tenth of a micrometre there, less than the contact's
+# own sigma. Derived.
+_EXACT_RAD = 1e-6
+# [rad] Of a whisk that ends at touch, so that nothing is divided by 0. Derived.
+_LEAST_SPAN_RAD = 1e-4
+# [1] Of the frames that the best camera has: a camera with fewer costs more than it tells. Set by
+# eye. Study: thresholds.py truth.whisk_pictures _FEWEST_SHARE ….
+# of the frames that the best camera has: a camera with fewer costs more than it tells
+_FEWEST_SHARE = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +73,9 @@ class WhiskPictures:
         if self.gives is None:
             return self
         span_rad = max(float(self.angles_rad.max()) - touch_rad, _LEAST_SPAN_RAD)
-        return replace(self, gives=Gives(touch_rad, span_rad, float(np.linalg.norm(came_mm, axis=1).max())))
+        return replace(
+            self, gives=Gives(touch_rad, span_rad, float(np.linalg.norm(came_mm, axis=1).max()))
+        )
 
     def yielding_as(self, problem: Problem, state: State) -> "WhiskPictures":
         """`yielding` by a fit."""
@@ -81,7 +89,11 @@ class WhiskPictures:
         """Radius about its axis within which the bar stays through the whisk."""
         if self.gives is not None:
             return self.rods.bar.radius_mm + self.gives.most_mm
-        moved = 0.0 if self.told is None else float(np.linalg.norm(self.motion.told_mm, axis=1).max(initial=0.0))
+        moved = (
+            0.0
+            if self.told is None
+            else float(np.linalg.norm(self.motion.told_mm, axis=1).max(initial=0.0))
+        )
         return self.rods.bar.radius_mm + moved
 
     @cached_property
@@ -115,10 +127,20 @@ class WhiskPictures:
 
     def without_gaps(self) -> "WhiskPictures":
         """The whisk by the cameras that have most of its frames: one camera's gaps are not all cameras'."""
-        counts = {view.camera.name: sum(f in view.frames for f in self.indices) for view in self.views}
-        few = [name for name, count in counts.items() if count <= _FEWEST_SHARE * max(counts.values())]
-        lines = (f"camera {name} was left out: {counts[name]} frames of {len(self.indices)}" for name in few)
-        return replace(self._by([name for name in counts if name not in few]), left_out=(*lines, *self.left_out))
+        counts = {
+            view.camera.name: sum(f in view.frames for f in self.indices) for view in self.views
+        }
+        few = [
+            name for name, count in counts.items() if count <= _FEWEST_SHARE * max(counts.values())
+        ]
+        lines = (
+            f"camera {name} was left out: {counts[name]} frames of {len(self.indices)}"
+            for name in few
+        )
+        return replace(
+            self._by([name for name in counts if name not in few]),
+            left_out=(*lines, *self.left_out),
+        )
 
     def without(self, camera: str, line: str) -> "WhiskPictures":
         """The whisk by the other cameras, and a line on why."""
@@ -142,10 +164,14 @@ class FittedWhisk:
     by_parameter: Jacobians
 
     @classmethod
-    def of(cls, problem: Problem, state: State, answer: np.ndarray, frames: list[int]) -> "FittedWhisk":
+    def of(
+        cls, problem: Problem, state: State, answer: np.ndarray, frames: list[int]
+    ) -> "FittedWhisk":
         """answer (size, size): how the parameters answer the observations (see `Uncertainty`)."""
         measured, by_parameter = jacobians(problem, state)
-        return cls(problem, state, frames, uncertainty(problem, state, answer), measured, by_parameter)
+        return cls(
+            problem, state, frames, uncertainty(problem, state, answer), measured, by_parameter
+        )
 
     @cached_property
     def exposure(self) -> Exposure:
@@ -166,7 +192,9 @@ class FittedWhisk:
     def of_whisk(self, name: str) -> Value:
         """A quantity of the whole whisk by its name."""
         gradient = self.by_parameter.whisk[name]
-        return Value(float(self.measured.whisk[name]), float(np.sqrt(gradient @ self.covariance @ gradient)))
+        return Value(
+            float(self.measured.whisk[name]), float(np.sqrt(gradient @ self.covariance @ gradient))
+        )
 
     def of_frames(self, name: str) -> Value:
         """A quantity of each frame (f,) by its name."""

@@ -14,19 +14,30 @@ from vision.fit.problem import curves_of
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import outline_of_bar
-from vision.lines.bands import Pieces
-from vision.lines.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 from vision.pictures.view import View, median_of
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.wire.bands import Pieces
+from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 
-_REACH = 1.6  # of the stated length, so far on
-_LOOKS = 8  # frames: the wire is in another place in each
-_PIECE_PX, _FLANK_PX, _GAP_PX = 4, 5, 2  # along the wire; beside it on each hand; between it and these
+# [lengths] How far on a longer wire is looked for; one still longer is told as this long at
+# least. Stated.
+_REACH = 1.6
+# [frames] The wire stands in another place in each, so that nothing behind it passes for it in
+# all. Stated.
+_LOOKS = 8
+# [px] Along the wire; beside it on each hand; between it and these, where its blur ends. Stated.
+_PIECE_PX, _FLANK_PX, _GAP_PX = 4, 5, 2
+# [px] Nearer to the bar's outline the bar is taken for wire, as in `first_bends.py`. Stated.
 _BESIDE_BAR_PX = 8.0
+# [mm] Of the evidence along the wire, and the sigma of an end: finer than lengths are stated
+# wrong. Study: wire_ends.py.
 _BIN_MM = 2.0
-_LEAST = np.log(2.0)  # evidence of a wire that stands out at all: twice what is beside it
-_BEYOND_MM = 10.0  # so much without a wire has to be in the picture
+# [1] A wire differs twice as much from what is behind it as what is beside it, or its end is not
+# told. Study: wire_ends.py.
+_LEAST = np.log(2.0)
+# [mm] Without a wire behind its end: less may be a dark place. Stated.
+_BEYOND_MM = 10.0
 
 
 def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
@@ -36,7 +47,9 @@ def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     if wire.taper_per_mm > 0.0:
         return {}
     curves = _some_curves(fitted, _REACH * wire.length_mm)
-    told = ((view.camera.name, _end(*_seen_along(view, whisk, curves), sure_mm)) for view in whisk.views)
+    told = (
+        (view.camera.name, _end(*_seen_along(view, whisk, curves), sure_mm)) for view in whisk.views
+    )
     return {name: end for name, end in told if end is not None}
 
 
@@ -61,14 +74,20 @@ def _in_picture_mm(camera: Camera, curves: Mapping[int, Curves], least_mm: float
     """Up to where curves stay in a picture, mm, least_mm at least: beyond, they may come up to the camera."""
     arc = next(iter(curves.values())).arc_mm
     px = np.stack([camera.project(curve.points_mm) for curve in curves.values()])
-    out = (arc > least_mm) & ~np.all((px >= 0.0) & (px <= np.array(camera.size_px) - 1.0), axis=(0, 2))
+    out = (arc > least_mm) & ~np.all(
+        (px >= 0.0) & (px <= np.array(camera.size_px) - 1.0), axis=(0, 2)
+    )
     return float(arc[np.argmax(out) - 1]) if np.any(out) else float(arc[-1])
 
 
-def _seen_along(view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]) -> tuple[np.ndarray, np.ndarray]:
+def _seen_along(
+    view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]
+) -> tuple[np.ndarray, np.ndarray]:
     """Places (b,) along the wire, mm, clear of hub and bar, and the evidence of it in one camera there."""
     length_mm = whisk.rods.wire.length_mm
-    wire = replace(whisk.rods.wire, length_mm=max(length_mm, _in_picture_mm(view.camera, curves, length_mm)))
+    wire = replace(
+        whisk.rods.wire, length_mm=max(length_mm, _in_picture_mm(view.camera, curves, length_mm))
+    )
     still = median_of([view.frames[frame] for frame in curves])
     pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, still)
     outline = outline_of_bar(view.camera, whisk.bar.axis, whisk.bar_swept_mm)
@@ -98,7 +117,9 @@ def _binned(place_mm, evidence) -> tuple[np.ndarray, np.ndarray]:
     known = np.isfinite(evidence) & (place_mm > NEAR_CLAMP_MM)
     number = np.floor(place_mm[known] / _BIN_MM).astype(int)
     bins = np.unique(number)
-    return (bins + 0.5) * _BIN_MM, np.array([np.median(evidence[known][number == one]) for one in bins])
+    return (bins + 0.5) * _BIN_MM, np.array(
+        [np.median(evidence[known][number == one]) for one in bins]
+    )
 
 
 def _end(place_mm, evidence, sure_mm: float) -> Value | None:

@@ -3,14 +3,15 @@
 import numpy as np
 
 from vision.fit.problem import bar_axis, curves_of
-from vision.lines.rod_width import log_width
 from vision.truth.value import Value
-from vision.truth.whisk import clear_pieces, wire_knots
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_truth import clear_pieces, wire_knots
+from vision.wire.rod_width import log_width
 
-_LOOKS = 4  # frames: the wire is before another background in each
-# By so much its half-width may look less than it is by what no model of light and lens has: in 25 views with the stated
-# diameter by 0.4 px at most. It may look more than it is by 0.7 px: shadows beside it, bloom, movement.
+# [frames] Of which the width is told: the wire is before another background in each. Derived.
+_LOOKS = 4
+# [px] By so much the half-width may look off by what no model of light and lens has. Study:
+# docs/truth.md.
 LIGHT_PX = 0.25
 
 
@@ -18,7 +19,10 @@ def wire_looks(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     """How thick the wire looks over how thick it is said to be, by camera, of those that tell."""
     chosen = np.unique(np.linspace(0, len(fitted.frames) - 1, _LOOKS).astype(int)).tolist()
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    axis, some = bar_axis(fitted.problem, fitted.state.vector), {fitted.frames[k]: curves.one(k) for k in chosen}
+    axis, some = (
+        bar_axis(fitted.problem, fitted.state.vector),
+        {fitted.frames[k]: curves.one(k) for k in chosen},
+    )
     found, knots = {}, wire_knots(whisk.during(list(some)))
     for view in whisk.views:
         name, pieces = view.camera.name, clear_pieces(whisk, view, axis, some)

@@ -6,21 +6,21 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
-from bench.friction.alphas import seen_friction
 from bench.gauges.felt import lateness
-from bench.records.trial import EstimateRow
+from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
 from bench.report.page.cures import cure_of
-from bench.report.page.pictures import picture_source
 from bench.report.page.plane import (
     force_angle_over_stroke,
     moments_over_stroke,
     sensing_plane,
     slip_over_stroke,
 )
+from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
-from bench.report.summary.doubts import SILENT
+from bench.report.summary.warning_lines import SILENT
 from bench.session.whisker import Whisker
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
@@ -56,12 +56,25 @@ class Card:
 def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
     """The card of one whisk. whisks: of the whole session."""
     trial, seen = row.result.trial, row.seen
-    said = [trial.surface, "" if trial.speed_deg_s is None else f"{trial.speed_deg_s:g}°/s", trial.purpose]
+    said = [
+        trial.surface,
+        "" if trial.speed_deg_s is None else f"{trial.speed_deg_s:g}°/s",
+        trial.purpose,
+    ]
     rests_on = counted(seen.cameras, "camera"), counted(seen.frames_used, "frame")
     subtitle = ", ".join([*filter(None, said), *rests_on])
-    source = picture_source(out, f"overlays/{row.trial}_{seen.whisk}.png", whisks) if seen.overlay else ""
+    source = (
+        picture_source(out, f"overlays/{row.trial}_{seen.whisk}.png", whisks)
+        if seen.overlay
+        else ""
+    )
     alt = f"{row.name}: wire, bar and contact as found, drawn on the frames at touch and at θ of every camera"
-    plots = sensing_plane(row), slip_over_stroke(row), force_angle_over_stroke(row), moments_over_stroke(row, whisker)
+    plots = (
+        sensing_plane(row),
+        slip_over_stroke(row),
+        force_angle_over_stroke(row),
+        moments_over_stroke(row, whisker),
+    )
     status = status_of(seen, row.felt)
     return Card(
         row.key,
@@ -105,7 +118,11 @@ def numbers(row: Row) -> list[tuple[str, str]]:
 
 def _beam_numbers(beam: BeamCheck) -> list[tuple[str, str, str]]:
     """By how much a curve left free moves what the beam with a point load gives."""
-    compared = (("d_x", beam.d_x, 1.0, "mm"), ("touch", beam.touch, _DEGREES, "°"), ("slip", beam.slip, 1.0, "mm"))
+    compared = (
+        ("d_x", beam.d_x, 1.0, "mm"),
+        ("touch", beam.touch, _DEGREES, "°"),
+        ("slip", beam.slip, 1.0, "mm"),
+    )
     return [
         (
             f"{name} by a spline, less by the beam",
@@ -121,7 +138,11 @@ def _estimate(row: Row, answer: EstimateRow) -> tuple[str, ...]:
     truth, d_x = row.seen.d_x_mm, answer.d_x_est_mm
     sigma = math.hypot(d_x.sigma, truth.sigma)
     low, high = answer.d_x_est_low_mm, answer.d_x_est_high_mm
-    interval = f"{number(low, 1)} to {number(high, 1)}" if math.isfinite(low) and math.isfinite(high) else MISSING
+    interval = (
+        f"{number(low, 1)} to {number(high, 1)}"
+        if math.isfinite(low) and math.isfinite(high)
+        else MISSING
+    )
     error = d_x.value - truth.value
     percent = 100.0 / truth.value
     return (
@@ -169,7 +190,11 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
         _cell(told(late, degrees=True), _DEGREES * late.value, wide=True),
         _cell(with_sigma(_DEGREES * alpha, _DEGREES * alpha_sigma), _DEGREES * alpha, wide=True),
     ]
-    return [*fixed, *(_error(row, name) for name in estimators), Cell(status_of(seen, row.felt) or SOUND)]
+    return [
+        *fixed,
+        *(_error(row, name) for name in estimators),
+        Cell(status_of(seen, row.felt) or SOUND),
+    ]
 
 
 def _error(row: Row, estimator: str) -> Cell:
@@ -179,7 +204,10 @@ def _error(row: Row, estimator: str) -> Cell:
         return Cell(MISSING, math.nan)
     percent = 100.0 / truth.value
     error = percent * (answer.d_x_est_mm.value - truth.value)
-    return Cell(with_sigma(error, percent * math.hypot(answer.d_x_est_mm.sigma, truth.sigma), sign=True), error)
+    return Cell(
+        with_sigma(error, percent * math.hypot(answer.d_x_est_mm.sigma, truth.sigma), sign=True),
+        error,
+    )
 
 
 def _cell(text: str, value: float, *, wide: bool = False) -> Cell:

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bench.friction.tables import SurfaceFriction
-from bench.records.trial import TrialResult
+from bench.analyses.friction_tables import SurfaceFriction
+from bench.records.trial_result import TrialResult
 from bench.report.page.standing import Standing, standings, sureness
 from bench.report.page.words import MISSING, number, with_sigma
-from bench.report.run import RunRecord
+from bench.report.run_facts import RunRecord
 
 _PAPER = """@article{solomon2008artificial,
   author  = {Solomon, Joseph H. and Hartmann, Mitra J. Z.},
@@ -35,7 +35,9 @@ def bibliography(record: RunRecord) -> str:
     return f"{program}\n{_PAPER}"
 
 
-def methods(record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> str:
+def methods(
+    record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
+) -> str:
     """Two paragraphs and two tables, Markdown."""
     stood = standings(results)
     return "\n".join(
@@ -79,7 +81,9 @@ def _truth(record: RunRecord, results: Sequence[TrialResult]) -> Iterator[str]:
     )
 
 
-def _estimates(record: RunRecord, results: Sequence[TrialResult], stood: Sequence[Standing]) -> Iterator[str]:
+def _estimates(
+    record: RunRecord, results: Sequence[TrialResult], stood: Sequence[Standing]
+) -> Iterator[str]:
     settings = record.settings
     yield (
         f"Estimates were taken at a pushing angle of {settings.theta_deg:g}° from the moments at the whisker's base "
@@ -91,7 +95,9 @@ def _estimates(record: RunRecord, results: Sequence[TrialResult], stood: Sequenc
         yield f"Gauge coefficients are from {gauges[0].split(';')[0].removeprefix('from ')}."
     for s in stood:
         if s.n:
-            held = f"; {s.held} of {s.stated} of its 95 % intervals hold the truth" if s.stated else ""
+            held = (
+                f"; {s.held} of {s.stated} of its 95 % intervals hold the truth" if s.stated else ""
+            )
             yield (
                 f"{s.label}: error of d_x {number(s.bias_percent, 2)} % in the mean and "
                 f"{number(s.rms_percent, 2)} % RMS over {s.n} whisks{held}."
@@ -118,7 +124,10 @@ def _friction_table(friction: Sequence[SurfaceFriction]) -> Iterator[str]:
     yield "| surface and speed | whisks | α seen / ° | α felt / ° | α of Fig. 8 / ° |"
     yield "|---|---|---|---|---|"
     for of in friction:
-        angles = (with_sigma(*np.degrees(of.alpha(name)).tolist()) for name in ("seen", "felt", "least_squares"))
+        angles = (
+            with_sigma(*np.degrees(of.alpha(name)).tolist())
+            for name in ("seen", "felt", "least_squares")
+        )
         yield f"| {_plain(of.surface.title)} | {len(of.surface.felt)} | {' | '.join(angles)} |"
     yield ""
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from bench.gauges.readings import reference_from_pictures
-from bench.records.trial import SeenWhisk
+from bench.gauges.gauge_readings import reference_from_pictures
+from bench.records.trial_result import SeenWhisk
 from bench.report.page.svg import Mark, Panel, limits
 from bench.report.page.words import Row
 from bench.session.whisker import Whisker
@@ -32,10 +32,18 @@ def sensing_plane(row: Row) -> Markup:
         _bar(panel, row, along, normal),
         panel.line(*path.T, "path"),
         panel.line(*np.array([virtual, contact]).T, "wire"),
-        *(_letter(panel, place, name) for place, name in ((np.zeros(2), "P0"), (contact, "P"), (virtual, "V"))),
+        *(
+            _letter(panel, place, name)
+            for place, name in ((np.zeros(2), "P0"), (contact, "P"), (virtual, "V"))
+        ),
     ]
     alt = f"Sensing plane of {row.name}: the contact slips {at.slip_mm.value:.2f} mm from P0 to P along the bar"
-    return panel.drawing(drawn, ("y  [mm]", "z  [mm]"), f"sensing plane at θ = {math.degrees(at.theta_rad):.2f}°", alt)
+    return panel.drawing(
+        drawn,
+        ("y  [mm]", "z  [mm]"),
+        f"sensing plane at θ = {math.degrees(at.theta_rad):.2f}°",
+        alt,
+    )
 
 
 def _equal_panel(points: np.ndarray) -> Panel:
@@ -57,7 +65,10 @@ def _bar(panel: Panel, row: Row, along, normal) -> Markup:
     far = _FAR_MM * along
     corners = [near - far, near + far, near + far + width, near - far + width]
     d = "L".join(f"{x:.1f},{y:.1f}" for x, y in (panel.at(*corner) for corner in corners))
-    (left, top), (right, bottom) = panel.at(panel.x[0], panel.y[1]), panel.at(panel.x[1], panel.y[0])
+    (left, top), (right, bottom) = (
+        panel.at(panel.x[0], panel.y[1]),
+        panel.at(panel.x[1], panel.y[0]),
+    )
     box = f'<clipPath id="p{row.key}"><path d="M{left:.1f},{top:.1f}H{right:.1f}V{bottom:.1f}H{left:.1f}Z"/></clipPath>'
     return Markup(f'{box}<path class="rod" clip-path="url(#p{row.key})" d="M{d}Z"/>')
 
@@ -75,7 +86,11 @@ def slip_over_stroke(row: Row) -> Markup:
     if frames is None or not np.any(frames.touching):
         return Markup("")
     on = np.asarray(frames.touching, dtype=bool)
-    theta, slip, sigma = np.degrees(frames.theta_rad.value[on]), frames.slip_mm.value[on], frames.slip_mm.sigma[on]
+    theta, slip, sigma = (
+        np.degrees(frames.theta_rad.value[on]),
+        frames.slip_mm.value[on],
+        frames.slip_mm.sigma[on],
+    )
     return _over_theta(row, "slip σ", "mm", theta, ((slip, sigma, "e1"),))
 
 
@@ -86,7 +101,9 @@ def force_angle_over_stroke(row: Row) -> Markup:
         return Markup("")
     good = np.asarray(frames.touching, dtype=bool) & (frames.theta_rad.value > np.radians(0.3))
     phi, sigma = np.degrees(frames.phi_rad.value[good]), np.degrees(frames.phi_rad.sigma[good])
-    return _over_theta(row, "force angle φ", "°", np.degrees(frames.theta_rad.value[good]), ((phi, sigma, "e1"),))
+    return _over_theta(
+        row, "force angle φ", "°", np.degrees(frames.theta_rad.value[good]), ((phi, sigma, "e1"),)
+    )
 
 
 def moments_over_stroke(row: Row, whisker: Whisker) -> Markup:
@@ -105,8 +122,17 @@ def moments_over_stroke(row: Row, whisker: Whisker) -> Markup:
 def _over_theta(row: Row, name: str, unit: str, theta, series, at=None) -> Markup:
     """Values with a band of one sigma over θ, deg; at: (θ, [(value, sigma, class)]) of what is known there alone."""
     extra = at[1] if at else []
-    known = [v for values, sigmas, _ in series for v in np.concatenate([values - sigmas, values + sigmas])]
-    panel = Panel(limits([0.0, *theta]), limits([*known, *(v for v, _, _ in extra)], (0.0, 0.0)), _WIDTH, _HEIGHT)
+    known = [
+        v
+        for values, sigmas, _ in series
+        for v in np.concatenate([values - sigmas, values + sigmas])
+    ]
+    panel = Panel(
+        limits([0.0, *theta]),
+        limits([*known, *(v for v, _, _ in extra)], (0.0, 0.0)),
+        _WIDTH,
+        _HEIGHT,
+    )
     drawn = []
     for values, sigmas, kind in series:
         good = np.isfinite(values) & np.isfinite(sigmas)

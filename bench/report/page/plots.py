@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from bench.analyses.against_theta import AtTheta, against_theta
+from bench.analyses.alphas import seen_friction
+from bench.analyses.explained import SHARES, explained_rows
+from bench.analyses.friction_tables import SurfaceFriction
+from bench.analyses.surfaces import Felt, Surface
 from bench.base.drawing import SLOPES_DEG, label_of
 from bench.base.settings import Settings
-from bench.friction.alphas import seen_friction
-from bench.friction.explained import SHARES, explained_rows
-from bench.friction.surfaces import Felt, Surface
-from bench.friction.tables import SurfaceFriction
-from bench.report.against_theta import AtTheta, against_theta
 from bench.report.page.svg import Mark, Panel, legend, limits
 from bench.report.page.words import Row, number, with_sigma
-from bench.report.run import RunRecord
-from bench.trials.compare import Judged, judge
+from bench.report.run_facts import RunRecord
+from bench.trials.estimate_errors import Judged, judge
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
 from estimator.threshold import distance_error
@@ -40,7 +40,9 @@ class Figure:
     legend: Markup | str = ""
 
 
-def figures(record: RunRecord, rows: Sequence[Row], friction: Sequence[SurfaceFriction]) -> Iterator[Figure]:
+def figures(
+    record: RunRecord, rows: Sequence[Row], friction: Sequence[SurfaceFriction]
+) -> Iterator[Figure]:
     """All figures that the results allow."""
     judged = [j for j in judge(row.result for row in unique(rows)) if _shown(j)]
     fitted = [f.surface for f in friction]
@@ -70,12 +72,17 @@ def series_of(estimator: str, names: Sequence[str]) -> tuple[str, int]:
     return found, int(found[1:])
 
 
-def error_by_slope(judged: Sequence[Judged], keys: dict, fitted: Sequence[Surface], settings: Settings) -> Figure:
+def error_by_slope(
+    judged: Sequence[Judged], keys: dict, fitted: Sequence[Surface], settings: Settings
+) -> Figure:
     """Error against slope, with every estimator and without (2), whose error dwarfs the others'."""
     names = list(dict.fromkeys(j.estimator for j in judged))
     near = [name for name in names if name != "no_slip"]
-    panels = [_slope_panel(judged, chosen, names, keys, fitted, settings, title) for chosen, title in (
-        (names, "every estimator"), (near, "without (2)")) if chosen]  # fmt: skip
+    panels = [
+        _slope_panel(judged, chosen, names, keys, fitted, settings, title)
+        for chosen, title in ((names, "every estimator"), (near, "without (2)"))
+        if chosen
+    ]
     entries = [(label_of(name), *series_of(name, names)) for name in names]
     caption = (
         f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in per cent of the truth, ± one sigma. "
@@ -87,7 +94,11 @@ def error_by_slope(judged: Sequence[Judged], keys: dict, fitted: Sequence[Surfac
 
 def _slope_panel(judged, chosen, names, keys, fitted, settings, title: str) -> Markup:
     mine = [j for j in judged if j.estimator in chosen]
-    reach = [j.error_percent + side * min(j.error_sigma_percent, 50.0) for j in mine for side in (-1.0, 1.0)]
+    reach = [
+        j.error_percent + side * min(j.error_sigma_percent, 50.0)
+        for j in mine
+        for side in (-1.0, 1.0)
+    ]
     panel = Panel((-3.0, 85.0), limits(reach, (-5.0, 5.0)))
     lines = [line for name in chosen for line in _predicted(panel, name, names, fitted, settings)]
     marks = [panel.mark(_error_mark(j, names, keys, abs(j.beta_deg))) for j in mine]
@@ -106,32 +117,50 @@ def _error_mark(j: Judged, names: Sequence[str], keys: dict, x: float) -> Mark:
     return Mark(*place, series + " doubt" * j.doubtful, shape, *which, title, aside_px)
 
 
-def _predicted(panel: Panel, name: str, names, fitted: Sequence[Surface], settings: Settings) -> Iterator[Markup]:
+def _predicted(
+    panel: Panel, name: str, names, fitted: Sequence[Surface], settings: Settings
+) -> Iterator[Markup]:
     """The error that (13), (14) predict where the surface has its fitted α; what leaves the panel is not drawn."""
     assumed = settings.alpha_est_rad if name == "with_friction" else _ASSUMED.get(name)
     equation = "no_slip" if name == "no_slip" else "with_friction"
     slopes = SLOPES_DEG[::_EVERY]
     for place, surface in enumerate(fitted):
         if surface.fit is not None and assumed is not None:
-            error = distance_error(np.radians(slopes), surface.alpha_rad, assumed, equation=equation)
+            error = distance_error(
+                np.radians(slopes), surface.alpha_rad, assumed, equation=equation
+            )
             error = 100.0 * surface.beam.error_share(surface.common_d_x_mm, error)
             inside = np.where((error > panel.y[0]) & (error < panel.y[1]), error, np.nan)
-            yield panel.line(slopes, inside, series_of(name, names)[0], _DASHES[place % len(_DASHES)])
+            yield panel.line(
+                slopes, inside, series_of(name, names)[0], _DASHES[place % len(_DASHES)]
+            )
 
 
-def error_by_friction(judged: Sequence[Judged], keys: dict, rows: Sequence[Row]) -> Iterator[Figure]:
+def error_by_friction(
+    judged: Sequence[Judged], keys: dict, rows: Sequence[Row]
+) -> Iterator[Figure]:
     """Error of (10) against the friction angle that the pictures show; nothing where none shows it."""
-    alpha = {row.key: math.degrees(seen_friction(row.seen)[0]) for row in rows if row.seen.deflection is not None}
+    alpha = {
+        row.key: math.degrees(seen_friction(row.seen)[0])
+        for row in rows
+        if row.seen.deflection is not None
+    }
     mine = [j for j in judged if j.estimator == "with_friction"]
     mine = [j for j in mine if math.isfinite(alpha.get(keys[j.trial, j.whisk], math.nan))]
     if len(mine) < 2:
         return
     places = [alpha[keys[j.trial, j.whisk]] for j in mine]
-    reach = [j.error_percent + side * min(j.error_sigma_percent, 50.0) for j in mine for side in (-1.0, 1.0)]
+    reach = [
+        j.error_percent + side * min(j.error_sigma_percent, 50.0)
+        for j in mine
+        for side in (-1.0, 1.0)
+    ]
     panel = Panel(limits(places, (0.0, 0.0)), limits(reach, (-5.0, 5.0)))
     marks = [panel.mark(_error_mark(j, ["with_friction"], keys, x)) for j, x in zip(mine, places)]
     alt = f"Error of (10) in per cent against the friction angle seen: {len(mine)} points"
-    drawn = panel.drawing(marks, ("friction angle α seen  [°]", "error of d_x  [%]"), "(10) with friction", alt)
+    drawn = panel.drawing(
+        marks, ("friction angle α seen  [°]", "error of d_x  [%]"), "(10) with friction", alt
+    )
     said = "Against the friction angle that the pictures show, of whisks that slip: where α_est is not α, (10) errs."
     yield Figure("Error against friction", said, (drawn,))
 
@@ -142,15 +171,26 @@ def error_by_theta(found: Sequence[AtTheta]) -> Iterator[Figure]:
     if len({at.theta_deg for at in known}) < 2:
         return
     names = list(dict.fromkeys(at.estimator for at in known))
-    values = [math.log10(v) for at in known for v in (at.error_rms_percent, at.error_sigma_percent) if v > 0]
-    panel = Panel(limits(math.log10(at.theta_deg) for at in known), limits(values), log=(True, True))
+    values = [
+        math.log10(v)
+        for at in known
+        for v in (at.error_rms_percent, at.error_sigma_percent)
+        if v > 0
+    ]
+    panel = Panel(
+        limits(math.log10(at.theta_deg) for at in known), limits(values), log=(True, True)
+    )
     drawn = []
     for name in names:
         mine, (series, _) = [at for at in known if at.estimator == name], series_of(name, names)
-        theta, rms, sigma = np.log10([(at.theta_deg, at.error_rms_percent, at.error_sigma_percent) for at in mine]).T
+        theta, rms, sigma = np.log10(
+            [(at.theta_deg, at.error_rms_percent, at.error_sigma_percent) for at in mine]
+        ).T
         drawn += [panel.line(theta, rms, series), panel.line(theta, sigma, series, "4 3")]
     alt = f"RMS error and stated sigma of {len(names)} estimators against the pushing angle"
-    drawing = panel.drawing(drawn, ("pushing angle θ  [°]", "RMS error of d_x  [%]"), "error and sigma", alt)
+    drawing = panel.drawing(
+        drawn, ("pushing angle θ  [°]", "RMS error of d_x  [%]"), "error and sigma", alt
+    )
     said = "RMS over the sound whisks: solid the error, dashed the stated sigma. Small θ: noise; large: bending."
     entries = [(label_of(name), series_of(name, names)[0], None) for name in names]
     yield Figure("Error and sigma against θ", said, (drawing,), legend(entries))
@@ -159,19 +199,31 @@ def error_by_theta(found: Sequence[AtTheta]) -> Iterator[Figure]:
 def figure_8(surface: Surface, keys: dict) -> Figure:
     """|m| and φ of each whisk of a surface against slope, and the curve of the α that fits."""
     EI, beam = surface.beam.rigidity_Nmm2, surface.beam
-    scale = [beam.as_cylinder_mm(f.d_x_mm) / beam.as_cylinder_mm(surface.common_d_x_mm) for f in surface.felt]
+    scale = [
+        beam.as_cylinder_mm(f.d_x_mm) / beam.as_cylinder_mm(surface.common_d_x_mm)
+        for f in surface.felt
+    ]
     m = [moment_in_EI_per_metre(s * f.m_Nmm, EI) for s, f in zip(scale, surface.felt)]
     m_sigma = [moment_in_EI_per_metre(s * f.m_sigma_Nmm, EI) for s, f in zip(scale, surface.felt)]
     phi, phi_sigma = [abs(f.phi_deg) for f in surface.felt], [f.phi_sigma_deg for f in surface.felt]
     slopes, lines = SLOPES_DEG[::_EVERY], (np.full(0, np.nan),) * 2
     if surface.fit is not None:
         common = beam.as_cylinder_mm(surface.common_d_x_mm)
-        found = curves(surface.alpha_rad, np.radians(slopes), common, surface.theta_rad, beam.C_Nmm2)
+        found = curves(
+            surface.alpha_rad, np.radians(slopes), common, surface.theta_rad, beam.C_Nmm2
+        )
         lines = moment_in_EI_per_metre(found[0], EI), np.degrees(found[1])
-    quantities = (("|m|  [EI/m]", m, m_sigma, lines[0]), ("slip angle φ  [°]", phi, phi_sigma, lines[1]))
+    quantities = (
+        ("|m|  [EI/m]", m, m_sigma, lines[0]),
+        ("slip angle φ  [°]", phi, phi_sigma, lines[1]),
+    )
     panels = tuple(_felt_panel(surface, keys, slopes, *quantity) for quantity in quantities)
     fit = surface.fit
-    fitted = "no α fits" if fit is None else f"line: α = {with_sigma(*np.degrees([fit.alpha_rad, fit.sigma_rad]))}°"
+    fitted = (
+        "no α fits"
+        if fit is None
+        else f"line: α = {with_sigma(*np.degrees([fit.alpha_rad, fit.sigma_rad]))}°"
+    )
     caption = (
         f"What was felt at θ = {math.degrees(surface.theta_rad):.2g}°, |m| scaled to d_x = "
         f"{surface.common_d_x_mm:.1f} mm, each whisk ± one sigma; {fitted}."
@@ -181,7 +233,10 @@ def figure_8(surface: Surface, keys: dict) -> Figure:
 
 def _felt_panel(surface: Surface, keys, slopes, label: str, values, sigmas, line) -> Markup:
     panel = Panel((-3.0, 85.0), limits([*values, *line], (0.0, 0.0)))
-    marks = [panel.mark(_felt_mark(f, v, s, label, keys)) for f, v, s in zip(surface.felt, values, sigmas)]
+    marks = [
+        panel.mark(_felt_mark(f, v, s, label, keys))
+        for f, v, s in zip(surface.felt, values, sigmas)
+    ]
     curve = [panel.line(slopes, line, "e1")] if len(line) else []
     alt = f"{label} against the slope β on {surface.title}: {len(marks)} points"
     return panel.drawing([*curve, *marks], ("slope |β|  [°]", label), surface.title, alt)
@@ -212,7 +267,14 @@ def explained_bars(record: RunRecord, rows: Sequence[Row]) -> list[Bar]:
         row = keys[one["trial"], one["whisk"]]
         shares = {name: 100.0 * one[name] / one["d_x_mm"] for name in SHARES}
         if row.result.trial.purpose == "measure" and all(map(math.isfinite, shares.values())):
-            bars.append(Bar(row.key, row.name, shares, number(100.0 * one["error_mm"] / one["d_x_mm"], 2) + " %"))
+            bars.append(
+                Bar(
+                    row.key,
+                    row.name,
+                    shares,
+                    number(100.0 * one["error_mm"] / one["d_x_mm"], 2) + " %",
+                )
+            )
     return bars
 
 
@@ -222,7 +284,11 @@ def budget_bars(rows: Sequence[Row]) -> list[Bar]:
         Bar(
             row.key,
             row.name,
-            {cause: 100.0 * share for cause, share in row.seen.budget.items() if math.isfinite(share)},
+            {
+                cause: 100.0 * share
+                for cause, share in row.seen.budget.items()
+                if math.isfinite(share)
+            },
             f"± {row.seen.d_x_mm.sigma:.3f} mm",
         )
         for row in rows

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.drawing import label_of
-from bench.records.trial import TrialResult, whisks
-from bench.trials.compare import Judged, judge
+from bench.records.trial_result import TrialResult, whisks
+from bench.trials.estimate_errors import Judged, judge
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,19 @@ class Standing:
 def standings(results: Iterable[TrialResult]) -> list[Standing]:
     """A Standing of each estimator, in the order in which they come."""
     results = list(results)
-    asked = [j for j in judge(results) if j.purpose == "measure" and not j.one_factor and math.isfinite(j.d_x_mm)]
+    asked = [
+        j
+        for j in judge(results)
+        if j.purpose == "measure" and not j.one_factor and math.isfinite(j.d_x_mm)
+    ]
     intervals = dict(_intervals(results))
     names = dict.fromkeys(j.estimator for j in asked)
     return [_standing(name, [j for j in asked if j.estimator == name], intervals) for name in names]
 
 
-def _intervals(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, int, str], tuple[float, float]]]:
+def _intervals(
+    results: Iterable[TrialResult],
+) -> Iterator[tuple[tuple[str, int, str], tuple[float, float]]]:
     """The 95 % interval of each whisk and estimator, mm, ends of no number left out."""
     for result, seen, felt in whisks(results):
         for answer in felt.estimates:
@@ -56,14 +62,29 @@ def _intervals(results: Iterable[TrialResult]) -> Iterator[tuple[tuple[str, int,
 def _standing(name: str, asked: list[Judged], intervals: dict) -> Standing:
     known = [j for j in asked if math.isfinite(j.error_percent) and not j.doubtful]
     doubtful = sum(j.doubtful and math.isfinite(j.error_percent) for j in asked)
-    stated = [(j, intervals[key]) for j in asked if (key := (j.trial, j.whisk, name)) in intervals and not j.doubtful]
+    stated = [
+        (j, intervals[key])
+        for j in asked
+        if (key := (j.trial, j.whisk, name)) in intervals and not j.doubtful
+    ]
     held = sum(low <= j.d_x_mm <= high for j, (low, high) in stated)
     if not known:
-        return Standing(name, len(asked), 0, math.nan, math.nan, math.nan, ("", 0), held, len(stated), doubtful)
+        return Standing(
+            name, len(asked), 0, math.nan, math.nan, math.nan, ("", 0), held, len(stated), doubtful
+        )
     errors = np.array([j.error_percent for j in known])
     worst = known[int(np.argmax(np.abs(errors)))]
     numbers = float(errors.mean()), float(np.sqrt(np.mean(errors**2))), worst.error_percent
-    return Standing(name, len(asked), len(known), *numbers, (worst.trial, worst.whisk), held, len(stated), doubtful)
+    return Standing(
+        name,
+        len(asked),
+        len(known),
+        *numbers,
+        (worst.trial, worst.whisk),
+        held,
+        len(stated),
+        doubtful,
+    )
 
 
 @dataclass(frozen=True)
@@ -82,9 +103,14 @@ def sureness(results: Iterable[TrialResult]) -> Sureness:
     """How sure the truth is; NaN where no whisk has one."""
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     known = [s for s in seen if s.has_truth]
-    angles = (np.degrees(_median([getattr(s, name).sigma for s in known])) for name in ("touch_rad", "beta_rad"))
+    angles = (
+        np.degrees(_median([getattr(s, name).sigma for s in known]))
+        for name in ("touch_rad", "beta_rad")
+    )
     slip = _median([s.at.slip_mm.sigma for s in known if s.at is not None])
-    return Sureness(len(known), len(seen), _median([s.d_x_mm.sigma for s in known]), *map(float, angles), slip)
+    return Sureness(
+        len(known), len(seen), _median([s.d_x_mm.sigma for s in known]), *map(float, angles), slip
+    )
 
 
 def _median(values: list[float]) -> float:

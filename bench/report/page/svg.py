@@ -35,7 +35,9 @@ class Mark:
     trial: str
     whisk: int
     title: str
-    aside_px: float = 0.0  # to the right of its place, so that points of one whisk do not hide each other
+    aside_px: float = (
+        0.0  # to the right of its place, so that points of one whisk do not hide each other
+    )
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,14 @@ class Panel:
             series, "".join(parts), Markup(f' stroke-dasharray="{dash}"') if dash else ""
         )
 
-    def band(self, xs: Sequence[float], lows: Sequence[float], highs: Sequence[float], series: str) -> Markup:
+    def band(
+        self, xs: Sequence[float], lows: Sequence[float], highs: Sequence[float], series: str
+    ) -> Markup:
         """The area between two curves (n,), all finite."""
         there = [*zip(xs, highs), *reversed(list(zip(xs, lows)))]
-        return Markup('<path class="band {}" d="M{}Z"/>').format(series, "L".join(_px(*self.at(*p)) for p in there))
+        return Markup('<path class="band {}" d="M{}Z"/>').format(
+            series, "L".join(_px(*self.at(*p)) for p in there)
+        )
 
     def mark(self, mark: Mark) -> Markup:
         """A point with its error bar, a link to its whisk's card."""
@@ -88,7 +94,9 @@ class Panel:
             '<a href="#{}" class="mark {}" data-w="{}" data-trial="{}" data-whisk="{}"><title>{}</title>{}{}</a>'
         ).format(*which, mark.title, Markup(bar), shape(x, y, mark.shape))
 
-    def drawing(self, content: Iterable[Markup], labels: tuple[str, str], title: str, alt: str) -> Markup:
+    def drawing(
+        self, content: Iterable[Markup], labels: tuple[str, str], title: str, alt: str
+    ) -> Markup:
         """The panel with its axes and what it holds. labels: of x and y; alt: for readers who do not see it."""
         body = Markup("").join([*self._axes(*labels), *content])
         return Markup(
@@ -100,17 +108,19 @@ class Panel:
         bottom, right = self.height - _BOTTOM, self.width - _RIGHT
         for value, said in _ticks(self.x, self.log[0]):
             x, _ = self.at(value, self.y[0])
-            yield Markup('<path class="grid" d="M{:.1f},{}V{}"/><text class="tick" x="{:.1f}" y="{}">{}</text>').format(
-                x, _TOP, bottom, x, bottom + 15, said
-            )
+            yield Markup(
+                '<path class="grid" d="M{:.1f},{}V{}"/><text class="tick" x="{:.1f}" y="{}">{}</text>'
+            ).format(x, _TOP, bottom, x, bottom + 15, said)
         for value, said in _ticks(self.y, self.log[1]):
             _, y = self.at(self.x[0], value)
             kind = "grid zero" if abs(value) < 1e-12 and not self.log[1] else "grid"
-            yield Markup('<path class="{}" d="M{},{:.1f}H{}"/><text class="tick y" x="{}" y="{:.1f}">{}</text>').format(
-                kind, _LEFT, y, right, _LEFT - 6, y + 4, said
-            )
+            yield Markup(
+                '<path class="{}" d="M{},{:.1f}H{}"/><text class="tick y" x="{}" y="{:.1f}">{}</text>'
+            ).format(kind, _LEFT, y, right, _LEFT - 6, y + 4, said)
         middle = 0.5 * (_LEFT + right), 0.5 * (_TOP + bottom)
-        yield Markup('<text class="label" x="{}" y="{}">{}</text>').format(middle[0], self.height - 8, x_label)
+        yield Markup('<text class="label" x="{}" y="{}">{}</text>').format(
+            middle[0], self.height - 8, x_label
+        )
         turned = Markup('<text class="label" transform="translate(13 {}) rotate(-90)">{}</text>')
         yield turned.format(middle[1], y_label)
 
@@ -120,20 +130,28 @@ def shape(x: float, y: float, number: int) -> Markup:
     corners = _SHAPES[number % len(_SHAPES)]
     if corners is None:
         return Markup(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{_R}"/>')
-    return Markup('<path class="dot" d="M{}Z"/>').format("L".join(_px(x + _R * u, y + _R * v) for u, v in corners))
+    return Markup('<path class="dot" d="M{}Z"/>').format(
+        "L".join(_px(x + _R * u, y + _R * v) for u, v in corners)
+    )
 
 
 def legend(entries: Sequence[tuple[str, str, int | None]]) -> Markup:
     """(label, class, shape; None for a line) of each series, as HTML below a plot."""
     items = []
     for label, series, number in entries:
-        inner = Markup('<path class="curve" d="M1,8H21"/>') if number is None else shape(11, 8, number)
-        icon = Markup('<svg class="key {}" viewBox="0 0 22 16" aria-hidden="true">{}</svg>').format(series, inner)
+        inner = (
+            Markup('<path class="curve" d="M1,8H21"/>') if number is None else shape(11, 8, number)
+        )
+        icon = Markup('<svg class="key {}" viewBox="0 0 22 16" aria-hidden="true">{}</svg>').format(
+            series, inner
+        )
         items.append(Markup("<li>{}{}</li>").format(icon, label))
     return Markup('<ul class="legend">{}</ul>').format(Markup("").join(items))
 
 
-def limits(values: Iterable[float], least: tuple[float, float] | None = None) -> tuple[float, float]:
+def limits(
+    values: Iterable[float], least: tuple[float, float] | None = None
+) -> tuple[float, float]:
     """Limits that hold all finite values, and `least`, with a margin on either side."""
     known = [v for v in values if math.isfinite(v)] + list(least or ())
     low, high = (min(known), max(known)) if known else (0.0, 1.0)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from bench.records.trial import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from vision.truth.value import Value
 
 MISSING = "–"
@@ -38,7 +38,11 @@ def rows_of(results: Iterable[TrialResult]) -> list[Row]:
 
 def number(value: float | None, digits: int = 2) -> str:
     """With so many digits after the point; a dash for what is missing."""
-    return MISSING if value is None or not math.isfinite(value) else f"{value:.{digits}f}".replace("-", "−")
+    return (
+        MISSING
+        if value is None or not math.isfinite(value)
+        else f"{value:.{digits}f}".replace("-", "−")
+    )
 
 
 def with_sigma(value: float, sigma: float, *, sign: bool = False) -> str:

@@ -8,27 +8,27 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from bench.analyses.explained import SHARES
+from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
 from bench.base.settings import Seeing
-from bench.friction.explained import SHARES
-from bench.friction.tables import SurfaceFriction
-from bench.records.trial import TrialResult
+from bench.records.trial_result import TrialResult
 from bench.report.evaluation import finished
 from bench.report.page.cards import SOUND, card, cells, columns
+from bench.report.page.combined_whisks import together
 from bench.report.page.cures import cure_of
-from bench.report.page.gauges import gauge_part
+from bench.report.page.gauge_card import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
-from bench.report.page.scene import ELLIPSOID_FACTOR, scene
+from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
 from bench.report.page.standing import standings, sureness
-from bench.report.page.together import together
 from bench.report.page.words import number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
-from bench.report.run import CameraFacts, RunRecord
-from bench.report.summary.doubts import SILENT
-from vision.fit.uncertainty import CAUSES
+from bench.report.run_facts import CameraFacts, RunRecord
+from bench.report.summary.warning_lines import SILENT
+from vision.fit.covariance import CAUSES
 
 REPORT, METHODS, BIBLIOGRAPHY = "report.html", "methods.md", "results.bib"
 _PARTS = {
@@ -38,7 +38,16 @@ _PARTS = {
     "remainder_mm": "beam theory, slip along",
 }
 _MOST_BARS = 60  # whisks; of more, those with the largest sum of shares are drawn
-_IN_FIGURES = ("Truth", "Error of d_x", "Doubtful", "Cameras", "Gauges", "Taken as exact", "Only what", "Sensors")
+_IN_FIGURES = (
+    "Truth",
+    "Error of d_x",
+    "Doubtful",
+    "Cameras",
+    "Gauges",
+    "Taken as exact",
+    "Only what",
+    "Sensors",
+)
 
 
 def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
@@ -52,12 +61,17 @@ def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
         if figure_formats:
             from bench.report.paper import write_paper_figures  # with all of matplotlib
 
-            figures = write_paper_figures(out, *of_run, record.whisker, record.settings, figure_formats)
+            figures = write_paper_figures(
+                out, *of_run, record.whisker, record.settings, figure_formats
+            )
         return [*write_report(out, record, *of_run), *figures]
 
 
 def write_report(
-    out: Path, record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
+    out: Path,
+    record: RunRecord,
+    results: Sequence[TrialResult],
+    friction: Sequence[SurfaceFriction],
 ) -> list[Path]:
     """report.html, methods.md and results.bib, each whole. The paths written; the same results give the same bytes."""
     written = {
@@ -70,36 +84,49 @@ def write_report(
     return [out / name for name in written]
 
 
-def page(out: Path, record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]) -> str:
+def page(
+    out: Path,
+    record: RunRecord,
+    results: Sequence[TrialResult],
+    friction: Sequence[SurfaceFriction],
+) -> str:
     """The page as HTML. out: where its pictures and the tables of whisks together are taken from."""
     rows = rows_of(results)
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
     standing = standings(results)
     drawn = scene(record, rows)
     at = {(row.trial, row.seen.whisk): row for row in rows}
-    return _environment().get_template("report.html.j2").render(
-        record=record,
-        rows=[(row, cells(row, estimators)) for row in rows],
-        columns=columns(estimators),
-        cards=[card(row, record.whisker, out, len(rows)) for row in rows],
-        standing=[(s, at.get(s.worst_at)) for s in standing],
-        sure=sureness(results),
-        doubts=[(line, cure_of(line)) for line in record.doubts],
-        figures=list(figures(record, rows, friction)),
-        explained=_stack(explained_bars(record, rows), SHARES, _PARTS),
-        budget=_stack(budget_bars(rows), CAUSES, {cause: cause for cause in CAUSES}),
-        together=together(out),
-        scene=as_script(drawn),
-        scene_known=bool(drawn["cameras"] or drawn["whisks"]),
-        settings=[(f.name, _setting(getattr(record.settings, f.name))) for f in fields(record.settings)],
-        factor=ELLIPSOID_FACTOR,
-        cameras=[(camera, _distance(camera)) for camera in record.cameras],
-        gauges=gauge_part(record.gauges, rows),
-        others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
-        citation=bibliography(record),
-        number=number,
-        silent=(SOUND, *SILENT),
-    ) + "\n"  # fmt: skip
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            record=record,
+            rows=[(row, cells(row, estimators)) for row in rows],
+            columns=columns(estimators),
+            cards=[card(row, record.whisker, out, len(rows)) for row in rows],
+            standing=[(s, at.get(s.worst_at)) for s in standing],
+            sure=sureness(results),
+            doubts=[(line, cure_of(line)) for line in record.doubts],
+            figures=list(figures(record, rows, friction)),
+            explained=_stack(explained_bars(record, rows), SHARES, _PARTS),
+            budget=_stack(budget_bars(rows), CAUSES, {cause: cause for cause in CAUSES}),
+            together=together(out),
+            scene=as_script(drawn),
+            scene_known=bool(drawn["cameras"] or drawn["whisks"]),
+            settings=[
+                (f.name, _setting(getattr(record.settings, f.name)))
+                for f in fields(record.settings)
+            ],
+            factor=ELLIPSOID_FACTOR,
+            cameras=[(camera, _distance(camera)) for camera in record.cameras],
+            gauges=gauge_part(record.gauges, rows),
+            others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
+            citation=bibliography(record),
+            number=number,
+            silent=(SOUND, *SILENT),
+        )
+        + "\n"
+    )
 
 
 def _stack(bars: Sequence[Bar], causes: Sequence[str], labels: dict[str, str]) -> dict:
@@ -117,7 +144,9 @@ def _stack(bars: Sequence[Bar], causes: Sequence[str], labels: dict[str, str]) -
     }
 
 
-def _segments(bar: Bar, causes: Sequence[str], low: float, scale: float) -> Iterator[tuple[int, str, str, float]]:
+def _segments(
+    bar: Bar, causes: Sequence[str], low: float, scale: float
+) -> Iterator[tuple[int, str, str, float]]:
     """(number of the cause, left and width in per cent of the track, share)."""
     ends = {True: 0.0, False: 0.0}
     for n, cause in enumerate(causes):
@@ -146,7 +175,9 @@ def _setting(value: object) -> str:
         return "yes" if value else "no"
     if isinstance(value, tuple):
         return ", ".join(map(str, value)) or "none"
-    return "by default" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+    return (
+        "by default" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+    )
 
 
 def _distance(camera: CameraFacts) -> float:
@@ -157,7 +188,9 @@ def _distance(camera: CameraFacts) -> float:
 def as_script(value: object) -> Markup:
     """JSON that may stand within a script: no "<" can end it, and what is missing is null."""
     text = json.dumps(plain(value), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))
+    return Markup(
+        text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+    )
 
 
 def _environment() -> Environment:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from bench.records.trial import TrialResult, whisks
+from bench.records.trial_result import TrialResult, whisks
 
 # Causes of `budget` that are the same wire, bar, lamp, lenses and board in every whisk.
 SHARED = ("diameters", "light", "cameras", "placement")
@@ -45,13 +45,17 @@ def shared_distance(results: Sequence[TrialResult]) -> SharedDistance | None:
         return None
     variance = np.array([s.d_x_mm.sigma**2 for s in seen])
     share = np.array([sum(np.nan_to_num(s.budget[cause]) for cause in SHARED) for s in seen])
-    shared, own = (float(np.sqrt(np.mean(variance * part))) for part in (share, np.maximum(1.0 - share, 0.0)))
+    shared, own = (
+        float(np.sqrt(np.mean(variance * part))) for part in (share, np.maximum(1.0 - share, 0.0))
+    )
     return SharedDistance(shared, own, len(seen), *_scatter(results, "d_x_mm"))
 
 
 def _scatter(results: Sequence[TrialResult], key: str) -> tuple[float, int]:
     """Standard deviation of whisks of one recording about their mean, pooled, and its degrees of freedom."""
-    groups = [[getattr(s, key).value for s in result.seen.whisks if s.has_truth] for result in results]
+    groups = [
+        [getattr(s, key).value for s in result.seen.whisks if s.has_truth] for result in results
+    ]
     freedom = sum(max(len(group) - 1, 0) for group in groups)
     squares = sum(len(group) * np.var(group) for group in groups if len(group) > 1)
     return (float(np.sqrt(squares / freedom)) if freedom else np.nan), freedom

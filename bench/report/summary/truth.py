@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from bench.gauges.felt import lateness
-from bench.records.trial import TrialResult, whisks
+from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import beam_rows, budget_rows
 from bench.trials.clocks import shared_touch
-from vision.fit.uncertainty import CAUSES
+from vision.fit.covariance import CAUSES
 from vision.truth.value import Value
 
 _LEAST_SHOWN_PERCENT = 0.5  # rounds to 0 %
@@ -38,7 +38,9 @@ def clock_lines(results: Sequence[TrialResult]) -> Iterator[str]:
     ways = Counter(clocks)
     for clock, number_of in ways.items():
         count = f"{number_of} of {len(clocks)} trials"
-        known = f"taken as known to {1e3 * clock.sigma_s:.3g} ms, which is in the sigma of touch seen"
+        known = (
+            f"taken as known to {1e3 * clock.sigma_s:.3g} ms, which is in the sigma of touch seen"
+        )
         if clock.recorded:
             yield f"frame times as recorded ({clock.source}), {count}; their clock is " + (
                 known if clock.sigma_s else "taken as that of the signals"
@@ -56,7 +58,9 @@ def clock_lines(results: Sequence[TrialResult]) -> Iterator[str]:
 
 def _delay_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """A line for each delay by the gauges' filter that was taken out of the felt touches."""
-    delays = dict.fromkeys((f.delay_s.value, f.delay_s.sigma) for r in results for f in r.felt.whisks)
+    delays = dict.fromkeys(
+        (f.delay_s.value, f.delay_s.sigma) for r in results for f in r.felt.whisks
+    )
     for delay_s, sigma_s in delays:
         if np.isfinite(delay_s):
             unnamed = f"± {1e3 * sigma_s:.2f} ms, as in the paper: the trial has no gauge_filter_Hz"
@@ -71,7 +75,9 @@ def budget_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         table = np.array([[row[f"{cause}_percent"] for cause in CAUSES] for row in rows])
         shares = dict(zip(CAUSES, np.nan_to_num(table).mean(axis=0)))
         largest = sorted(shares.items(), key=lambda item: -item[1])
-        parts = (f"{cause} {share:.0f} %" for cause, share in largest if share >= _LEAST_SHOWN_PERCENT)
+        parts = (
+            f"{cause} {share:.0f} %" for cause, share in largest if share >= _LEAST_SHOWN_PERCENT
+        )
         yield f"variance of d_x by cause, mean over the whisks: {', '.join(parts)} (docs/truth.md, budget.csv)"
         if np.isnan(table).any():
             yield "  cameras.npz does not tell the rig board's part from the lenses': `cameras` is both"
@@ -91,7 +97,9 @@ def beam_lines(results: Iterable[TrialResult]) -> Iterator[str]:
 
 
 def _shown(value: Value, digits: int) -> str:
-    return f"{value.value:.{digits}f} ± {value.sigma:.{digits}f}" if np.isfinite(value.value) else "-"
+    return (
+        f"{value.value:.{digits}f} ± {value.sigma:.{digits}f}" if np.isfinite(value.value) else "-"
+    )
 
 
 def _degrees(angle: Value, digits: int) -> str:

@@ -5,19 +5,23 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from bench.analyses.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.base.drawing import label_of
 from bench.base.settings import Seeing, Settings
-from bench.friction.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.gauges.matrix import FROM_ALL, Gauges
-from bench.records.trial import TrialResult, whisks
-from bench.trials.compare import Judged
+from bench.records.trial_result import TrialResult, whisks
+from bench.trials.estimate_errors import Judged
 from vision.geometry.counted import counted
 
 _SIGNIFICANT = 2.0  # sigmas: no whisk beyond this, and the estimator may be right in all
 
 
 def verdict(
-    session: str, pictures: bool, results: Iterable[TrialResult], judged: Sequence[Judged], settings: Settings,
+    session: str,
+    pictures: bool,
+    results: Iterable[TrialResult],
+    judged: Sequence[Judged],
+    settings: Settings,
     doubtful: int,
 ) -> Iterator[str]:
     """How wrong each estimator is, and of how many whisks the truth is known. session: its name; pictures: whether it
@@ -25,11 +29,15 @@ def verdict(
     measured = _measured(judged)
     seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     with_truth = sum(s.has_truth for s in seen)
-    asked = [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)]
+    asked = [
+        j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)
+    ]
     for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
         mine = [j for j in measured if j.estimator == name]
         missing = _without_or_doubted([j for j in asked if j.estimator == name])
-        yield (_verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance.") + missing
+        yield (
+            _verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance."
+        ) + missing
     if not measured:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
     yield (
@@ -73,7 +81,11 @@ def looked_at(results: Iterable[TrialResult], settings: Settings) -> Iterator[st
 
 
 def _measured(judged: Sequence[Judged]) -> list[Judged]:
-    return [j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)]
+    return [
+        j
+        for j in judged
+        if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)
+    ]
 
 
 def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
@@ -85,7 +97,9 @@ def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
     ):
         mine = [j for j in _measured(judged) if j.estimator == name]
         if mine:
-            yield _verdict_on(name, mine, settings).replace(label_of(name), f"{label_of(name)} ({what}),", 1)
+            yield _verdict_on(name, mine, settings).replace(
+                label_of(name), f"{label_of(name)} ({what}),", 1
+            )
 
 
 def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:

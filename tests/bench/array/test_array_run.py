@@ -9,12 +9,12 @@ import pytest
 
 from bench import api
 from bench.api import ArrayRun, Run
-from bench.array.compare import compare_arrays
+from bench.array.compare_arrays import compare_arrays
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.check import check
-from bench.evaluate import evaluate
-from bench.report.compare import compare_runs
+from bench.commands.check import check
+from bench.commands.evaluate import evaluate
+from bench.report.compare_runs import compare_runs
 from bench.report.video import write_video
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
@@ -33,7 +33,9 @@ QUIET = Settings(figures=False)
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     folder = tmp_path_factory.mktemp("array")
-    return simulate(folder / "session", protocol=protocol_file(folder, PROTOCOL), seed=3, signals_only=True)
+    return simulate(
+        folder / "session", protocol=protocol_file(folder, PROTOCOL), seed=3, signals_only=True
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,9 @@ def test_each_row_names_its_whisker(out):
     for name in run.whiskers:
         mine = run.table("estimates")
         mine = mine[mine["whisker"] == name]
-        np.testing.assert_array_equal(mine["d_x_est_mm"], run.whiskers[name].estimates["d_x_est_mm"])
+        np.testing.assert_array_equal(
+            mine["d_x_est_mm"], run.whiskers[name].estimates["d_x_est_mm"]
+        )
     with pytest.raises(KeyError):
         run.table("beam")
 
@@ -66,9 +70,10 @@ def test_felt_contacts_lie_on_the_bar(out):
     assert (rows["normal_off_deg"] < 4 * rows["normal_sigma_deg"]).all()
     summary = (out / "summary.txt").read_text()
     assert summary.startswith("Surface by (10) with friction: 2 contacts felt by 2 whiskers lie")
-    assert "Score against the truth files" in summary and '<a href="whiskers/w2/report.html">' in (
-        out / "report.html"
-    ).read_text()
+    assert (
+        "Score against the truth files" in summary
+        and '<a href="whiskers/w2/report.html">' in (out / "report.html").read_text()
+    )
 
 
 def test_a_whisker_of_an_array_gives_what_its_own_session_gives(session, out, tmp_path):
@@ -79,18 +84,27 @@ def test_a_whisker_of_an_array_gives_what_its_own_session_gives(session, out, tm
     keys = tomllib.loads(text)["whiskers"][1]
     assert keys["name"] == "w2"
     head, _, table = text.split("[[whiskers]]\n")[0], *text.split("[[whiskers]]\n")[1:]
-    table = re.sub(r'name = .*\nbase_mm = \[[^]]*\]\nbase_deg = \[[^]]*\]\n', "", table)
-    (alone / "session.toml").write_text(head + "[whisker]\n" + table.replace("[whiskers.gauges]", "[gauges]"))
+    table = re.sub(r"name = .*\nbase_mm = \[[^]]*\]\nbase_deg = \[[^]]*\]\n", "", table)
+    (alone / "session.toml").write_text(
+        head + "[whisker]\n" + table.replace("[whiskers.gauges]", "[gauges]")
+    )
     (signals,) = alone.glob("trials/*/signals.csv")
     rows = [line.split(",") for line in signals.read_text().splitlines()]
-    signals.write_text("\n".join(",".join([*row[:2], *row[4:]]) for row in rows).replace("@w2", "") + "\n")
+    signals.write_text(
+        "\n".join(",".join([*row[:2], *row[4:]]) for row in rows).replace("@w2", "") + "\n"
+    )
     evaluate(alone, tmp_path / "out", QUIET, workers=0, announce=lambda _: None)
     for name in ("whisks.csv", "estimates.csv", "against_theta.csv"):
-        assert (tmp_path / "out" / name).read_bytes() == (out / "whiskers" / "w2" / name).read_bytes()
+        assert (tmp_path / "out" / name).read_bytes() == (
+            out / "whiskers" / "w2" / name
+        ).read_bytes()
 
 
 def test_the_report_is_made_again_of_the_runs_alone(out):
-    before = {name: (out / name).read_bytes() for name in ("report.html", "summary.txt", "surface.csv", "array.json")}
+    before = {
+        name: (out / name).read_bytes()
+        for name in ("report.html", "summary.txt", "surface.csv", "array.json")
+    }
     (out / "surface.csv").unlink()
     assert out / "report.html" in api.report(out)
     assert {name: (out / name).read_bytes() for name in before} == before

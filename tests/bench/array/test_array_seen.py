@@ -10,10 +10,10 @@ from bench import api
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.tables import sigma_name
-from bench.evaluate import evaluate
+from bench.commands.evaluate import evaluate
 from bench.report.score import truth_of
 from bench.rig.simulate import simulate
-from bench.session.array import load_views
+from bench.session.array_view import load_views
 from tests.scenes.rig_sessions import protocol_file
 
 # Two columns that stand before each other, one higher: their wires cross in both cameras' pictures.
@@ -64,7 +64,10 @@ def out(session, tmp_path_factory):
 
 def test_each_whisker_has_a_truth_that_is_true(session, out):
     """Nothing is off by more than four stated sigmas; a wire that was the other's would be, by some hundreds."""
-    rows, views = api.read(out).table("whisks"), {view.base.name: view for view in load_views(session)}
+    rows, views = (
+        api.read(out).table("whisks"),
+        {view.base.name: view for view in load_views(session)},
+    )
     assert rows["whisker"].tolist() == ["a1", "b1"]
     for row in rows:
         true = truth_of(views[row["whisker"]], row["trial"], 0)
@@ -100,6 +103,8 @@ def test_pictures_without_a_place_are_refused(session, tmp_path):
     for picture in session.rglob("*.jpg"):
         (copy / picture.relative_to(session)).write_bytes(b"")
     text = (copy / "session.toml").read_text()
-    (copy / "session.toml").write_text(re.sub(r"T_rig_board = \[.*?\n\]\n", "", text, flags=re.DOTALL))
+    (copy / "session.toml").write_text(
+        re.sub(r"T_rig_board = \[.*?\n\]\n", "", text, flags=re.DOTALL)
+    )
     with pytest.raises(BadInput, match="T_rig_board is missing; measure it, or bring"):
         load_views(copy)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from bench.array.cloud import Mount, contacts
+from bench.array.shape_verdict import surface_lines, surface_verdict
 from bench.array.surface import Surface
-from bench.array.verdict import surface_lines, surface_verdict
-from bench.records.trial import (
+from bench.records.trial_result import (
     EstimateRow,
     FeltTrial,
     FeltWhisk,
@@ -28,12 +28,19 @@ ALPHA = np.radians(10.0)
 
 
 def felt(d_x_mm=60.0, touch_rad=0.3, beta=0.5, status="") -> TrialResult:
-    row = EstimateRow("with_friction", Value(d_x_mm, 0.5), ALPHA, beta, touch_covariance_mm_rad=0.001)
+    row = EstimateRow(
+        "with_friction", Value(d_x_mm, 0.5), ALPHA, beta, touch_covariance_mm_rad=0.001
+    )
     touch, phi = Value(touch_rad, 0.004), Value(beta - ALPHA, 0.03)
     whisk = FeltWhisk(touch_felt_rad=touch, phi_felt_rad=phi, estimates=(row,), status=status)
     facts = TrialFacts("t", "measure", "steel", 10.0, *[np.nan] * 3)
-    return TrialResult(facts, WhiskerFacts("cylinder", 100.0, 1.0, 2945.0, None), 3.0,
-                       SeenTrial((SeenWhisk(0),)), FeltTrial((whisk,)))  # fmt: skip
+    return TrialResult(
+        facts,
+        WhiskerFacts("cylinder", 100.0, 1.0, 2945.0, None),
+        3.0,
+        SeenTrial((SeenWhisk(0),)),
+        FeltTrial((whisk,)),
+    )
 
 
 def cloud(result: TrialResult, surface: Surface | None = None, base: Base = BASE):
@@ -46,20 +53,36 @@ def test_point_and_covariance_are_those_of_draws():
     (contact,) = cloud(felt())
     rng, n = np.random.default_rng(0), 50_000
     polar = rng.multivariate_normal([60.0, 0.3], [[0.25, 0.001], [0.001, 1.6e-5]], n)
-    points = np.column_stack([polar[:, 0] * np.cos(polar[:, 1]), polar[:, 0] * np.sin(polar[:, 1]),
-                              Z_C_MM.sigma * rng.standard_normal(n)])  # fmt: skip
+    points = np.column_stack(
+        [
+            polar[:, 0] * np.cos(polar[:, 1]),
+            polar[:, 0] * np.sin(polar[:, 1]),
+            Z_C_MM.sigma * rng.standard_normal(n),
+        ]
+    )
     arm = points @ TURN.T
-    drawn = arm + np.cross(0.002 * rng.standard_normal((n, 3)), arm) + [10, 20, 5] + 0.1 * rng.standard_normal((n, 3))
+    drawn = (
+        arm
+        + np.cross(0.002 * rng.standard_normal((n, 3)), arm)
+        + [10, 20, 5]
+        + 0.1 * rng.standard_normal((n, 3))
+    )
     np.testing.assert_allclose(contact.point_mm, drawn.mean(axis=0), atol=0.01)
     size = np.sqrt(np.diag(contact.covariance_mm2))
-    np.testing.assert_allclose(np.cov(drawn.T) / np.outer(size, size), contact.covariance_mm2 / np.outer(size, size),
-                               atol=0.02)  # fmt: skip
+    np.testing.assert_allclose(
+        np.cov(drawn.T) / np.outer(size, size),
+        contact.covariance_mm2 / np.outer(size, size),
+        atol=0.02,
+    )
     assert contact.normal_sigma_rad == pytest.approx(np.hypot(0.03, 0.05))
 
 
 def bar(along_mm: float) -> tuple[Surface, Base]:
     """A bar of slope 0.5 that a whisker at the origin touches at 60 mm and 0.3 rad; its point moved along the axis."""
-    across, axis = np.array([0.0, -np.cos(0.5), np.sin(0.5)]), np.array([0.0, np.sin(0.5), np.cos(0.5)])
+    across, axis = (
+        np.array([0.0, -np.cos(0.5), np.sin(0.5)]),
+        np.array([0.0, np.sin(0.5), np.cos(0.5)]),
+    )
     cos, sin = np.cos(0.3), np.sin(0.3)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     point = turn @ (np.array([60.0, 0.0, 0.0]) - 3.5 * across + along_mm * axis)
@@ -102,7 +125,9 @@ def test_distances_from_a_cone():
     beside = np.array([0.5, 0.0, -np.sqrt(0.75)]) * 10.0 + 2.0 * np.array([np.sqrt(0.75), 0.0, 0.5])
     outside, normals = cone.distance_mm(np.array([beside, [0.0, 1e-9, -4.0], [3.0, 0.0, 4.0]]))
     np.testing.assert_allclose(outside, [2.0, -2.0, 5.0], atol=1e-8)
-    np.testing.assert_allclose(normals[::2], [[np.sqrt(0.75), 0.0, 0.5], [0.6, 0.0, 0.8]], atol=1e-12)
+    np.testing.assert_allclose(
+        normals[::2], [[np.sqrt(0.75), 0.0, 0.5], [0.6, 0.0, 0.8]], atol=1e-12
+    )
 
 
 def test_doubtful_contacts_are_in_the_table_and_not_in_the_verdict():

@@ -2,8 +2,16 @@
 
 import numpy as np
 
-from bench.array.exchanged import exchanged
-from bench.records.trial import FeltTrial, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts, TrialResult, WhiskerFacts
+from bench.array.exchanged_whiskers import exchanged
+from bench.records.trial_result import (
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
 from vision.truth.value import NAN, Value
 
 SIGMA = 1e-4
@@ -14,7 +22,13 @@ def result(seen_rad: float, felt_rad: float, shared_rad: float = 0.0) -> TrialRe
     seen = SeenWhisk(0, touch_rad=touch, touch_shared_rad=shared_rad)
     felt = FeltWhisk(touch_felt_rad=Value(felt_rad, SIGMA))
     facts = TrialFacts("t", "measure", "steel", 10.0)
-    return TrialResult(facts, WhiskerFacts("cylinder", 100.0, 1.0, 2945.0), 3.0, SeenTrial((seen,)), FeltTrial((felt,)))
+    return TrialResult(
+        facts,
+        WhiskerFacts("cylinder", 100.0, 1.0, 2945.0),
+        3.0,
+        SeenTrial((seen,)),
+        FeltTrial((felt,)),
+    )
 
 
 def lines(a: TrialResult, b: TrialResult) -> list[str]:
@@ -25,7 +39,9 @@ def test_touches_that_are_each_others_are_told():
     """Also where what felt touches are off by together was added to the sigma of those seen, as `finished` does."""
     for shared in (0.0, 0.05):
         (line,) = lines(result(0.02, 0.07, shared), result(0.07, 0.02, shared))
-        assert line.startswith("a and b look exchanged: each touches, as felt, when the other does, as seen")
+        assert line.startswith(
+            "a and b look exchanged: each touches, as felt, when the other does, as seen"
+        )
 
 
 def test_touches_of_their_own_are_not():

@@ -32,7 +32,9 @@ def touched(name: str, number: int) -> tuple[float, float]:
 
     low, high = -1.0, next(angle for angle in np.arange(-1.0, 1.5, 0.01) if gap(angle)[0] < 0)
     for _ in range(50):
-        low, high = (low, (low + high) / 2) if gap((low + high) / 2)[0] < 0 else ((low + high) / 2, high)
+        low, high = (
+            (low, (low + high) / 2) if gap((low + high) / 2)[0] < 0 else ((low + high) / 2, high)
+        )
     return gap(low)[1], low
 
 
@@ -43,11 +45,27 @@ def drawn(surface: Surface, rng: np.random.Generator, scale: float = 1.0) -> lis
         arc, angle = touched(surface.shape, number)
         arc += scale * D_SIGMA * rng.standard_normal() - ALPHA_MM * common
         angle += scale * TOUCH_SIGMA * rng.standard_normal()
-        towards, aside = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0]])
+        towards, aside = np.array(
+            [[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0]]
+        )
         covariance = (D_SIGMA**2 + ALPHA_MM**2) * np.outer(towards, towards)
         covariance += (arc * TOUCH_SIGMA) ** 2 * np.outer(aside, aside) + 1e-8 * np.outer(UP, UP)
-        contacts.append(Contact(f"w{number}", "t", 0, "with_friction", base + arc * towards, covariance,
-                                np.full(3, np.nan), np.nan, "", base, WIRE, -ALPHA_MM))  # fmt: skip
+        contacts.append(
+            Contact(
+                f"w{number}",
+                "t",
+                0,
+                "with_friction",
+                base + arc * towards,
+                covariance,
+                np.full(3, np.nan),
+                np.nan,
+                "",
+                base,
+                WIRE,
+                -ALPHA_MM,
+            )
+        )
     return contacts
 
 
@@ -56,7 +74,10 @@ def test_sizes_come_back_from_where_they_are_not_quite_said_to_be(surface, rng):
     """Without noise, begun 2 mm and a twentieth of the size aside: to the steps' accuracy."""
     contacts = drawn(surface, rng, 0.0)
     key = felt_size("t", contacts, surface).key
-    said = {"point_mm": surface.point_mm + np.array([2.0, -1.0, 1.0]), key: 1.05 * getattr(surface, key)}
+    said = {
+        "point_mm": surface.point_mm + np.array([2.0, -1.0, 1.0]),
+        key: 1.05 * getattr(surface, key),
+    }
     found = felt_size("t", contacts, Surface(**(vars(surface) | said)))
     assert found.size.value == pytest.approx(getattr(surface, key), rel=1e-4)
     assert not found.status and found.chance > 0.999

@@ -64,9 +64,14 @@ with lock_output(Path(sys.argv[1])):
 
 def test_a_second_run_on_one_output_stops(tmp_path):
     command = [sys.executable, "-c", OTHER_RUN, str(tmp_path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
         assert other.stdout.readline() == "held\n"
-        with pytest.raises(BadInput, match=rf"another run \(process {other.pid}\)"), lock_output(tmp_path):
+        with (
+            pytest.raises(BadInput, match=rf"another run \(process {other.pid}\)"),
+            lock_output(tmp_path),
+        ):
             pass
         other.kill()
         other.wait()

@@ -17,7 +17,9 @@ distributed = pytest.importorskip("distributed")
 def local():
     """A cluster of two workers in this process."""
     single_thread()
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as made:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as made:
         yield made.scheduler_address
 
 

@@ -16,7 +16,9 @@ LONG_AGO_S = 60.0
 def read(monkeypatch):
     """Files whose contents were read."""
     found = []
-    monkeypatch.setattr(digests, "content_hash", lambda file: found.append(file.name) or content_hash(file))
+    monkeypatch.setattr(
+        digests, "content_hash", lambda file: found.append(file.name) or content_hash(file)
+    )
     return found
 
 
@@ -37,11 +39,15 @@ def test_a_file_that_is_as_it_was_is_read_once(tmp_path, monkeypatch, read):
     file = tmp_path / "0.png"
     file.write_bytes(b"a")
     looked_later(monkeypatch)
-    assert digest_of(file, tmp_path / "out") == digest_of(file, tmp_path / "out") == content_hash(file)
+    assert (
+        digest_of(file, tmp_path / "out") == digest_of(file, tmp_path / "out") == content_hash(file)
+    )
     assert read == ["0.png"]
 
 
-def test_a_file_that_was_changed_is_read_again_even_if_its_size_and_time_are_the_same(tmp_path, monkeypatch, read):
+def test_a_file_that_was_changed_is_read_again_even_if_its_size_and_time_are_the_same(
+    tmp_path, monkeypatch, read
+):
     file = tmp_path / "0.png"
     file.write_bytes(b"a")
     then = file.stat()

@@ -28,7 +28,9 @@ def test_two_opencvs(monkeypatch):
 
 def test_no_opencv(monkeypatch):
     monkeypatch.setattr(environment.metadata, "distributions", distributions("numpy"))
-    with pytest.raises(BadInput, match="found no OpenCV where exactly opencv-contrib-python-headless"):
+    with pytest.raises(
+        BadInput, match="found no OpenCV where exactly opencv-contrib-python-headless"
+    ):
         environment.check_environment()
 
 
@@ -37,7 +39,10 @@ def test_no_opencv(monkeypatch):
     [
         (SimpleNamespace(), "cv2 is broken"),
         (SimpleNamespace(__version__="4.14.0", aruco=SimpleNamespace()), "cv2 is broken"),
-        (SimpleNamespace(__version__="4.13.0", aruco=SimpleNamespace(CharucoDetector=1)), "OpenCV is 4.13.0"),
+        (
+            SimpleNamespace(__version__="4.13.0", aruco=SimpleNamespace(CharucoDetector=1)),
+            "OpenCV is 4.13.0",
+        ),
     ],
 )
 def test_broken_and_old_opencv(monkeypatch, cv2, expected):

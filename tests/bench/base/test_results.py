@@ -32,7 +32,9 @@ class Thing:
 
 def test_a_moved_session_is_the_same_session():
     values = np.arange(3.0)
-    assert hash_of(Thing(Path("/here/trial"), values)) == hash_of(Thing(Path("/there/trial"), values))
+    assert hash_of(Thing(Path("/here/trial"), values)) == hash_of(
+        Thing(Path("/there/trial"), values)
+    )
     assert hash_of(Thing(Path("trial"), values)) != hash_of(Thing(Path("other"), values))
 
 
@@ -68,8 +70,16 @@ def test_pictures_in_a_linked_folder_count(tmp_path):
 
 def test_results_come_back_as_they_went(tmp_path):
     value = 0.1 + 0.2
-    write_result(tmp_path / "r.json", {"x": np.float64(value), "n": np.int64(3), "none": math.nan, "a": np.eye(2)})
-    assert read_result(tmp_path / "r.json") == {"x": value, "n": 3, "none": None, "a": [[1.0, 0.0], [0.0, 1.0]]}
+    write_result(
+        tmp_path / "r.json",
+        {"x": np.float64(value), "n": np.int64(3), "none": math.nan, "a": np.eye(2)},
+    )
+    assert read_result(tmp_path / "r.json") == {
+        "x": value,
+        "n": 3,
+        "none": None,
+        "a": [[1.0, 0.0], [0.0, 1.0]],
+    }
 
 
 def test_half_a_result_is_none(tmp_path):
@@ -84,13 +94,17 @@ def test_plain_takes_nested_dataclasses():
     }
 
 
-FOLDERS = sorted(path.name for path in (ROOT / "vision").iterdir() if (path / "__init__.py").is_file())
+FOLDERS = sorted(
+    path.name for path in (ROOT / "vision").iterdir() if (path / "__init__.py").is_file()
+)
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_a_changed_line_in_any_folder_of_vision_looks_at_the_pictures_again(folder, tmp_path):
     for package in ("vision", "bench", "estimator"):
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
     seeing, estimating = (hash_of_code(places, tmp_path) for places in (SEEING, ESTIMATING))
     with (tmp_path / "vision" / folder / "__init__.py").open("a") as file:
         file.write("# a line more\n")
@@ -101,7 +115,9 @@ def test_a_changed_line_in_any_folder_of_vision_looks_at_the_pictures_again(fold
 
 def test_a_changed_figure_or_estimator_looks_at_no_picture_again(tmp_path):
     for package in ("vision", "bench", "estimator"):
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
     before = [hash_of_code(places, tmp_path) for places in (SEEING, ESTIMATING, DRAWING)]
     for changed in ("bench/base/drawing.py", "estimator/slip.py"):
         with (tmp_path / changed).open("a") as file:
@@ -128,7 +144,11 @@ def test_all_code_that_what_is_seen_rests_on_is_in_its_hash():
         new = {found for path in new for found in _imported(path)} - reached
     apart = [ROOT / place for place in ("bench/base", "estimator")]
     covered = [ROOT / place for place in SEEING]
-    missing = [path for path in reached if not any(path.is_relative_to(place) for place in (*covered, *apart))]
+    missing = [
+        path
+        for path in reached
+        if not any(path.is_relative_to(place) for place in (*covered, *apart))
+    ]
     assert len(reached) > 50 and missing == []
 
 

@@ -7,7 +7,12 @@ import numpy as np
 from bench.base.tables import read_table, write_table
 
 ROWS = [
-    {"trial": "Prüfung", "whisk": 0, "d_x_mm": 60.25, "status": "χ² 79, β = 30° ± 0.2°; α − φ ≥ 0 …"},
+    {
+        "trial": "Prüfung",
+        "whisk": 0,
+        "d_x_mm": 60.25,
+        "status": "χ² 79, β = 30° ± 0.2°; α − φ ≥ 0 …",
+    },
     {"trial": "b", "whisk": 1, "d_x_mm": math.nan, "status": ""},
 ]
 

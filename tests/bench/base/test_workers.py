@@ -49,7 +49,9 @@ def test_one_process_of_one_thread_works_here(monkeypatch):
         monkeypatch.setenv(name, "1")
     before = cv2.getNumThreads()
     with Workers(1) as pool:
-        assert pool.run(lambda _: (os.getpid(), cv2.getNumThreads()), [1], "here") == [(os.getpid(), 1)]
+        assert pool.run(lambda _: (os.getpid(), cv2.getNumThreads()), [1], "here") == [
+            (os.getpid(), 1)
+        ]
     assert cv2.getNumThreads() == before
     with Workers(2) as pool:
         assert pool.run(os.path.abspath, ["/"], "elsewhere") == ["/"] and pool._processes
@@ -74,7 +76,10 @@ def test_a_process_that_dies_costs_its_task_a_retry_and_the_third_death_is_its_r
 
 def test_a_killed_process_is_told_in_a_line(tmp_path, monkeypatch):
     monkeypatch.setattr("bench.base.workers.MOST_DEATHS", 1)
-    with pytest.raises(BadInput, match="a worker process was killed three times"), Workers(2) as pool:
+    with (
+        pytest.raises(BadInput, match="a worker process was killed three times"),
+        Workers(2) as pool,
+    ):
         pool.run(dies, [(tmp_path / "always", 9)], "killed")
 
 

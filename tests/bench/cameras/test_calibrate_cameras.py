@@ -8,7 +8,7 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.cameras.board_views import sampled_frames
-from bench.cameras.calibrate import calibrate_cameras_command
+from bench.cameras.calibrate_session import calibrate_cameras_command
 from vision.calibration.cameras_file import read_cameras
 
 MANIFEST = """format = 1
@@ -28,7 +28,9 @@ def webcam(real, tmp_path):
     def made(dictionary="DICT_4X4_1000", inverted="true"):
         folder = tmp_path / "webcam"
         (folder / "boards").mkdir(parents=True)
-        (folder / "session.toml").write_text(MANIFEST.format(dictionary=dictionary, inverted=inverted))
+        (folder / "session.toml").write_text(
+            MANIFEST.format(dictionary=dictionary, inverted=inverted)
+        )
         shutil.copy(real / "calibration" / "single" / "cam_0.mp4", folder / "boards")
         return folder
 
@@ -80,7 +82,10 @@ def test_lenses_of_another_tool_are_placed_by_the_rig_board(small_session, tmp_p
     truth = json.loads((small_session / "truth.json").read_text())["cameras"]
     text = "".join(LENSES.format(name=n, K=t["K"], dist=t["dist"]) for n, t in truth.items())
     (tmp_path / "anipose.toml").write_text(text)
-    assert calibrate_cameras_command(small_session, tmp_path / "c.toml", tmp_path / "anipose.toml") == 0
+    assert (
+        calibrate_cameras_command(small_session, tmp_path / "c.toml", tmp_path / "anipose.toml")
+        == 0
+    )
     assert "lenses as in anipose.toml" in capsys.readouterr().out
     for camera in read_cameras(tmp_path / "c.toml"):
         # With true lenses a camera's place is known to some hundredths of a millimetre from one picture.
@@ -89,7 +94,11 @@ def test_lenses_of_another_tool_are_placed_by_the_rig_board(small_session, tmp_p
 
 
 def test_lenses_that_cannot_be_are_refused(small_session, tmp_path):
-    text = LENSES.format(name="high", K=[[3754, 0, 545], [0, 3323, 683], [0, 0, 1]], dist=[-2.9, 0.01, -0.3, 0.1, 625])
+    text = LENSES.format(
+        name="high",
+        K=[[3754, 0, 545], [0, 3323, 683], [0, 0, 1]],
+        dist=[-2.9, 0.01, -0.3, 0.1, 625],
+    )
     (tmp_path / "wild.toml").write_text(text)
     with pytest.raises(BadInput, match=r"wild\.toml: camera high: fx = 3754 and fy = 3323"):
         calibrate_cameras_command(small_session, tmp_path / "c.toml", tmp_path / "wild.toml")

@@ -7,10 +7,10 @@ import tomllib
 import cv2
 import pytest
 
-from bench.cameras.calibration import calibrate_session
-from bench.cli import main
-from bench.session.check import checked_session
+from bench.cameras.session_cameras import calibrate_session
+from bench.commands.cli import main
 from bench.session.session import load_session
+from bench.session.session_check import checked_session
 from vision.calibration.cameras_file import read_cameras
 
 
@@ -38,7 +38,9 @@ def edit(session, old, new):
 @pytest.mark.parametrize(
     "old, new, works",
     [
-        pytest.param("DICT_5X5_100", "DICT_4X4_100", 'dictionary = "DICT_5X5_50"', marks=pytest.mark.slow),
+        pytest.param(
+            "DICT_5X5_100", "DICT_4X4_100", 'dictionary = "DICT_5X5_50"', marks=pytest.mark.slow
+        ),
         ("legacy = false", "legacy = true", "legacy = false"),
         ("legacy = false", "inverted = true", "inverted = false"),
     ],
@@ -59,7 +61,10 @@ def test_a_square_that_does_not_go_with_its_marker(small_copy, refused):
 def test_a_whole_board_at_the_wrong_scale_is_told_by_the_bars(small_copy, refused):
     """A third too large: the bars are not where the whisker could touch them, so what is found for them disagrees."""
     edit(small_copy, "square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 20.0\nmarker_mm = 14.67")
-    assert "hardly seen where square_mm and T_rig_board have the whisker: measure a square of the board" in refused()
+    assert (
+        "hardly seen where square_mm and T_rig_board have the whisker: measure a square of the board"
+        in refused()
+    )
 
 
 def test_too_few_views(small_copy, refused):
@@ -94,7 +99,9 @@ translation = [0.0, 0.0, 500.0]
 
 def test_a_diverged_lens_brought_along(small_copy, refused, tmp_path):
     (tmp_path / "wild.toml").write_text(DIVERGED)
-    assert "fx = 3754 and fy = 3323 differ by 13 %" in refused("--lenses", str(tmp_path / "wild.toml"))
+    assert "fx = 3754 and fy = 3323 differ by 13 %" in refused(
+        "--lenses", str(tmp_path / "wild.toml")
+    )
 
 
 def test_another_tool_s_file_as_cameras_toml(small_copy):
@@ -106,7 +113,7 @@ def test_another_tool_s_file_as_cameras_toml(small_copy):
 def caliscope(truth: dict) -> str:
     """As caliscope writes cameras: numbered, metres, a world of its own."""
     tables = (
-        f"[cameras.{k}]\ncam_id = {k}\nname = \"{name}\"\nsize = [1280, 720]\nmatrix = {t['K']}\n"
+        f'[cameras.{k}]\ncam_id = {k}\nname = "{name}"\nsize = [1280, 720]\nmatrix = {t["K"]}\n'
         f"distortions = {t['dist']}\nrotation = [0.1, 0.2, 0.3]\ntranslation = [0.0, 0.1, 1.0]\n"
         for k, (name, t) in enumerate(truth.items())
     )
@@ -121,8 +128,20 @@ def test_lenses_of_another_tool_do_without_board_views(small_copy, tmp_path):
     edit(small_copy, "[rig]\n", "[rig]\nT_rig_board_sigma_mm = 0.1\n")
     (tmp_path / "camera_array.toml").write_text(caliscope(truth))
     made = small_copy / "cameras.toml"
-    assert main(["calibrate", "cameras", str(small_copy), "--out", str(made), "--lenses",
-                 str(tmp_path / "camera_array.toml")]) == 0  # fmt: skip
+    assert (
+        main(
+            [
+                "calibrate",
+                "cameras",
+                str(small_copy),
+                "--out",
+                str(made),
+                "--lenses",
+                str(tmp_path / "camera_array.toml"),
+            ]
+        )
+        == 0
+    )
     assert tomllib.loads(made.read_text())["covariance"] == "cameras.npz"
     cameras = calibrate_session(load_session(small_copy), tmp_path / "out").cameras
     # T_rig_board's 0.1 mm is all of a pose's uncertainty that both cameras share.

@@ -47,7 +47,9 @@ def test_drift_widens_what_is_read_far_from_the_free_stroke(rng):
     one = stroke(rng)
     touch = one.touch()
     far = np.radians(3.0)
-    steady, wandering = (one.at(far, allow_drift(touch, rate, SPEED)) for rate in ([0.0, 0.0], [0.05, 0.05]))
+    steady, wandering = (
+        one.at(far, allow_drift(touch, rate, SPEED)) for rate in ([0.0, 0.0], [0.05, 0.05])
+    )
     seconds = (touch.motor_rad + far - touch.level.centre_rad) / SPEED
     added = np.diag(wandering.covariance - steady.covariance)
     assert np.sqrt(added) == pytest.approx(0.05 * seconds * np.ones(2), rel=0.1)
@@ -62,7 +64,9 @@ def test_no_touch_stays_none(rng):
 def test_a_zero_that_may_drift_is_in_the_touch_too(rng):
     """As far from the free stroke as touch is: drift times that, through the rise's slope."""
     one = stroke(rng)
-    steady, wandering = (allow_drift(one.touch(), rate, SPEED) for rate in ([0.0, 0.0], [0.05, 0.05]))
+    steady, wandering = (
+        allow_drift(one.touch(), rate, SPEED) for rate in ([0.0, 0.0], [0.05, 0.05])
+    )
     seconds = (steady.motor_rad - steady.level.centre_rad) / SPEED
     added = np.linalg.norm(steady.rise.gain) * 0.05 * seconds
     assert wandering.sigma_rad == pytest.approx(np.hypot(steady.sigma_rad, added), rel=1e-6)
@@ -73,7 +77,9 @@ def test_touch_and_moments_may_be_one_whisks(rng):
     one = stroke(rng)
     touch = allow_drift(one.touch(), [0.3, 0.3], SPEED)
     at = one.at(np.radians(0.3), touch)
-    whole = np.block([[touch.sigma_rad**2, at.theta_covariance], [at.theta_covariance[:, None], at.covariance]])
+    whole = np.block(
+        [[touch.sigma_rad**2, at.theta_covariance], [at.theta_covariance[:, None], at.covariance]]
+    )
     scale = np.sqrt(np.diag(whole))
     assert np.linalg.eigvalsh(whole / np.outer(scale, scale)).min() > -1e-9
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.gauges.checks import check_alive
 from bench.gauges.felt import Stroke
 from bench.gauges.fit import fit_gauges, fit_matrix
+from bench.gauges.gauge_faults import check_alive
+from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix, to_follicle
-from bench.gauges.readings import Pairs
 
 TRUE = np.array([[11.3, 0.32], [-0.25, 10.5]])
 THETA = np.radians([0.5, 1.5, 2.5, 3.5, 4.5])
@@ -16,15 +16,26 @@ RIGID = 9.3  # N·mm at 3°
 
 
 def pairs(
-    trial: str, roll_deg: float, rng=None, *, noise_V=0.0005, zero_V=0.002, distance=0.002, point_Nmm=0.01
+    trial: str,
+    roll_deg: float,
+    rng=None,
+    *,
+    noise_V=0.0005,
+    zero_V=0.002,
+    distance=0.002,
+    point_Nmm=0.01,
 ) -> Pairs:
     """A push at β = 0 on a follicle turned by roll_deg, with noise of each kind where there is a generator."""
     hub = np.stack([np.zeros_like(THETA), RIGID * THETA / np.radians(3.0)], axis=1)
     moments = hub @ to_follicle(np.radians(roll_deg)).T
     volts = np.linalg.solve(TRUE, moments.T).T
     n = 2 * len(THETA)
-    moments_covariance = distance**2 * np.outer(moments.ravel(), moments.ravel()) + point_Nmm**2 * np.eye(n)
-    volts_covariance = np.kron(np.ones((len(THETA),) * 2), zero_V**2 * np.eye(2)) + noise_V**2 * np.eye(n)
+    moments_covariance = distance**2 * np.outer(
+        moments.ravel(), moments.ravel()
+    ) + point_Nmm**2 * np.eye(n)
+    volts_covariance = np.kron(
+        np.ones((len(THETA),) * 2), zero_V**2 * np.eye(2)
+    ) + noise_V**2 * np.eye(n)
     paper = to_follicle(np.radians(roll_deg)) @ [0.0, RIGID]
     if rng is not None:
         moments = moments + rng.multivariate_normal(np.zeros(n), moments_covariance).reshape(-1, 2)
@@ -63,17 +74,24 @@ def test_a_distance_that_is_hardly_known_draws_no_coefficient_towards_zero():
     of the readings alone; as a share of the known moments it would draw the factor down by χ² · 0.05², here a quarter.
     """
     uneven = 1.0 + 0.03 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])[:, None]
-    sound = [pairs(trial, roll, distance=0.0, point_Nmm=0.05) for trial, roll in (("a", 0.0), ("b", 90.0))]
+    sound = [
+        pairs(trial, roll, distance=0.0, point_Nmm=0.05)
+        for trial, roll in (("a", 0.0), ("b", 90.0))
+    ]
     exact = [Pairs(**(vars(p) | {"volts": p.volts * uneven})) for p in sound]
     loose = [Pairs(**(vars(p) | {"scale_sigma": 0.05})) for p in exact]
-    assert np.diag(fit_matrix(loose).matrix) == pytest.approx(np.diag(fit_matrix(exact).matrix), rel=1e-3)
+    assert np.diag(fit_matrix(loose).matrix) == pytest.approx(
+        np.diag(fit_matrix(exact).matrix), rel=1e-3
+    )
 
 
 def test_one_factor_a_channel_leaves_cross_talk_out():
     """Each factor is moment over volts where that channel senses the push, so it holds the other's cross-talk: the
     inverse of the inverse matrix's diagonal."""
     gauges = fit_gauges([pairs("a", 0.0), pairs("b", 90.0)])
-    assert np.diag(gauges.one_factor.matrix) == pytest.approx(1 / np.diag(np.linalg.inv(TRUE)), rel=1e-9)
+    assert np.diag(gauges.one_factor.matrix) == pytest.approx(
+        1 / np.diag(np.linalg.inv(TRUE)), rel=1e-9
+    )
     assert gauges.one_factor.matrix[0, 1] == gauges.one_factor.matrix[1, 0] == 0.0
 
 
@@ -85,7 +103,9 @@ def test_stated_intervals_hold():
     rng = np.random.default_rng(7)
     held = []
     for _ in range(1000):
-        made = fit_matrix([pairs(name, roll, rng) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))])
+        made = fit_matrix(
+            [pairs(name, roll, rng) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))]
+        )
         held.append(np.abs(made.matrix - TRUE) < 1.959964 * made.sigma)
     share = np.mean(held, axis=0)
     assert np.all(share > 0.93) and np.all(share < 0.97)
@@ -94,8 +114,14 @@ def test_stated_intervals_hold():
 def test_wider_scatter_than_stated_widens_the_result():
     rng = np.random.default_rng(3)
     sound = [pairs(name, roll, rng) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))]
-    wild = [pairs(name, roll, rng, point_Nmm=0.2) for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))]
-    claimed = [Pairs(**(vars(p) | {"moments_covariance": q.moments_covariance})) for p, q in zip(wild, sound)]
+    wild = [
+        pairs(name, roll, rng, point_Nmm=0.2)
+        for name, roll in (("a", 0), ("b", 90), ("c", 0), ("d", 90))
+    ]
+    claimed = [
+        Pairs(**(vars(p) | {"moments_covariance": q.moments_covariance}))
+        for p, q in zip(wild, sound)
+    ]
     assert fit_matrix(claimed).sigma[1, 1] > 3 * fit_matrix(sound).sigma[1, 1]
 
 
@@ -111,7 +137,9 @@ def test_each_trial_gets_the_coefficients_fitted_without_it():
     recorded = [pairs("a", 0.0, rng), pairs("b", 90.0, rng), pairs("c", 90.0, rng)]
     gauges = fit_gauges(recorded)
     # the weights are those of the whole fit: they differ by its change of some 0.1 %, the result by the square of it
-    assert gauges.for_trial("b").matrix == pytest.approx(fit_matrix([recorded[0], recorded[2]]).matrix, rel=1e-4)
+    assert gauges.for_trial("b").matrix == pytest.approx(
+        fit_matrix([recorded[0], recorded[2]]).matrix, rel=1e-4
+    )
     assert gauges.for_trial("a") is None  # the only one with the follicle unturned
     assert gauges.for_trial("measured").matrix == pytest.approx(gauges.all.matrix)
 
@@ -122,7 +150,9 @@ def test_covariance_of_a_moment_from_that_of_the_coefficients():
     root = rng.normal(size=(4, 4)) * 0.05
     made = GaugeMatrix(TRUE, root @ root.T)
     volts = np.array([0.3, 0.7])
-    drawn = rng.multivariate_normal(TRUE.ravel(), made.covariance, size=4000).reshape(-1, 2, 2) @ volts
+    drawn = (
+        rng.multivariate_normal(TRUE.ravel(), made.covariance, size=4000).reshape(-1, 2, 2) @ volts
+    )
     assert np.sqrt(np.diag(made.covariance_at(volts))) == pytest.approx(drawn.std(axis=0), rel=0.05)
 
 
@@ -161,4 +191,6 @@ def test_moments_beyond_the_calibrated_range_are_said():
     most = gauges.full_scale_Nmm
     assert most == pytest.approx(RIGID * 1.5 * np.ones(2))
     assert gauges.beyond(1.04 * most) == ""
-    assert "m_z of" in gauges.beyond(most * [1.0, 1.1]) and "m_y of" not in gauges.beyond(most * [1.0, 1.1])
+    assert "m_z of" in gauges.beyond(most * [1.0, 1.1]) and "m_y of" not in gauges.beyond(
+        most * [1.0, 1.1]
+    )

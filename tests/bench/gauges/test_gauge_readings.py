@@ -11,11 +11,11 @@ from bench.base.settings import Settings
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import gauge_delay, strokes_of
 from bench.gauges.fit import fit_gauges
-from bench.gauges.readings import pairs_of, reference_from_nominal, reference_from_pictures
+from bench.gauges.gauge_readings import pairs_of, reference_from_nominal, reference_from_pictures
 from bench.rig.bar import Bar, first_touch
-from bench.rig.contact import moments_Nmm
-from bench.rig.friction import Friction, March
-from bench.rig.rod import Rod
+from bench.rig.elastic_rod import Rod
+from bench.rig.rod_contact import moments_Nmm
+from bench.rig.stick_slip import Friction, March
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.whisker import Whisker
@@ -68,7 +68,9 @@ def test_a_nominal_bar_gives_the_moments_of_2(session):
     """Without pictures: (2) at small angles, a distance known to 1 %, and the touch's sigma in all of it."""
     trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=6.0)
     reference = reference_from_nominal(trial, Touch(0.04, 1e-4), WHISKER)
-    assert reference.moments[:, 1] == pytest.approx(WHISKER.C_Nmm2 * reference.theta_rad / 50.0, rel=5e-3)
+    assert reference.moments[:, 1] == pytest.approx(
+        WHISKER.C_Nmm2 * reference.theta_rad / 50.0, rel=5e-3
+    )
     own = np.sqrt(np.diag(reference.covariance))[1::2] / reference.moments[:, 1]
     sigma = np.hypot(own, reference.scale_sigma)
     assert np.all(sigma > 0.01) and np.all(sigma < 0.013)
@@ -86,7 +88,9 @@ def test_a_nominal_bar_gives_the_moments_of_the_exact_contact(bar_radius_mm):
         radius_mm=bar_radius_mm,
         whisker_radius_mm=WHISKER.diameter_mm / 2,
     )
-    trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=2 * bar_radius_mm)
+    trial = SimpleNamespace(
+        d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=2 * bar_radius_mm
+    )
     reference = reference_from_nominal(trial, Touch(0.0, 1e-4), WHISKER)
     march = March(rod, bar, Friction(0.2, 0.2), first_touch(rod, bar, 0.0, 50.0))
     exact = [moments_Nmm(state)[1] for state in march.along(reference.theta_rad)[1]]
@@ -102,7 +106,9 @@ def test_no_touch_no_pairs(session, exactly_seen):
     trial = session.trial("gauge_roll0")
     signals = read_signals(trial)
     stroke = strokes_of(signals, trial, Settings())[0]
-    free = type(stroke)(*(getattr(stroke, name)[:250] for name in ("time_s", "motor_rad", "channels", "filtered")))
+    free = type(stroke)(
+        *(getattr(stroke, name)[:250] for name in ("time_s", "motor_rad", "channels", "filtered"))
+    )
     assert len(forward_strokes(signals)) == 1
     assert pairs_of(trial, exactly_seen(trial), free, np.zeros(2), WHISKER, 0.05) is None
 
@@ -111,8 +117,10 @@ def test_volts_are_read_as_late_as_the_gauges_filter_has_them(session, exactly_s
     """A recording whose channels come 20 samples later, as the trial says by its filter, has the same volts."""
     trial = session.trial("gauge_roll0")
     stroke, late = strokes_of(read_signals(trial), trial, Settings())[0], 20
-    later = {name: np.concatenate([np.repeat(every[:1], late, axis=0), every[:-late]])
-             for name, every in (("channels", stroke.channels), ("filtered", stroke.filtered))}  # fmt: skip
+    later = {
+        name: np.concatenate([np.repeat(every[:1], late, axis=0), every[:-late]])
+        for name, every in (("channels", stroke.channels), ("filtered", stroke.filtered))
+    }
     filter_Hz = gauge_delay(1.0).value / (late * np.diff(stroke.time_s).mean())
 
     def volts_of(filter_Hz, stroke):
@@ -123,5 +131,10 @@ def test_volts_are_read_as_late_as_the_gauges_filter_has_them(session, exactly_s
     count = min(len(on_time), len(shifted))
     # A window of samples that begins one sample off averages noise of 1e-2 V over a hundred others.
     np.testing.assert_allclose(shifted.volts[:count], on_time.volts[:count], atol=3e-3)
-    unknown = volts_of(None, stroke)  # any delay from none to twice the paper's: 0.3 ms at 10°/s of some degrees
-    assert np.all(np.diag(unknown.volts_covariance)[1::2] > np.diag(on_time.volts_covariance)[1 : 2 * len(unknown) : 2])
+    unknown = volts_of(
+        None, stroke
+    )  # any delay from none to twice the paper's: 0.3 ms at 10°/s of some degrees
+    assert np.all(
+        np.diag(unknown.volts_covariance)[1::2]
+        > np.diag(on_time.volts_covariance)[1 : 2 * len(unknown) : 2]
+    )

@@ -41,7 +41,9 @@ def test_without_a_back_stroke_nothing_is_measured():
 def test_a_motor_that_stops_short_of_the_free_stroke_shows_no_return():
     signals = recording(back=True)
     cut = slice(0, len(signals.motor_rad) - 400)
-    cut_short = Signals(*(a[cut] for a in (signals.time_s, signals.motor_rad, signals.y, signals.z)), "V")
+    cut_short = Signals(
+        *(a[cut] for a in (signals.time_s, signals.motor_rad, signals.y, signals.z)), "V"
+    )
     found = reversals(TRIAL, cut_short, Settings())
     hysteresis, returned = in_percent(found, 10.0 * np.eye(2), np.array([11.5, 11.5]))
     assert hysteresis is not None
@@ -54,9 +56,15 @@ def test_drift_is_taken_out_where_both_free_strokes_show_it(back):
     signals = recording(back=back)
     level = LEFT_V if back else 0.0
     sound = signals.z - np.where(np.arange(len(signals.z)) >= 1240, level, 0.0)
-    drifting = Signals(signals.time_s, signals.motor_rad, signals.y, sound + 0.05 * signals.time_s, "V")
+    drifting = Signals(
+        signals.time_s, signals.motor_rad, signals.y, sound + 0.05 * signals.time_s, "V"
+    )
     (stroke,) = strokes_of(drifting, TRIAL, Settings())
     pushed = stroke.motor_rad > np.radians(4.0)
-    off = stroke.channels[pushed, 1] - stroke.motor_rad[pushed] / np.radians(4.0) - stroke.touch().offset[1]
+    off = (
+        stroke.channels[pushed, 1]
+        - stroke.motor_rad[pushed] / np.radians(4.0)
+        - stroke.touch().offset[1]
+    )
     gained = 0.05 * stroke.time_s[pushed].mean()
     assert off.mean() == pytest.approx(0.0 if back else gained, abs=0.012 if not back else 0.003)

@@ -12,7 +12,7 @@ from bench.plan.sight import curves_of, sight_of
 from bench.plan.tries import looking
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from vision.geometry.camera import Cameras
-from vision.geometry.settings import VisionSettings
+from vision.geometry.vision_settings import VisionSettings
 
 THETA_RAD = np.radians(3.0)
 
@@ -39,7 +39,9 @@ def test_values_are_those_staged(bench):
     bar = staged.whisk.bar
     assert found.truth.d_x_mm.value == pytest.approx(staged.touch.d_x_mm, abs=1e-6)
     assert found.truth.touch_rad.value == pytest.approx(staged.touch.motor_rad, abs=1e-7)
-    assert found.truth.beta_rad.value == pytest.approx(bar.slope(staged.touch.motor_rad)[0], abs=1e-9)
+    assert found.truth.beta_rad.value == pytest.approx(
+        bar.slope(staged.touch.motor_rad)[0], abs=1e-9
+    )
     # the beam of the fit is one of small angles: within 0.3 µm of the exact rod, and of its contact (docs/truth.md)
     slip = float(staged.whisk.slip_at(THETA_RAD))
     assert found.truth.at(THETA_RAD).slip_mm.value == pytest.approx(slip, abs=0.005)
@@ -48,8 +50,10 @@ def test_values_are_those_staged(bench):
 
 def test_sigmas_grow_with_the_lines(bench):
     """Lines twice as uncertain make each sigma larger, and none more than twice as large: priors stay."""
-    for wider in (replace(LINES, wire_px=2.0 * LINES.wire_px),
-                  replace(LINES, bar_px=LINES.bar_px * np.array([1.0, 2.0, 2.0]))):
+    for wider in (
+        replace(LINES, wire_px=2.0 * LINES.wire_px),
+        replace(LINES, bar_px=LINES.bar_px * np.array([1.0, 2.0, 2.0])),
+    ):
         _, before = of(*bench)
         _, after = of(*bench, wider)
         ratios = np.array([after.sigma[name] / before.sigma[name] for name in QUANTITIES])
@@ -67,7 +71,10 @@ def in_a_plane(bench, angles_deg):
     staged, cameras = bench
     axis = staged.axis.direction
     aside = np.cross(axis, [1.0, 0.0, 0.0])
-    places = [staged.foot_mm + 350.0 * (np.cos(a) * axis + np.sin(a) * aside) for a in np.radians(angles_deg)]
+    places = [
+        staged.foot_mm + 350.0 * (np.cos(a) * axis + np.sin(a) * aside)
+        for a in np.radians(angles_deg)
+    ]
     return Cameras(tuple(moved(camera, staged, place) for camera, place in zip(cameras, places)))
 
 
@@ -79,7 +86,11 @@ def test_cameras_on_one_side_of_the_bar_give_no_truth(bench):
 
 def test_a_camera_along_the_bar_is_said(bench):
     _, row = of(bench[0], in_a_plane(bench, [8.0, 90.0]))
-    assert [sentence for sentence in row.obstacles if "camera high looks along the bar (8 deg" in sentence]
+    assert [
+        sentence
+        for sentence in row.obstacles
+        if "camera high looks along the bar (8 deg" in sentence
+    ]
 
 
 def test_a_whisker_outside_the_picture_is_said(bench):
@@ -87,7 +98,10 @@ def test_a_whisker_outside_the_picture_is_said(bench):
     high = cameras["high"]
     away = replace(high, matrix=high.matrix + np.array([[0, 0, 700.0], [0, 0, 0], [0, 0, 0]]))
     _, row = of(staged, Cameras((away, cameras["low"])))
-    assert any("camera high" in sentence and "outside its picture" in sentence for sentence in row.obstacles)
+    assert any(
+        "camera high" in sentence and "outside its picture" in sentence
+        for sentence in row.obstacles
+    )
 
 
 def test_the_clamp_hides_what_it_stands_before(bench):

@@ -6,16 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench import api, cli
+from bench import api
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
+from bench.commands import cli
 from bench.plan.expected import expected
 from bench.plan.outlook import QUANTITIES
 from bench.plan.recorded import SeenTask, plan_seen
-from bench.plan.run import EXAMPLE, Options, plan
+from bench.plan.run_plan import EXAMPLE, Options, plan
 from bench.plan.written import Plan, lines_of
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial import Clock, SeenTrial, SeenWhisk
+from bench.records.trial_result import Clock, SeenTrial, SeenWhisk
 from bench.rig.protocol import load
 from bench.session.session import load_session
 from bench.trials.seen import whisk_record
@@ -64,16 +65,24 @@ def planned(tmp_path_factory):
 def test_a_rig_is_planned_whole(planned):
     made, out = planned
     good, bad = made.rows
-    assert good.outlook.has_truth and all(0.0 < good.outlook.sigma[name] < 3.0 for name in QUANTITIES)
+    assert good.outlook.has_truth and all(
+        0.0 < good.outlook.sigma[name] < 3.0 for name in QUANTITIES
+    )
     assert not bad.outlook.has_truth and "slips off" in bad.outlook.status and made.doubtful
     first, second = rows(out / "plan.csv")
     assert float(first["d_x_sigma_mm"]) == pytest.approx(good.outlook.sigma["d_x_mm"], rel=1e-8)
     assert second["d_x_sigma_mm"] == ""
-    assert json.loads((out / "plan.json").read_text())["rows"][0]["sigma"]["d_x_mm"] == good.outlook.sigma["d_x_mm"]
+    assert (
+        json.loads((out / "plan.json").read_text())["rows"][0]["sigma"]["d_x_mm"]
+        == good.outlook.sigma["d_x_mm"]
+    )
     assert (out / "plan.png").stat().st_size > 10_000
     assert sorted(path.name for path in (out / "views").iterdir()) == ["high.png", "low.png"]
     text = (out / "plan.txt").read_text()
-    assert "has no truth: the whisker slips off" in text and "camera high: at (38, -175, 335) mm" in text
+    assert (
+        "has no truth: the whisker slips off" in text
+        and "camera high: at (38, -175, 335) mm" in text
+    )
 
 
 @pytest.mark.slow
@@ -95,8 +104,12 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
     trial = SeenTrial((seen,), clock=Clock("frames.csv", 0.0, True))
     row = plan_seen(SeenTask(session, session.trials[0], trial, seen, cameras, (), np.radians(3.0)))
     ratios = np.array([row.outlook.sigma[name] / row.stated[name] for name in QUANTITIES])
-    assert ratios[:3] == pytest.approx(1.0, abs=0.02)  # by another whisker's stiffness and bar's diameter
-    assert np.all(ratios[3:] > 0.98) and np.all(ratios[3:] < 1.3)  # staged frames do not scatter, those expected do
+    assert ratios[:3] == pytest.approx(
+        1.0, abs=0.02
+    )  # by another whisker's stiffness and bar's diameter
+    assert np.all(ratios[3:] > 0.98) and np.all(
+        ratios[3:] < 1.3
+    )  # staged frames do not scatter, those expected do
     text = "\n".join(lines_of(Plan("t", (), (row,), 3.0)))
     assert "Expected over stated, median over 1 whisks: d_x 1.0" in text
 
@@ -104,13 +117,17 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
 def test_a_whisk_without_truth_keeps_its_reason(steel_signals, tmp_path):
     session, protocol = load_session(steel_signals), protocol_of(tmp_path)
     seen = SeenWhisk(0, "the whisker never touches")
-    task = SeenTask(session, session.trials[0], SeenTrial((seen,)), seen, cameras_of(protocol), (), 0.05)
+    task = SeenTask(
+        session, session.trials[0], SeenTrial((seen,)), seen, cameras_of(protocol), (), 0.05
+    )
     row = plan_seen(task)
     assert not row.outlook.has_truth and row.outlook.status == "the whisker never touches"
 
 
 def test_lines_come_back_from_a_file():
-    kept = from_plain(LineNoise, json.loads(json.dumps(to_plain(replace(LINES, wire_px=float("nan"))))))
+    kept = from_plain(
+        LineNoise, json.loads(json.dumps(to_plain(replace(LINES, wire_px=float("nan")))))
+    )
     assert np.isnan(kept.wire_px) and np.array_equal(kept.bar_px, LINES.bar_px)
 
 
@@ -125,19 +142,27 @@ def test_the_example_is_a_rig():
         ("[[trials]]\n", "no [[cameras]]"),
         ("[[trials]]\nbeta = 3\n", "beta"),
         (SMALL.replace("focal_px = 720.0", "focal_mm = 8.0"), "pixel_um"),
-        (SMALL.replace("focal_px = 720.0", "focal_px = 720.0\ntarget_mm = [98.0, -900.0, 500.0]"), "camera low"),
+        (
+            SMALL.replace(
+                "focal_px = 720.0", "focal_px = 720.0\ntarget_mm = [98.0, -900.0, 500.0]"
+            ),
+            "camera low",
+        ),
         (SMALL.replace("[38.0, -175.0, 335.0]", "[55.0, 0.0, 335.0]"), "straight"),
         pytest.param(SMALL.split("[[trials]]")[0] + FAR, "slips off", marks=pytest.mark.slow),
     ],
 )
 def test_bad_rigs_are_one_line(text, says, tmp_path, capsys):
-    assert cli.main(["plan", str(protocol_file(tmp_path, text)), "--out", str(tmp_path / "out")]) == 2
+    assert (
+        cli.main(["plan", str(protocol_file(tmp_path, text)), "--out", str(tmp_path / "out")]) == 2
+    )
     told = capsys.readouterr().err
     assert says in told and told.count("\n") == 1
 
 
 @pytest.mark.parametrize(
-    "options", [[], ["rig.toml"], ["no-such.toml", "--out", "o"], ["quick", "--out", "o", "--theta-deg", "0"]]
+    "options",
+    [[], ["rig.toml"], ["no-such.toml", "--out", "o"], ["quick", "--out", "o", "--theta-deg", "0"]],
 )
 def test_bad_usage_is_one_line(options, capsys):
     assert cli.main(["plan", *options]) == 2
@@ -155,7 +180,9 @@ def test_a_session_without_pictures_is_refused(steel_signals, tmp_path, capsys):
 
 
 def test_a_sessions_manifest_is_no_rig(small_session, tmp_path):
-    with pytest.raises(BadInput, match=r"session\.toml: is a recorded session's; give the session's folder"):
+    with pytest.raises(
+        BadInput, match=r"session\.toml: is a recorded session's; give the session's folder"
+    ):
         plan(small_session / "session.toml", tmp_path / "out", Options())
     assert not (tmp_path / "out").exists()
 

@@ -9,7 +9,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.plan import where
 from bench.plan.outlook import Outlook
-from bench.plan.rows import Facts, Row, Tried, tried_on
+from bench.plan.plan_rows import Facts, Row, Tried, tried_on
 from bench.plan.tries import LIGHT, Try, tries
 from bench.rig.build import cameras as built
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
@@ -38,7 +38,9 @@ def test_every_kind_of_change_is_tried(bench):
     for one in by_kind(found, "third"):
         assert len(one.cameras) == 3
     for one in by_kind(found, "lens"):
-        assert np.allclose([c.lens[:4] for c in one.cameras], [c.lens[:4] * [1.5, 1.5, 1, 1] for c in cameras])
+        assert np.allclose(
+            [c.lens[:4] for c in one.cameras], [c.lens[:4] * [1.5, 1.5, 1, 1] for c in cameras]
+        )
     for one in by_kind(found, "move"):  # each looks at the contact
         for name in one.like:
             camera = one.cameras[name]
@@ -63,7 +65,9 @@ def test_only_a_camera_elsewhere_comes_to_see_the_bar(bench):
     blind = replace(LINES, bar_px=np.zeros((0, 3)))
     found = tries(cameras, None, staged.touch.point_mm, light=False)
     lines = dict.fromkeys(cameras.names, blind)
-    assert not any(len(noise.bar_px) for noise in by_kind(found, "lens")[0].lines(lines, staged.axis).values())
+    assert not any(
+        len(noise.bar_px) for noise in by_kind(found, "lens")[0].lines(lines, staged.axis).values()
+    )
     moved = by_kind(found, "move")[0]
     (name,) = moved.like
     assert len(moved.lines(lines, staged.axis)[name].bar_px) == 1
@@ -95,12 +99,20 @@ def test_a_board_placed_better_leaves_less_of_what_all_cameras_share(bench):
 def row(sigma_mm: float, tried: dict[str, float]) -> Row:
     facts = Facts("t", 0, "measure", "", 10.0, 30.0, 0.0, 60.0)
     one = Outlook() if np.isnan(sigma_mm) else Outlook({"d_x_mm": sigma_mm})
-    return Row(facts, one, tuple(Tried("", words, {"d_x_mm": mm} if mm else {}) for words, mm in tried.items()))
+    return Row(
+        facts,
+        one,
+        tuple(Tried("", words, {"d_x_mm": mm} if mm else {}) for words, mm in tried.items()),
+    )
 
 
 def test_the_best_change_and_whether_it_halves():
     better = row(0.02, {"a": 0.015, "b": 0.009, "c": 0.0})
-    assert better.best()[0].words == "b" and better.best()[1] == pytest.approx(0.45) and better.halved()
+    assert (
+        better.best()[0].words == "b"
+        and better.best()[1] == pytest.approx(0.45)
+        and better.halved()
+    )
     assert not row(0.02, {"a": 0.015}).halved()
     assert row(np.nan, {"a": 0.015}).halved()  # a truth at all
     assert row(0.02, {"a": 0.0}).best() is None
@@ -112,8 +124,11 @@ def test_cameras_without_a_place_are_given_one(bench, monkeypatch):
     free = [msgspec.structs.replace(camera, position_mm=None) for camera in protocol.cameras]
     with pytest.raises(ValueError, match="camera high has no position_mm"):
         built(msgspec.structs.replace(protocol, cameras=free))
-    placed = where.place_cameras(msgspec.structs.replace(protocol, cameras=free[:1] + protocol.cameras[1:]), [staged],
-                                 staged.touch.point_mm)
+    placed = where.place_cameras(
+        msgspec.structs.replace(protocol, cameras=free[:1] + protocol.cameras[1:]),
+        [staged],
+        staged.touch.point_mm,
+    )
     assert placed.cameras[1] == protocol.cameras[1] and placed.cameras[0].position_mm is not None
     assert len(built(placed)) == 2
 
@@ -124,4 +139,6 @@ def test_cameras_that_see_nothing_anywhere_are_refused(bench, monkeypatch):
     protocol, staged, _ = bench
     alone = [msgspec.structs.replace(protocol.cameras[0], position_mm=None, size_px=(8, 8))]
     with pytest.raises(BadInput, match="no place"):
-        where.place_cameras(msgspec.structs.replace(protocol, cameras=alone), [staged], staged.touch.point_mm)
+        where.place_cameras(
+            msgspec.structs.replace(protocol, cameras=alone), [staged], staged.touch.point_mm
+        )

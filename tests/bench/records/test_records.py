@@ -7,7 +7,7 @@ import pytest
 
 from bench.records.phases import STATIC, Angle, Phases
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts
 from vision.truth.value import Value
 
 
@@ -16,7 +16,9 @@ def there_and_back(record):
 
 
 def test_a_value_is_two_keys_and_its_sigma_stands_before_the_unit():
-    plain = to_plain(SeenWhisk(0, d_x_mm=Value(60.0, 0.01), point_mm=Value(np.arange(3.0), np.ones(3))))
+    plain = to_plain(
+        SeenWhisk(0, d_x_mm=Value(60.0, 0.01), point_mm=Value(np.arange(3.0), np.ones(3)))
+    )
     assert (plain["d_x_mm"], plain["d_x_sigma_mm"]) == (60.0, 0.01)
     assert (plain["point_mm"], plain["point_sigma_mm"]) == ([0.0, 1.0, 2.0], [1.0, 1.0, 1.0])
 
@@ -25,18 +27,27 @@ def test_felt_whisks_come_back_to_the_last_bit():
     third = 1.0 / 3.0
     row = EstimateRow("no_slip", Value(60.0 + third, third), status="doubtful")
     phases = Phases(2, 1, (Angle(STATIC, 0.05, third, 0.01),))
-    made = FeltWhisk(3, Value(third, 1e-4), covariance_at=third * np.eye(2), phases=phases, estimates=(row,))
+    made = FeltWhisk(
+        3, Value(third, 1e-4), covariance_at=third * np.eye(2), phases=phases, estimates=(row,)
+    )
     felt = there_and_back(made)
     assert felt.touch_felt_rad.value == third and felt.phases == phases and felt.whisk == 3
     assert felt.covariance_at[1, 1] == third and felt.theta_moment_covariance_at is None
     (back,) = felt.estimates
-    assert back.d_x_est_mm.value == row.d_x_est_mm.value and back.status == "doubtful" and np.isnan(back.beta_est_rad)
+    assert (
+        back.d_x_est_mm.value == row.d_x_est_mm.value
+        and back.status == "doubtful"
+        and np.isnan(back.beta_est_rad)
+    )
 
 
 def test_whole_records_come_back_with_all_that_vision_told(exact_record, steel_trial):
     record = exact_record(steel_trial)
     back = there_and_back(SeenTrial((record,))).whisks[0]
-    for one, other in ((record.frames.slip_mm, back.frames.slip_mm), (record.at.alpha_rad, back.at.alpha_rad)):
+    for one, other in (
+        (record.frames.slip_mm, back.frames.slip_mm),
+        (record.at.alpha_rad, back.at.alpha_rad),
+    ):
         np.testing.assert_array_equal(one.value, other.value)
         np.testing.assert_array_equal(one.sigma, other.sigma)
     assert back.frames.touching.dtype == bool and back.frames.status == record.frames.status
@@ -53,7 +64,9 @@ def test_a_speed_that_is_not_given_is_none_and_whisks_without_one_belong_togethe
     assert one.panel == other.panel == ("steel", None)
 
 
-@pytest.mark.parametrize("plain", [{"name": "t"}, [], "t", None, {"name": "t", "purpose": "measure"}])
+@pytest.mark.parametrize(
+    "plain", [{"name": "t"}, [], "t", None, {"name": "t", "purpose": "measure"}]
+)
 def test_what_is_no_record_is_refused(plain):
     with pytest.raises(ValueError, match="TrialFacts"):
         from_plain(TrialFacts, plain)

@@ -7,8 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from bench.cli import main
-from bench.report.compare import CHANGED, DONE, compare_runs
+from bench.commands.cli import main
+from bench.report.compare_runs import CHANGED, DONE, compare_runs
 
 KEY = "b60_4"
 
@@ -47,7 +47,9 @@ def test_a_run_and_its_copy_are_alike(exact_run, tmp_path):
     assert any("values moved by 0.00 sigma at most" in line for line in lines)
 
 
-@pytest.mark.parametrize(("sigmas", "another", "told"), [(2.5, False, "+2.5"), (-6.0, True, "-4.2"), (2.5, True, "")])
+@pytest.mark.parametrize(
+    ("sigmas", "another", "told"), [(2.5, False, "+2.5"), (-6.0, True, "-4.2"), (2.5, True, "")]
+)
 def test_a_distance_that_moved_is_told_in_sigmas(exact_run, tmp_path, sigmas, another, told):
     """Of one recording the larger stated sigma counts, of two both: 6 sigma of one are 6/√2 = 4.2 of their difference,
     which stands out, and 2.5 are 1.8, which do not."""

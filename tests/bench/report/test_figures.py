@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from bench.analyses.figure_8 import figure_8
+from bench.analyses.surfaces import Felt, Surface
 from bench.base.drawing import is_drawn, save
 from bench.base.settings import Settings
-from bench.friction.surfaces import Felt, Surface
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial import (
+from bench.records.trial_result import (
     FeltTrial,
     FeltWhisk,
     SeenTrial,
@@ -20,12 +21,11 @@ from bench.records.trial import (
     TrialResult,
     WhiskerFacts,
 )
-from bench.report.figure_8 import figure_8
 from bench.report.figures import error_against_slope
 from bench.report.page.plane import contact_path
 from bench.report.planes import sensing_plane
 from bench.session.session import load_session
-from bench.trials.compare import Judged
+from bench.trials.estimate_errors import Judged
 from estimator import slip
 from estimator.beam import Beam
 from estimator.friction import Pushes, fit_alpha
@@ -41,12 +41,25 @@ def surface(name="steel", alpha_deg=10.5, slopes=(0, 20, 40, -60)) -> Surface:
         Felt(b, 60.0, THETA, y, z, 0.02, 0.02, np.degrees(np.arctan2(y, z)), 0.2, False)
         for b, y, z in zip(slopes, m_y, m_z)
     )
-    return Surface(name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), Beam(C, 100.0))
+    return Surface(
+        name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), Beam(C, 100.0)
+    )
 
 
 def judged(estimator, beta, error_percent, one_factor=False) -> Judged:
     return Judged(
-        "t", 0, "measure", "steel", 10.0, estimator, beta, 60.0, 0.01, 60.0 * (1 + error_percent / 100), 0.3, one_factor
+        "t",
+        0,
+        "measure",
+        "steel",
+        10.0,
+        estimator,
+        beta,
+        60.0,
+        0.01,
+        60.0 * (1 + error_percent / 100),
+        0.3,
+        one_factor,
     )
 
 

@@ -6,8 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from bench import api, cli
+from bench import api
 from bench.base.errors import BadInput
+from bench.commands import cli
 from bench.report.nwb import check_nwb, write_nwb
 from bench.report.record import SESSION
 from bench.session.session import load_session
@@ -30,21 +31,36 @@ def test_a_run_is_read_back(exact_run, tmp_path):
         np.testing.assert_array_equal(gauges.data[:], np.column_stack([signals.y, signals.z]))
         np.testing.assert_array_equal(gauges.timestamps[:], signals.time_s)
         tables = file.processing["whisker_bench"]
-        for name, rows in (("whisks", run.whisks), ("estimates", run.estimates), ("track_b60_4", run.track("b60_4"))):
+        for name, rows in (
+            ("whisks", run.whisks),
+            ("estimates", run.estimates),
+            ("track_b60_4", run.track("b60_4")),
+        ):
             assert tables[name].colnames == rows.dtype.names
             for column in rows.dtype.names:
                 np.testing.assert_array_equal(tables[name][column].data[:], rows[column])
 
 
-def test_what_is_missing_is_told_before_anything_is_evaluated(small_session, tmp_path, monkeypatch, capsys):
+def test_what_is_missing_is_told_before_anything_is_evaluated(
+    small_session, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setitem(sys.modules, "pynwb", None)
-    arguments = ["evaluate", str(small_session), "--out", str(tmp_path / "out"), "--nwb", str(tmp_path / "run.nwb")]
+    arguments = [
+        "evaluate",
+        str(small_session),
+        "--out",
+        str(tmp_path / "out"),
+        "--nwb",
+        str(tmp_path / "run.nwb"),
+    ]
     assert cli.main(arguments) == 2
     assert "--nwb needs pynwb: pip install 'whisker-bench[nwb]'" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("name", "said"), [("run.h5", "must end in .nwb"), ("session/run.nwb", "lies in the session")])
+@pytest.mark.parametrize(
+    ("name", "said"), [("run.h5", "must end in .nwb"), ("session/run.nwb", "lies in the session")]
+)
 def test_another_name_or_place_is_refused(tmp_path, name, said):
     with pytest.raises(BadInput, match=said):
         check_nwb(tmp_path / name, tmp_path / "session")

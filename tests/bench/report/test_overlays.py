@@ -62,8 +62,16 @@ def test_a_frame_that_its_camera_dropped_has_an_empty_panel():
 
 def test_a_line_breaks_where_a_point_is_missing():
     picture = np.zeros((20, 60, 3), np.uint8)
-    polyline(picture, np.array([[5.0, 10.0], [20.0, 10.0], [np.nan, np.nan], [40.0, 10.0], [55.0, 10.0]]), YELLOW)
-    assert np.all(picture[10, 5:20, 0]) and not np.any(picture[10, 23:38]) and np.all(picture[10, 41:55, 0])
+    polyline(
+        picture,
+        np.array([[5.0, 10.0], [20.0, 10.0], [np.nan, np.nan], [40.0, 10.0], [55.0, 10.0]]),
+        YELLOW,
+    )
+    assert (
+        np.all(picture[10, 5:20, 0])
+        and not np.any(picture[10, 23:38])
+        and np.all(picture[10, 41:55, 0])
+    )
 
 
 def test_a_painted_picture_carries_its_hash(tmp_path):

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.cli import main
+from bench.commands.cli import main
 from bench.report.page import words
 from bench.report.page.cures import _OTHERWISE, cure_of
-from bench.report.page.pictures import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.standing import standings, sureness
 from bench.report.page.svg import Panel, ticks
+from bench.report.page.thumbnails import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script
 from bench.report.pooled import read_run
 from tests.scenes.results import table
@@ -52,7 +52,11 @@ class Reader(HTMLParser):
 
     def all(self, tag: str, **attributes) -> list[dict]:
         """Attributes of the elements of that tag that have these."""
-        return [a for t, a in self.elements if t == tag and all(a.get(k) == v for k, v in attributes.items())]
+        return [
+            a
+            for t, a in self.elements
+            if t == tag and all(a.get(k) == v for k, v in attributes.items())
+        ]
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +99,9 @@ def test_every_whisk_has_a_row_a_card_and_its_points(exact_run, reader):
     for key, row in zip(keys, rows):
         assert reader.all("dialog", id=key)
         if row["trial"] in ("<script>", "b60_4"):
-            marks = [a for a in reader.all("a", href=f"#{key}") if a.get("data-trial") == row["trial"]]
+            marks = [
+                a for a in reader.all("a", href=f"#{key}") if a.get("data-trial") == row["trial"]
+            ]
             assert len(marks) >= 4 and {a["data-whisk"] for a in marks} == {row["whisk"]}
 
 
@@ -114,13 +120,20 @@ def test_standing_is_that_of_the_tables(exact_run):
     stood = {s.estimator: s for s in standings(read_run(exact_run))}
     for name in ("no_slip", "with_friction", "frictionless"):
         assert stood[name].n == len(errors[name])
-        assert stood[name].rms_percent == pytest.approx(np.sqrt(np.mean(np.square(errors[name]))), rel=1e-6)
-        assert abs(stood[name].worst_percent) == pytest.approx(np.max(np.abs(errors[name])), rel=1e-6)
+        assert stood[name].rms_percent == pytest.approx(
+            np.sqrt(np.mean(np.square(errors[name]))), rel=1e-6
+        )
+        assert abs(stood[name].worst_percent) == pytest.approx(
+            np.max(np.abs(errors[name])), rel=1e-6
+        )
 
 
 def test_methods_tell_this_runs_numbers(exact_run):
     text, sure = (exact_run / METHODS).read_text(), sureness(read_run(exact_run))
-    assert f"known for {sure.known} of {sure.measured} whisks" in text or "No pictures were recorded" in text
+    assert (
+        f"known for {sure.known} of {sure.measured} whisks" in text
+        or "No pictures were recorded" in text
+    )
     for s in standings(read_run(exact_run)):
         numbers = (words.number(v) for v in (s.bias_percent, s.rms_percent, s.worst_percent))
         assert f"| {s.label} | {s.n} of {s.asked} | {' | '.join(numbers)} |" in text
@@ -129,21 +142,33 @@ def test_methods_tell_this_runs_numbers(exact_run):
 
 def test_the_gauges_stand_with_their_residuals_and_the_whisks_that_calibrated(exact_run, reader):
     gauges = json.loads((exact_run / "run.json").read_text())["gauges"]
-    trials = {row["trial"] for row in table(exact_run / "whisks.csv") if row["trial"].startswith("gauge")}
+    trials = {
+        row["trial"] for row in table(exact_run / "whisks.csv") if row["trial"].startswith("gauge")
+    }
     assert {p["trial"] for p in gauges["points"]} == trials and len(trials) == 2
-    marks = [m for m in reader.all("a") if m.get("class", "").startswith("mark") and m["data-trial"] in trials]
+    marks = [
+        m
+        for m in reader.all("a")
+        if m.get("class", "").startswith("mark") and m["data-trial"] in trials
+    ]
     assert len(marks) == 2 * sum(len(p["moments_Nmm"]) for p in gauges["points"])
     said = "".join(reader.text)
     sigma = np.array(gauges["matrix_sigma_Nmm_per_V"])
     for value, one in zip(np.ravel(gauges["matrix_Nmm_per_V"]), np.ravel(sigma)):
         assert f"{words.number(value, 4)} ± {1.96 * one:.4f}" in said
-    assert all(line.strip() in said for line in gauges["certificate"]) and "seen in pictures" in said
+    assert (
+        all(line.strip() in said for line in gauges["certificate"]) and "seen in pictures" in said
+    )
 
 
 def test_gauges_brought_along_have_no_residuals_here(exact_run, tmp_path):
     out = shutil.copytree(exact_run, tmp_path / "out")
     record = json.loads((out / "run.json").read_text())
-    record["gauges"] |= {"certificate": [], "points": [], "matrix_sigma_Nmm_per_V": [[0, 0], [0, 0]]}
+    record["gauges"] |= {
+        "certificate": [],
+        "points": [],
+        "matrix_sigma_Nmm_per_V": [[0, 0], [0, 0]],
+    }
     (out / "run.json").write_text(json.dumps(record))
     assert main(["report", str(out)]) == 0
     part = (out / REPORT).read_text().split('<section id="gauges">')[1].split("</section>")[0]
@@ -172,7 +197,9 @@ def test_figures_for_a_paper_hold_their_fonts_and_are_as_wide_as_columns(exact_r
     assert set(pages) == {"fig8", "error_against_slope", "explained", "error_map", "against_theta"}
     for page in pages.values():
         width = float(re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", page)[1])
-        assert width == pytest.approx(72 * 3.5, abs=0.1) or width == pytest.approx(72 * 7.16, abs=0.1)
+        assert width == pytest.approx(72 * 3.5, abs=0.1) or width == pytest.approx(
+            72 * 7.16, abs=0.1
+        )
         assert b"/FontFile2" in page and b"/Type3" not in page
 
 
@@ -260,7 +287,9 @@ def test_a_small_picture_keeps_its_size(tmp_path):
 def test_what_is_no_code_is_package_data():
     """What an installed program needs of these folders is named in pyproject.toml."""
     root = Path(__file__).resolve().parents[3]
-    patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["*"]
+    patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"][
+        "package-data"
+    ]["*"]
     for package in ("bench", "vision", "estimator"):
         for path in (root / package).rglob("*"):
             if path.is_file() and path.suffix not in (".py", ".pyc"):

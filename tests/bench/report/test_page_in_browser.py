@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.cli import main
+from bench.commands.cli import main
 from bench.report.page.write import REPORT
 from tests.scenes.chromium import Page, chromium
 
-pytestmark = [pytest.mark.browser, pytest.mark.skipif(chromium() is None, reason="no chromium (apt install chromium)")]
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(chromium() is None, reason="no chromium (apt install chromium)"),
+]
 WIDTHS = (400, 1280)
 
 
@@ -23,14 +26,22 @@ def report(exact_run, tmp_path_factory):
     trial["seen"]["whisks"][0]["overlay"] = {"touch": {"frame": 0, "cameras": {}}}
     (out / "trials" / "b60_4.json").write_text(json.dumps(trial))
     (out / "overlays").mkdir()
-    Image.fromarray(np.tile(np.arange(256, dtype=np.uint8), (144, 1))).save(out / "overlays" / "b60_4_0.png")
+    Image.fromarray(np.tile(np.arange(256, dtype=np.uint8), (144, 1))).save(
+        out / "overlays" / "b60_4_0.png"
+    )
     record = json.loads((out / "run.json").read_text())
-    lens = {"size_px": [1280, 720], "matrix": [[2000, 0, 640], [0, 2000, 360], [0, 0, 1]], "distortion": [0] * 5}
+    lens = {
+        "size_px": [1280, 720],
+        "matrix": [[2000, 0, 640], [0, 2000, 360], [0, 0, 1]],
+        "distortion": [0] * 5,
+    }
     poses = {
         "high": [[1, 0, 0, -50], [0, -1, 0, 0], [0, 0, -1, 400]],
         "low": [[1, 0, 0, -50], [0, 0, -1, 0], [0, 1, 0, 400]],
     }
-    record["cameras"] = [{"name": n, "T_camera_rig": T, "rms_px": 0.05} | lens for n, T in poses.items()]
+    record["cameras"] = [
+        {"name": n, "T_camera_rig": T, "rms_px": 0.05} | lens for n, T in poses.items()
+    ]
     (out / "run.json").write_text(json.dumps(record))
     assert main(["report", str(out)]) == 0
     return out / REPORT
@@ -63,7 +74,9 @@ def test_the_table_sorts_and_filters_and_so_do_the_points(report):
         page.run("document.getElementById('search').dispatchEvent(new Event('input'))")
         assert page.run(first) == "b60_4"
         assert page.run("document.getElementById('count').innerText").startswith("1 of 5")
-        off = page.run("[...document.querySelectorAll('.mark.off')].map(mark => mark.dataset.trial)")
+        off = page.run(
+            "[...document.querySelectorAll('.mark.off')].map(mark => mark.dataset.trial)"
+        )
         assert "<script>" in off and "b60_4" not in off
 
 
@@ -82,9 +95,7 @@ def test_cards_open_from_points_and_go_by_keyboard(report):
 
 def test_every_picture_is_there(report):
     with Page(report) as page:
-        loaded = (
-            "Promise.all([...document.images].map(i => (i.loading = 'eager', i.decode().then(() => i.naturalWidth))))"
-        )
+        loaded = "Promise.all([...document.images].map(i => (i.loading = 'eager', i.decode().then(() => i.naturalWidth))))"
         assert page.run(loaded) == [256]
 
 
@@ -92,7 +103,9 @@ def test_the_rig_turns_by_mouse_and_keyboard(report):
     look = "document.getElementById('rig-view').dataset.look"
     drawn = "new Set(document.getElementById('rig-view').getContext('2d').getImageData(0, 0, 800, 500).data).size"
     with Page(report) as page:
-        page.run("document.getElementById('rig-view').scrollIntoView({behavior: 'instant', block: 'center'})")
+        page.run(
+            "document.getElementById('rig-view').scrollIntoView({behavior: 'instant', block: 'center'})"
+        )
         first = page.run(look)
         assert page.run(drawn) > 20
         page.run("document.getElementById('rig-view').focus()")

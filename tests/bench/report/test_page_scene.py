@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.records.trial import SeenWhisk
-from bench.report.page.scene import _ellipsoid
+from bench.records.trial_result import SeenWhisk
+from bench.report.page.rig_in_3d import _ellipsoid
 from vision.truth.value import Value
 
 

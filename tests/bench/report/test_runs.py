@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli
 from bench.base.errors import BadInput
 from bench.base.results import plain, write_result
+from bench.commands import cli
 from bench.records.plain import from_plain
-from bench.records.trial import TrialResult
+from bench.records.trial_result import TrialResult
 from bench.report.assembly import write_tables
 from bench.report.pooled import pooled
 from estimator import slip
@@ -34,10 +34,17 @@ def whisk(beta_deg, alpha_deg, d_x_mm, number) -> dict:
 def run(tmp_path):
     """A function that writes an evaluated run without pictures, a trial a slope, as `evaluate` leaves it."""
 
-    def write(name, *, alphas=(10.0,), d_x_mm=60.0, slopes=(0, 30, 60), whisker=None, theta_deg=THETA_DEG) -> Path:
+    def write(
+        name, *, alphas=(10.0,), d_x_mm=60.0, slopes=(0, 30, 60), whisker=None, theta_deg=THETA_DEG
+    ) -> Path:
         out, results = tmp_path / name, []
         for beta in slopes:
-            trial = {"name": f"b{beta}", "purpose": "measure", "surface": "steel", "speed_deg_s": 10.0}
+            trial = {
+                "name": f"b{beta}",
+                "purpose": "measure",
+                "surface": "steel",
+                "speed_deg_s": 10.0,
+            }
             trial |= {"d_x_nominal_mm": d_x_mm, "beta_nominal_deg": float(beta)}
             seen = {"status": "no pictures", "d_x_mm": None, "cameras": 0, "frames_used": 0}
             result = {
@@ -46,7 +53,9 @@ def run(tmp_path):
                 "whisker": whisker or WHISKER,
                 "theta_deg": theta_deg,
                 "seen": {"whisks": [{"whisk": k} | seen for k in range(len(alphas))], "notes": []},
-                "felt": {"whisks": [whisk(beta, alpha, d_x_mm, k) for k, alpha in enumerate(alphas)]},
+                "felt": {
+                    "whisks": [whisk(beta, alpha, d_x_mm, k) for k, alpha in enumerate(alphas)]
+                },
             }
             write_result(out / "trials" / f"b{beta}.json", result)
             results.append(result)
@@ -74,15 +83,25 @@ def test_figure_table_and_friction_angle_are_written(run, tmp_path, capsys):
     outs = [str(run(name, alphas=(10.0, 10.0))) for name in ("monday", "tuesday")]
     assert cli.main(["figures", "8", *outs, "--out", str(tmp_path / "figures")]) == 0
     assert "steel, 10°/s: α = 10.00" in capsys.readouterr().out
-    assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == [f"figure_8.{s}" for s in ("csv", "png", "svg")]
+    assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == [
+        f"figure_8.{s}" for s in ("csv", "png", "svg")
+    ]
     with (tmp_path / "figures" / "figure_8.csv").open(newline="") as file:
         table = list(csv.DictReader(file))
-    assert [(float(r["beta_deg"]), r["whisks"]) for r in table] == [(0.0, "4"), (30.0, "4"), (60.0, "4")]
+    assert [(float(r["beta_deg"]), r["whisks"]) for r in table] == [
+        (0.0, "4"),
+        (30.0, "4"),
+        (60.0, "4"),
+    ]
     for row in table:  # points made by (13), (14) lie on the fitted curve
-        assert float(row["m_EI_per_metre"]) == pytest.approx(float(row["m_fit_EI_per_metre"]), rel=1e-6)
+        assert float(row["m_EI_per_metre"]) == pytest.approx(
+            float(row["m_fit_EI_per_metre"]), rel=1e-6
+        )
         assert float(row["phi_deg"]) == pytest.approx(float(row["phi_fit_deg"]), abs=1e-5)
     # at β = 0 the small-angle moment is 3 θ/d_x EI, whatever α
-    assert float(table[0]["m_EI_per_metre"]) == pytest.approx(3 * np.radians(THETA_DEG) / 0.060, rel=1e-6)
+    assert float(table[0]["m_EI_per_metre"]) == pytest.approx(
+        3 * np.radians(THETA_DEG) / 0.060, rel=1e-6
+    )
 
 
 def test_the_same_runs_give_the_same_bytes(run, tmp_path):
@@ -96,7 +115,10 @@ def test_the_same_runs_give_the_same_bytes(run, tmp_path):
 @pytest.mark.parametrize(
     "other, complaint",
     [
-        ({"whisker": WHISKER | {"EI_Nmm2": 3100.0}}, "another whisker: EI_Nmm2 is 3100, in .* 2945.2"),
+        (
+            {"whisker": WHISKER | {"EI_Nmm2": 3100.0}},
+            "another whisker: EI_Nmm2 is 3100, in .* 2945.2",
+        ),
         ({"whisker": WHISKER | {"shape": "cone"}}, "another whisker: shape is cone"),
         ({"d_x_mm": 70.0}, "steel, 10°/s: d_x is 70.0 mm, in .* 60.0 mm"),
         ({"theta_deg": 5.0}, "evaluated at θ = 5°, .* at 3°"),
@@ -126,7 +148,9 @@ def test_what_is_no_evaluated_run_is_refused(run, tmp_path, small_session):
     with pytest.raises(BadInput, match=r"whisks.csv: is damaged"):
         pooled([garbled])
     (damaged / "trials" / "b30.json").write_text("{")
-    with pytest.raises(BadInput, match=r"b30.json is not there or damaged; evaluate the session again"):
+    with pytest.raises(
+        BadInput, match=r"b30.json is not there or damaged; evaluate the session again"
+    ):
         pooled([damaged])
     result = json.loads((old / "trials" / "b60.json").read_text())
     del result["whisker"]
@@ -137,8 +161,12 @@ def test_what_is_no_evaluated_run_is_refused(run, tmp_path, small_session):
 
 def test_results_of_a_later_run_that_was_stopped_are_not_mixed_with_these(run):
     out = run("monday")
-    (out / "run.json").write_text(json.dumps({"results": {"b0": "monday0", "b30": "monday30", "b60": "before60"}}))
-    with pytest.raises(BadInput, match=r"trials/b60.json is of a later run, which was not finished; evaluate"):
+    (out / "run.json").write_text(
+        json.dumps({"results": {"b0": "monday0", "b30": "monday30", "b60": "before60"}})
+    )
+    with pytest.raises(
+        BadInput, match=r"trials/b60.json is of a later run, which was not finished; evaluate"
+    ):
         pooled([out])
 
 

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
+from bench.analyses.friction_tables import WHISK_COLUMNS as FRICTION_COLUMNS
 from bench.base.tables import write_table
-from bench.friction.tables import WHISK_COLUMNS as FRICTION_COLUMNS
 from bench.gauges.matrix import GaugeMatrix, Gauges
 from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
 from bench.report.score import Score, score
@@ -31,7 +31,13 @@ def finished(small_session, tmp_path):
             }
         )
         estimates.append(
-            {"trial": trial, "whisk": 0, "estimator": "no_slip", "d_x_est_mm": d_x, "d_x_est_sigma_mm": 1.0}
+            {
+                "trial": trial,
+                "whisk": 0,
+                "estimator": "no_slip",
+                "d_x_est_mm": d_x,
+                "d_x_est_sigma_mm": 1.0,
+            }
         )
         with (small_session / "trials" / trial / "truth.csv").open(newline="") as file:
             track = [
@@ -66,15 +72,23 @@ def test_estimates_are_scored_on_measure_trials(finished, small_session):
 
 
 def test_gauges_against_the_true_matrix(finished, small_session):
-    true = np.array([[11.31159134809883, 0.32264565212488266], [-0.2488179917658187, 10.536191428351158]])
-    lines = score(load_session(small_session), finished, Gauges(GaugeMatrix(true * [1.01, 1.0]), ""))
+    true = np.array(
+        [[11.31159134809883, 0.32264565212488266], [-0.2488179917658187, 10.536191428351158]]
+    )
+    lines = score(
+        load_session(small_session), finished, Gauges(GaugeMatrix(true * [1.01, 1.0]), "")
+    )
     assert "diagonal +1.00 %, +0.00 %" in lines[-1] and "cross-talk +0.00, +0.00" in lines[-1]
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_channel_that_answers_to_no_moment_has_no_cross_talk(finished, small_session):
-    lines = score(load_session(small_session), finished, Gauges(GaugeMatrix(np.diag([11.3116, 0.0])), ""))
-    assert "diagonal +0.00 %, -100.00 %" in lines[-1] and "cross-talk +nan, +2.20 points" in lines[-1]
+    lines = score(
+        load_session(small_session), finished, Gauges(GaugeMatrix(np.diag([11.3116, 0.0])), "")
+    )
+    assert (
+        "diagonal +0.00 %, -100.00 %" in lines[-1] and "cross-talk +nan, +2.20 points" in lines[-1]
+    )
 
 
 def test_a_recorded_session_has_no_score(finished, small_copy):
@@ -106,7 +120,12 @@ def test_friction_is_scored_as_one_angle_or_as_two(finished, small_session):
 def test_static_and_kinetic_are_scored_where_they_differ(finished, small_copy):
     truth = small_copy / "trials" / "b60_4" / "truth.toml"
     truth.write_text(re.sub("mu_static = .*", "mu_static = 0.267949", truth.read_text()))  # 15°
-    row = {"trial": "b60_4", "whisk": 0, "alpha_static_felt_deg": 15.5, "alpha_static_felt_sigma_deg": 0.5}
+    row = {
+        "trial": "b60_4",
+        "whisk": 0,
+        "alpha_static_felt_deg": 15.5,
+        "alpha_static_felt_sigma_deg": 0.5,
+    }
     write_table(finished / "friction.csv", FRICTION_COLUMNS, [row | {"alpha_seen_deg": 12.0}])
     lines = score(load_session(small_copy), finished)
     assert line(lines, "alpha_static_felt_deg")[1] == "+0.5000"

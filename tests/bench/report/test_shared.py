@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
-from bench.records.trial import FeltTrial, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts, TrialResult, WhiskerFacts
+from bench.records.trial_result import (
+    FeltTrial,
+    FeltWhisk,
+    SeenTrial,
+    SeenWhisk,
+    TrialFacts,
+    TrialResult,
+    WhiskerFacts,
+)
 from bench.report.summary.shared import shared_distance, shared_doubts, shared_lines
-from vision.fit.uncertainty import CAUSES
+from vision.fit.covariance import CAUSES
 from vision.truth.value import Value
 
 SHARED_MM, OWN_MM = 0.008, 0.002
@@ -14,18 +22,33 @@ SHARED_MM, OWN_MM = 0.008, 0.002
 def session(rng, trials, a_trial, own_mm=OWN_MM):
     """Results of whisks whose stated own part is OWN_MM, and which scatter by own_mm."""
     share = SHARED_MM**2 / (SHARED_MM**2 + OWN_MM**2)
-    budget = dict.fromkeys(CAUSES, 0.0) | {"light": 0.7 * share, "diameters": 0.3 * share, "wire": 1.0 - share}
+    budget = dict.fromkeys(CAUSES, 0.0) | {
+        "light": 0.7 * share,
+        "diameters": 0.3 * share,
+        "wire": 1.0 - share,
+    }
     off = SHARED_MM * rng.standard_normal()
     results = []
     for _ in range(trials):
         errors = off + own_mm * rng.standard_normal(a_trial)
         sigma = float(np.hypot(SHARED_MM, OWN_MM))
         whisks = [
-            SeenWhisk(k, d_x_mm=Value(60.0 + e, sigma), budget=budget, touch_rad=Value(0.04), beta_rad=Value(0.5))
+            SeenWhisk(
+                k,
+                d_x_mm=Value(60.0 + e, sigma),
+                budget=budget,
+                touch_rad=Value(0.04),
+                beta_rad=Value(0.5),
+            )
             for k, e in enumerate(errors)
         ]
-        facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 3000.0)
-        results.append(TrialResult(*facts, 3.0, SeenTrial(tuple(whisks)), FeltTrial((FeltWhisk(),) * a_trial)))
+        facts = (
+            TrialFacts("t", "measure", "steel", 10.0),
+            WhiskerFacts("cylinder", 100.0, 1.0, 3000.0),
+        )
+        results.append(
+            TrialResult(*facts, 3.0, SeenTrial(tuple(whisks)), FeltTrial((FeltWhisk(),) * a_trial))
+        )
     return results
 
 
@@ -36,7 +59,10 @@ def test_a_mean_over_whisks_is_known_to_what_they_share():
     made = [session(rng, 4, 3) for _ in range(400)]
     found = shared_distance(made[0])
     assert found.shared_mm == pytest.approx(SHARED_MM) and found.own_mm == pytest.approx(OWN_MM)
-    means = [np.mean([w.d_x_mm.value for result in one for w in result.seen.whisks]) - 60.0 for one in made]
+    means = [
+        np.mean([w.d_x_mm.value for result in one for w in result.seen.whisks]) - 60.0
+        for one in made
+    ]
     assert np.std(means) == pytest.approx(found.mean_sigma_mm, rel=3 / np.sqrt(2 * 400))
 
 

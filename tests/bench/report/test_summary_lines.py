@@ -6,7 +6,7 @@ from scipy.signal import butter, sosfilt
 
 from bench.base.settings import Settings
 from bench.gauges.felt import gauge_delay, lateness
-from bench.records.trial import (
+from bench.records.trial_result import (
     Clock,
     FeltTrial,
     FeltWhisk,
@@ -17,14 +17,14 @@ from bench.records.trial import (
     WhiskerFacts,
 )
 from bench.report.assembly import beam_rows, budget_rows
-from bench.report.run import Section
-from bench.report.summary.page import Summary
+from bench.report.run_facts import Section
+from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
 from bench.report.summary.verdict import verdict
 from bench.trials.estimates import as_felt
 from estimator.signal import Touch
 from vision.fit.beam_check import BeamCheck, Compared
-from vision.fit.uncertainty import CAUSES
+from vision.fit.covariance import CAUSES
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
@@ -44,7 +44,8 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
 
 
 @pytest.mark.parametrize(
-    "filter_Hz, late_deg, doubt_deg", [(800.0, 0.0468, 0.0), (None, 0.0468, 0.0270), (0.0, 0.0, 0.0)]
+    "filter_Hz, late_deg, doubt_deg",
+    [(800.0, 0.0468, 0.0), (None, 0.0468, 0.0270), (0.0, 0.0, 0.0)],
 )
 def test_the_filters_delay_is_taken_out_of_felt_touch(filter_Hz, late_deg, doubt_deg):
     """At 90 deg/s 0.52 ms are 0.047 deg; whose filter is not named may have any delay up to twice the paper's."""
@@ -61,7 +62,9 @@ def test_the_delay_is_the_mean_of_the_filters_impulse_response(filter_Hz):
     rate_Hz = 1e5
     sections = butter(4, filter_Hz, fs=rate_Hz, output="sos")
     answer = sosfilt(sections, np.eye(1, 10_000)[0])
-    assert answer @ np.arange(10_000) / rate_Hz == pytest.approx(gauge_delay(filter_Hz).value, rel=1e-3)
+    assert answer @ np.arange(10_000) / rate_Hz == pytest.approx(
+        gauge_delay(filter_Hz).value, rel=1e-3
+    )
 
 
 def test_a_rig_board_that_is_not_told_apart_is_an_empty_cell_and_a_line():
@@ -79,7 +82,9 @@ def test_beam_and_spline_stand_side_by_side():
     compared = both(60.0, 60.004, 0.001), both(0.04, 0.041, 1e-4), both(2.0, 1.9, 0.02)
     made = result(beam=BeamCheck(*compared, theta_rad=0.07, chance=0.3))
     (row,) = beam_rows([made])
-    assert row["touch_spline_deg"] == pytest.approx(np.degrees(0.041)) and row["slip_beam_mm"] == 2.0
+    assert (
+        row["touch_spline_deg"] == pytest.approx(np.degrees(0.041)) and row["slip_beam_mm"] == 2.0
+    )
     (line,) = beam_lines([made])
     assert "d_x +0.0040 ± 0.0010 mm (t)" in line and "slip -0.1000 ± 0.0200 mm (t)" in line
     assert list(beam_lines([result()])) == []
@@ -93,11 +98,15 @@ def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
     where = f"All of it: {tmp_path}/report.html, {tmp_path}/summary.txt"
     assert shown[-3:] == ["  and 10 more, in summary.txt", "", where]
     assert len(shown) == 26 and not any("camera high" in line for line in shown)
-    assert Summary(("sample.",), (), sections[:1]).on_screen(tmp_path).splitlines()[:2] == ["sample.", ""]
+    assert Summary(("sample.",), (), sections[:1]).on_screen(tmp_path).splitlines()[:2] == [
+        "sample.",
+        "",
+    ]
 
 
 @pytest.mark.parametrize(
-    ("doubts", "said"), [(0, "nothing doubtful."), (1, "1 doubt, see below."), (2, "2 doubts, see below.")]
+    ("doubts", "said"),
+    [(0, "nothing doubtful."), (1, "1 doubt, see below."), (2, "2 doubts, see below.")],
 )
 def test_doubts_are_counted_apart_from_whisks(doubts, said):
     """Of one whisk there may be two."""

@@ -2,16 +2,29 @@
 
 import pytest
 
+from bench.analyses import friction_tables as tables
+from bench.analyses import soft, tilted
+from bench.analyses import table_i_sensors as sensors
 from bench.base.errors import BadInput
 from bench.base.tables import write_table
-from bench.friction import soft, tables, tilted
-from bench.report import sensors
-from bench.report.page.together import together
+from bench.report.page.combined_whisks import together
 
 SURFACE = {"surface": "paint", "speed_deg_s": 10.0, "whisks": 3}
-TILT = {"beta_from_deg": 0.0, "beta_to_deg": 60.0, "d_x_mm": 54.987, "d_x_sigma_mm": 0.564, "d_x_low_mm": 53.88}
+TILT = {
+    "beta_from_deg": 0.0,
+    "beta_to_deg": 60.0,
+    "d_x_mm": 54.987,
+    "d_x_sigma_mm": 0.564,
+    "d_x_low_mm": 53.88,
+}
 TILT |= {"d_x_high_mm": 56.09, "alpha_deg": 14.06, "alpha_sigma_deg": 1.3}
-SOFT = {"whisks_near": 2, "whisks_far": 4, "near_nominal_mm": 50.0, "far_nominal_mm": 70.0, "d_x_mm": 49.0}
+SOFT = {
+    "whisks_near": 2,
+    "whisks_far": 4,
+    "near_nominal_mm": 50.0,
+    "far_nominal_mm": 70.0,
+    "d_x_mm": 49.0,
+}
 SOFT |= {"d_x_sigma_mm": 0.29, "give_mm_N": 0.134, "give_sigma_mm_N": 0.061}
 SENSOR = {"beta_from_deg": 7.5, "beta_to_deg": 22.5, "alpha_deg": 16.7, "whisks": 3, "none": 0}
 
@@ -30,7 +43,13 @@ def test_a_folder_that_has_no_rows_has_no_tables(tmp_path):
 
 def test_friction_has_a_column_for_each_way_that_says_something(tmp_path):
     known = {"alpha_seen_deg": 16.71, "alpha_seen_sigma_deg": 0.12}
-    write(tmp_path, "surfaces.csv", tables.SURFACE_COLUMNS, known, {"surface": "felt", "speed_deg_s": None})
+    write(
+        tmp_path,
+        "surfaces.csv",
+        tables.SURFACE_COLUMNS,
+        known,
+        {"surface": "felt", "speed_deg_s": None},
+    )
     (told,) = together(tmp_path)
     assert told.head == ("surface", "whisks", "seen [°]")
     assert told.rows == (("paint, 10°/s", "3", "16.71 ± 0.12"), ("felt", "3", "–"))
@@ -44,7 +63,11 @@ def test_slopes_together_stand_with_sigma_and_interval(tmp_path):
 
 
 def test_an_object_is_soft_stiffer_than_or_not_told(tmp_path):
-    ends = [{"stiffness_low_N_mm": 4.0, "stiffness_high_N_mm": 71.0}, {"stiffness_low_N_mm": 4.0}, {}]
+    ends = [
+        {"stiffness_low_N_mm": 4.0, "stiffness_high_N_mm": 71.0},
+        {"stiffness_low_N_mm": 4.0},
+        {},
+    ]
     write(tmp_path, "compliance.csv", soft.COLUMNS, *(SOFT | end for end in ends))
     (told,) = together(tmp_path)
     assert [row[5] for row in told.rows] == ["4 to 71", "more than 4", "–"]
@@ -53,7 +76,10 @@ def test_an_object_is_soft_stiffer_than_or_not_told(tmp_path):
 
 def test_sensors_stand_side_by_side_by_surface_and_slope(tmp_path):
     known = SENSOR | {"error_rms_percent": 4.04, "error_sigma_percent": 2.3}
-    rows = [{"estimator": "with_friction"} | known, {"estimator": "touch_alone"} | SENSOR | {"whisks": 0, "none": 3}]
+    rows = [
+        {"estimator": "with_friction"} | known,
+        {"estimator": "touch_alone"} | SENSOR | {"whisks": 0, "none": 3},
+    ]
     steeper = {"beta_from_deg": 22.5, "beta_to_deg": 37.5, "whisks": 2, "none": 1}
     rows += [{"estimator": "with_friction"} | known | steeper]
     write(tmp_path, "sensors.csv", sensors.COLUMNS, *rows)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.cli import main
+from bench.commands.cli import main
 from bench.plan.expected import expected
-from bench.records.trial import WhiskerFacts
+from bench.records.trial_result import WhiskerFacts
 from bench.report.video import _wire, wire_between
 from bench.trials.seen import whisk_record
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
@@ -33,7 +33,10 @@ CAMERA = {
 def filmed(exact_run, steel_signals, tmp_path_factory):
     """A run with a camera, and its session with grey pictures of one trial."""
     folder = tmp_path_factory.mktemp("filmed")
-    out, session = shutil.copytree(exact_run, folder / "out"), shutil.copytree(steel_signals, folder / "session")
+    out, session = (
+        shutil.copytree(exact_run, folder / "out"),
+        shutil.copytree(steel_signals, folder / "session"),
+    )
     record = json.loads((out / "run.json").read_text()) | {"cameras": [CAMERA]}
     (out / "run.json").write_text(json.dumps(record))
     rows = (session / "trials" / "b60_4" / "frames.csv").read_text().splitlines()[1:]
@@ -64,7 +67,10 @@ def test_every_frame_is_there_with_its_contact(filmed, tmp_path, name, capfd):
     k = max(k for k, touching in enumerate(frames["touching"]) if touching)
     x, y, z = frames["point_mm"][k]
     scale = film[k].shape[1] / SIZE[0]
-    px = scale * (np.array([400 * (x - 50) / (200 - z) + 160, 400 * -y / (200 - z) + 90]) + 0.5) - 0.5
+    px = (
+        scale * (np.array([400 * (x - 50) / (200 - z) + 160, 400 * -y / (200 - z) + 90]) + 0.5)
+        - 0.5
+    )
     around = film[k][int(px[1]) - 8 : int(px[1]) + 9, int(px[0]) - 8 : int(px[0]) + 9].astype(int)
     redness = around[..., 2] - around[..., 0]
     assert redness.max() > 60  # the ring about the contact; the picture itself is grey
@@ -118,4 +124,6 @@ def test_the_wire_drawn_is_the_one_that_was_fitted(tmp_path):
 
 def _dense(line):
     """Points (n, 3) on the straight pieces of a line."""
-    return np.concatenate([a + (b - a) * np.linspace(0.0, 1.0, 500)[:, None] for a, b in pairwise(line)])
+    return np.concatenate(
+        [a + (b - a) * np.linspace(0.0, 1.0, 500)[:, None] for a, b in pairwise(line)]
+    )

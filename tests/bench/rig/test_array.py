@@ -7,14 +7,16 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.rig import build
-from bench.rig.array import ArrayRecording, mounted, touch_from_afar
+from bench.rig.array_rig import ArrayRecording, mounted, touch_from_afar
 from bench.rig.bar import Bar, first_touch
 from bench.rig.protocol import ColumnTable, Protocol, TrialTable
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
 
-TRIAL = TrialTable(beta_deg=40.0, d_x_mm=55.0, beta_scatter_deg=0.0, d_x_scatter_mm=0.0, touch_scatter_deg=0.0)
+TRIAL = TrialTable(
+    beta_deg=40.0, d_x_mm=55.0, beta_scatter_deg=0.0, d_x_scatter_mm=0.0, touch_scatter_deg=0.0
+)
 QUIET = {"noise_V": 0.0, "hum_V": 0.0, "adc_bits": 0}
 
 
@@ -73,19 +75,23 @@ def test_a_whisker_that_reaches_nothing_feels_nothing():
 
 def test_columns_move_motors_of_their_own():
     bases = {"a": (0.0, 0.0, 0.0), "b": (0.0, -20.0, 0.0)}
-    columns = [ColumnTable(name=name, base_mm=base, heights_mm=[0.0]) for name, base in bases.items()]
+    columns = [
+        ColumnTable(name=name, base_mm=base, heights_mm=[0.0]) for name, base in bases.items()
+    ]
     array = recorded(Protocol(trials=[TRIAL], columns=columns))
     assert list(array.channels)[:2] == ["time_s", "motor_deg@a"] and "motor_deg@b" in array.channels
     starts = [array.channels[f"motor_deg@{name}"][0] for name in "ab"]
     touches = [math.degrees(array.recordings[f"{name}1"].touch.motor_rad) for name in "ab"]
-    np.testing.assert_allclose(np.diff(starts), np.diff(touches), atol=0.006)  # a step of the encoder is 0.005°
+    np.testing.assert_allclose(
+        np.diff(starts), np.diff(touches), atol=0.006
+    )  # a step of the encoder is 0.005°
 
 
 @pytest.mark.parametrize(
     "text, said",
     [
         ("heights_mm = [0, 9]\nlength_mm = [90]", "length_mm has 1 values, heights_mm 2"),
-        ('heights_mm = [0]\n[[columns]]\nheights_mm = [9]', "need names of their own"),
+        ("heights_mm = [0]\n[[columns]]\nheights_mm = [9]", "need names of their own"),
         ("heights_mm = []", "heights_mm"),
         ("heights_mm = [0]\nbase_mm = [60, 6, 0]", "whisker w1 stands in the bar before it moves"),
     ],

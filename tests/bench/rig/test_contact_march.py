@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 from bench.rig.bar import Bar, first_touch, turned
-from bench.rig.contact import moments_Nmm
-from bench.rig.friction import Friction
-from bench.rig.rod import Rest, Rod
+from bench.rig.elastic_rod import Rest, Rod
+from bench.rig.rod_contact import moments_Nmm
+from bench.rig.stick_slip import Friction
 from tests.scenes.marches import MU_10, polar, slip_mm, small_angle, whisk
 
 
 def test_the_numbers_that_three_solvers_agree_on():
     """|m|, φ and slip at d_x = 65 mm, β = 60°, μ = 0.1763, known to 0.05 %."""
     march, touch, states = whisk(np.arange(0.1, 5.01, 0.1), mu=0.1763)
-    for theta, moment, phi, slip in ((1, 1.205, 50.01, 0.882), (3, 3.610, 50.06, 2.649), (5, 6.004, 50.17, 4.422)):
+    for theta, moment, phi, slip in (
+        (1, 1.205, 50.01, 0.882),
+        (3, 3.610, 50.06, 2.649),
+        (5, 6.004, 50.17, 4.422),
+    ):
         state = states[round(theta / 0.1) - 1]
         assert polar(state) == (pytest.approx(moment, rel=5e-4), pytest.approx(phi, abs=0.01))
         assert slip_mm(march, touch, state) == pytest.approx(slip, rel=5e-4)
@@ -29,16 +33,22 @@ def test_the_numbers_that_three_solvers_agree_on():
 @pytest.mark.parametrize("beta", [0.0, 15.0, 30.0, 45.0, 60.0, 75.0])
 def test_against_small_angle_theory(d_x, beta, alpha_deg):
     """To θ = 5° on a 3 mm bar: |m| within 0.5 % (1 % if β < 30° and α > 10.5°), φ within 0.4° or, near β = α, 1.5°."""
-    _, _, states = whisk(np.arange(0.25, 5.01, 0.25), d_x=d_x, beta=beta, mu=math.tan(math.radians(alpha_deg)))
+    _, _, states = whisk(
+        np.arange(0.25, 5.01, 0.25), d_x=d_x, beta=beta, mu=math.tan(math.radians(alpha_deg))
+    )
     tolerance = 0.005 if alpha_deg <= 10.5 or beta >= 30 else 0.01
     phi_tolerance = 0.4 if abs(beta - alpha_deg) >= 8 else 1.5
     for theta, state in zip(np.arange(0.25, 5.01, 0.25), states):
         moment, phi = small_angle(theta, d_x, beta, alpha_deg)
-        assert polar(state) == (pytest.approx(moment, rel=tolerance), pytest.approx(phi, abs=phi_tolerance))
+        assert polar(state) == (
+            pytest.approx(moment, rel=tolerance),
+            pytest.approx(phi, abs=phi_tolerance),
+        )
 
 
 @pytest.mark.parametrize(
-    "beta, alpha_deg", [(60.0, 0.0), (60.0, 10.5), (60.0, 20.0), (0.0, 0.0), (30.0, 0.0), (75.0, 0.0)]
+    "beta, alpha_deg",
+    [(60.0, 0.0), (60.0, 10.5), (60.0, 20.0), (0.0, 0.0), (30.0, 0.0), (75.0, 0.0)],
 )
 def test_meets_small_angle_theory_in_the_limit(beta, alpha_deg):
     """At θ = 0.5° on a bar of no thickness what is left is second order, θ² = 8e-5: within 0.02 %."""
@@ -49,7 +59,9 @@ def test_meets_small_angle_theory_in_the_limit(beta, alpha_deg):
         radius=1e-4,
         rod=Rod("cylinder", 100.0, 1.0, 60.0),
     )
-    assert polar(states[-1])[0] == pytest.approx(small_angle(0.5, 65.0, beta, alpha_deg)[0], rel=2e-4)
+    assert polar(states[-1])[0] == pytest.approx(
+        small_angle(0.5, 65.0, beta, alpha_deg)[0], rel=2e-4
+    )
 
 
 @pytest.mark.parametrize("trial", ["b00_2", "b30_3", "b60_4", "gauge_roll0", "gauge_roll90"])
@@ -57,16 +69,26 @@ def test_against_the_truth_of_another_rig(steel_signals, trial):
     """steel-sample's truth comes from another program. It is written to 1e-6 mm, its d_x and β to 1e-6 too."""
     folder = steel_signals / "trials" / trial
     truth = tomllib.loads((folder / "truth.toml").read_text())
-    rows = [r for r in csv.DictReader((folder / "truth.csv").read_text().splitlines()) if r["contact"] == "1"]
+    rows = [
+        r
+        for r in csv.DictReader((folder / "truth.csv").read_text().splitlines())
+        if r["contact"] == "1"
+    ]
     thetas = np.array([float(r["motor_deg"]) - truth["touch_deg"] for r in rows])
     path = np.unique(np.concatenate([np.arange(0.05, thetas[-1], 0.05), thetas]))
     march, touch, states = whisk(
-        path, d_x=truth["d_x_mm"], beta=truth["beta_deg"], mu=truth["mu_kinetic"], touch_deg=truth["touch_deg"]
+        path,
+        d_x=truth["d_x_mm"],
+        beta=truth["beta_deg"],
+        mu=truth["mu_kinetic"],
+        touch_deg=truth["touch_deg"],
     )
     for theta, row in zip(thetas, rows):
         state = states[int(np.argmin(np.abs(path - theta)))]
         # Steps of the two marches differ: first order in a step of 0.05°, some micrometres of 60 mm at most.
-        assert state.point_mm == pytest.approx([float(row[k]) for k in ("x_mm", "y_mm", "z_mm")], abs=5e-6)
+        assert state.point_mm == pytest.approx(
+            [float(row[k]) for k in ("x_mm", "y_mm", "z_mm")], abs=5e-6
+        )
         assert slip_mm(march, touch, state) == pytest.approx(float(row["slip_mm"]), abs=5e-6)
         assert state.arc_mm == pytest.approx(float(row["arc_mm"]), abs=5e-6)
         expected = [float(row["m_y_Nmm"]), float(row["m_z_Nmm"])]
@@ -96,7 +118,10 @@ def test_mirrored_bar_gives_the_mirrored_whisk():
 
 
 def test_moments_scale_with_stiffness_and_shapes_do_not():
-    soft, stiff = (whisk(np.arange(0.1, 3.01, 0.1), rod=Rod("cylinder", 100.0, 1.0, e))[2][-1] for e in (60.0, 120.0))
+    soft, stiff = (
+        whisk(np.arange(0.1, 3.01, 0.1), rod=Rod("cylinder", 100.0, 1.0, e))[2][-1]
+        for e in (60.0, 120.0)
+    )
     assert stiff.force_hub_N == pytest.approx(2 * soft.force_hub_N, rel=1e-8)
     assert stiff.point_mm == pytest.approx(soft.point_mm, abs=1e-8)
 
@@ -112,7 +137,9 @@ def test_the_way_back_ends_at_touch_and_without_friction_retraces(beta, mu):
     if not mu:
         forward = {round(s.motor_rad, 9): s for s in states}
         for state in back[:-2]:
-            assert state.point_mm == pytest.approx(forward[round(state.motor_rad, 9)].point_mm, abs=1e-7)
+            assert state.point_mm == pytest.approx(
+                forward[round(state.motor_rad, 9)].point_mm, abs=1e-7
+            )
     elif beta > math.degrees(math.atan(mu)):
         # Friction holds the slip back on both ways, so on the way back more of it is left.
         assert slip_mm(march, touch, back[5]) > slip_mm(march, touch, states[-7])
@@ -127,7 +154,10 @@ def test_stick_slip_is_a_saw_tooth_between_the_two_cones():
     for i in jumps:
         assert states[i].share == pytest.approx(0.25, rel=2e-4) and states[i].status == "held"
         # The jump itself goes a few hundredths as far along the whisker: its cosine's share of the cone.
-        assert states[i + 1].share == pytest.approx(0.18, rel=5e-3) and states[i + 1].status == "sliding"
+        assert (
+            states[i + 1].share == pytest.approx(0.18, rel=5e-3)
+            and states[i + 1].status == "sliding"
+        )
         assert slip[i + 1] > slip[i]
     held = np.array([s.status == "held" for s in states])
     sliding_or_after_jump = np.diff(slip)[held[1:]]
@@ -135,7 +165,10 @@ def test_stick_slip_is_a_saw_tooth_between_the_two_cones():
         np.abs(sliding_or_after_jump).max() < 2e-3 * slip[-1]
     )  # material holds; the centreline's point rolls a little
     phi = np.array([polar(s)[1] for s in states[20:]])
-    assert 60 - math.degrees(math.atan(0.25)) - 0.3 < phi.min() and phi.max() < 60 - math.degrees(math.atan(0.18)) + 0.3
+    assert (
+        60 - math.degrees(math.atan(0.25)) - 0.3 < phi.min()
+        and phi.max() < 60 - math.degrees(math.atan(0.18)) + 0.3
+    )
 
 
 def test_each_rest_reaches_its_own_coefficient():
@@ -156,7 +189,9 @@ def test_below_the_static_cone_the_whisker_never_slips_along_the_bar():
 
 def test_equal_coefficients_are_the_limit_of_unequal_ones():
     """Far from β = α, teeth of 1 % of the friction leave φ within their own height (0.1°) of sliding."""
-    sliding, teeth = (whisk(np.arange(0.1, 4.01, 0.1), mu=0.18, static=s)[2][-1] for s in (0.18, 0.1818))
+    sliding, teeth = (
+        whisk(np.arange(0.1, 4.01, 0.1), mu=0.18, static=s)[2][-1] for s in (0.18, 0.1818)
+    )
     assert polar(teeth)[1] == pytest.approx(polar(sliding)[1], abs=0.15)
 
 
@@ -178,7 +213,12 @@ def test_cone_meets_the_small_angle_cone():
     """m = Cθ(1/d − 1/L)·cos β/cos(β − φ) for a cone to a point at L; at θ = 1°, on 0.1 mm, within 0.1 %."""
     rod = Rod("cone", 100.0, 1.0, 60.0)
     _, _, states = whisk(
-        np.arange(0.1, 1.01, 0.1), rod=rod, d_x=60.0, beta=60.0, mu=math.tan(math.radians(10.5)), radius=0.1
+        np.arange(0.1, 1.01, 0.1),
+        rod=rod,
+        d_x=60.0,
+        beta=60.0,
+        mu=math.tan(math.radians(10.5)),
+        radius=0.1,
     )
     moment, _ = small_angle(1.0, 60.0, 60.0, 10.5)
     assert polar(states[-1])[0] == pytest.approx(moment * (1 - 60 / 100), rel=1e-3)
@@ -186,7 +226,9 @@ def test_cone_meets_the_small_angle_cone():
 
 def test_rest_shape_moves_touch_but_hardly_the_moments():
     """Sag and set are 0.2 mm of 60: they turn the plane of pushing by some 0.3°, and |m| by less than 0.5 %."""
-    rod = Rod("cylinder", 100.0, 1.0, 60.0, rest=Rest(100.0, sag_mm=0.21, set_y_mm=0.5, set_z_mm=0.3))
+    rod = Rod(
+        "cylinder", 100.0, 1.0, 60.0, rest=Rest(100.0, sag_mm=0.21, set_y_mm=0.5, set_z_mm=0.3)
+    )
     bare = whisk([1.0, 2.0, 3.0])
     bent = whisk([1.0, 2.0, 3.0], rod=rod)
     assert bent[1].motor_rad != pytest.approx(bare[1].motor_rad, abs=1e-4)
@@ -195,7 +237,14 @@ def test_rest_shape_moves_touch_but_hardly_the_moments():
 
 def test_first_touch_is_where_the_distance_is_both_radii():
     rod = Rod("cone", 100.0, 1.0, 60.0, rest=Rest(100.0, sag_mm=0.2, set_y_mm=-0.4))
-    bar = Bar.placed(d_x_mm=70.0, beta_rad=0.6, psi_rad=0.2, touch_rad=0.05, radius_mm=3.0, whisker_radius_mm=0.15)
+    bar = Bar.placed(
+        d_x_mm=70.0,
+        beta_rad=0.6,
+        psi_rad=0.2,
+        touch_rad=0.05,
+        radius_mm=3.0,
+        whisker_radius_mm=0.15,
+    )
     touch = first_touch(rod, bar, 0.05, 70.0)
     assert np.linalg.norm(touch.point_mm - bar.foot_mm(touch.point_mm)) == pytest.approx(
         3 + 0.5 * (1 - touch.arc_mm / 100)

@@ -58,7 +58,9 @@ def test_the_drawn_bar_and_whisker_are_where_truth_says(tmp_path):
     contact = np.array([float(rows(folder / "truth.csv")[-1][k]) for k in ("x_mm", "y_mm", "z_mm")])
     axis, _, foot = bar_of(tomllib.loads((folder / "truth.toml").read_text()), both_radii_mm=3.5)
     for name, camera in json.loads((session / "truth.json").read_text())["cameras"].items():
-        picture = cv2.imread(str(folder / name / "000012.png"), cv2.IMREAD_UNCHANGED).astype(np.float32)
+        picture = cv2.imread(str(folder / name / "000012.png"), cv2.IMREAD_UNCHANGED).astype(
+            np.float32
+        )
         eye = -np.array(camera["R"]).T @ np.array(camera["t"])
         for up in (-14.0, 14.0):
             edges = [project(camera, e) for e in silhouette(foot + up * axis, axis, 3.0, eye)]
@@ -69,7 +71,10 @@ def test_the_drawn_bar_and_whisker_are_where_truth_says(tmp_path):
 
 def project(camera, point):
     lens = np.array(camera["K"]), np.array(camera["dist"])
-    turn, points = cv2.Rodrigues(np.array(camera["R"]))[0], np.asarray(point, float).reshape(1, 1, 3)
+    turn, points = (
+        cv2.Rodrigues(np.array(camera["R"]))[0],
+        np.asarray(point, float).reshape(1, 1, 3),
+    )
     return cv2.projectPoints(points, turn, np.array(camera["t"]), *lens)[0].ravel()
 
 
@@ -79,7 +84,9 @@ def silhouette(point, axis, radius, eye):
     near = np.linalg.norm(towards)
     facing, aside = towards / near, np.cross(axis, towards / near)
     cos = radius / near
-    return [point + radius * (cos * facing + way * math.sqrt(1 - cos**2) * aside) for way in (-1, 1)]
+    return [
+        point + radius * (cos * facing + way * math.sqrt(1 - cos**2) * aside) for way in (-1, 1)
+    ]
 
 
 def half_heights(picture, first, second):

@@ -15,7 +15,9 @@ def test_against_elliptic_integrals(load, direction_deg):
     direction = math.radians(direction_deg)
     arc = 70.0
     force = load * CYLINDER.rigidity_Nmm2 / arc**2
-    bent = Elastica(CYLINDER, nodes=30).solve(force * math.cos(direction), force * math.sin(direction), arc)
+    bent = Elastica(CYLINDER, nodes=30).solve(
+        force * math.cos(direction), force * math.sin(direction), arc
+    )
     end, slope = elliptic_end(load, direction)
     assert bent.end_mm / arc == pytest.approx(end, abs=1e-9)
     assert bent.slope == pytest.approx(slope, abs=1e-9)
@@ -43,7 +45,9 @@ def test_answers_equal_finite_differences(rod):
     bent = elastica.solve(*at)
     for i, h in enumerate(1e-4 * np.abs(at)):
         up, down = (elastica.solve(*(at + s * h * np.eye(3)[i])) for s in (1, -1))
-        assert bent.end_by[:, i] == pytest.approx((up.end_mm - down.end_mm) / (2 * h), rel=1e-6, abs=1e-6)
+        assert bent.end_by[:, i] == pytest.approx(
+            (up.end_mm - down.end_mm) / (2 * h), rel=1e-6, abs=1e-6
+        )
         assert bent.slope_by[i] == pytest.approx((up.slope - down.slope) / (2 * h), rel=1e-6)
 
 
@@ -58,6 +62,8 @@ def test_curve_keeps_its_length_and_goes_straight_beyond_the_load():
     arc = np.linspace(0, 100, 4001)
     curve = elastica.curve_mm(bent, arc)
     steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    assert steps.sum() == pytest.approx(100.0, abs=1e-5)  # chords of 0.025 mm at κ ≤ 0.01/mm fall short by 3e-9 each
+    assert steps.sum() == pytest.approx(
+        100.0, abs=1e-5
+    )  # chords of 0.025 mm at κ ≤ 0.01/mm fall short by 3e-9 each
     beyond = np.diff(curve[arc > 60.1], axis=0)
     assert np.ptp(np.arctan2(beyond[:, 1], beyond[:, 0])) < 1e-10

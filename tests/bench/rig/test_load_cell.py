@@ -4,15 +4,22 @@ import msgspec
 import numpy as np
 import pytest
 
-from bench.rig.load_cell import LoadCell
+from bench.rig.force_sensor import LoadCell
 from bench.rig.protocol import LoadCellTable, Protocol, TrialTable, load
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
 from tests.scenes.six_axes import pushed
 
-QUIET = {"noise_N": 0.0, "hum_N": 0.0, "hum_Hz": 50.0, "drift_N_per_s": 0.0, "step_N": 0.0, "filter_Hz": 0.0,
-         "rate_Hz": 2000.0}  # fmt: skip
+QUIET = {
+    "noise_N": 0.0,
+    "hum_N": 0.0,
+    "hum_Hz": 50.0,
+    "drift_N_per_s": 0.0,
+    "step_N": 0.0,
+    "filter_Hz": 0.0,
+    "rate_Hz": 2000.0,
+}
 TRIAL = TrialTable(beta_deg=40.0, d_x_mm=55.0)
 
 

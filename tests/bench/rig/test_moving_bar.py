@@ -48,7 +48,9 @@ def test_slip_is_over_the_bar():
     end = made.forward
     went = 5.0 * (end.motor_rad[-1] - made.touch.motor_rad) / np.radians(10.0)
     moved = end.point_mm[-1, 2] - made.touch.point_mm[2]
-    assert made.slip_mm(end.point_mm[-1], end.motor_rad[-1]) == pytest.approx(went + moved, abs=1e-9)
+    assert made.slip_mm(end.point_mm[-1], end.motor_rad[-1]) == pytest.approx(
+        went + moved, abs=1e-9
+    )
 
 
 def test_what_is_stated_is_off_by_its_sigma(tmp_path):

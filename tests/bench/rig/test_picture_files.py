@@ -10,9 +10,13 @@ from tests.scenes.rig_sessions import TINY, protocol_file
 
 def taken(folder, kind, bits):
     """Frames of the first camera of a trial, (n, rows, columns), and the session's folder."""
-    text = TINY.split("[[trials]]")[0].replace("[pictures]", f'[pictures]\nformat = "{kind}"\nbits = {bits}')
+    text = TINY.split("[[trials]]")[0].replace(
+        "[pictures]", f'[pictures]\nformat = "{kind}"\nbits = {bits}'
+    )
     session = simulate(
-        folder / "session", protocol=protocol_file(folder, text + "[[trials]]\nbeta_deg = 20\n"), seed=1
+        folder / "session",
+        protocol=protocol_file(folder, text + "[[trials]]\nbeta_deg = 20\n"),
+        seed=1,
     )
     (trial,) = (session / "trials").iterdir()
     if (trial / "left.mkv").exists():

@@ -11,21 +11,27 @@ from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import TINY, protocol_file
 
 
-@pytest.mark.parametrize("change, message", [
-    (("name = \"tiny\"", "nome = \"tiny\""), "unknown field `nome`"),
-    (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±89"),
-    (("beta_deg = [20, 50]", "beta_deg = \"steep\""), "beta_deg"),
-    (("friction = 0.2\n", "friction = -0.2\n"), "friction"),
-    (("static_friction = 0.3", "static_friction = 0.1"), "below friction"),
-    (("d_x_mm = 50.0", "d_x_mm = 0.05"), "d_x_mm"),
-    (("speed_deg_s = 90.0", "speed_deg_s = 0.0"), "speed_deg_s"),
-    (("views = 2", "views = 2\nmarker_mm = 20.0"), "marker"),
-    (("views = 2", "views = 2\ndictionary = \"DICT_9X9\""), "no ArUco dictionary"),
-    (("position_mm = [30.0, -150.0, 250.0]", "position_mm = [55.0, 0.0, 250.0]"), "straight up or down"),
-    (("name = \"right\"", "name = \"left\""), "names of their own"),
-    (("clock_offset_s = 0.003", "after_deg = 9.0"), "at most the motor's"),
-    (("[[trials]]\nbeta_deg = [20, 50]", "[[trials]\nbeta_deg = [20, 50]"), "is not TOML"),
-])
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (('name = "tiny"', 'nome = "tiny"'), "unknown field `nome`"),
+        (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±89"),
+        (("beta_deg = [20, 50]", 'beta_deg = "steep"'), "beta_deg"),
+        (("friction = 0.2\n", "friction = -0.2\n"), "friction"),
+        (("static_friction = 0.3", "static_friction = 0.1"), "below friction"),
+        (("d_x_mm = 50.0", "d_x_mm = 0.05"), "d_x_mm"),
+        (("speed_deg_s = 90.0", "speed_deg_s = 0.0"), "speed_deg_s"),
+        (("views = 2", "views = 2\nmarker_mm = 20.0"), "marker"),
+        (("views = 2", 'views = 2\ndictionary = "DICT_9X9"'), "no ArUco dictionary"),
+        (
+            ("position_mm = [30.0, -150.0, 250.0]", "position_mm = [55.0, 0.0, 250.0]"),
+            "straight up or down",
+        ),
+        (('name = "right"', 'name = "left"'), "names of their own"),
+        (("clock_offset_s = 0.003", "after_deg = 9.0"), "at most the motor's"),
+        (("[[trials]]\nbeta_deg = [20, 50]", "[[trials]\nbeta_deg = [20, 50]"), "is not TOML"),
+    ],
+)
 def test_a_bad_protocol_is_refused_in_one_line(tmp_path, change, message):
     assert change[0] in TINY
     path = protocol_file(tmp_path, TINY.replace(*change))
@@ -67,7 +73,11 @@ def test_the_papers_protocol_is_section_v():
     measured = [r for r in runs if r.table.purpose == "measure"]
     assert sum(r.table.whisks for r in measured) == 640
     assert {(r.table.surface, r.speed_deg_s) for r in measured} == {
-        ("steel", 10), ("steel", 90), ("sandpaper", 10), ("sandpaper", 90)}
+        ("steel", 10),
+        ("steel", 90),
+        ("sandpaper", 10),
+        ("sandpaper", 90),
+    }
     assert sorted({r.beta_deg for r in measured}) == list(range(0, 80, 5))
     assert {r.table.follicle_roll_deg for r in runs if r.table.purpose == "gauge"} == {0, 90}
     assert {(r.before_deg, r.after_deg) for r in measured} == {(3, 12), (15, 20)}
@@ -85,5 +95,15 @@ def test_the_documents_example_loads(tmp_path):
     text = document.split("```toml\n")[1].split("```")[0]
     protocol = load(protocol_file(tmp_path, text))
     assert len(protocol.runs()) == 7
-    tables = {"whisker", "board", "cameras", "light", "pictures", "motor", "friction", "gauges", "trials"}
+    tables = {
+        "whisker",
+        "board",
+        "cameras",
+        "light",
+        "pictures",
+        "motor",
+        "friction",
+        "gauges",
+        "trials",
+    }
     assert tables < set(tomllib.loads(text))

@@ -71,7 +71,9 @@ def test_all_off_is_the_motors_way_and_the_bare_moments(quiet):
 
 def test_crosstalk(quiet, volts_with):
     volts = volts_with(("[[1.0, 0.0], [0.0, 1.0]]", "[[2.0, 0.3], [-0.2, 1.5]]"))
-    assert volts @ np.array([[2.0, 0.3], [-0.2, 1.5]]).T == pytest.approx(quiet.signals[:, 2:], abs=1e-12)
+    assert volts @ np.array([[2.0, 0.3], [-0.2, 1.5]]).T == pytest.approx(
+        quiet.signals[:, 2:], abs=1e-12
+    )
 
 
 def test_offset(quiet, volts_with):
@@ -89,7 +91,10 @@ def test_drift(quiet, volts_with):
 
 @pytest.mark.parametrize("mains_Hz", [50, 60])
 def test_mains(quiet, volts_with, mains_Hz):
-    hum = volts_with(("hum_V = 0.0", "hum_V = 0.1"), ("hum_Hz = 50.0", f"hum_Hz = {mains_Hz}.0")) - quiet.signals[:, 2:]
+    hum = (
+        volts_with(("hum_V = 0.0", "hum_V = 0.1"), ("hum_Hz = 50.0", f"hum_Hz = {mains_Hz}.0"))
+        - quiet.signals[:, 2:]
+    )
     wave = np.exp(2j * math.pi * mains_Hz * quiet.signals[:, 0])
     waves = np.column_stack([wave.real, wave.imag])
     fitted = waves @ np.linalg.lstsq(waves, hum, rcond=None)[0]
@@ -104,7 +109,10 @@ def test_noise(quiet, volts_with):
 
 def test_converter_steps(quiet, volts_with):
     """Twelve bits over ±10 V: steps of 4.9 mV, off by half a step at most."""
-    volts, step = volts_with(("adc_bits = 0", "adc_bits = 12"), ("range_V = 1e9", "range_V = 10.0")), 20 / 4096
+    volts, step = (
+        volts_with(("adc_bits = 0", "adc_bits = 12"), ("range_V = 1e9", "range_V = 10.0")),
+        20 / 4096,
+    )
     assert volts / step == pytest.approx(np.rint(volts / step), abs=1e-9)
     assert 0.4 * step < np.abs(volts - quiet.signals[:, 2:]).max() <= 0.5 * step + 1e-12
 
@@ -150,7 +158,11 @@ def test_vibration_by_stick_slip(tmp_path):
     jumps = np.nonzero(np.diff(way.motor_rad) == 0)[0]
     assert len(jumps) >= 3
     step = (way.moment_Nmm[jumps[-1] + 1] - way.moment_Nmm[jumps[-1]])[0]
-    at = int(np.searchsorted(still.signals[:, 0], float(still.stroke.time_s(0, way.motor_rad[jumps[-1]]))))
+    at = int(
+        np.searchsorted(
+            still.signals[:, 0], float(still.stroke.time_s(0, way.motor_rad[jumps[-1]]))
+        )
+    )
     apart = (shaken.signals[:, 2] - still.signals[:, 2]) / step
     earlier = apart[at - 1]  # what is left of the jumps before
     assert apart[at] - earlier == pytest.approx(-1, abs=0.3)

@@ -11,17 +11,17 @@ from scipy.special import ndtr
 
 from bench.rig import build
 from bench.rig.bar import Bar, unloaded
-from bench.rig.board import Board, Ink
-from bench.rig.camera import Camera
+from bench.rig.elastic_rod import Rod
 from bench.rig.light import Light, Material
+from bench.rig.painted_scene import HUB_FRONT_MM
+from bench.rig.pinhole import Camera
+from bench.rig.printed_board import Board, Ink
 from bench.rig.protocol import load
-from bench.rig.rod import Rod
-from bench.rig.scene import HUB_FRONT_MM
 from bench.rig.sensor import Sensor
 from bench.rig.studio import Moment, Studio
 from bench.rig.tube import Tube
 from bench.rig.window import Window
-from tests.ladder.renderer import (
+from tests.studies.accuracy.renderer import (
     ANGLES_DEG,
     BLURS_PX,
     CAMERA,
@@ -74,15 +74,22 @@ def grazing(tube, at, axis):
 
     def gap(v):
         px = np.array([[[at, v]]] if axis == 0 else [[[v, at]]], float)
-        ray = CAMERA.rotation.T @ np.append(cv2.undistortPoints(px, CAMERA.matrix, CAMERA.distortion)[0, 0], 1)
+        ray = CAMERA.rotation.T @ np.append(
+            cv2.undistortPoints(px, CAMERA.matrix, CAMERA.distortion)[0, 0], 1
+        )
         normal = np.cross(ray, way)
-        return abs((tube.axis_mm[0] - CAMERA.centre_mm) @ normal) / np.linalg.norm(normal) - tube.radius_mm[0]
+        return (
+            abs((tube.axis_mm[0] - CAMERA.centre_mm) @ normal) / np.linalg.norm(normal)
+            - tube.radius_mm[0]
+        )
 
     centre = float(crossing(CAMERA.project(tube.axis_mm), at, axis))
     return brentq(gap, centre - 30, centre, xtol=1e-6), brentq(gap, centre, centre + 30, xtol=1e-6)
 
 
-@pytest.mark.parametrize("off_px, largest, whole", [(1.5, 0.5 / 255, 0.01), (-1.5, 0.5 / 255, 0.01), (0.0, 0.03, 0.08)])
+@pytest.mark.parametrize(
+    "off_px, largest, whole", [(1.5, 0.5 / 255, 0.01), (-1.5, 0.5 / 255, 0.01), (0.0, 0.03, 0.08)]
+)
 def test_drawing_finer_changes_nothing(off_px, largest, whole):
     """A shaded wire over a step in the background along its edge, at 3 and at 12 samples a pixel.
 
@@ -90,7 +97,10 @@ def test_drawing_finer_changes_nothing(off_px, largest, whole):
     Exactly along the edge, coverage squared is what differs: 0.6·0.2/√π = 0.068 px·brightness across the edge.
     Composing after the blur would be off by 0.15 at the edge in all three.
     """
-    light, material = Light(np.array([-0.3, -0.5, 0.8]) / math.sqrt(0.98), 0.55, 0.35), Material(0.25, 0.5, 18, 0.3)
+    light, material = (
+        Light(np.array([-0.3, -0.5, 0.8]) / math.sqrt(0.98), 0.55, 0.35),
+        Material(0.25, 0.5, 18, 0.3),
+    )
     tube, pictures = wire(7.0, 5.7, material), []
     for fine, soft_px in ((3, 0.2), (12, 0.05)):
         margin = 5
@@ -119,8 +129,12 @@ def test_lens_is_inverted_over_the_picture_and_its_margin():
     u, v = np.arange(-30, 1310, 41.0), np.arange(-25, 745, 37.0)
     x, y = (r.astype(float) for r in camera.rays(u, v))
     points = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3)
-    px = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0].reshape(*x.shape, 2)
-    assert px == pytest.approx(np.stack(np.meshgrid(u, v), -1), abs=1e-4)  # float32 rays: 6e-8 · 2000 px
+    px = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[
+        0
+    ].reshape(*x.shape, 2)
+    assert px == pytest.approx(
+        np.stack(np.meshgrid(u, v), -1), abs=1e-4
+    )  # float32 rays: 6e-8 · 2000 px
 
 
 @pytest.mark.parametrize("legacy", [False, True])
@@ -131,7 +145,10 @@ def test_the_print_is_opencvs(legacy, inverted):
     per_mm = 7  # marker modules of 11/7 mm are 11 px then
     px = (np.arange(7 * 15 * per_mm) + 0.5) / per_mm
     column, row = (np.searchsorted(e, px[px < e[-2]]) - 1 for e in (print_.x_mm, print_.y_mm))
-    drawn = board.opencv().generateImage((7 * 15 * per_mm, 6 * 15 * per_mm), marginSize=0, borderBits=1) / 255
+    drawn = (
+        board.opencv().generateImage((7 * 15 * per_mm, 6 * 15 * per_mm), marginSize=0, borderBits=1)
+        / 255
+    )
     ours = print_.reflectance[np.ix_(row, column)]
     assert np.mean(ours != (1 - drawn if inverted else drawn)) == 0
 
@@ -145,7 +162,9 @@ def moment(motor_rad, material=None):
 @pytest.fixture(scope="module", params=[0, 1])
 def setting(request):
     camera = build.cameras(QUICK)[request.param]
-    bar = Bar.placed(d_x_mm=60.0, beta_rad=0.5, psi_rad=0.1, touch_rad=0.04, radius_mm=3.0, whisker_radius_mm=0.5)
+    bar = Bar.placed(
+        d_x_mm=60.0, beta_rad=0.5, psi_rad=0.1, touch_rad=0.04, radius_mm=3.0, whisker_radius_mm=0.5
+    )
     return studio(camera).setting(bar, bar.foot_mm(np.array([60.0, 2.4, 0.0]))), camera, bar
 
 
@@ -156,7 +175,9 @@ def test_a_frame_is_the_still_scene_but_for_what_moves(setting):
     px = np.concatenate([camera.project(moment(m).whiskers[0].axis_mm) for m in (0.0, 0.01)])
     rows, columns = np.nonzero(changed)
     assert 500 < len(rows) < 0.1 * changed.size
-    hub = camera.project(np.array([[x, y, z] for x in (-18, 6) for y in (-10, 10) for z in (-7, 8)]))
+    hub = camera.project(
+        np.array([[x, y, z] for x in (-18, 6) for y in (-10, 10) for z in (-7, 8)])
+    )
     low, high = np.minimum(px.min(0), hub.min(0)) - 6, np.maximum(px.max(0), hub.max(0)) + 6
     assert columns.min() > low[0] and columns.max() < high[0]
     assert rows.min() > low[1] and rows.max() < high[1]
@@ -166,7 +187,9 @@ def test_whisker_covers_the_bar_where_it_touches(setting):
     """The whisker lies on the cameras' side of the bar: at the crossing its own tone is seen, not the bar's."""
     still, camera, _ = setting
     bright = still.brightness([moment(0.04, Material(0.9))])
-    column, row = np.round(camera.project(60.0 * np.array([[math.cos(0.04), math.sin(0.04), 0.0]]))[0]).astype(int)
+    column, row = np.round(
+        camera.project(60.0 * np.array([[math.cos(0.04), math.sin(0.04), 0.0]]))[0]
+    ).astype(int)
     assert bright[row, column] > 0.6
 
 
@@ -209,5 +232,11 @@ def test_vignetting_darkens_corners_by_what_it_says():
 
 def test_a_camera_that_looks_straight_down_is_refused():
     with pytest.raises(ValueError, match="straight"):
-        Camera.looking("c", size_px=(64, 48), focal_px=100.0, distortion=np.zeros(5), position_mm=np.array([0, 0, 9.0]),
-                       target_mm=np.zeros(3))
+        Camera.looking(
+            "c",
+            size_px=(64, 48),
+            focal_px=100.0,
+            distortion=np.zeros(5),
+            position_mm=np.array([0, 0, 9.0]),
+            target_mm=np.zeros(3),
+        )

@@ -19,13 +19,23 @@ def test_same_seed_same_bytes_for_any_workers(tiny, tmp_path):
 
 
 def test_another_seed_is_another_session(tiny, tmp_path):
-    other = simulate(tmp_path / "other", protocol=protocol_file(tmp_path, TINY), seed=6, signals_only=True)
+    other = simulate(
+        tmp_path / "other", protocol=protocol_file(tmp_path, TINY), seed=6, signals_only=True
+    )
     ours, theirs = contents(tiny), contents(other)
-    assert all(ours[name] != data for name, data in theirs.items() if name.endswith(("signals.csv", "truth.toml")))
+    assert all(
+        ours[name] != data
+        for name, data in theirs.items()
+        if name.endswith(("signals.csv", "truth.toml"))
+    )
 
 
 def test_signals_only_differs_by_the_pictures_alone(tiny, tmp_path):
-    bare = contents(simulate(tmp_path / "bare", protocol=protocol_file(tmp_path, TINY), seed=5, signals_only=True))
+    bare = contents(
+        simulate(
+            tmp_path / "bare", protocol=protocol_file(tmp_path, TINY), seed=5, signals_only=True
+        )
+    )
     assert bare == {k: v for k, v in contents(tiny).items() if not k.endswith((".jpg", ".png"))}
 
 
@@ -91,10 +101,15 @@ def whole_parts(session):
 
 def test_size_and_time_are_said_before_and_progress_after(tmp_path, capsys):
     said, path = [], protocol_file(tmp_path, TINY)
-    session = simulate(tmp_path / "s", protocol=path, signals_only=True, progress=True, announce=said.append)
+    session = simulate(
+        tmp_path / "s", protocol=path, signals_only=True, progress=True, announce=said.append
+    )
     (line,) = said
     assert "4 trials, 6 whisks, 0 pictures" in line and "MB" in line and "minutes" in line
     bar = capsys.readouterr().err
     assert "parts" in bar and "/4 [" in bar
-    size = sum(len(data) for name, data in contents(session).items() if name.endswith("signals.csv")) / 1e6
+    size = (
+        sum(len(data) for name, data in contents(session).items() if name.endswith("signals.csv"))
+        / 1e6
+    )
     assert float(line.split("about ")[1].split(" MB")[0]) == pytest.approx(size, abs=0.6)

@@ -14,7 +14,12 @@ from tests.scenes.rig_sessions import bar_of, rows
 
 def test_the_bench_reads_what_the_rig_writes(tiny):
     session = load_session(tiny)
-    assert sorted(t.name for t in session.trials) == ["gauge_roll90", "rough_b60_v90", "steel_b20_v10", "steel_b50_v10"]
+    assert sorted(t.name for t in session.trials) == [
+        "gauge_roll90",
+        "rough_b60_v90",
+        "steel_b20_v10",
+        "steel_b50_v10",
+    ]
     for trial in session.trials:
         signals = read_signals(trial)
         assert len(forward_strokes(signals)) == (3 if trial.name.startswith("rough") else 1)
@@ -24,7 +29,9 @@ def test_the_bench_reads_what_the_rig_writes(tiny):
 def test_frames_stand_from_before_touch_to_after_it(tiny):
     for folder in sorted((tiny / "trials").iterdir()):
         truth = tomllib.loads((folder / "truth.toml").read_text())
-        touch = truth["touch_deg"][0] if isinstance(truth["touch_deg"], list) else truth["touch_deg"]
+        touch = (
+            truth["touch_deg"][0] if isinstance(truth["touch_deg"], list) else truth["touch_deg"]
+        )
         angles = [float(r["motor_deg"]) - touch for r in rows(folder / "truth.csv")][:13]
         assert angles == pytest.approx(np.arange(-1.6, 4.5, 0.5), abs=1e-5)
         assert [r["contact"] for r in rows(folder / "truth.csv")][:13] == ["0"] * 4 + ["1"] * 9
@@ -57,7 +64,9 @@ def test_truth_has_the_form_of_steel_signalss(tiny, steel_signals):
 
 def test_camera_clock_is_off_by_what_the_protocol_says(tiny):
     folder = tiny / "trials" / "steel_b20_v10"
-    stated, true = ([float(r["time_s"]) for r in rows(folder / f"{n}.csv")] for n in ("frames", "truth"))
+    stated, true = (
+        [float(r["time_s"]) for r in rows(folder / f"{n}.csv")] for n in ("frames", "truth")
+    )
     assert np.subtract(true, stated) == pytest.approx(0.003, abs=2e-6)
 
 
@@ -73,5 +82,3 @@ def test_signals_carry_the_truths_moments(tiny):
         if near.sum() > 14:
             expected = [float(row["m_y_Nmm"]), float(row["m_z_Nmm"])]
             assert moments[near].mean(0) == pytest.approx(expected, abs=0.13)
-
-

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bench.rig.bar import Bar, first_touch
-from bench.rig.friction import Friction
-from bench.rig.gauges import Gauges
+from bench.rig.elastic_rod import Rod
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
-from bench.rig.rod import Rod
+from bench.rig.stick_slip import Friction
+from bench.rig.strain_gauges import Gauges
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, ring
 
@@ -20,8 +20,18 @@ OFFSET = np.array([-0.015, -0.026])
 
 
 def gauges(**changes):
-    quiet = {"matrix_Nmm_per_V": MATRIX, "offset_V": OFFSET, "noise_V": 0.0, "hum_V": 0.0, "hum_Hz": 50.0,
-             "drift_V_per_s": 0.0, "filter_Hz": 0.0, "rate_Hz": 2000.0, "adc_bits": 0, "range_V": 10.0}
+    quiet = {
+        "matrix_Nmm_per_V": MATRIX,
+        "offset_V": OFFSET,
+        "noise_V": 0.0,
+        "hum_V": 0.0,
+        "hum_Hz": 50.0,
+        "drift_V_per_s": 0.0,
+        "filter_Hz": 0.0,
+        "rate_Hz": 2000.0,
+        "adc_bits": 0,
+        "range_V": 10.0,
+    }
     return Gauges(**(quiet | changes))
 
 
@@ -43,7 +53,9 @@ def test_quiet_gauges_give_back_the_moments():
 def test_a_follicle_turned_by_90_degrees_senses_m_z_on_y_and_minus_m_y_on_z():
     moments = ramp()
     volts = gauges().volts(moments, math.pi / 2, rng())
-    assert (volts - OFFSET) @ MATRIX.T == pytest.approx(moments[::4] @ np.array([[0, -1], [1, 0]]), abs=1e-12)
+    assert (volts - OFFSET) @ MATRIX.T == pytest.approx(
+        moments[::4] @ np.array([[0, -1], [1, 0]]), abs=1e-12
+    )
 
 
 def test_noise_is_white_and_of_its_size():
@@ -88,8 +100,12 @@ def test_filter_delays_a_ramp_by_its_group_delay_and_keeps_its_slope():
 def test_free_wire_rings_at_the_textbook_frequency():
     """1.8751²/2π·√(EI/ρA)/L² = 42.67 Hz; propped at the end 3.9266² in its place; a cone 8.7192/2π."""
     unit = math.sqrt(1e-6 * WIRE.rigidity_Nmm2 / WIRE.mass_kg_m) / 0.1**2 / (2 * math.pi)
-    assert Mode.of(WIRE).frequency_rad_s / (2 * math.pi) == pytest.approx(1.8751041**2 * unit, rel=1e-6)
-    assert Mode.of(WIRE, 100.0).frequency_rad_s / (2 * math.pi) == pytest.approx(3.9266023**2 * unit, rel=1e-5)
+    assert Mode.of(WIRE).frequency_rad_s / (2 * math.pi) == pytest.approx(
+        1.8751041**2 * unit, rel=1e-6
+    )
+    assert Mode.of(WIRE, 100.0).frequency_rad_s / (2 * math.pi) == pytest.approx(
+        3.9266023**2 * unit, rel=1e-5
+    )
     cone = Mode.of(Rod("cone", 100.0, 1.0, 60.0))
     assert cone.frequency_rad_s / (2 * math.pi) == pytest.approx(8.7192 * unit, rel=1e-3)
 
@@ -97,7 +113,9 @@ def test_free_wire_rings_at_the_textbook_frequency():
 def test_pushed_mode_knows_the_small_angle_moment():
     assert Mode.of(WIRE, 60.0).push_Nmm == pytest.approx(3 * WIRE.rigidity_Nmm2 / 60, rel=1e-5)
     cone = Rod("cone", 100.0, 1.0, 60.0)
-    assert Mode.of(cone, 60.0).push_Nmm == pytest.approx(3 * cone.rigidity_Nmm2 * (1 / 60 - 1 / 100), rel=1e-4)
+    assert Mode.of(cone, 60.0).push_Nmm == pytest.approx(
+        3 * cone.rigidity_Nmm2 * (1 / 60 - 1 / 100), rel=1e-4
+    )
 
 
 def test_ring_solves_its_equation():
@@ -106,17 +124,33 @@ def test_ring_solves_its_equation():
     speed, push = np.gradient(wave, times), np.gradient(np.gradient(wave, times), times)
     left = push + 2 * damping * frequency * speed + frequency**2 * wave
     assert wave[0] == 0.4 and speed[1] == pytest.approx(-30.0, rel=0.05)
-    assert np.abs(left[5:-5]).max() < 1e-4 * frequency**2  # central differences: (ω dt)²/12 = 6e-7, doubled twice
+    assert (
+        np.abs(left[5:-5]).max() < 1e-4 * frequency**2
+    )  # central differences: (ω dt)²/12 = 6e-7, doubled twice
 
 
 def whisked(friction, back=False, beta_deg=60.0, whisks=1, ramp_s=0.0):
-    bar = Bar.placed(d_x_mm=60.0, beta_rad=math.radians(beta_deg), psi_rad=0.0, touch_rad=0.04, radius_mm=3.0,
-                     whisker_radius_mm=0.5)
+    bar = Bar.placed(
+        d_x_mm=60.0,
+        beta_rad=math.radians(beta_deg),
+        psi_rad=0.0,
+        touch_rad=0.04,
+        radius_mm=3.0,
+        whisker_radius_mm=0.5,
+    )
     touch = first_touch(WIRE, bar, 0.04, 60.0)
-    stroke = Stroke.plan(touch.motor_rad - 0.05, touch.motor_rad + 0.07, math.radians(10), whisks=whisks, back=back,
-                         ramp_s=ramp_s)
+    stroke = Stroke.plan(
+        touch.motor_rad - 0.05,
+        touch.motor_rad + 0.07,
+        math.radians(10),
+        whisks=whisks,
+        back=back,
+        ramp_s=ramp_s,
+    )
     end_rad = float(stroke.angles_rad.max())
-    whisk = MarchedWhisk.run(WIRE, bar, friction, touch, end_rad, step_rad=math.radians(0.1), back=back)
+    whisk = MarchedWhisk.run(
+        WIRE, bar, friction, touch, end_rad, step_rad=math.radians(0.1), back=back
+    )
     return stroke, (whisk,) * whisks
 
 
@@ -127,7 +161,9 @@ def test_moments_are_zero_before_touch_and_after_the_way_back():
     free = motor < whisks[0].touch.motor_rad
     assert not moments[free].any() and (moments[~free][1:-1].any(1)).all()
     half = len(times) // 2
-    assert moments[half:2 * half] == pytest.approx(moments[:half], abs=0.05)  # the second whisk is like the first
+    assert moments[half : 2 * half] == pytest.approx(
+        moments[:half], abs=0.05
+    )  # the second whisk is like the first
 
 
 def test_friction_opens_a_loop_between_the_two_ways():
@@ -145,9 +181,14 @@ def test_touch_rings_the_propped_mode_and_dies_out():
     touch_s = float(stroke.time_s(0, whisks[0].touch.motor_rad))
     after = ringing[times > touch_s + 1e-3][:, 1]
     crossings = np.nonzero(np.diff(np.sign(after[:2000])))[0]
-    assert len(crossings) / (2 * 0.2) == pytest.approx(Mode.of(WIRE, 60.0).frequency_rad_s / (2 * math.pi), rel=0.05)
+    assert len(crossings) / (2 * 0.2) == pytest.approx(
+        Mode.of(WIRE, 60.0).frequency_rad_s / (2 * math.pi), rel=0.05
+    )
     assert not ringing[times < touch_s].any()
-    assert 0.001 < np.abs(ringing).max() < 0.2 and np.abs(after[3000:]).max() < 0.05 * np.abs(after[:300]).max()
+    assert (
+        0.001 < np.abs(ringing).max() < 0.2
+        and np.abs(after[3000:]).max() < 0.05 * np.abs(after[:300]).max()
+    )
 
 
 def test_ringing_makes_a_jump_of_stick_slip_continuous():
@@ -162,7 +203,9 @@ def test_ringing_makes_a_jump_of_stick_slip_continuous():
     assert np.abs(np.diff(shaken[:, 0]))[largest] < 0.2 * jumps[largest]
 
 
-@pytest.mark.parametrize("ramp_s, pause_s, back, whisks", [(0, 0, False, 1), (0.02, 0.1, True, 3), (0, 0, True, 2)])
+@pytest.mark.parametrize(
+    "ramp_s, pause_s, back, whisks", [(0, 0, False, 1), (0.02, 0.1, True, 3), (0, 0, True, 2)]
+)
 def test_stroke_goes_where_and_when_it_says(ramp_s, pause_s, back, whisks):
     stroke = Stroke.plan(0.1, 0.3, 1.5, whisks=whisks, ramp_s=ramp_s, pause_s=pause_s, back=back)
     assert len(stroke.forward) == whisks
@@ -171,7 +214,9 @@ def test_stroke_goes_where_and_when_it_says(ramp_s, pause_s, back, whisks):
         assert stroke.angle_rad(stroke.time_s(whisk, angles)) == pytest.approx(angles, abs=1e-12)
     times = np.linspace(0, stroke.end_s, 200_001)
     angle = stroke.angle_rad(times)
-    assert np.abs(np.diff(angle)).max() <= 1.5 * times[1] * (1 + 1e-9)  # never faster than told, never a jump
+    assert np.abs(np.diff(angle)).max() <= 1.5 * times[1] * (
+        1 + 1e-9
+    )  # never faster than told, never a jump
     assert angle.min() == pytest.approx(0.1 - 0.75 * ramp_s, abs=1e-9)
     assert angle.max() == pytest.approx(0.3 + 0.75 * ramp_s, abs=1e-5)
 

@@ -7,12 +7,12 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.rig.bar import Bar, first_touch, turned
-from bench.rig.friction import Friction
+from bench.rig.elastic_rod import Rod
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import load
-from bench.rig.rod import Rod
-from bench.rig.rounded import Cone, Ring, Sphere
+from bench.rig.round_objects import Cone, Ring, Sphere
 from bench.rig.simulate import simulate
+from bench.rig.stick_slip import Friction
 from tests.scenes.rig_sessions import protocol_file
 
 ROD = Rod("cylinder", 100.0, 1.0, 60.0)
@@ -31,7 +31,9 @@ def sphere(radius_mm: float) -> Sphere:
 
 def marched(bar: Bar, friction: Friction) -> MarchedWhisk:
     touch, step = first_touch(ROD, bar, 0.04, 60.0), math.radians(0.2)
-    return MarchedWhisk.run(ROD, bar, friction, touch, touch.motor_rad + math.radians(3.0), step_rad=step)
+    return MarchedWhisk.run(
+        ROD, bar, friction, touch, touch.motor_rad + math.radians(3.0), step_rad=step
+    )
 
 
 def cone(radius_mm: float = 20.0, half_angle_rad: float = 0.35) -> Cone:
@@ -54,12 +56,18 @@ def test_what_a_contact_sees_has_these_derivatives(thing):
         np.testing.assert_allclose(made, differences, atol=1e-8)
 
 
-@pytest.mark.parametrize("friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"])
+@pytest.mark.parametrize(
+    "friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"]
+)
 def test_a_large_ring_is_a_straight_bar(friction):
     """Of a circle of 1e5 mm the axis turns by 2e-5 over 2 mm of slip: moments to some parts in 1e5."""
-    straight, bent = (marched(bar, friction) for bar in (placed(), Ring.bent(placed(), TOUCHED, 1e5)))
+    straight, bent = (
+        marched(bar, friction) for bar in (placed(), Ring.bent(placed(), TOUCHED, 1e5))
+    )
     at = straight.touch.motor_rad + np.radians([0.5, 1.5, 2.5])
-    np.testing.assert_allclose(bent.forward.moments_at(at), straight.forward.moments_at(at), rtol=2e-4)
+    np.testing.assert_allclose(
+        bent.forward.moments_at(at), straight.forward.moments_at(at), rtol=2e-4
+    )
     np.testing.assert_allclose(bent.slip_at(0.04), straight.slip_at(0.04), rtol=2e-4)
 
 
@@ -86,13 +94,19 @@ def test_a_cone_is_touched_where_the_bar_is_and_ends_at_its_tip():
     assert same.motor_rad == pytest.approx(touch.motor_rad, abs=1e-9)
     assert thing.slope(0.04, same.point_mm) == pytest.approx(bar.slope(0.04), abs=1e-9)
     down = -thing.axis
-    surface = thing.tip_mm + 30.0 * (np.cos(0.35) * down + np.sin(0.35) * np.cross(thing.axis, [1.0, 0.0, 0.0]))
-    assert thing.outside_mm(np.array([surface, thing.tip_mm + 3.0 * thing.axis]))[1] == pytest.approx(3.0)
+    surface = thing.tip_mm + 30.0 * (
+        np.cos(0.35) * down + np.sin(0.35) * np.cross(thing.axis, [1.0, 0.0, 0.0])
+    )
+    assert thing.outside_mm(np.array([surface, thing.tip_mm + 3.0 * thing.axis]))[
+        1
+    ] == pytest.approx(3.0)
     with pytest.raises(ArithmeticError, match="past the cone's tip"):
         thing.around(thing.tip_mm + thing.axis + [0.0, 1e-3, 0.0])
 
 
-@pytest.mark.parametrize("friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"])
+@pytest.mark.parametrize(
+    "friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"]
+)
 def test_a_slim_cone_is_a_bar(friction):
     """Of a half-angle of 1e-5 the radius changes by 2e-5 mm over 2 mm of slip."""
     bar, slim = (marched(thing, friction) for thing in (placed(), cone(3.0, 1e-5)))
@@ -100,12 +114,15 @@ def test_a_slim_cone_is_a_bar(friction):
     np.testing.assert_allclose(slim.forward.moments_at(at), bar.forward.moments_at(at), rtol=2e-4)
 
 
-@pytest.mark.parametrize("said, text", [
-    ("cone_half_angle_deg belongs to", "cone_half_angle_deg = 10"),
-    ("cone_half_angle_deg belongs to", 'object = "cone"'),
-    ("1 to 75 is allowed", 'object = "cone"\ncone_half_angle_deg = 80'),
-    ("cone_half_angle_deg", 'object = "cone"\ncone_half_angle_deg = -5'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "said, text",
+    [
+        ("cone_half_angle_deg belongs to", "cone_half_angle_deg = 10"),
+        ("cone_half_angle_deg belongs to", 'object = "cone"'),
+        ("1 to 75 is allowed", 'object = "cone"\ncone_half_angle_deg = 80'),
+        ("cone_half_angle_deg", 'object = "cone"\ncone_half_angle_deg = -5'),
+    ],
+)
 def test_a_cone_that_cannot_be_is_refused(tmp_path, said, text):
     with pytest.raises(BadInput) as refused:
         load(protocol_file(tmp_path, f"[[trials]]\n{text}\n"))
@@ -117,7 +134,9 @@ def test_a_ring_bends_away_from_the_whisker(tmp_path):
     text = "[[columns]]\nheights_mm = [-8, 0, 8]\n[[trials]]\nbeta_scatter_deg = 0\n"
     touches = []
     for name, bent in (("bar", ""), ("ring", 'object = "ring"\nring_diameter_mm = 80\n')):
-        made = simulate(tmp_path / name, protocol=protocol_file(tmp_path, text + bent), signals_only=True)
+        made = simulate(
+            tmp_path / name, protocol=protocol_file(tmp_path, text + bent), signals_only=True
+        )
         rows = sorted(made.glob("trials/*/truth@*.toml"))
         touches.append([float(row.read_text().split()[2]) for row in rows])
     assert 'shape = "ring"' in next(made.glob("trials/*/trial.toml")).read_text()

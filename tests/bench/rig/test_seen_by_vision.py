@@ -51,8 +51,13 @@ def test_a_dark_set_wire_on_a_tilted_thin_bar(tmp_path):
     (trial,) = session.trials
     truth = tomllib.loads((trial.folder / "truth.toml").read_text())
     signals, times = read_signals(trial), frame_times(trial)
-    frames = {name: read_frames(source, range(len(times))) for name, source in trial.camera_sources.items()}
-    background = {name: read_picture(path).astype(float) for name, path in session.rig_pictures.items()}
+    frames = {
+        name: read_frames(source, range(len(times)))
+        for name, source in trial.camera_sources.items()
+    }
+    background = {
+        name: read_picture(path).astype(float) for name, path in session.rig_pictures.items()
+    }
     whisks = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
     pictures = TrialPictures(frames, times.time_s, signals.motor_at(times.time_s), background)
     rods = Rods(Wire("cylinder", 100.0, 1.0), Bar(4.0))
@@ -60,6 +65,8 @@ def test_a_dark_set_wire_on_a_tilted_thin_bar(tmp_path):
     assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=0.10)
     assert abs(seen.d_x_mm.value - truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
     assert np.degrees(seen.beta_rad.value) == pytest.approx(truth["beta_deg"], abs=0.3)
-    slip = np.array([float(row["slip_mm"]) for row in csv.DictReader((trial.folder / "truth.csv").open())])
+    slip = np.array(
+        [float(row["slip_mm"]) for row in csv.DictReader((trial.folder / "truth.csv").open())]
+    )
     touching = seen.frames.touching
     assert np.sqrt(np.mean((seen.frames.slip_mm.value - slip)[touching] ** 2)) < 0.08

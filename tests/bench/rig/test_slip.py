@@ -8,18 +8,20 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from bench.rig.bar import Bar, first_touch, turned
+from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
-from bench.rig.friction import Friction
 from bench.rig.marched import MarchedWhisk
-from bench.rig.rod import Rod
-from bench.rig.rounded import Cone, Ring, Sphere
+from bench.rig.round_objects import Cone, Ring, Sphere
 from bench.rig.simulate import simulate
-from bench.rig.slip import slips_mm
+from bench.rig.stick_slip import Friction
+from bench.rig.surface_slip import slips_mm
 from tests.scenes.rig_sessions import protocol_file, rows
 
 ROD = Rod("cylinder", 100.0, 1.0, 60.0)
 TOUCHED = turned(np.array([60.0, 0.0, 0.0]), 0.04)
-BAR = Bar.placed(d_x_mm=60.0, beta_rad=0.6, psi_rad=0.0, touch_rad=0.04, radius_mm=20.0, whisker_radius_mm=0.5)
+BAR = Bar.placed(
+    d_x_mm=60.0, beta_rad=0.6, psi_rad=0.0, touch_rad=0.04, radius_mm=20.0, whisker_radius_mm=0.5
+)
 BALL = Sphere(BAR.point_mm, BAR.axis, 20.0)
 THINGS = [BAR, Ring.bent(BAR, TOUCHED, 20.0), BALL, Cone.narrowing(BAR, TOUCHED, 0.35)]
 
@@ -27,7 +29,9 @@ THINGS = [BAR, Ring.bent(BAR, TOUCHED, 20.0), BALL, Cone.narrowing(BAR, TOUCHED,
 def marched(thing: Bar, mu: float, step_deg: float = 0.1, back: bool = False) -> MarchedWhisk:
     touch = first_touch(ROD, thing, 0.04, 60.0)
     end, step = touch.motor_rad + math.radians(4.0), math.radians(step_deg)
-    return MarchedWhisk.run(ROD, thing, Friction(mu, mu, 1e-3), touch, end, step_rad=step, back=back)
+    return MarchedWhisk.run(
+        ROD, thing, Friction(mu, mu, 1e-3), touch, end, step_rad=step, back=back
+    )
 
 
 def shears(whisk: MarchedWhisk) -> np.ndarray:
@@ -45,7 +49,9 @@ def bending_Nmm(state) -> float:
     elastica, force = Elastica(ROD), state.force_hub_N
     across = math.hypot(force[1], force[2])
     bent, nodes = elastica.solve(force[0], across, state.arc_mm, state.angle), elastica.nodes
-    x, e = (bent.arc_mm * nodes.from_base @ part for part in (np.cos(bent.angle), np.sin(bent.angle)))
+    x, e = (
+        bent.arc_mm * nodes.from_base @ part for part in (np.cos(bent.angle), np.sin(bent.angle))
+    )
     moment = across * (x[-1] - x) - force[0] * (e[-1] - e)
     return bent.arc_mm * float(nodes.weights @ moment**2) / (2 * ROD.rigidity_Nmm2)
 
@@ -56,7 +62,9 @@ def test_what_the_motor_does_is_bending_and_friction_over_the_slide(thing, mu):
     """By trapezes of 0.1°: 1e-4 of the work, where the largest that is left is 3.7e-5. Friction takes a tenth of it."""
     whisk = marched(thing, mu)
     way, shear = whisk.forward, shears(whisk)
-    work = float(np.sum((way.moment_Nmm[1:, 1] + way.moment_Nmm[:-1, 1]) / 2 * np.diff(way.motor_rad)))
+    work = float(
+        np.sum((way.moment_Nmm[1:, 1] + way.moment_Nmm[:-1, 1]) / 2 * np.diff(way.motor_rad))
+    )
     slid = np.diff(slips_mm(whisk, False)[:, 2:], axis=0)
     taken = -float(np.sum((shear[1:] + shear[:-1]) / 2 * slid))
     assert work == pytest.approx(bending_Nmm(way.states[-1]) + taken, rel=1e-4)
@@ -71,6 +79,7 @@ def shot(force, arc, motor):
         def rates(_, here):
             moment = np.cross(end - here[:3], force)
             return np.append(here[3:], np.cross(moment, here[3:]) / ROD.rigidity_Nmm2)
+
         return solve_ivp(rates, (0.0, arc), base, rtol=1e-9, atol=1e-11, dense_output=True)
 
     return made
@@ -106,14 +115,19 @@ def test_a_sphere_by_shooting(mu):
     def centreline(unknowns, motor):
         path = shot(unknowns[:3], unknowns[3], motor)(unknowns[4:])
         last = path.y[:, -1]
-        return lambda arc: path.sol(arc)[:3] if arc <= unknowns[3] else last[:3] + (arc - unknowns[3]) * last[3:]
+        return lambda arc: (
+            path.sol(arc)[:3] if arc <= unknowns[3] else last[:3] + (arc - unknowns[3]) * last[3:]
+        )
 
-    unknowns = np.concatenate([turned(states[0].force_hub_N, states[0].motor_rad), [states[0].arc_mm],
-                               states[0].point_mm])  # fmt: skip
+    unknowns = np.concatenate(
+        [turned(states[0].force_hub_N, states[0].motor_rad), [states[0].arc_mm], states[0].point_mm]
+    )
     motor = states[0].motor_rad
     for state in states[1:]:
         before = centreline(unknowns, motor)
-        guess = np.concatenate([turned(state.force_hub_N, state.motor_rad), [state.arc_mm], state.point_mm])
+        guess = np.concatenate(
+            [turned(state.force_hub_N, state.motor_rad), [state.arc_mm], state.point_mm]
+        )
         motor = state.motor_rad
         unknowns = pushed_on(motor, guess + 1e-3, before, mu)
         np.testing.assert_allclose(unknowns[4:], state.point_mm, atol=1e-8)
@@ -129,7 +143,9 @@ def test_on_a_straight_bar_the_path_along_it_is_the_slip():
 
 
 def test_truth_of_rounded_objects_has_both_directions(tmp_path):
-    text = '[[trials]]\nbeta_deg = 40\nbeta_scatter_deg = 0\nbar_diameter_mm = 40\nobject = "sphere"\n'
+    text = (
+        '[[trials]]\nbeta_deg = 40\nbeta_scatter_deg = 0\nbar_diameter_mm = 40\nobject = "sphere"\n'
+    )
     session = simulate(tmp_path / "s", protocol=protocol_file(tmp_path, text), signals_only=True)
     (path,) = session.glob("trials/*/truth.csv")
     touching = [row for row in rows(path) if row["contact"] == "1"]

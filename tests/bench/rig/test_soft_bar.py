@@ -26,7 +26,9 @@ def test_the_bar_is_painted_where_the_contact_is(beta_deg):
             assert not gave.any()
             continue
         there = made.bar.given(gave)
-        assert np.linalg.norm(state.point_mm - there.foot_mm(state.point_mm)) == pytest.approx(3.5, abs=2e-4)
+        assert np.linalg.norm(state.point_mm - there.foot_mm(state.point_mm)) == pytest.approx(
+            3.5, abs=2e-4
+        )
         assert abs(gave @ made.bar.axis) < 1e-12
         most = max(most, np.linalg.norm(gave))
     assert most > 1.0

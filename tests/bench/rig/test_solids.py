@@ -9,18 +9,24 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.rig.bar import Bar, turned
-from bench.rig.camera import Camera
 from bench.rig.layer import Front
 from bench.rig.light import Light, Material
-from bench.rig.rounded import Cone, Ring, Sphere
+from bench.rig.pinhole import Camera
+from bench.rig.round_objects import Cone, Ring, Sphere
 from bench.rig.simulate import simulate
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 from tests.scenes.rig_sessions import TINY, protocol_file
 
-CAMERA = Camera.looking("small", size_px=(320, 240), focal_px=1000.0, distortion=(-0.11, 0.14, 0.0006, -0.0004, 0.01),
-                        position_mm=np.array([60.0, -350.0, 150.0]), target_mm=np.array([60.0, 8.0, 0.0]))  # fmt: skip
+CAMERA = Camera.looking(
+    "small",
+    size_px=(320, 240),
+    focal_px=1000.0,
+    distortion=(-0.11, 0.14, 0.0006, -0.0004, 0.01),
+    position_mm=np.array([60.0, -350.0, 150.0]),
+    target_mm=np.array([60.0, 8.0, 0.0]),
+)
 EVEN = Light(np.array([0.0, -1.0, 0.0]), lamp=0.0, soft=1.0)
 LAMP = Light(np.array([-0.3, -0.5, 0.8]) / math.sqrt(0.98), 0.55, 0.35)
 METAL = Material(0.22, 0.6, 12.0, 0.5)
@@ -29,7 +35,11 @@ TOUCHED = np.array([60.0, 0.0, 0.0])
 
 
 def placed(beta_deg: float, radius_mm: float, psi_deg: float = 8.0) -> Bar:
-    angles = {"beta_rad": math.radians(beta_deg), "psi_rad": math.radians(psi_deg), "touch_rad": 0.0}
+    angles = {
+        "beta_rad": math.radians(beta_deg),
+        "psi_rad": math.radians(psi_deg),
+        "touch_rad": 0.0,
+    }
     return Bar.placed(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
@@ -60,7 +70,9 @@ def within(thing, points):
     if isinstance(thing, Ring):
         return np.hypot(far - thing.ring_radius_mm, height) - thing.radius_mm
     sin, tan = math.sin(thing.half_angle_rad), math.tan(thing.half_angle_rad)
-    touched = thing.radius_mm * sin  # of the circle on which it is touched, from the thinner cone's tip
+    touched = (
+        thing.radius_mm * sin
+    )  # of the circle on which it is touched, from the thinner cone's tip
     above = height - touched
     slanting = far - (thing.radius_mm / sin - height) * tan
     return np.maximum(slanting, np.maximum(above - 60.0, -30.0 - above))
@@ -74,7 +86,11 @@ def rays(u, v):
     for _ in range(6):
         ways = cv2.undistortPoints(asked, CAMERA.matrix, CAMERA.distortion)[:, 0]
         ways = np.column_stack([ways, np.ones(len(ways))])
-        asked = asked + px - cv2.projectPoints(ways, ORIGIN, ORIGIN, CAMERA.matrix, CAMERA.distortion)[0]
+        asked = (
+            asked
+            + px
+            - cv2.projectPoints(ways, ORIGIN, ORIGIN, CAMERA.matrix, CAMERA.distortion)[0]
+        )
     ways = ways @ CAMERA.rotation
     return ways / np.linalg.norm(ways, axis=1)[:, None]
 
@@ -86,7 +102,9 @@ def least(thing, ways):
         at = np.linspace(low, high, count)
         value = within(thing, CAMERA.centre_mm + at[..., None] * ways)
         best = value.argmin(0)
-        low, high = (at[np.clip(best + side, 0, count - 1), np.arange(len(ways))] for side in (-1, 1))
+        low, high = (
+            at[np.clip(best + side, 0, count - 1), np.arange(len(ways))] for side in (-1, 1)
+        )
     return value.min(0)
 
 
@@ -114,10 +132,17 @@ def amount(thing, u, soft_px):
 
 
 THINGS = {
-    "ring": ring(0), "ring 40": ring(40), "ring face on": ring(20, 70.0), "sphere": sphere(0), "sphere 40": sphere(40),
-    "cone": cone(0), "cone 40": cone(40), "cone -60": cone(-60), "slim cone": cone(20, 3.0, 6.0),
+    "ring": ring(0),
+    "ring 40": ring(40),
+    "ring face on": ring(20, 70.0),
+    "sphere": sphere(0),
+    "sphere 40": sphere(40),
+    "cone": cone(0),
+    "cone 40": cone(40),
+    "cone -60": cone(-60),
+    "slim cone": cone(20, 3.0, 6.0),
     "blunt cone": cone(30, 45.0, 5.0),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -144,10 +169,14 @@ def test_what_is_seen_is_what_sights_meet_first(name):
     whole = np.flatnonzero(cv2.erode(inner, np.ones((5, 5)))[layer.at])[::97]
     ways = rays(window.u_px[layer.at[1][whole]], window.v_px[layer.at[0][whole]])
     seen = layer.depth_mm[whole]
-    before, behind = (within(thing, CAMERA.centre_mm + (seen + step)[:, None] * ways) for step in (-0.02, 0.02))
+    before, behind = (
+        within(thing, CAMERA.centre_mm + (seen + step)[:, None] * ways) for step in (-0.02, 0.02)
+    )
     assert len(whole) > 10 and (behind < 0).all()
     up_to = np.linspace(0.5, 1, 400)[:, None] * (seen - 0.02)
-    assert (before > 0).all() and (within(thing, CAMERA.centre_mm + up_to[..., None] * ways) > 0).all()
+    assert (before > 0).all() and (
+        within(thing, CAMERA.centre_mm + up_to[..., None] * ways) > 0
+    ).all()
 
 
 def test_a_large_ring_looks_like_a_straight_bar():
@@ -158,7 +187,9 @@ def test_a_large_ring_looks_like_a_straight_bar():
     layer = Solid(Ring.bent(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
     bent[layer.at] += (layer.cover * (layer.tone - bent[layer.at])).astype(np.float32)
     foot = bar.foot_mm(TOUCHED)
-    Tube.straight(foot - 120 * bar.axis, foot + 120 * bar.axis, 3.0, METAL).draw(window, straight, LAMP)
+    Tube.straight(foot - 120 * bar.axis, foot + 120 * bar.axis, 3.0, METAL).draw(
+        window, straight, LAMP
+    )
     pictures = [window.seen(one, 0.9)[4:-4, 4:-4] for one in (bent, straight)]
     assert pictures[1].std() > 0.02
     assert np.abs(pictures[0] - pictures[1]).max() < 1 / 255
@@ -168,7 +199,9 @@ def test_a_wire_is_seen_before_an_object_and_not_behind_it():
     thing, window = sphere(20), Window.whole(CAMERA, 3, 0.2)
     layer = Solid(thing, Material(0.6)).layer(window, EVEN)
     front = Front.of(layer, window)
-    towards = (CAMERA.centre_mm - thing.point_mm) / np.linalg.norm(CAMERA.centre_mm - thing.point_mm)
+    towards = (CAMERA.centre_mm - thing.point_mm) / np.linalg.norm(
+        CAMERA.centre_mm - thing.point_mm
+    )
     still = np.full(window.shape, 0.3, np.float32)
     still[layer.at] += (layer.cover * (layer.tone - still[layer.at])).astype(np.float32)
     part = window.around(np.array([[60.0, 60.0], [260.0, 200.0]]), 3)
@@ -192,16 +225,21 @@ def test_an_object_beside_a_camera_is_refused():
 
 
 OBJECTS = {
-    "ring": "ring_diameter_mm = 80.0\n", "sphere": "bar_diameter_mm = 40.0\n",
+    "ring": "ring_diameter_mm = 80.0\n",
+    "sphere": "bar_diameter_mm = 40.0\n",
     "cone": "cone_half_angle_deg = 20.0\nbar_diameter_mm = 30.0\n",
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rounded")
-    camera, text = TINY.split("[[cameras]]")[1], "".join(
-        f'[[trials]]\nname = "{name}"\nbeta_deg = 20\nobject = "{name}"\n{keys}' for name, keys in OBJECTS.items()
+    camera, text = (
+        TINY.split("[[cameras]]")[1],
+        "".join(
+            f'[[trials]]\nname = "{name}"\nbeta_deg = 20\nobject = "{name}"\n{keys}'
+            for name, keys in OBJECTS.items()
+        ),
     )
     text = f"[[cameras]]{camera}[board]\nviews = 1\n[pictures]\nbefore_deg = 0.5\nafter_deg = 1.0\n{text}"
     return simulate(folder / "session", protocol=protocol_file(folder, text), seed=2)
@@ -213,7 +251,11 @@ def test_a_session_shows_it_and_says_what_it_is(session, name):
     (trial,) = (session / "trials").glob(f"{name}*")
     stated = tomllib.loads((trial / "trial.toml").read_text())["object"]
     truth = tomllib.loads((trial / "truth.toml").read_text())
-    assert stated["shape"] == name and "point_mm" not in stated and stated.items() <= truth["object"].items()
+    assert (
+        stated["shape"] == name
+        and "point_mm" not in stated
+        and stated.items() <= truth["object"].items()
+    )
     empty = cv2.imread(str(session / "boards" / "rig" / "left.png"), 0).astype(float)
     first = cv2.imread(str(trial / "left" / "000000.jpg"), 0)
     assert (np.abs(first - empty) > 12).sum() > 400
@@ -223,6 +265,9 @@ def test_a_session_shows_it_and_says_what_it_is(session, name):
     height = (touched - point) @ axis
     far = math.sqrt((touched - point) @ (touched - point) - height**2)
     angle = math.radians(stated.get("half_angle_deg", 0))
-    off = {"ring": math.hypot(far - 40.0, height) - radius_mm, "sphere": math.hypot(far, height) - radius_mm,
-           "cone": math.cos(angle) * far + math.sin(angle) * height}[name]  # fmt: skip
+    off = {
+        "ring": math.hypot(far - 40.0, height) - radius_mm,
+        "sphere": math.hypot(far, height) - radius_mm,
+        "cone": math.cos(angle) * far + math.sin(angle) * height,
+    }[name]
     assert off == pytest.approx(0.5, abs=1e-3)  # the wire's radius

@@ -34,7 +34,9 @@ friction = 0.18
 def ways(tmp_path_factory):
     """Rows of truth.csv of both trials, a frame each 0.05° there and back; no pictures are taken."""
     folder = tmp_path_factory.mktemp("ways")
-    session = simulate(folder / "session", protocol=protocol_file(folder, WAYS), seed=3, signals_only=True)
+    session = simulate(
+        folder / "session", protocol=protocol_file(folder, WAYS), seed=3, signals_only=True
+    )
     return {f.name.split("_")[0]: rows(f / "truth.csv") for f in (session / "trials").iterdir()}
 
 
@@ -58,7 +60,10 @@ def test_friction_holds_slip_and_moment_back_on_both_ways(ways):
     """
     table = [r for r in ways["smooth"] if r["contact"] == "1"]
     half = len(table) // 2
-    slip, phi = column(table, "slip_mm"), np.degrees(np.arctan2(column(table, "m_y_Nmm"), column(table, "m_z_Nmm")))
+    slip, phi = (
+        column(table, "slip_mm"),
+        np.degrees(np.arctan2(column(table, "m_y_Nmm"), column(table, "m_z_Nmm"))),
+    )
     up, down = slip[:half], slip[:half:-1]
     assert (down[10:] > up[10:] + 1e-4).all()
     alpha_deg = math.degrees(math.atan(0.18))
@@ -72,13 +77,17 @@ def test_the_whisker_that_is_drawn_touches_where_truth_says(back, tmp_path):
     protocol = load(protocol_file(tmp_path, WAYS))
     recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng(2))
     whisk, way = recording.whisks[0], recording.whisks[0].way(back)
-    frames = [motor for _, motor, _, b in recording.frames if b == back and way.state_at(motor) is not None]
+    frames = [
+        motor
+        for _, motor, _, b in recording.frames
+        if b == back and way.state_at(motor) is not None
+    ]
     assert len(frames) > 80
     for motor in frames[::5]:
         state = way.state_at(motor)
-        assert way.state_between(motor) is state or way.state_between(motor).force_hub_N == pytest.approx(
-            state.force_hub_N, rel=1e-9
-        )
+        assert way.state_between(motor) is state or way.state_between(
+            motor
+        ).force_hub_N == pytest.approx(state.force_hub_N, rel=1e-9)
         (point,) = whisk.centreline_mm(motor, way.state_between(motor), [state.arc_mm])
         assert point == pytest.approx(state.point_mm, abs=1e-8)
         between = motor + 1e-4
@@ -92,15 +101,22 @@ def test_stick_slip_is_a_saw_tooth_in_truth(ways):
     beyond the kinetic, each frame slips by much the same.
     """
     half = len(ways["teeth"]) // 2
-    teeth, smooth = ([r for r in ways[n][:half] if r["contact"] == "1"] for n in ("teeth", "smooth"))
+    teeth, smooth = (
+        [r for r in ways[n][:half] if r["contact"] == "1"] for n in ("teeth", "smooth")
+    )
     steps, even = np.diff(column(teeth, "slip_mm"))[10:], np.diff(column(smooth, "slip_mm"))[10:]
     assert steps.sum() == pytest.approx(even.sum(), rel=0.1)
     assert even.max() < 1.3 * even.min()
     assert (steps < 0.1 * even.mean()).sum() > 20 and (steps > 1.5 * even.mean()).sum() > 20
     assert {"held", "sliding"} == {row["status"] for row in teeth}
-    friction = np.array([60 - math.degrees(math.atan2(float(r["m_y_Nmm"]), float(r["m_z_Nmm"]))) for r in teeth])[10:]
+    friction = np.array(
+        [60 - math.degrees(math.atan2(float(r["m_y_Nmm"]), float(r["m_z_Nmm"]))) for r in teeth]
+    )[10:]
     cones = [math.degrees(math.atan(mu)) for mu in (0.18, 0.25)]
-    assert cones[0] - 0.5 < friction.min() < cones[0] + 1 and cones[1] - 1 < friction.max() < cones[1] + 0.5
+    assert (
+        cones[0] - 0.5 < friction.min() < cones[0] + 1
+        and cones[1] - 1 < friction.max() < cones[1] + 0.5
+    )
 
 
 def test_tip_contact_and_letting_go_are_statuses(tmp_path):
@@ -121,7 +137,11 @@ friction = 0.2
     table = rows(folder / "truth.csv")
     statuses = [row["status"] for row in table]
     first, last = statuses.index("tip"), len(statuses) - 1 - statuses[::-1].index("tip")
-    assert {"held", "sliding"} & set(statuses[:first]) and set(statuses[first : last + 1]) == {"tip"}
+    assert {"held", "sliding"} & set(statuses[:first]) and set(statuses[first : last + 1]) == {
+        "tip"
+    }
     assert set(statuses[last + 1 :]) == {"free"} and last + 1 < len(statuses)
     assert {row["arc_mm"] for row in table[first : last + 1]} == {"100.000000"}
-    assert {(row["contact"], row["m_y_Nmm"], row["x_mm"]) for row in table[last + 1 :]} == {("0", "0.000000", "nan")}
+    assert {(row["contact"], row["m_y_Nmm"], row["x_mm"]) for row in table[last + 1 :]} == {
+        ("0", "0.000000", "nan")
+    }

@@ -57,7 +57,11 @@ def refusal(session) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ('"ai1"', '"ai7"', f"trials/{TRIAL}/daq.csv: has no channel ai7; it has enc, ai1, ai2, trigger"),
+        (
+            '"ai1"',
+            '"ai7"',
+            f"trials/{TRIAL}/daq.csv: has no channel ai7; it has enc, ai1, ai2, trigger",
+        ),
         ("rate_Hz = 2000.0", "", r"[signals] has neither a time_s channel nor rate_Hz"),
         ("rate_Hz = 2000.0", 'time_s = { channel = "ai1" }', "column time_s: goes back"),
         ('file = "daq.csv"', 'file = "other.csv"', f"trials/{TRIAL}/other.csv: is not there"),

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.session.check import checked_session
 from bench.session.frame_times import FrameTimes, frame_times, merge_times, read_trial
 from bench.session.session import load_session
+from bench.session.session_check import checked_session
 from bench.session.signals import forward_strokes, read_signals
 
 
@@ -47,7 +47,9 @@ def test_stated_rate(small_copy, folder):
 
 
 def test_a_stated_sigma_of_the_first_frame_is_the_clocks(small_copy, folder):
-    replace_frames_csv(folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\nfirst_frame_sigma_s = 0.002\n")
+    replace_frames_csv(
+        folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\nfirst_frame_sigma_s = 0.002\n"
+    )
     assert times(small_copy).clock_sigma_s == 0.002
 
 
@@ -75,7 +77,9 @@ def test_own_times_of_each_camera(small_copy, folder):
 
 def test_own_times_of_one_camera_only_are_refused(small_copy, folder):
     (folder / "frames.csv").rename(folder / "frames_high.csv")
-    with pytest.raises(BadInput, match=r"trials/b30_3/frames_low.csv: is missing, and camera high has its own"):
+    with pytest.raises(
+        BadInput, match=r"trials/b30_3/frames_low.csv: is missing, and camera high has its own"
+    ):
         times(small_copy)
 
 
@@ -86,13 +90,18 @@ def test_container_times_are_doubtful(small_copy, folder, as_video):
     found = times(small_copy)
     assert found.source == "container" and found.clock_sigma_s == pytest.approx(0.025, rel=0.05)
     assert "nothing ties them to the signals' clock" in found.doubts[0]
-    np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=6e-4)  # rounded to 1 ms
+    np.testing.assert_allclose(
+        found.time_s, 0.0005 + 0.05 * np.arange(11), atol=6e-4
+    )  # rounded to 1 ms
 
 
 @pytest.mark.parametrize(
-    ("rate_Hz", "toml", "count"), [(20.0, "", 0), (30.0, "", 2), (30.0, "frame_rate_Hz = 20.0\n", 0)]
+    ("rate_Hz", "toml", "count"),
+    [(20.0, "", 0), (30.0, "", 2), (30.0, "frame_rate_Hz = 20.0\n", 0)],
 )
-def test_a_header_with_another_rate_is_doubtful_until_settled(small_copy, folder, as_video, rate_Hz, toml, count):
+def test_a_header_with_another_rate_is_doubtful_until_settled(
+    small_copy, folder, as_video, rate_Hz, toml, count
+):
     """A film of 500 frames a second is often stored to play at 30."""
     for camera in ("high", "low"):
         as_video(folder / camera, ".avi", "MJPG", rate_Hz)
@@ -100,7 +109,10 @@ def test_a_header_with_another_rate_is_doubtful_until_settled(small_copy, folder
         file.write(toml)
     found = times(small_copy)
     assert (found.source, len(found.doubts)) == ("frames.csv", count)
-    assert all("frames come at 20 Hz, the header of" in doubt and "says 30 Hz" in doubt for doubt in found.doubts)
+    assert all(
+        "frames come at 20 Hz, the header of" in doubt and "says 30 Hz" in doubt
+        for doubt in found.doubts
+    )
 
 
 def test_frames_of_a_session_without_pictures(small_copy, folder):
@@ -168,5 +180,7 @@ def test_a_stack_within_a_folder_of_pictures_is_refused(small_copy, folder):
     (folder / "frames.csv").write_text("frame,time_s\n0,0.1\n")
     for file in sorted((folder / "high").iterdir())[1:]:
         file.unlink()
-    with pytest.raises(BadInput, match=r"low/all.tif: holds 11 pictures; a stack stands beside .* as low.tif"):
+    with pytest.raises(
+        BadInput, match=r"low/all.tif: holds 11 pictures; a stack stands beside .* as low.tif"
+    ):
         checked_session(small_copy)

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from bench.base.settings import Settings
-from bench.evaluate import evaluate
+from bench.commands.evaluate import evaluate
 from bench.trials.seeing import by_preset
 from tests.scenes.results import table
 
@@ -42,16 +42,27 @@ def trigger(times_s: np.ndarray, count: int) -> np.ndarray:
 
 def made_messy(session: Path) -> None:
     trial = session / "trials" / "w"
-    rows, frames = (np.genfromtxt(trial / name, delimiter=",", names=True) for name in ("signals.csv", "frames.csv"))
-    channels = {"enc": (rows["motor_deg"] - 12.5) / -0.036, "my": 1e3 * rows["m_y_Nmm"], "mz": 1e3 * rows["m_z_Nmm"],
-                "trigger": trigger(frames["time_s"], len(rows))}
+    rows, frames = (
+        np.genfromtxt(trial / name, delimiter=",", names=True)
+        for name in ("signals.csv", "frames.csv")
+    )
+    channels = {
+        "enc": (rows["motor_deg"] - 12.5) / -0.036,
+        "my": 1e3 * rows["m_y_Nmm"],
+        "mz": 1e3 * rows["m_z_Nmm"],
+        "trigger": trigger(frames["time_s"], len(rows)),
+    }
     savemat(trial / "daq.mat", {"daq": channels})
     manifest = session / "session.toml"
     manifest.write_text(manifest.read_text() + SIGNALS + (trial / "trial.toml").read_text())
     for name in ("signals.csv", "frames.csv", "trial.toml"):
         (trial / name).unlink()
-    greys = {name: [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted((trial / name).iterdir())]
-             for name in ("cam0", "cam1")}
+    greys = {
+        name: [
+            cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in sorted((trial / name).iterdir())
+        ]
+        for name in ("cam0", "cam1")
+    }
     for name in greys:
         shutil.rmtree(trial / name)
     assert cv2.imwritemulti(str(trial / "cam0.tif"), greys["cam0"])
@@ -74,9 +85,14 @@ def test_a_messy_session_gives_what_its_clean_twin_gives(tmp_path):
     for session in (clean, messy):
         assert evaluate(session, session.with_suffix(".out"), settings, workers=0) in (0, 1)
     for name in ("whisks.csv", "estimates.csv"):
-        (wanted,), (found,) = ([row for row in columns(session.with_suffix(".out"), name)
-                                if row.get("estimator", "with_friction") == "with_friction"]
-                               for session in (clean, messy))
+        (wanted,), (found,) = (
+            [
+                row
+                for row in columns(session.with_suffix(".out"), name)
+                if row.get("estimator", "with_friction") == "with_friction"
+            ]
+            for session in (clean, messy)
+        )
         for key, text in wanted.items():
             if text and text.replace(".", "").replace("-", "").replace("e", "").isdigit():
                 assert float(found[key]) == pytest.approx(float(text), rel=1e-4, abs=1e-6), key

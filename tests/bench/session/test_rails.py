@@ -6,7 +6,9 @@ from bench.session.rails import off_the_rails
 
 
 def ramp(rng, noise=0.01):
-    return np.concatenate([np.zeros(200), np.linspace(0.0, 5.0, 400)]) + noise * rng.normal(size=600)
+    return np.concatenate([np.zeros(200), np.linspace(0.0, 5.0, 400)]) + noise * rng.normal(
+        size=600
+    )
 
 
 def test_a_flat_top_is_masked(rng):

@@ -28,7 +28,13 @@ def test_cameras_are_the_folders_that_hold_pictures(small_session, steel_signals
 
 def test_manifests_of_the_sample_session(steel_signals):
     session = load_session(steel_signals)
-    assert [trial.name for trial in session.trials] == ["b00_2", "b30_3", "b60_4", "gauge_roll0", "gauge_roll90"]
+    assert [trial.name for trial in session.trials] == [
+        "b00_2",
+        "b30_3",
+        "b60_4",
+        "gauge_roll0",
+        "gauge_roll90",
+    ]
     assert [trial.purpose for trial in session.trials] == ["measure"] * 3 + ["gauge"] * 2
     assert session.trial("gauge_roll90").follicle_roll_deg == 90.0
     assert session.trial("b60_4").beta_deg == 60.0
@@ -45,7 +51,9 @@ def test_rigidity_of_the_nitinol_wire(steel_signals):
 
 def test_natural_order_of_trials(small_copy):
     for name in ("b30_3", "b60_4"):
-        (small_copy / "trials" / name).rename(small_copy / "trials" / f"w{10 if name == 'b30_3' else 9}")
+        (small_copy / "trials" / name).rename(
+            small_copy / "trials" / f"w{10 if name == 'b30_3' else 9}"
+        )
     names = [trial.name for trial in load_session(small_copy).trials]
     assert names == ["gauge_roll0", "gauge_roll90", "w9", "w10"]
 
@@ -54,7 +62,11 @@ def test_trials_come_in_the_order_of_the_sessions_surfaces(small_copy):
     for name, surface in (("b30_3", "sandpaper"), ("b60_4", "steel")):
         manifest = small_copy / "trials" / name / "trial.toml"
         replace(manifest, 'surface = "steel"', f'surface = "{surface}"')
-    replace(small_copy / "session.toml", "format = 1", 'format = 1\nsurfaces = ["steel", "sandpaper", "glas"]')
+    replace(
+        small_copy / "session.toml",
+        "format = 1",
+        'format = 1\nsurfaces = ["steel", "sandpaper", "glas"]',
+    )
     doubts = Doubts(stop_at_first=False)
     names = [t.name for t in load_session(small_copy, doubts).trials if t.purpose == "measure"]
     assert names == ["b60_4", "b30_3"]
@@ -78,15 +90,26 @@ def test_defaults_of_the_session_yield_to_the_trial(small_copy):
 def test_a_trial_without_manifest_takes_the_defaults(small_copy):
     (small_copy / "trials" / "b30_3" / "trial.toml").unlink()
     trial = load_session(small_copy).trial("b30_3")
-    assert (trial.surface, trial.purpose, trial.speed_deg_s, trial.beta_deg) == ("", "measure", None, None)
+    assert (trial.surface, trial.purpose, trial.speed_deg_s, trial.beta_deg) == (
+        "",
+        "measure",
+        None,
+        None,
+    )
 
 
 def sigma_keys() -> list[str]:
     return [
-        "speed_sigma_deg_s = 0.1", "beta_sigma_deg = 0.5", "d_x_sigma_mm = 0.3", "bar_diameter_sigma_mm = 0.01",
-        "follicle_roll_sigma_deg = 0.2", "force_sigma_N = 0.001", "at_sigma_mm = 0.1",
-        "frame_rate_sigma_Hz = 0.01", "first_frame_sigma_s = 0.001",
-    ]  # fmt: skip
+        "speed_sigma_deg_s = 0.1",
+        "beta_sigma_deg = 0.5",
+        "d_x_sigma_mm = 0.3",
+        "bar_diameter_sigma_mm = 0.01",
+        "follicle_roll_sigma_deg = 0.2",
+        "force_sigma_N = 0.001",
+        "at_sigma_mm = 0.1",
+        "frame_rate_sigma_Hz = 0.01",
+        "first_frame_sigma_s = 0.001",
+    ]
 
 
 @pytest.mark.parametrize("key", sigma_keys())
@@ -155,7 +178,9 @@ def test_real_board_videos_make_a_session(real, tmp_path):
     """The webcam recordings of `real/calibration/single`, wrapped as a session of boards alone."""
     (tmp_path / "boards").mkdir()
     for camera in ("cam_0", "cam_2"):
-        shutil.copyfile(real / "calibration" / "single" / f"{camera}.mp4", tmp_path / "boards" / f"{camera}.mp4")
+        shutil.copyfile(
+            real / "calibration" / "single" / f"{camera}.mp4", tmp_path / "boards" / f"{camera}.mp4"
+        )
     (tmp_path / "session.toml").write_text(
         "format = 1\n[board]\nsquares = [4, 5]\nsquare_mm = 54.0\nmarker_mm = 40.5\n"
         'dictionary = "DICT_4X4_50"\ninverted = true\n'

@@ -16,7 +16,9 @@ def test_volts_and_degrees(small_session):
     signals = read(small_session)
     rows = np.loadtxt(small_session / "trials" / "b30_3" / "signals.csv", delimiter=",", skiprows=1)
     assert signals.kind == "V"
-    np.testing.assert_array_equal(np.column_stack([signals.time_s, signals.y, signals.z]), rows[:, [0, 2, 3]])
+    np.testing.assert_array_equal(
+        np.column_stack([signals.time_s, signals.y, signals.z]), rows[:, [0, 2, 3]]
+    )
     np.testing.assert_allclose(np.degrees(signals.motor_rad), rows[:, 1], rtol=1e-14)
     assert signals.rate_Hz == pytest.approx(2000.0)
     assert (dict(signals.dropped), signals.doubts) == ({}, ())
@@ -33,7 +35,10 @@ def with_forces(session, columns="f_x_N,f_y_N,f_z_N", scale=1.0):
     file = session / "trials" / "b30_3" / "signals.csv"
     header, *rows = file.read_text().splitlines()
     cells = (",".join(f"{scale * k * n / 1000:.6f}" for k in (1, 2, 3)) for n in range(len(rows)))
-    file.write_text("\n".join([f"{header},{columns}", *(f"{row},{cell}" for row, cell in zip(rows, cells))]) + "\n")
+    file.write_text(
+        "\n".join([f"{header},{columns}", *(f"{row},{cell}" for row, cell in zip(rows, cells))])
+        + "\n"
+    )
     return session
 
 
@@ -76,13 +81,21 @@ def test_three_whisks_in_one_recording(small_copy):
     """The trial's stroke, three times, with back strokes and pauses between."""
     file = small_copy / "trials" / "b30_3" / "signals.csv"
     rows = np.loadtxt(file, delimiter=",", skiprows=1)
-    cycle = np.concatenate([rows, np.repeat(rows[-1:], 100, 0), rows[::-2], np.repeat(rows[:1], 100, 0)])
+    cycle = np.concatenate(
+        [rows, np.repeat(rows[-1:], 100, 0), rows[::-2], np.repeat(rows[:1], 100, 0)]
+    )
     whole = np.tile(cycle, (3, 1))
     whole[:, 0] = np.arange(len(whole)) * 5e-4
-    np.savetxt(file, whole, delimiter=",", header="time_s,motor_deg,y_V,z_V", comments="", fmt="%.6f")
+    np.savetxt(
+        file, whole, delimiter=",", header="time_s,motor_deg,y_V,z_V", comments="", fmt="%.6f"
+    )
     strokes = forward_strokes(read(small_copy))
-    assert [stroke.stop - stroke.start for stroke in strokes] == pytest.approx([len(rows)] * 3, abs=4)
-    assert [stroke.start for stroke in strokes] == pytest.approx([k * len(cycle) for k in range(3)], abs=4)
+    assert [stroke.stop - stroke.start for stroke in strokes] == pytest.approx(
+        [len(rows)] * 3, abs=4
+    )
+    assert [stroke.start for stroke in strokes] == pytest.approx(
+        [k * len(cycle) for k in range(3)], abs=4
+    )
 
 
 def test_a_weight_trial_may_stand_still(small_copy):

@@ -42,7 +42,9 @@ def test_a_bare_ramp_is_one_stroke_from_end_to_end():
 
 # An end is known to the time in which the motor, at 0.005° a sample, moves by two encoder steps plus six sigmas
 # of noise (twice the jitter); the median over five samples adds two.
-@pytest.mark.parametrize(("step_deg", "noise_deg"), [(0, 0), (0.005, 0), (0.09, 0), (0, 0.02), (0.05, 0.02)])
+@pytest.mark.parametrize(
+    ("step_deg", "noise_deg"), [(0, 0), (0.005, 0), (0.09, 0), (0, 0.02), (0.05, 0.02)]
+)
 @pytest.mark.parametrize("pieces", [ONE, THREE])
 def test_strokes_between_pauses_and_back_strokes(pieces, step_deg, noise_deg):
     angle, strokes = motor(*pieces)

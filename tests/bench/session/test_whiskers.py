@@ -1,12 +1,11 @@
 """Whiskers that taper, from a session's signals alone to α and d_x; and how the session states them."""
 
-
 import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.evaluate import evaluate
+from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from tests.scenes.results import table
@@ -35,7 +34,9 @@ def evaluated(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp(request.param)
     tip = "tip_diameter_mm = 0.4" if request.param == "tapered" else ""
     (folder / "protocol.toml").write_text(PROTOCOL.format(shape=request.param, tip=tip))
-    session = simulate(folder / "session", protocol=str(folder / "protocol.toml"), signals_only=True, seed=3)
+    session = simulate(
+        folder / "session", protocol=str(folder / "protocol.toml"), signals_only=True, seed=3
+    )
     evaluate(session, folder / "out", Settings(alpha_est_deg=ALPHA_DEG))
     return folder
 
@@ -46,7 +47,9 @@ def test_fitted_friction_is_that_of_the_rig(evaluated):
 
 
 def test_10_at_the_right_friction_finds_the_distance(evaluated):
-    rows = [r for r in table(evaluated / "out" / "estimates.csv") if r["estimator"] == "with_friction"]
+    rows = [
+        r for r in table(evaluated / "out" / "estimates.csv") if r["estimator"] == "with_friction"
+    ]
     gentle = [r for r in rows if r["trial"].split("_")[1] in ("b00", "b15", "b30")]
     assert len(gentle) == 3
     for row in gentle:
@@ -58,8 +61,12 @@ def test_10_at_the_right_friction_finds_the_distance(evaluated):
 def test_the_session_states_the_whisker(evaluated):
     session = load_session(evaluated / "session")
     whisker = session.whisker
-    assert whisker.wire.radius_mm(100.0) == pytest.approx({"cylinder": 0.5, "cone": 0.0, "tapered": 0.2}[whisker.shape])
-    assert whisker.beam.taper == pytest.approx({"cylinder": 0.0, "cone": 1.0, "tapered": 0.6}[whisker.shape])
+    assert whisker.wire.radius_mm(100.0) == pytest.approx(
+        {"cylinder": 0.5, "cone": 0.0, "tapered": 0.2}[whisker.shape]
+    )
+    assert whisker.beam.taper == pytest.approx(
+        {"cylinder": 0.0, "cone": 1.0, "tapered": 0.6}[whisker.shape]
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,15 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.cli import main
-from bench.setup.board_pdf import MM_PER_INCH, dark_rectangles, page, paper_for, toml_block, write_board
+from bench.commands.cli import main
+from bench.setup.board_pdf import (
+    MM_PER_INCH,
+    dark_rectangles,
+    page,
+    paper_for,
+    toml_block,
+    write_board,
+)
 from vision.boards.corners import find_corners
 from vision.geometry.board import Board
 
@@ -59,12 +66,22 @@ def covered(pixels: slice, low: float, high: float) -> np.ndarray:
     return np.minimum(edges + 1, high) - np.maximum(edges, low)
 
 
-@pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="no pdftoppm (apt install poppler-utils)")
+@pytest.mark.skipif(
+    shutil.which("pdftoppm") is None, reason="no pdftoppm (apt install poppler-utils)"
+)
 @pytest.mark.parametrize("board", BOARDS, ids=lambda b: b.dictionary)
 def test_the_pdf_is_found_again(board, tmp_path):
     """pdftoppm moves each edge to a whole pixel, half a pixel at most."""
     write_board(tmp_path / "board.pdf", board)
-    command = ["pdftoppm", "-r", str(DPI), "-gray", "-singlefile", tmp_path / "board.pdf", tmp_path / "board"]
+    command = [
+        "pdftoppm",
+        "-r",
+        str(DPI),
+        "-gray",
+        "-singlefile",
+        tmp_path / "board.pdf",
+        tmp_path / "board",
+    ]
     subprocess.run(command, check=True)
     check_found(cv2.imread(str(tmp_path / "board.pgm"), cv2.IMREAD_GRAYSCALE), board, most_px=1.0)
 
@@ -74,7 +91,9 @@ def test_the_pdf_states_its_scale(tmp_path):
     paper = write_board(tmp_path / "board.pdf", BOARD)
     written = (tmp_path / "board.pdf").read_bytes()
     box = [float(n) for n in re.search(rb"/MediaBox \[([^]]+)\]", written)[1].split()]
-    assert box[2:] == pytest.approx([72 / MM_PER_INCH * n for n in (paper.width_mm, paper.height_mm)], abs=1e-3)
+    assert box[2:] == pytest.approx(
+        [72 / MM_PER_INCH * n for n in (paper.width_mm, paper.height_mm)], abs=1e-3
+    )
     streams = re.findall(rb"stream\r?\n(.*?)endstream", written, flags=re.DOTALL)
     text = b"".join(_inflated(stream) for stream in streams).decode("latin-1")
     across = [float(x) for x in re.findall(r"^(-?[\d.]+) -?[\d.]+ [ml]$", text, flags=re.MULTILINE)]

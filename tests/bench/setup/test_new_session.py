@@ -6,7 +6,7 @@ import pytest
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from bench.cli import main
+from bench.commands.cli import main
 from bench.session.manifest import SessionKeys
 from bench.session.strict_toml import as_keys
 from bench.setup.new_session import FOLDERS, QUESTIONS, new_session
@@ -22,19 +22,33 @@ NUMBERS = {
 
 
 def options(numbers) -> list[str]:
-    return [text for name, value in numbers.items() for text in (f"--{name.replace('_', '-')}", str(value))]
+    return [
+        text
+        for name, value in numbers.items()
+        for text in (f"--{name.replace('_', '-')}", str(value))
+    ]
 
 
 def read(path):
-    return as_keys(tomllib.loads((path / "session.toml").read_text()), SessionKeys, "session.toml", Doubts())
+    return as_keys(
+        tomllib.loads((path / "session.toml").read_text()), SessionKeys, "session.toml", Doubts()
+    )
 
 
 def test_all_given_is_a_sound_manifest(tmp_path, capsys):
     path = tmp_path / "session"
-    assert main(["new", str(path), "--name", 'a "b"\nc', "--squares", "10x7", *options(NUMBERS)]) == 0
+    assert (
+        main(["new", str(path), "--name", 'a "b"\nc', "--squares", "10x7", *options(NUMBERS)]) == 0
+    )
     keys = read(path)
-    assert keys.name == 'a "b"\nc' and keys.board.squares == [10, 7] and keys.board.square_mm == 15.03
-    assert (keys.whisker.length_mm, keys.whisker.diameter_mm, keys.bar.diameter_mm) == (100.0, 1.02, 6.0)
+    assert (
+        keys.name == 'a "b"\nc' and keys.board.squares == [10, 7] and keys.board.square_mm == 15.03
+    )
+    assert (keys.whisker.length_mm, keys.whisker.diameter_mm, keys.bar.diameter_mm) == (
+        100.0,
+        1.02,
+        6.0,
+    )
     assert all((path / folder).is_dir() for folder in FOLDERS)
     assert "FILL IN" not in capsys.readouterr().out
 
@@ -59,7 +73,11 @@ def test_a_terminal_is_asked_until_the_answer_makes_sense(tmp_path, capsys):
     new_session(tmp_path / "s", "s", {}, (8, 6), "DICT_5X5_100", ask)
     text = (tmp_path / "s" / "session.toml").read_text()
     assert len(asked) == len(QUESTIONS) + 2
-    assert "length_mm = 100 " in text and "# diameter_mm = " in text and "youngs_modulus_GPa = 60 " in text
+    assert (
+        "length_mm = 100 " in text
+        and "# diameter_mm = " in text
+        and "youngs_modulus_GPa = 60 " in text
+    )
     said = capsys.readouterr().out
     assert "Is it in metres? Then write 100." in said and "'one hundred' is no number" in said
 

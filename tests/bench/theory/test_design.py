@@ -5,18 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench import cli
 from bench.base.errors import BadInput
+from bench.commands import cli
 from bench.theory.design import Design, Means, Region, best_design, expected, faults, worst_percent
 from bench.theory.design_map import designed, exact_percent, write_design
-from bench.theory.readings import stroke_noise
+from bench.theory.sample_noise import stroke_noise
 
 REGION, MEANS, PAPER = Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0)), Means(), Design()
-HELD = {"theta_deg": (3.0, 3.0), "alpha_est_deg": (10.0, 10.0), "diameter_mm": (1.0, 1.0),
-        "length_mm": (100.0, 100.0), "taper": (0.0, 0.0), "tilt_deg": (0.0, 0.0)}  # fmt: skip
+HELD = {
+    "theta_deg": (3.0, 3.0),
+    "alpha_est_deg": (10.0, 10.0),
+    "diameter_mm": (1.0, 1.0),
+    "length_mm": (100.0, 100.0),
+    "taper": (0.0, 0.0),
+    "tilt_deg": (0.0, 0.0),
+}
 
 
-@pytest.mark.parametrize("design", [PAPER, Design(2.0, 5.0, 1.5, 110.0, 0.8, 40.0), Design(4.0, 12.0, 0.6, 85.0, 1.0)])
+@pytest.mark.parametrize(
+    "design", [PAPER, Design(2.0, 5.0, 1.5, 110.0, 0.8, 40.0), Design(4.0, 12.0, 0.6, 85.0, 1.0)]
+)
 def test_the_bias_is_that_of_exact_mechanics(design):
     """At the region's corners to 0.5 % of d_x: what (10) leaves out is known to first order, and where β is little
     above α friction acts along the whisker, too (docs/rig.md)."""
@@ -40,16 +48,25 @@ def test_the_best_is_no_worse_than_any_on_a_grid():
 
 
 def test_noise_of_a_stroke_goes_with_one_sample_and_the_root_of_their_number():
-    plain, loud, slow = (stroke_noise(0.05, one, rate, 10.0) for one, rate in ((0.1, 2e3), (0.2, 2e3), (0.1, 8e3)))
-    assert (loud.touch_Nmm, loud.moment_Nmm) == pytest.approx((2 * plain.touch_Nmm, 2 * plain.moment_Nmm))
-    assert (slow.touch_Nmm, slow.moment_Nmm) == pytest.approx((plain.touch_Nmm / 2, plain.moment_Nmm / 2))
+    plain, loud, slow = (
+        stroke_noise(0.05, one, rate, 10.0) for one, rate in ((0.1, 2e3), (0.2, 2e3), (0.1, 8e3))
+    )
+    assert (loud.touch_Nmm, loud.moment_Nmm) == pytest.approx(
+        (2 * plain.touch_Nmm, 2 * plain.moment_Nmm)
+    )
+    assert (slow.touch_Nmm, slow.moment_Nmm) == pytest.approx(
+        (plain.touch_Nmm / 2, plain.moment_Nmm / 2)
+    )
     # a mean over 1° of 200 samples a degree, above a level of 1.4°
     assert plain.moment_Nmm == pytest.approx(0.1 * np.hypot(200**-0.5, 280**-0.5), rel=0.01)
 
 
 def test_what_a_wire_cannot_bear_is_no_design():
     assert faults(PAPER, REGION, MEANS) == {}
-    assert set(faults(replace(PAPER, diameter_mm=3.0), REGION, MEANS)) == {"strain", "gauges' range"}
+    assert set(faults(replace(PAPER, diameter_mm=3.0), REGION, MEANS)) == {
+        "strain",
+        "gauges' range",
+    }
     assert set(faults(replace(PAPER, length_mm=80.0), REGION, MEANS)) == {"length"}
     with pytest.raises(BadInput, match=r"no design .* gauges' range by"):
         best_design({**HELD, "diameter_mm": (3.0, 3.0)}, REGION, MEANS)
@@ -57,7 +74,9 @@ def test_what_a_wire_cannot_bear_is_no_design():
 
 def test_where_10_has_no_distance_there_is_no_design():
     with pytest.raises(BadInput, match="no distance"):
-        best_design({**HELD, "alpha_est_deg": (50.0, 50.0)}, replace(REGION, beta_deg=(70.0, 80.0)), MEANS)
+        best_design(
+            {**HELD, "alpha_est_deg": (50.0, 50.0)}, replace(REGION, beta_deg=(70.0, 80.0)), MEANS
+        )
 
 
 def test_what_is_written(tmp_path):
@@ -65,9 +84,15 @@ def test_what_is_written(tmp_path):
     paths = write_design(tmp_path, made)
     assert [path.name for path in paths] == ["design.txt", "design.csv", "design.png", "design.svg"]
     text = (tmp_path / "design.txt").read_text()
-    assert "the paper's whisker" in text and "base tilted by 0.0°" in text and "exact mechanics" in text
+    assert (
+        "the paper's whisker" in text
+        and "base tilted by 0.0°" in text
+        and "exact mechanics" in text
+    )
     table = np.genfromtxt(tmp_path / "design.csv", delimiter=",", names=True)
-    assert np.isfinite(table["exact_percent"][:8]).all() and np.isnan(table["exact_percent"][8:]).all()
+    assert (
+        np.isfinite(table["exact_percent"][:8]).all() and np.isnan(table["exact_percent"][8:]).all()
+    )
     assert table["bound_percent"].max() == pytest.approx(made.worst_percent, abs=1e-4)
 
 
@@ -83,8 +108,32 @@ def test_what_is_written(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(given, said, tmp_path, capsys):
-    usual = ["design", "--beta-deg", "0", "30", "--alpha-deg", "5", "15", "--d-x-mm", "30", "80", "--theta-deg", "3"]
-    usual += ["--alpha-est-deg", "10", "--diameter-mm", "1", "--taper", "0", "--tilt-deg", "0", "--out", str(tmp_path)]
+    usual = [
+        "design",
+        "--beta-deg",
+        "0",
+        "30",
+        "--alpha-deg",
+        "5",
+        "15",
+        "--d-x-mm",
+        "30",
+        "80",
+        "--theta-deg",
+        "3",
+    ]
+    usual += [
+        "--alpha-est-deg",
+        "10",
+        "--diameter-mm",
+        "1",
+        "--taper",
+        "0",
+        "--tilt-deg",
+        "0",
+        "--out",
+        str(tmp_path),
+    ]
     assert cli.main([*usual, *given]) == 2
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1 and not list(tmp_path.iterdir())

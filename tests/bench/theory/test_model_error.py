@@ -7,14 +7,24 @@ import pytest
 
 from bench.base.workers import Workers
 from bench.theory import model_error_maps
-from bench.theory.model_error import ROD, Push, error_percent, errors_percent, predicted_percent, radius_map, tilt_map
+from bench.theory.model_error import (
+    ROD,
+    Push,
+    error_percent,
+    errors_percent,
+    predicted_percent,
+    radius_map,
+    tilt_map,
+)
 from bench.theory.model_error_maps import MAPS, Map, write_map
 from estimator.first_order import HELD_SHARE
 
 THIN_MM = 1e-6  # radius of a bar that is nearly a line
 
 
-@pytest.mark.parametrize("beta_deg, alpha_deg", [(0.0, 0.0), (0.0, 23.3), (30.0, 0.0), (60.0, 10.5), (75.0, 23.3)])
+@pytest.mark.parametrize(
+    "beta_deg, alpha_deg", [(0.0, 0.0), (0.0, 23.3), (30.0, 0.0), (60.0, 10.5), (75.0, 23.3)]
+)
 def test_error_vanishes_with_the_pushing_angle(beta_deg, alpha_deg):
     """(10) is the first order in θ of the whole problem, whatever the tilt: at 0.05° no coefficient of θ exceeds 5.
 
@@ -54,7 +64,9 @@ def test_a_bar_without_radius_and_tilt_leaves_only_the_second_order():
     """At ψ = 0 on a thin bar only the whisker's own radius is left of the first order, and (10) is exact but for it."""
     for beta_deg in (30.0, 60.0, 75.0):
         push = Push(beta_deg, 0.0, 10.5, bar_radius_mm=THIN_MM, theta_deg=0.2)
-        own_radius = 37.5 * np.radians(0.2) * ROD.diameter_mm / 2 / 60.0 * np.cos(np.radians(beta_deg))
+        own_radius = (
+            37.5 * np.radians(0.2) * ROD.diameter_mm / 2 / 60.0 * np.cos(np.radians(beta_deg))
+        )
         assert error_percent(push) == pytest.approx(-own_radius, abs=1e-3)
 
 
@@ -67,8 +79,12 @@ def test_a_mirrored_bar_gives_the_same_error(psi_deg):
 
 def test_error_does_not_depend_on_scale():
     """Distance and radii alike larger by 1.5 are another unit of length (but for the whisker's own radius, 0.25 mm)."""
-    small = error_percent(Push(40.0, 30.0, 10.5, d_x_mm=40.0, bar_radius_mm=8.0 - ROD.diameter_mm / 2))
-    large = error_percent(Push(40.0, 30.0, 10.5, d_x_mm=60.0, bar_radius_mm=12.0 - ROD.diameter_mm / 2))
+    small = error_percent(
+        Push(40.0, 30.0, 10.5, d_x_mm=40.0, bar_radius_mm=8.0 - ROD.diameter_mm / 2)
+    )
+    large = error_percent(
+        Push(40.0, 30.0, 10.5, d_x_mm=60.0, bar_radius_mm=12.0 - ROD.diameter_mm / 2)
+    )
     assert small == pytest.approx(large, abs=1e-4)
 
 
@@ -83,7 +99,11 @@ def test_files_hold_the_cells(tmp_path, monkeypatch):
     monkeypatch.setitem(MAPS, "tilt", Map(small, "few cells"))
     monkeypatch.setattr(model_error_maps, "Workers", lambda *_: Workers(0))
     paths = write_map("tilt", tmp_path)
-    assert [p.name for p in paths] == ["error_by_tilt.png", "error_by_tilt.svg", "error_by_tilt.csv"]
+    assert [p.name for p in paths] == [
+        "error_by_tilt.png",
+        "error_by_tilt.svg",
+        "error_by_tilt.csv",
+    ]
     with paths[2].open(newline="") as file:
         table = list(csv.DictReader(file))
     assert len(table) == 3 * 2 * 2
@@ -94,16 +114,29 @@ def test_files_hold_the_cells(tmp_path, monkeypatch):
 
 
 def test_the_radius_map_grows_towards_thick_bars_near_the_base():
-    for panel in radius_map(Workers(0), d_x_mm=np.array([20.0, 80.0]), bar_radius_mm=np.array([2.0, 20.0])):
-        assert (panel.error_percent[1] < 0).all()  # slip towards the base: d_x comes out short, as the paper says
+    for panel in radius_map(
+        Workers(0), d_x_mm=np.array([20.0, 80.0]), bar_radius_mm=np.array([2.0, 20.0])
+    ):
+        assert (
+            panel.error_percent[1] < 0
+        ).all()  # slip towards the base: d_x comes out short, as the paper says
         assert panel.error_percent[1, 0] == panel.error_percent.min()
 
 
-@pytest.mark.parametrize("push", [Push(0.0, 0.0, 23.3), Push(40.0, 0.0, 0.0, d_x_mm=30.0, bar_radius_mm=10.0),
-                                  Push(50.0, 0.0, 10.5), Push(0.0, 0.0, 10.5, d_x_mm=20.0, bar_radius_mm=15.0)])
+@pytest.mark.parametrize(
+    "push",
+    [
+        Push(0.0, 0.0, 23.3),
+        Push(40.0, 0.0, 0.0, d_x_mm=30.0, bar_radius_mm=10.0),
+        Push(50.0, 0.0, 10.5),
+        Push(0.0, 0.0, 10.5, d_x_mm=20.0, bar_radius_mm=15.0),
+    ],
+)
 def test_10_corrected_leaves_the_second_order(push):
     """Half the angle leaves a quarter, but for friction of a held contact beyond HELD_SHARE: all of it at β = 0."""
-    held = 20.0 * (1 - HELD_SHARE) * np.tan(np.radians(push.alpha_deg)) if push.beta_deg == 0 else 0.0
+    held = (
+        20.0 * (1 - HELD_SHARE) * np.tan(np.radians(push.alpha_deg)) if push.beta_deg == 0 else 0.0
+    )
     left = []
     for theta_deg in (0.5, 0.25):
         plain, better = errors_percent(Push(**(vars(push) | {"theta_deg": theta_deg})))

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from bench.theory.figures import PRINTED_POINTS, figure_5, figure_6, write_figure
+from bench.theory.slope_limits import PRINTED_POINTS, figure_5, figure_6, write_figure
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,11 @@ def test_csv_of_figure_5_holds_the_printed_point_at_60_degrees(written):
 
 def test_threshold_that_is_never_reached_is_an_empty_cell(written):
     """With α = α_est (10) is exact on a flat surface, whatever its slope."""
-    right = [r for r in rows(written[5][2]) if r["equation"] == "(10)" and r["alpha_est_deg"] == r["alpha_deg"] + ".0"]
+    right = [
+        r
+        for r in rows(written[5][2])
+        if r["equation"] == "(10)" and r["alpha_est_deg"] == r["alpha_deg"] + ".0"
+    ]
     assert len(right) == 9
     assert all(row["beta_thresh_deg"] == "" for row in right)
 
@@ -62,7 +66,9 @@ def test_curves_pass_through_the_printed_points(number, curves):
             near = [
                 abs(np.interp(x, c.x, c.beta_thresh_deg) - beta)
                 for c in drawn
-                if c.panel == panel and c.row != "exact" and np.isfinite(np.interp(x, c.x, c.beta_thresh_deg))
+                if c.panel == panel
+                and c.row != "exact"
+                and np.isfinite(np.interp(x, c.x, c.beta_thresh_deg))
             ]
             assert min(near) <= 0.2 * 13, (panel, x, beta)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.evaluate import evaluate
+from bench.commands.evaluate import evaluate
+from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import FROM_ALL, FROM_FILE, FROM_TRIALS, GaugeMatrix, Gauges, to_follicle
-from bench.gauges.readings import Pairs
 from bench.rig.simulate import simulate
 from bench.trials.agreement import LEAST_CHANCE, agreement
 from bench.trials.estimates import Readout
@@ -33,7 +33,9 @@ def pairs(rng, spoil=None) -> Pairs:
     return Pairs("t", 0, 0.0, THETA, moments, of_moments, volts, of_volts, nothing, nothing, 0.001)
 
 
-@pytest.mark.parametrize("source, tells", [(FROM_TRIALS, True), (FROM_ALL, True), (FROM_FILE, False)])
+@pytest.mark.parametrize(
+    "source, tells", [(FROM_TRIALS, True), (FROM_ALL, True), (FROM_FILE, False)]
+)
 def test_gauges_fitted_to_the_wire_agree_with_it_whatever_its_stiffness(rng, source, tells):
     """C cancels between such gauges and the seen shape: moments 5 % too large are a fault, however badly C is known.
     Gauges with newtons of their own may show another C."""
@@ -66,7 +68,9 @@ def test_what_stands_out_is_named(rng, spoil, said, value, within):
     assert found.chance < LEAST_CHANCE
     assert found.cause.startswith(said) and found.cause in found.status
     if value is not None:
-        assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(value, abs=within)
+        assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(
+            value, abs=within
+        )
 
 
 def test_what_no_gauge_does_may_be_another_trials_signals(rng):
@@ -79,7 +83,9 @@ def test_a_gauge_that_begins_to_drift_at_touch_is_told(rng):
     drifting = pairs(rng)
     drifting.volts[:, 0] += 0.17 * THETA / np.radians(10.0)
     found = agreement(drifting, GAUGES)
-    assert found.chance < LEAST_CHANCE and found.cause.endswith("or drifts while the whisker pushes")
+    assert found.chance < LEAST_CHANCE and found.cause.endswith(
+        "or drifts while the whisker pushes"
+    )
 
 
 def test_sound_whisks_agree_as_often_as_chance_allows(rng):
@@ -91,7 +97,9 @@ def test_sound_whisks_agree_as_often_as_chance_allows(rng):
         felt = GaugeMatrix(MATRIX + (root @ rng.normal(size=4)).reshape(2, 2), GAUGES.covariance)
         one.moments[:] *= 1.0 + one.scale_sigma * rng.normal()
         found.append(agreement(one, felt).chance)
-    assert np.mean(np.array(found) < 0.05) == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / 400))
+    assert np.mean(np.array(found) < 0.05) == pytest.approx(
+        0.05, abs=3 * np.sqrt(0.05 * 0.95 / 400)
+    )
     assert agreement(pairs(rng), GAUGES).status == ""
 
 
@@ -112,11 +120,19 @@ d_x_mm = 55.0
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "cone"])
-def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(tmp_path, exact_vision, shape):
+def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(
+    tmp_path, exact_vision, shape
+):
     (tmp_path / "p.toml").write_text(PROTOCOL.format(shape=shape))
-    session = simulate(tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4)
+    session = simulate(
+        tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4
+    )
     evaluate(session, tmp_path / "sound", Settings(), workers=0)
-    assert {r["status"] for r in table(tmp_path / "sound" / "whisks.csv") if r["trial"].startswith("steel")} == {""}
+    assert {
+        r["status"]
+        for r in table(tmp_path / "sound" / "whisks.csv")
+        if r["trial"].startswith("steel")
+    } == {""}
     (trial,) = (session / "trials").glob("steel_b45*")
     signals = trial / "signals.csv"
     signals.write_text(signals.read_text().replace("y_V,z_V", "z_V,y_V", 1))
@@ -132,14 +148,21 @@ def test_exchanged_channels_in_one_trial_are_found_and_spoil_no_other(tmp_path, 
 
 def test_signals_of_two_trials_exchanged_are_told_from_a_fault_of_one(tmp_path, exact_vision):
     (tmp_path / "p.toml").write_text(PROTOCOL.format(shape="cylinder"))
-    session = simulate(tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4)
-    one, other = (next((session / "trials").glob(f"steel_b{slope}*")) / "signals.csv" for slope in (30, 60))
+    session = simulate(
+        tmp_path / "session", protocol=str(tmp_path / "p.toml"), signals_only=True, seed=4
+    )
+    one, other = (
+        next((session / "trials").glob(f"steel_b{slope}*")) / "signals.csv" for slope in (30, 60)
+    )
     texts = one.read_text(), other.read_text()
     for file, text in zip((other, one), texts):
         file.write_text(text)
     evaluate(session, tmp_path / "out", Settings(), workers=0)
     names = f"{one.parent.name} and {other.parent.name}"
-    assert f"the signals of trials {names} look exchanged" in (tmp_path / "out" / "summary.txt").read_text()
+    assert (
+        f"the signals of trials {names} look exchanged"
+        in (tmp_path / "out" / "summary.txt").read_text()
+    )
     one.write_text(texts[0].replace("y_V,z_V", "z_V,y_V", 1))
     other.write_text(texts[1].replace("y_V,z_V", "z_V,y_V", 1))
     evaluate(session, tmp_path / "both", Settings(), workers=0)

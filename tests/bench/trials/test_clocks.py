@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.gauges.felt import gauge_delay
-from bench.records.trial import (
+from bench.records.trial_result import (
     BackStroke,
     FeltTrial,
     FeltWhisk,
@@ -25,9 +25,15 @@ def frames(speed_rad_s):
     time_s = np.arange(6) * 0.01
     nothing = Value(np.zeros(6), np.zeros(6))
     return FrameTruth(
-        index=np.arange(6), time_s=time_s, motor_rad=speed_rad_s * time_s, theta_rad=nothing,
-        touching=np.zeros(6, dtype=bool), point_mm=nothing, arc_mm=np.zeros(6), status=("",) * 6,
-    )  # fmt: skip
+        index=np.arange(6),
+        time_s=time_s,
+        motor_rad=speed_rad_s * time_s,
+        theta_rad=nothing,
+        touching=np.zeros(6, dtype=bool),
+        point_mm=nothing,
+        arc_mm=np.zeros(6),
+        status=("",) * 6,
+    )
 
 
 def trial(seen, felt, **halves):
@@ -47,7 +53,9 @@ def session(rng, speeds_deg_s, *, clock_s=0.0, zero_rad=0.0, back=False):
             sees = Value(whisk + light - clock_s * way - zero_rad, SEEN_RAD)
             pair.append((sees, Value(whisk + FELT_RAD * rng.standard_normal(), FELT_RAD), way))
         (sees, feels, way), *rest = pair
-        halves = {"back": BackStroke(rest[0][0], rest[0][2]), "felt_back": rest[0][1]} if back else {}
+        halves = (
+            {"back": BackStroke(rest[0][0], rest[0][2]), "felt_back": rest[0][1]} if back else {}
+        )
         results.append(trial(SeenWhisk(0, touch_rad=sees, frames=frames(way)), feels, **halves))
     return results
 
@@ -68,13 +76,22 @@ def test_a_clock_at_one_speed_is_a_doubt_and_in_the_sigma_of_touch(rng):
         assert other.value == one.value  # what is felt moves no truth
         assert other.sigma == pytest.approx(np.radians(0.04), rel=0.3)
     again = shared_touch(with_shared_touch(results, shared))
-    np.testing.assert_allclose(again.values, shared.values, rtol=1e-9)  # the summary reads the widened records
+    np.testing.assert_allclose(
+        again.values, shared.values, rtol=1e-9
+    )  # the summary reads the widened records
 
 
-@pytest.mark.parametrize("how", [{"speeds_deg_s": [10.0] * 12, "back": True}, {"speeds_deg_s": [10.0, 40.0] * 6}])
-@pytest.mark.parametrize("clock_s, zero_deg, words", [(0.008, 0.0, "the frames' clock runs behind"),
-                                                      (-0.008, 0.0, "the frames' clock runs ahead of"),
-                                                      (0.0, 0.1, "no clock does it")])  # fmt: skip
+@pytest.mark.parametrize(
+    "how", [{"speeds_deg_s": [10.0] * 12, "back": True}, {"speeds_deg_s": [10.0, 40.0] * 6}]
+)
+@pytest.mark.parametrize(
+    "clock_s, zero_deg, words",
+    [
+        (0.008, 0.0, "the frames' clock runs behind"),
+        (-0.008, 0.0, "the frames' clock runs ahead of"),
+        (0.0, 0.1, "no clock does it"),
+    ],
+)
 def test_back_strokes_and_speeds_tell_a_clock_from_a_zero(rng, how, clock_s, zero_deg, words):
     results = session(rng, **how, clock_s=clock_s, zero_rad=np.radians(zero_deg))
     shared = shared_touch(results)

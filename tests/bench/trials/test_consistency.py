@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.records.trial import FeltWhisk, SeenWhisk
+from bench.records.trial_result import FeltWhisk, SeenWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
 from bench.trials.consistency import (
@@ -75,7 +75,9 @@ def test_an_encoder_jump(rng, before):
 
 
 def test_a_frame_that_shows_the_one_before_it(rng):
-    assert "frame 5 looks the same as the one before it" in doubt(rng, kept=[0, 1, 2, 3, 4, 4, 6, 7, 8])
+    assert "frame 5 looks the same as the one before it" in doubt(
+        rng, kept=[0, 1, 2, 3, 4, 4, 6, 7, 8]
+    )
 
 
 def test_a_frame_lost_whose_time_stayed(rng):
@@ -118,13 +120,20 @@ def test_cameras_that_see_different_widths_do_not_see_the_bar_alone(trial):
 
 
 def test_a_diameter_known_badly_is_not_contradicted(trial):
-    assert width_doubt({"low": Value(1.2, 0.02)}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD) == ""
+    assert (
+        width_doubt({"low": Value(1.2, 0.02)}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD)
+        == ""
+    )
 
 
 @pytest.mark.parametrize(
     ("ends_mm", "length_mm", "said"),
     [
-        ((100.0, 100.0), 90.0, "the whisker is seen to end 100 ± 2 mm from its base, length_mm says 90"),
+        (
+            (100.0, 100.0),
+            90.0,
+            "the whisker is seen to end 100 ± 2 mm from its base, length_mm says 90",
+        ),
         ((100.0, 101.0), 150.0, "length_mm says 150"),
         ((100.0, 102.0), 97.0, ""),
         ((80.0, 100.0), 150.0, ""),  # dark before something dark in one of them
@@ -141,7 +150,11 @@ def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, 
     ("looks", "sigma_mm", "said"),
     [
         # what the small session's two cameras say where 1.5 mm are stated for 1
-        ((Value(0.69, 0.063), Value(0.83, 0.07)), 0.0, "0.76 ± 0.05 times as thick as said: its diameter_mm would"),
+        (
+            (Value(0.69, 0.063), Value(0.83, 0.07)),
+            0.0,
+            "0.76 ± 0.05 times as thick as said: its diameter_mm would",
+        ),
         ((Value(0.69, 0.063), Value(0.83, 0.07)), 0.4, ""),
         ((Value(1.4, 0.05), Value(1.0, 0.05)), 0.0, ""),  # a shadow beside the wire in one of them
         ((Value(1.4, 0.08), Value(1.4, 0.08)), 0.0, ""),  # bloom in both
@@ -152,7 +165,9 @@ def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, 
         ((), 0.0, ""),
     ],
 )
-def test_a_whisker_of_another_diameter_is_told_by_cameras_that_do_not_contradict_each_other(looks, sigma_mm, said):
+def test_a_whisker_of_another_diameter_is_told_by_cameras_that_do_not_contradict_each_other(
+    looks, sigma_mm, said
+):
     whisker = Whisker("cylinder", 100.0, 1.5, 60.0, diameter_sigma_mm=sigma_mm)
     found = wire_doubt({str(k): one for k, one in enumerate(looks)}, whisker)
     assert said in found and bool(found) == bool(said)
@@ -161,7 +176,9 @@ def test_a_whisker_of_another_diameter_is_told_by_cameras_that_do_not_contradict
 def test_a_contradicted_whisk_is_apart_and_names_no_gauge(exact_record, trial):
     seen = exact_record(trial)
     assert not seen.contradicted
-    felt = _against_pictures(FeltWhisk(status=""), None, None, None, replace(seen, contradicted=True))
+    felt = _against_pictures(
+        FeltWhisk(status=""), None, None, None, replace(seen, contradicted=True)
+    )
     assert felt.apart
     assert felt.status == ""
 

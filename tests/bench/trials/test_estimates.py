@@ -44,7 +44,9 @@ def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
 
 def test_answers_carry_what_they_assumed(rng):
     touch, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    rows = {row.estimator: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))}
+    rows = {
+        row.estimator: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))
+    }
     assert np.isnan([rows["no_slip"].alpha_est_rad, rows["no_slip"].beta_est_rad]).all()
     assert rows["frictionless"].alpha_est_rad == 0.0
     assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
@@ -57,7 +59,9 @@ def test_sigma_of_10_is_its_scatter(rng):
     """Over 200 strokes the sampled standard deviation scatters by 5 %; the stated one averages over them."""
     stated, found = [], []
     for _ in range(200):
-        _, whisk = felt_whisk(stroke(rng, noise=0.01), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
+        _, whisk = felt_whisk(
+            stroke(rng, noise=0.01), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA
+        )
         row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
         stated.append(row.d_x_est_sigma_alpha_exact_mm)
         found.append(row.d_x_est_mm.value)
@@ -78,8 +82,17 @@ def test_what_whisks_share_is_the_part_of_gauges_and_turn():
     spread = np.diag([0.02, 0.01, 0.03, 0.02]) ** 2
     readout = Readout(GaugeMatrix(MATRIX, spread), np.radians(20.0), np.radians(0.5), True)
     channels = np.array([0.3, 0.8])
-    weak, strong = (Whisk(*(np.zeros(0),) * 4, THETA, *(k * readout.matrix @ channels), np.zeros((2, 2)), 0.0, BEAM)
-                    for k in (1.0, 2.0))  # fmt: skip
+    weak, strong = (
+        Whisk(
+            *(np.zeros(0),) * 4,
+            THETA,
+            *(k * readout.matrix @ channels),
+            np.zeros((2, 2)),
+            0.0,
+            BEAM,
+        )
+        for k in (1.0, 2.0)
+    )
     shared = readout.shared_Nmm(weak)
     assert np.allclose(shared.T @ shared, readout.covariance(channels, np.zeros((2, 2))))
     assert np.allclose(readout.shared_Nmm(strong), 2.0 * shared)
@@ -87,19 +100,27 @@ def test_what_whisks_share_is_the_part_of_gauges_and_turn():
 
 def test_sigma_of_10_holds_how_thick_the_object_is_said_to_be(rng):
     """−θ R/d_x cos β (½ − ⅛) at R = 20.5 mm: 0.34 % of d_x at β = 60°, beyond all else of this whisk."""
-    _, whisk = felt_whisk(stroke(rng, noise=1e-5), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    untold, thin, thick = (answer("with_friction", with_friction, whisk, ALPHA, 0.0, (radius, 0.5)).d_x_est_mm.sigma
-                           for radius in (np.nan, 3.0, 20.0))  # fmt: skip
+    _, whisk = felt_whisk(
+        stroke(rng, noise=1e-5), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA
+    )
+    untold, thin, thick = (
+        answer("with_friction", with_friction, whisk, ALPHA, 0.0, (radius, 0.5)).d_x_est_mm.sigma
+        for radius in (np.nan, 3.0, 20.0)
+    )
     assert untold == pytest.approx(thin)
     rolling = 60.0 * THETA * 0.375 * np.cos(BETA) / 60.0
-    assert np.sqrt(thick**2 - thin**2) == pytest.approx(rolling * np.sqrt(20.5**2 - 3.5**2), rel=0.02)
+    assert np.sqrt(thick**2 - thin**2) == pytest.approx(
+        rolling * np.sqrt(20.5**2 - 3.5**2), rel=0.02
+    )
 
 
 def test_no_touch_is_a_reason(rng):
     free = stroke(rng)
     silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
     touch, reason = felt_whisk(silent, Readout.bare(), np.zeros(2), BEAM, THETA)
-    assert "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
+    assert (
+        "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status
+    )
     assert np.isnan(as_felt(0, touch, None, 0.17, gauge_delay(None)).touch_felt_rad.value)
 
 
@@ -121,7 +142,9 @@ def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
 
     _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f")
-    assert np.isnan(row.d_x_est_mm.value) and row.status == "mine:f raised ZeroDivisionError: no slope"
+    assert (
+        np.isnan(row.d_x_est_mm.value) and row.status == "mine:f raised ZeroDivisionError: no slope"
+    )
 
 
 def asked(rng, function) -> dict:
@@ -153,8 +176,10 @@ def test_a_distance_without_a_sigma_is_told(rng, sigma):
 
 def test_past_a_cones_point_there_is_no_contact(rng):
     """And no warning: what bends there is infinitely thin."""
-    whisk = replace(felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)[1],
-                    beam=Beam(8835.7, 100.0, "cone"))  # fmt: skip
+    whisk = replace(
+        felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)[1],
+        beam=Beam(8835.7, 100.0, "cone"),
+    )
     row = answers(whisk, {"mine:f": lambda *_: Estimate(130.0, 1.0)}, Settings())[0]
     assert "past the whisker's length" in row.status and np.isnan(row.d_y_est_mm.value)
 

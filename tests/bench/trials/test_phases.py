@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.evaluate import evaluate
+from bench.commands.evaluate import evaluate
 from bench.gauges.felt import strokes_of
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.trials.phases import felt_phases, seen_phases
+from bench.trials.stick_slip_phases import felt_phases, seen_phases
 from estimator.beam import Beam
 from vision.truth.records import FrameTruth
 from vision.truth.value import Value
@@ -99,7 +99,9 @@ def test_ringing_after_a_jump_is_no_jump():
     ringing, rung = np.zeros_like(slip), np.flatnonzero(np.diff(slip) > 0.02)
     for k in rung:
         since = np.maximum(time - time[k], 0.0) * 2 * np.pi * 165
-        ringing += np.where(since > 0, 0.5 * (slip[k + 1] - slip[k]) * np.exp(-0.02 * since) * np.cos(since), 0.0)
+        ringing += np.where(
+            since > 0, 0.5 * (slip[k + 1] - slip[k]) * np.exp(-0.02 * since) * np.cos(since), 0.0
+        )
     felt = moments(theta, slip - ringing, np.random.default_rng(1))
     found = felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0))
     assert found.jumps <= len(rung)
@@ -134,13 +136,22 @@ def test_frames_too_far_apart_show_no_phases():
     theta = np.radians(np.arange(0.1, 4.6, 0.5))
     fine = np.radians(np.arange(0.0, 4.6, 0.001))
     found = seen_phases(frames(theta, np.interp(theta, fine, saw_tooth(fine))), BETA, D_X)
-    assert not any(a.kind == STATIC and abs(np.degrees(a.alpha_rad) - 23.0) > 3.0 for a in found.angles)
+    assert not any(
+        a.kind == STATIC and abs(np.degrees(a.alpha_rad) - 23.0) > 3.0 for a in found.angles
+    )
 
 
 def test_the_rig_s_sandpaper(tmp_path):
     """Exact mechanics, ringing, hum and noise; gauges and slope as they are. The requirement is 1°."""
     protocol = Path(__file__).parents[2] / "ladder" / "protocols" / "sandpaper.toml"
-    simulate(tmp_path / "session", protocol=protocol, signals_only=True, seed=5, workers=1, progress=False)
+    simulate(
+        tmp_path / "session",
+        protocol=protocol,
+        signals_only=True,
+        seed=5,
+        workers=1,
+        progress=False,
+    )
     session = load_session(tmp_path / "session")
     true = json.loads((tmp_path / "session" / "truth.json").read_text())
     for trial in (trial for trial in session.trials if trial.purpose == "measure"):
@@ -161,7 +172,9 @@ def test_without_pictures_the_nominal_slope_serves(tmp_path):
     text = text.replace("vibration = true", "vibration = true\nknown = true")
     text = text.replace("beta_deg = [45, 60]", "beta_deg = 60")
     (tmp_path / "p.toml").write_text(text)
-    session = simulate(tmp_path / "session", protocol=tmp_path / "p.toml", signals_only=True, seed=5)
+    session = simulate(
+        tmp_path / "session", protocol=tmp_path / "p.toml", signals_only=True, seed=5
+    )
     evaluate(session, tmp_path / "out", Settings())
     kinds = (tmp_path / "out" / "phases.csv").read_text()
     assert kinds.count("felt,static") >= 5 and kinds.count("felt,kinetic") >= 5

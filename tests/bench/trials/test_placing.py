@@ -11,18 +11,20 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.calibration import SessionCalibration
-from bench.records.trial import SeenTrial, SeenWhisk
+from bench.cameras.session_cameras import SessionCalibration
+from bench.records.trial_result import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit
 from tests.scenes.base_lines import some_lines
 from tests.scenes.model_scenes import CAMERAS
-from vision.calibration.turning import FirstRig
+from vision.calibration.hub_turning import FirstRig
 
 SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 T_RIG_BOARD = load_session(SMALL).T_rig_board
-OFF = np.array([0.0, 0.0, 0.0, 0.0, 0.8, 0.0])  # the centre 0.8 mm across the whisker from where the board has it
+OFF = np.array(
+    [0.0, 0.0, 0.0, 0.0, 0.8, 0.0]
+)  # the centre 0.8 mm across the whisker from where the board has it
 
 
 @pytest.fixture
@@ -35,9 +37,14 @@ def place(small_copy, monkeypatch):
 
         def see(unit):
             stages.append(unit.stage)
-            now = unit.calibration.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
+            now = (
+                unit.calibration.cameras["one"].T_camera_rig[:, 3]
+                - CAMERAS["one"].T_camera_rig[:, 3]
+            )
             left = step - np.append(np.zeros(3), CAMERAS["one"].T_camera_rig[:, :3].T @ now)
-            made = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames or 1, rng=rng)
+            made = some_lines(
+                width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames or 1, rng=rng
+            )
             base = lines.setdefault((unit.stage, unit.trial.name), made if frames else None)
             return SeenTrial((SeenWhisk(0, base=base), SeenWhisk(1), SeenWhisk(2, "no pictures")))
 
@@ -55,15 +62,21 @@ def place(small_copy, monkeypatch):
 def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
     made, doubts, stages = place(0 * OFF)
     assert made.cameras is CAMERAS and made.hash == "before" and not doubts
-    assert stages == {"seen"}  # what was looked at is the trial's own result and is not looked at again
-    assert any("free strokes of 8.0 degrees give: centre of rotation ± " in note for note in made.notes)
+    assert stages == {
+        "seen"
+    }  # what was looked at is the trial's own result and is not looked at again
+    assert any(
+        "free strokes of 8.0 degrees give: centre of rotation ± " in note for note in made.notes
+    )
 
 
 def test_a_disagreement_is_an_alarm(place):
     made, doubts, _ = place(OFF)
     assert made.cameras is CAMERAS
     assert len(doubts) == 1 and "board and free stroke disagree" in doubts[0]
-    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubts[0])[1]) == pytest.approx(0.8, abs=0.02)
+    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubts[0])[1]) == pytest.approx(
+        0.8, abs=0.02
+    )
 
 
 def test_a_board_with_a_sigma_gives_way(place):
@@ -72,13 +85,17 @@ def test_a_board_with_a_sigma_gives_way(place):
     moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
     np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ OFF[3:], atol=0.05)
     # The board on the rig has not moved in the pictures: it stands elsewhere in the rig's frame.
-    before, after = (c.project(T[:, 3][None]) for c, T in ((CAMERAS["one"], T_RIG_BOARD),
-                                                           (made.cameras["one"], made.T_rig_board)))  # fmt: skip
+    before, after = (
+        c.project(T[:, 3][None])
+        for c, T in ((CAMERAS["one"], T_RIG_BOARD), (made.cameras["one"], made.T_rig_board))
+    )
     np.testing.assert_allclose(after, before, atol=1e-6)
 
 
 def test_strokes_too_short_to_tell_are_no_doubt(place, monkeypatch):
-    monkeypatch.setattr("bench.trials.placing.first_look", None)  # which would decode every trial: not asked
+    monkeypatch.setattr(
+        "bench.trials.placing.first_look", None
+    )  # which would decode every trial: not asked
     made, doubts, _ = place(OFF, frames=3)
     assert not doubts and "needs 4 frames" in made.notes[-1]
 
@@ -103,14 +120,20 @@ def test_without_a_board_the_strokes_place_the_rig(place):
     made, doubts, _ = place(10 * OFF, board=False, width_deg=20.0)
     assert not doubts and not any("board" in note for note in made.notes[1:])
     moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
-    np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ (10 * OFF[3:]), atol=0.05)
+    np.testing.assert_allclose(
+        moved, CAMERAS["one"].T_camera_rig[:, :3] @ (10 * OFF[3:]), atol=0.05
+    )
 
 
 def test_without_a_board_narrow_strokes_are_refused(place):
-    with pytest.raises(BadInput, match=r"trials: the free strokes are what places the rig, and 0\.1 degrees fix"):
+    with pytest.raises(
+        BadInput, match=r"trials: the free strokes are what places the rig, and 0\.1 degrees fix"
+    ):
         place(0 * OFF, board=False, width_deg=0.15, frames=5)
 
 
 def test_without_a_board_strokes_that_say_nothing_are_refused(place):
-    with pytest.raises(BadInput, match=r"trials: T_rig_board is missing, and 3 frames of free stroke"):
+    with pytest.raises(
+        BadInput, match=r"trials: T_rig_board is missing, and 3 frames of free stroke"
+    ):
         place(0 * OFF, board=False, frames=3)

@@ -12,7 +12,7 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.calibration import SessionCalibration, on_the_rig
+from bench.cameras.session_cameras import SessionCalibration, on_the_rig
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
@@ -69,8 +69,12 @@ def wide(tmp_path_factory):
 def moved(session, T_world_rig):
     """The exact cameras in another frame."""
     T_rig_world = invert_transform(T_world_rig)
-    return Cameras(tuple(replace(c, T_camera_rig=compose(c.T_camera_rig, T_rig_world))
-                         for c in exact_cameras(session.path)))  # fmt: skip
+    return Cameras(
+        tuple(
+            replace(c, T_camera_rig=compose(c.T_camera_rig, T_rig_world))
+            for c in exact_cameras(session.path)
+        )
+    )
 
 
 def place(session, cameras, T_rig_board, out):
@@ -96,19 +100,28 @@ def test_a_board_1_mm_across_is_an_alarm(wide, tmp_path):
     shift = np.column_stack([np.eye(3), [0.0, -1.0, 0.0]])
     _, (doubt,), _ = place(wide, moved(wide, shift), compose(shift, wide.T_rig_board), tmp_path)
     # Three of the 0.13 mm that the stroke tells the centre to across the whisker.
-    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubt)[1]) == pytest.approx(-1.0, abs=0.4)
+    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubt)[1]) == pytest.approx(
+        -1.0, abs=0.4
+    )
 
 
 @pytest.mark.slow
 def test_the_swing_alone_places_the_rig(wide, tmp_path):
     session = replace(wide, T_rig_board=None)
-    cameras, T_rig_board, note = on_the_rig(session, moved(wide, invert_transform(wide.T_rig_board)), np.eye(3, 4))
+    cameras, T_rig_board, note = on_the_rig(
+        session, moved(wide, invert_transform(wide.T_rig_board)), np.eye(3, 4)
+    )
     assert "a first look at 1 stroke " in note
     _, (doubt,), unit = place(session, cameras, T_rig_board, tmp_path)
-    assert re.search(r"22\.8 degrees fix the centre of rotation to 0\.05\d mm along the whisker only", doubt)
+    assert re.search(
+        r"22\.8 degrees fix the centre of rotation to 0\.05\d mm along the whisker only", doubt
+    )
     truth = tomllib.loads((unit.trial.folder / "truth.toml").read_text())
     (seen,) = see_unit(unit).whisks
-    for found, true in ((seen.d_x_mm, truth["d_x_mm"]), (seen.beta_rad, np.radians(truth["beta_deg"]))):
+    for found, true in (
+        (seen.d_x_mm, truth["d_x_mm"]),
+        (seen.beta_rad, np.radians(truth["beta_deg"])),
+    ):
         assert abs(found.value - true) < 3 * found.sigma
     # 0.05 mm along the whisker, and the bar's own place on top of it.
     assert seen.d_x_mm.sigma < 0.08
@@ -120,7 +133,10 @@ def test_the_swing_alone_places_the_rig(wide, tmp_path):
 
 def test_a_narrow_swing_alone_is_refused_with_the_width_that_would_do(tmp_path):
     narrow = recorded(tmp_path, 1.6, 0.8)
-    alone, in_board = replace(narrow, T_rig_board=None), moved(narrow, invert_transform(narrow.T_rig_board))
+    alone, in_board = (
+        replace(narrow, T_rig_board=None),
+        moved(narrow, invert_transform(narrow.T_rig_board)),
+    )
     with pytest.raises(BadInput, match=r"record free strokes of (about|some) [0-9]+ degrees"):
         place(alone, *on_the_rig(alone, in_board, np.eye(3, 4))[:2], tmp_path)
 
@@ -128,8 +144,15 @@ def test_a_narrow_swing_alone_is_refused_with_the_width_that_would_do(tmp_path):
 @pytest.mark.slow
 def test_squares_a_sixth_too_large_are_what_a_stroke_that_cannot_be_read_leads_to(wide, tmp_path):
     """The cameras then stand a sixth too far from the board, and the whisker is nowhere near where they look."""
-    far = [replace(c, T_camera_rig=np.column_stack([c.T_camera_rig[:, :3], 1.16 * c.T_camera_rig[:, 3]]))
-           for c in moved(wide, invert_transform(wide.T_rig_board))]  # fmt: skip
-    on_rig = [replace(c, T_camera_rig=compose(c.T_camera_rig, invert_transform(wide.T_rig_board))) for c in far]
+    far = [
+        replace(
+            c, T_camera_rig=np.column_stack([c.T_camera_rig[:, :3], 1.16 * c.T_camera_rig[:, 3]])
+        )
+        for c in moved(wide, invert_transform(wide.T_rig_board))
+    ]
+    on_rig = [
+        replace(c, T_camera_rig=compose(c.T_camera_rig, invert_transform(wide.T_rig_board)))
+        for c in far
+    ]
     _, (doubt,), _ = place(wide, Cameras(tuple(on_rig)), wide.T_rig_board, tmp_path)
     assert "square_mm" in doubt

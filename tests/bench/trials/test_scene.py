@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from bench.base.results import hash_of
-from bench.cameras.calibration import SessionCalibration
+from bench.cameras.session_cameras import SessionCalibration
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
-from bench.trials.scene import evenly_exposed, still_scene
+from bench.trials.still_scene import evenly_exposed, still_scene
 from tests.scenes.faults import FAULTS, TRIAL
 from vision.pictures.files import read_picture
 
@@ -31,7 +31,10 @@ def test_a_sound_trial_is_as_recorded(small_session):
 @pytest.mark.parametrize(
     ("fault", "expected"),
     [
-        ("camera knocked 6,4 px", "the scene lies +6, +4 px from where the rig picture has it, so it was moved"),
+        (
+            "camera knocked 6,4 px",
+            "the scene lies +6, +4 px from where the rig picture has it, so it was moved",
+        ),
         ("camera mirrored", "its frames are mirrored left to right"),
         ("camera black", "its frames show nothing, they are all of one grey"),
         ("camera damaged", "none of its frames can be read"),
@@ -55,13 +58,17 @@ def test_cameras_exchanged(small_copy):
 
 def series(gains, rng):
     scene = rng.uniform(30.0, 140.0, size=(120, 160))
-    return {k: np.clip(np.rint(gain * scene), 0, 255).astype(np.uint8) for k, gain in enumerate(gains)}
+    return {
+        k: np.clip(np.rint(gain * scene), 0, 255).astype(np.uint8) for k, gain in enumerate(gains)
+    }
 
 
 def test_exposure_is_made_good(rng):
     pictures = series([1.0, 1.0, 1.0, 1.1, 0.85], rng)
     even, lines = evenly_exposed("low", pictures)
-    assert lines == ["camera low: 2 of 5 frames are 0.850 to 1.100 times as bright as most, made good (frames 3, 4)"]
+    assert lines == [
+        "camera low: 2 of 5 frames are 0.850 to 1.100 times as bright as most, made good (frames 3, 4)"
+    ]
     for grey in even.values():
         np.testing.assert_allclose(grey, pictures[0].astype(float), atol=1.1)
 

@@ -36,7 +36,10 @@ def test_what_a_file_leaves_out_goes_by_its_preset(tmp_path):
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("[seeing]\nround = 2\n", r"mine.toml: \[seeing\] round is not a key of this file; did you mean 'rounds'\?"),
+        (
+            "[seeing]\nround = 2\n",
+            r"mine.toml: \[seeing\] round is not a key of this file; did you mean 'rounds'\?",
+        ),
         ("[seeing]\nrounds = -1\n", r"rounds is -1; from 0 to 5 is allowed"),
         ("[seeing]\nevery_frame = 1.5\n", r"expected .*whole number.*, found a number"),
         ('[seeing]\npreset = "best"\n', r"--preset best: there are draft, standard, fine"),
@@ -69,7 +72,11 @@ def test_a_whisk_climbs_until_it_is_known_well_enough():
         asked.extend(whisks)
         return TrialTruth(np.zeros(3), np.ones(3), (whisk(0, 50.1, 0.04), whisk(1, np.nan, np.nan)))
 
-    first = [("draft", whisk(0, 50.0, 0.03)), ("draft", whisk(1, 50.0, 0.09)), ("draft", whisk(2, np.nan, np.nan))]
+    first = [
+        ("draft", whisk(0, 50.0, 0.03)),
+        ("draft", whisk(1, 50.0, 0.09)),
+        ("draft", whisk(2, np.nan, np.nan)),
+    ]
     places = [slice(0, 9), slice(10, 19), slice(20, 29)]
     looked = _looked_harder(observe, places, first, ("standard", PRESETS["standard"]), 0.05)
     assert asked == places[1:]

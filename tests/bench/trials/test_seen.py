@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.cameras.calibration import _backgrounds
+from bench.cameras.session_cameras import _backgrounds
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
 from bench.trials.seen import _lost
@@ -18,14 +18,18 @@ def test_damaged_frames_are_counted_and_named(small_copy):
     third.write_bytes(data[: len(data) // 2][:40])
     trial = next(t for t in load_session(small_copy).trials if t.name == "b60_4")
     times = frame_times(trial)
-    assert list(_lost(read_trial(trial, times), times)) == [f"camera low: 1 of {len(times)} frames damaged (2)"]
+    assert list(_lost(read_trial(trial, times), times)) == [
+        f"camera low: 1 of {len(times)} frames damaged (2)"
+    ]
 
 
 def test_without_a_rig_picture_the_trials_median_is_the_background(small_session, monkeypatch):
     """Where neither rod ever stands, the median is the rig picture but for noise and light."""
     session = load_session(small_session)
-    cameras = Cameras([Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))])
-    monkeypatch.setattr("bench.cameras.calibration._FEWEST_FOR_MEDIAN", 3)
+    cameras = Cameras(
+        [Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))]
+    )
+    monkeypatch.setattr("bench.cameras.session_cameras._FEWEST_FOR_MEDIAN", 3)
     rig = read_picture(session.rig_pictures["high"]).astype(float)
     session.rig_pictures.clear()
     median = _backgrounds(session, cameras)["high"]
@@ -35,6 +39,8 @@ def test_without_a_rig_picture_the_trials_median_is_the_background(small_session
 
 def test_too_few_trials_leave_no_background(small_session):
     session = load_session(small_session)
-    cameras = Cameras([Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))])
+    cameras = Cameras(
+        [Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))]
+    )
     session.rig_pictures.clear()
     assert _backgrounds(session, cameras)["high"] is None

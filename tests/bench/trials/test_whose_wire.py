@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.records.trial import Drawing, SeenTrial, SeenWhisk
+from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
 from bench.trials.whose_wire import with_whose
 from vision.pictures.others import RodLines
 
@@ -48,7 +48,9 @@ def test_a_wire_that_starts_at_anothers_base_in_one_camera_may_be_the_others():
 
 
 def test_a_wire_far_off_its_base_but_at_none_is_told():
-    assert status(line(90.0), line(100.0)) == "its wire starts 2.5 mm beside its base, check base_mm"
+    assert (
+        status(line(90.0), line(100.0)) == "its wire starts 2.5 mm beside its base, check base_mm"
+    )
 
 
 def test_a_wire_that_lies_on_anothers_in_all_cameras_may_be_that():

@@ -28,7 +28,9 @@ def angle_of(rng, top_deg):
 
 
 def beta_of(rng):
-    return min(angle_of(rng, 90.0), float(np.radians(90 - 1e-9) if rng.integers(2) else np.pi / 2 - 1e-9))
+    return min(
+        angle_of(rng, 90.0), float(np.radians(90 - 1e-9) if rng.integers(2) else np.pi / 2 - 1e-9)
+    )
 
 
 def slope_and_friction(rng):
@@ -98,7 +100,12 @@ def contact_far_out(rng):
 
 def deflected(rng):
     d_x, theta = log_uniform(rng, 1e-3, 1e4), theta_of(rng)
-    return d_x, theta, d_x * theta * (1 - log_uniform(rng, 1e-12, 0.99)), d_x * log_uniform(rng, 1e-12, 0.3)
+    return (
+        d_x,
+        theta,
+        d_x * theta * (1 - log_uniform(rng, 1e-12, 0.99)),
+        d_x * log_uniform(rng, 1e-12, 0.3),
+    )
 
 
 def soft_object(rng):
@@ -110,4 +117,9 @@ def soft_object(rng):
 
 def two_samples(rng):
     angle, moment = theta_of(rng), log_uniform(rng, 1e-9, 1e9)
-    return angle, angle * (1 + log_uniform(rng, 1e-6, 10)), moment, moment * (1 + log_uniform(rng, 1e-6, 10))
+    return (
+        angle,
+        angle * (1 + log_uniform(rng, 1e-6, 10)),
+        moment,
+        moment * (1 + log_uniform(rng, 1e-6, 10)),
+    )

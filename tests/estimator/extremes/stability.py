@@ -162,12 +162,24 @@ CASES = [
         cone_printed,
         lambda rng: (theta_of(rng), *moments_of(rng), rigidity(rng), rigidity(rng)),
     ),
-    Case("zeta (25)", curvature.virtual_angle, lambda *a: circle(*a)[2], lambda rng: curved(rng)[:3]),
+    Case(
+        "zeta (25)", curvature.virtual_angle, lambda *a: circle(*a)[2], lambda rng: curved(rng)[:3]
+    ),
     Case("p (32)", curvature.virtual_radius, lambda *a: circle(*a)[3], lambda rng: curved(rng)[:3]),
     Case("phi exact", curvature.slip_angle, lambda *a: appendix_b(*a, False)[0], curved),
-    Case("phi (24) as printed", curvature.slip_angle_printed, lambda *a: appendix_b(*a, True)[0], curved),
+    Case(
+        "phi (24) as printed",
+        curvature.slip_angle_printed,
+        lambda *a: appendix_b(*a, True)[0],
+        curved,
+    ),
     Case("d (31) exact", curvature.deflection, lambda *a: appendix_b(*a, False)[1], curved),
-    Case("d (31) as printed", curvature.deflection_printed, lambda *a: appendix_b(*a, True)[1], curved),
+    Case(
+        "d (31) as printed",
+        curvature.deflection_printed,
+        lambda *a: appendix_b(*a, True)[1],
+        curved,
+    ),
     Case(
         "m_z (22) exact",
         _nth(curvature.moments, 1),
@@ -180,7 +192,9 @@ CASES = [
         lambda *a: (lambda phi, d: d * mp.sin(phi))(*appendix_b(*a, True)),
         curved,
     ),
-    Case("distance on a soft object", _nth(compliance.two_distances, 0), two_distances, soft_object),
+    Case(
+        "distance on a soft object", _nth(compliance.two_distances, 0), two_distances, soft_object
+    ),
 ]
 
 
@@ -222,11 +236,15 @@ def worst(case, samples, seed=20080923):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--samples", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=20080923)
     options = parser.parse_args()
-    print(f"worst error over {options.samples} samples, in units of epsilon max(1, kappa); the bound is {BOUND:g}")
+    print(
+        f"worst error over {options.samples} samples, in units of epsilon max(1, kappa); the bound is {BOUND:g}"
+    )
     for case in CASES:
         print(f"{case.name:32s} {worst(case, options.samples, options.seed)[0]:8.3f}")
 

@@ -1,12 +1,11 @@
 """Corners: unbiased, as sure as they say, and silent about what is hidden or disturbed."""
 
-
 import cv2
 import numpy as np
 import pytest
 
-from tests.ladder.board_scenes import BOARD
 from tests.scenes.board_pictures import picture, true_px
+from tests.studies.accuracy.board_scenes import BOARD
 from vision.boards.corners import Corners, detect, find_corners, refine_corners
 from vision.geometry.board import Board
 
@@ -46,7 +45,9 @@ def test_sigma_is_the_scatter(rng, correlated):
 
 def test_an_inverted_print_is_found_only_as_such(rng):
     grey = picture(BOARD, rng, noise=2.0, invert=True)
-    inverted = Board(BOARD.squares, BOARD.square_mm, BOARD.marker_mm, BOARD.dictionary, inverted=True)
+    inverted = Board(
+        BOARD.squares, BOARD.square_mm, BOARD.marker_mm, BOARD.dictionary, inverted=True
+    )
     assert len(find_corners(grey, BOARD)) == 0
     found = find_corners(grey, inverted)
     assert np.abs(found.px - true_px(BOARD)[found.ids]).max() < 0.1
@@ -89,4 +90,8 @@ def test_nothing_is_found_where_nothing_is():
 def test_chosen_keeps_rows_together():
     three = Corners([4, 5, 6], [[1, 2], [3, 4], [5, 6]], [0.1, 0.2, 0.3])
     two = three.chosen(np.array([True, False, True]))
-    assert (two.ids.tolist(), two.px.tolist(), two.sigma_px.tolist()) == ([4, 6], [[1, 2], [5, 6]], [0.1, 0.3])
+    assert (two.ids.tolist(), two.px.tolist(), two.sigma_px.tolist()) == (
+        [4, 6],
+        [[1, 2], [5, 6]],
+        [0.1, 0.3],
+    )

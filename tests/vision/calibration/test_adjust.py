@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.board_scenes import BOARD, SIZE_PX, T_RIG_BOARD, WORK_MM, a_recording, moving_board, noisy_view_at
+from tests.studies.accuracy.board_scenes import (
+    BOARD,
+    SIZE_PX,
+    T_RIG_BOARD,
+    WORK_MM,
+    a_recording,
+    moving_board,
+    noisy_view_at,
+)
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, BundleState, Sightings, predict
@@ -22,7 +30,9 @@ TIMES_S = np.array([0.0, 0.2, 0.5, 0.7])
 def a_state(moving):
     rng = np.random.default_rng(0)
     turns = [exp_rotation(np.array([0.15, 0.05, 0.1]) * (k + 1)) for k in range(VIEWS)]
-    boards = np.array([np.column_stack([R, [5 * k, 3 * k, 300 + 4 * k]]) for k, R in enumerate(turns)])
+    boards = np.array(
+        [np.column_stack([R, [5 * k, 3 * k, 300 + 4 * k]]) for k, R in enumerate(turns)]
+    )
     cameras = np.array([np.eye(3, 4), np.column_stack([exp_rotation([0.1, 0.3, 0]), [10, 20, 30]])])
     one = [1000, 1010, 640, 360, -0.2, 0.1, 1e-3, -1e-3, 0.05]
     other = [900, 910, 600, 350, 0.1, 0.1, 1e-3, 2e-3, 0.05]
@@ -78,8 +88,12 @@ def test_gradients_by_board_poses_are_finite_differences(moving):
     for view, k in np.ndindex(VIEWS, N_VIEW):
         step = np.zeros((VIEWS, 6))
         step[view, k] = 1e-5 if k < 3 else 1e-3
-        numeric = differences(state, seen, np.zeros(N_CAMERA * CAMERAS + N_BOARD), step) / (2 * step[view, k])
-        analytic = sum(J[:, :, N_VIEW * b + k] * (who == view)[:, None] for b, who in enumerate(touched))
+        numeric = differences(state, seen, np.zeros(N_CAMERA * CAMERAS + N_BOARD), step) / (
+            2 * step[view, k]
+        )
+        analytic = sum(
+            J[:, :, N_VIEW * b + k] * (who == view)[:, None] for b, who in enumerate(touched)
+        )
         np.testing.assert_allclose(analytic, numeric, atol=1e-6 * np.abs(numeric).max())
 
 
@@ -92,11 +106,15 @@ def test_left_jacobian_is_that_of_the_exponential():
 def test_without_noise_cameras_come_out_exact():
     recording = a_recording(views=8)
     boards, rig = recording.seen(0.0, np.random.default_rng(0))
-    made = calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX), rig), BOARD, MeasuredPose(T_RIG_BOARD))
+    made = calibrate_cameras(
+        BoardViews(boards, dict.fromkeys(boards, SIZE_PX), rig), BOARD, MeasuredPose(T_RIG_BOARD)
+    )
     for camera in made.cameras:
         # Corners carry 1e-9 px as sigma, the lens priors weigh against that by (1e-9)²; what is left is where the
         # adjustment stops: relative changes of the cost below 1e-8.
-        np.testing.assert_allclose(camera.project(WORK_MM), recording.cameras[camera.name].project(WORK_MM), atol=1e-4)
+        np.testing.assert_allclose(
+            camera.project(WORK_MM), recording.cameras[camera.name].project(WORK_MM), atol=1e-4
+        )
 
 
 def test_a_moving_board_seen_late_is_followed():
@@ -107,7 +125,9 @@ def test_a_moving_board_seen_late_is_followed():
     boards = {name: [] for name in recording.cameras.names}
     for k, t in enumerate(times):
         for c, camera in enumerate(recording.cameras):
-            boards[camera.name].append(noisy_view_at(camera, moving_board(t + late[k, c]), 0.02, rng))
+            boards[camera.name].append(
+                noisy_view_at(camera, moving_board(t + late[k, c]), 0.02, rng)
+            )
     rig = recording.seen(0.02, rng)[1]
     sizes = dict.fromkeys(boards, SIZE_PX)
     views = BoardViews(boards, sizes, rig, times_s=dict.fromkeys(boards, times))
@@ -116,7 +136,10 @@ def test_a_moving_board_seen_late_is_followed():
     # The mean of 24 latenesses that scatter by 20 ms is known to 4 ms; four of these.
     assert abs(made.timing.offset_s[1] - made.timing.offset_s[0] - 0.04) < 0.016
     for camera in made.cameras:
-        assert np.abs(camera.project(WORK_MM) - recording.cameras[camera.name].project(WORK_MM)).max() < 0.25
+        assert (
+            np.abs(camera.project(WORK_MM) - recording.cameras[camera.name].project(WORK_MM)).max()
+            < 0.25
+        )
 
 
 def test_more_iterations_change_nothing_at_rest():
@@ -126,13 +149,15 @@ def test_more_iterations_change_nothing_at_rest():
     priors = lens_priors(1, 6)
     priors.free[9:15] = False
     seen = settled.seen.chosen(settled.kept)
-    again = adjust_bundle(settled.solution.state, seen, BOARD.corners_mm, replace(priors), tolerance=1e-14)
+    again = adjust_bundle(
+        settled.solution.state, seen, BOARD.corners_mm, replace(priors), tolerance=1e-14
+    )
     sigma = np.sqrt(np.diag(again.covariance)[:9])
     assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
 
 
 def test_cost_is_linear_in_views():
-    from tests.speed.cameras import seconds
+    from tests.studies.speed.cameras import seconds
 
     few, many = seconds(2, 15), seconds(2, 60)
     # Four times the views cost four times as much; a dense solve would cost up to 64 times. Twice for a busy machine.

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.board_scenes import (
+from tests.studies.accuracy.board_scenes import (
     BOARD,
     SIZE_PX,
     T_RIG_BOARD,
@@ -22,12 +22,14 @@ from vision.boards.sufficiency import check_lens
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.camera import Camera
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
 
 SIGMA_PX = 0.04
 # The session's contract: 0 to 100 mm along x, a bar's ± 30 mm to either side.
-RIG_POINTS = np.array([[x, 0.0, z] for x in np.linspace(0, 100, 11) for z in (-30.0, -15.0, 0.0, 15.0, 30.0)])
+RIG_POINTS = np.array(
+    [[x, 0.0, z] for x in np.linspace(0, 100, 11) for z in (-30.0, -15.0, 0.0, 15.0, 30.0)]
+)
 
 
 @pytest.fixture(scope="module")
@@ -43,13 +45,15 @@ def steel_views(small_session):
 def true_cameras(small_session):
     truth = json.loads((small_session / "truth.json").read_text())["cameras"]
     return {
-        name: Camera(name, (t["width"], t["height"]), t["K"], t["dist"], np.column_stack([t["R"], t["t"]]))
+        name: Camera(
+            name, (t["width"], t["height"]), t["K"], t["dist"], np.column_stack([t["R"], t["t"]])
+        )
         for name, t in truth.items()
     }
 
 
 def test_a_recorded_session_against_its_truth(steel_views, true_cameras):
-    from bench.cameras.calibrate import calibrate_from
+    from bench.cameras.calibrate_session import calibrate_from
 
     made = calibrate_from(*steel_views)
     for camera in made.cameras:
@@ -111,7 +115,9 @@ def test_a_wild_corner_is_left_out(recording, rng):
 def test_errors_larger_than_stated_are_noticed(recording, rng):
     """Corners that say 0.02 px and err by 0.1 px: the model error makes up for it."""
     boards, rig = recording.seen(0.1, rng)
-    boards = {n: [Corners(v.ids, v.px, 0.2 * v.sigma_px) for v in views] for n, views in boards.items()}
+    boards = {
+        n: [Corners(v.ids, v.px, 0.2 * v.sigma_px) for v in views] for n, views in boards.items()
+    }
     made = calibrated(boards, rig)
     for report in made.report:
         # 700 values scatter by 3 %, ten parameters' share besides.
@@ -150,7 +156,9 @@ def without_rig_board(boards, rig):
     return boards, rig | {"low": Corners.none()}
 
 
-@pytest.mark.parametrize("spoil, words", [(few, "well seen in 4 views"), (without_rig_board, "camera low: 0 corners")])
+@pytest.mark.parametrize(
+    "spoil, words", [(few, "well seen in 4 views"), (without_rig_board, "camera low: 0 corners")]
+)
 def test_too_little_is_refused(recording, rng, spoil, words):
     with pytest.raises(Refused, match=words):
         calibrated(*spoil(*recording.seen(SIGMA_PX, rng)))
@@ -169,11 +177,15 @@ def test_views_that_cannot_settle_a_lens_are_refused_with_what_to_record(rng, ho
 
 
 def test_work_outside_all_views_is_refused(recording, rng):
-    aside = np.array([[x, 0.0, 0.0] for x in np.linspace(100, 140, 5)])  # in the picture, right of every view
+    aside = np.array(
+        [[x, 0.0, 0.0] for x in np.linspace(100, 140, 5)]
+    )  # in the picture, right of every view
     boards, rig = recording.seen(SIGMA_PX, rng)
     left = {n: [v.chosen(v.px[:, 0] < 700) for v in views] for n, views in boards.items()}
     rig = {n: v.chosen(v.px[:, 0] < 700) for n, v in rig.items()}
-    with pytest.raises(Refused, match=r"whisker and bar will be lies outside .* at the right of the picture"):
+    with pytest.raises(
+        Refused, match=r"whisker and bar will be lies outside .* at the right of the picture"
+    ):
         calibrated(left, rig, work_points_mm=aside)
 
 
@@ -183,8 +195,20 @@ def suzie(matrix, distortion):
 
 def test_over_fitted_lenses_are_refused():
     """Two calibrations of the public repository suzie13/Whisker-Robot-Project, 1920 x 1080."""
-    wild = [-2.912144150739864, 0.011063557294453519, -0.27781540758819406, 0.11957148513743394, 625.4938967961976]
-    folded = [-0.23820125090035102, 3.6368781282348848, -0.0030323996843331486, -0.0076102186785494685, -16.363127666]
+    wild = [
+        -2.912144150739864,
+        0.011063557294453519,
+        -0.27781540758819406,
+        0.11957148513743394,
+        625.4938967961976,
+    ]
+    folded = [
+        -0.23820125090035102,
+        3.6368781282348848,
+        -0.0030323996843331486,
+        -0.0076102186785494685,
+        -16.363127666,
+    ]
     with pytest.raises(Refused, match="differ by 13 %"):
         check_lens(suzie([[3753.7, 0, 545.4], [0, 3323.4, 683.4], [0, 0, 1]], wild))
     with pytest.raises(Refused, match="p1 or p2"):
@@ -196,7 +220,9 @@ def test_over_fitted_lenses_are_refused():
 def test_a_camera_that_stands_still_has_not_moved(recording, rng):
     camera = recording.cameras["high"]
     shifts = [
-        np.divide(*camera_moved(camera, noisy(recording.rig["high"], SIGMA_PX, rng), BOARD, T_RIG_BOARD))
+        np.divide(
+            *camera_moved(camera, noisy(recording.rig["high"], SIGMA_PX, rng), BOARD, T_RIG_BOARD)
+        )
         for _ in range(40)
     ]
     # The shift is a root mean square over six fitted parameters: about one sigma, rarely two.
@@ -206,8 +232,12 @@ def test_a_camera_that_stands_still_has_not_moved(recording, rng):
 def test_a_knock_of_a_tenth_of_a_degree_is_seen(recording, rng):
     camera = recording.cameras["high"]
     turn, t = np.array([np.radians(0.1), 0, 0]), camera.T_camera_rig[:, 3]
-    knocked = camera.moved(np.concatenate([np.zeros(9), turn, np.cross(turn, t)]))  # about its own centre
-    shift, sigma = camera_moved(knocked, noisy(recording.rig["high"], SIGMA_PX, rng), BOARD, T_RIG_BOARD)
+    knocked = camera.moved(
+        np.concatenate([np.zeros(9), turn, np.cross(turn, t)])
+    )  # about its own centre
+    shift, sigma = camera_moved(
+        knocked, noisy(recording.rig["high"], SIGMA_PX, rng), BOARD, T_RIG_BOARD
+    )
     # 2000 px of focal length times 0.1 degrees.
     assert shift == pytest.approx(3.5, abs=0.5) and sigma < 0.05
 
@@ -224,8 +254,8 @@ def test_disturbed_corners_do_not_enter_the_mean(rng):
 
 @pytest.mark.slow
 def test_predicted_sigmas_are_the_sampled_ones():
-    """The small form of tests/ladder/cameras_montecarlo.py, which draws a thousand."""
-    from tests.ladder.cameras_montecarlo import sample_calibrations
+    """The small form of tests/studies/accuracy/cameras_montecarlo.py, which draws a thousand."""
+    from tests.studies.accuracy.cameras_montecarlo import sample_calibrations
 
     for sample in sample_calibrations(80, seed=3, views=8):
         # 80 draws of some eight independent directions: the pooled ratio scatters by 1/√(2·640) = 2.8 %.
@@ -236,7 +266,7 @@ def test_predicted_sigmas_are_the_sampled_ones():
 @pytest.mark.slow
 @pytest.mark.parametrize("rig", [{}, {"rig_sigma_mm": 0.1, "rig_sigma_rad": np.radians(0.1)}])
 def test_a_thousand_calibrations(rig):
-    from tests.ladder.cameras_montecarlo import sample_calibrations
+    from tests.studies.accuracy.cameras_montecarlo import sample_calibrations
 
     for sample in sample_calibrations(1000, seed=0, **rig):
         # A standard deviation of 1000 draws scatters by 2.2 %.
@@ -248,14 +278,19 @@ def elsewhere(T, rng):
     """The pose T of a board, held by hand a second time: 2 degrees and 4 mm off, each about an axis."""
     turn = exp_rotation(np.radians(2.0) * rng.standard_normal(3))
     middle = T[:, :3] @ BOARD.corners_mm.mean(axis=0) + T[:, 3] + 4.0 * rng.standard_normal(3)
-    return np.column_stack([turn @ T[:, :3], middle - turn @ T[:, :3] @ BOARD.corners_mm.mean(axis=0)])
+    return np.column_stack(
+        [turn @ T[:, :3], middle - turn @ T[:, :3] @ BOARD.corners_mm.mean(axis=0)]
+    )
 
 
 @pytest.fixture
 def same_order(recording, rng):
     """Each camera's own series of the same fourteen poses, in one order, a hand's accuracy apart; rig views."""
     poses = [moving_board(0.9 * k) for k in range(14)]
-    boards = {c.name: [noisy_view_at(c, elsewhere(T, rng), SIGMA_PX, rng) for T in poses] for c in recording.cameras}
+    boards = {
+        c.name: [noisy_view_at(c, elsewhere(T, rng), SIGMA_PX, rng) for T in poses]
+        for c in recording.cameras
+    }
     return boards, recording.seen(SIGMA_PX, rng)[1]
 
 
@@ -266,12 +301,18 @@ def test_series_of_their_own_that_look_alike_are_each_camera_s_own(recording, sa
     assert any("they did not: so taken, corners of camera" in note for note in made.notes)
     for report, camera in zip(made.report, made.cameras):
         assert report.rms_px < 2 * SIGMA_PX and report.left_out == 0
-        assert np.abs(camera.lens - recording.cameras[camera.name].lens)[0] < 5 * report.intrinsics_sigma[0]
+        assert (
+            np.abs(camera.lens - recording.cameras[camera.name].lens)[0]
+            < 5 * report.intrinsics_sigma[0]
+        )
 
 
 def test_series_of_their_own_do_not_place_cameras(same_order):
     boards, _ = same_order
-    with pytest.raises(Refused, match=r"by itself 0\.0. px; record views that all cameras see at once, or a picture"):
+    with pytest.raises(
+        Refused,
+        match=r"by itself 0\.0. px; record views that all cameras see at once, or a picture",
+    ):
         calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX)), BOARD, None)
 
 
@@ -279,6 +320,10 @@ def test_views_that_no_lens_explains_are_refused(recording, rng):
     """A board that bends as it is held: each view another way."""
     boards, rig = recording.seen(SIGMA_PX, rng)
     for view in boards["high"]:
-        view.px[:, 1] += 2.0 * np.sin(BOARD.corners_mm[view.ids, 0] / 20.0 + rng.uniform(0, 2 * np.pi))
-    with pytest.raises(Refused, match=r"camera high: corners are off by .* px an axis .*: the board is not flat"):
+        view.px[:, 1] += 2.0 * np.sin(
+            BOARD.corners_mm[view.ids, 0] / 20.0 + rng.uniform(0, 2 * np.pi)
+        )
+    with pytest.raises(
+        Refused, match=r"camera high: corners are off by .* px an axis .*: the board is not flat"
+    ):
         calibrated(boards, rig)

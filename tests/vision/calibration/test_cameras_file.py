@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.cameras.cameras_file import write_cameras
+from bench.cameras.cameras_toml import write_cameras
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 
 
 @pytest.fixture
@@ -44,7 +44,9 @@ def test_read_is_what_was_written(tmp_path, cameras):
 def test_without_covariance_cameras_are_taken_as_exact(tmp_path, cameras):
     path = tmp_path / "cameras.toml"
     write_cameras(path, cameras)
-    path.write_text("\n".join(line for line in path.read_text().splitlines() if "covariance" not in line))
+    path.write_text(
+        "\n".join(line for line in path.read_text().splitlines() if "covariance" not in line)
+    )
     assert not read_cameras(path).covariance.any()
 
 

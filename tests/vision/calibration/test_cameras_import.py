@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.ladder.board_scenes import BOARD, T_RIG_BOARD, noisy, rig_view, two_cameras
+from tests.studies.accuracy.board_scenes import BOARD, T_RIG_BOARD, noisy, rig_view, two_cameras
 from vision.calibration.cameras_import import import_cameras, place_on_rig
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import log_rotation
 
 ANIPOSE = """
@@ -40,13 +40,18 @@ def test_aniposelib_s_vectors_become_poses(tmp_path):
 def test_caliscope_s_metres_become_millimetres(real):
     made = import_cameras(real / "calibration" / "multi4_b" / "camera_array.toml")
     assert made.names == ("cam_0", "cam_1", "cam_2", "cam_3")
-    np.testing.assert_allclose(made["cam_0"].T_camera_rig[:, 3], [171.25994, -32.34536, 1208.38646], atol=1e-4)
+    np.testing.assert_allclose(
+        made["cam_0"].T_camera_rig[:, 3], [171.25994, -32.34536, 1208.38646], atol=1e-4
+    )
     assert made["cam_3"].lens[0] == 639.8834321530571
 
 
 def test_both_files_of_caliscope_give_the_same_cameras(real):
     folder = real / "calibration" / "multi4_b"
-    one, other = import_cameras(folder / "camera_array.toml"), import_cameras(folder / "config.toml")
+    one, other = (
+        import_cameras(folder / "camera_array.toml"),
+        import_cameras(folder / "config.toml"),
+    )
     for a, b in zip(one, other):
         np.testing.assert_array_equal(a.T_camera_rig, b.T_camera_rig)
 

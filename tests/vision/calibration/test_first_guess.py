@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.ladder.board_scenes import BOARD, SIZE_PX
+from tests.studies.accuracy.board_scenes import BOARD, SIZE_PX
 from vision.boards.corners import Corners
 from vision.calibration.first_guess import board_pose
 from vision.geometry import lens as lens_model

@@ -10,7 +10,7 @@ from vision.calibration.known_lengths import check_known_lengths
 from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
 from vision.calibration.swing import by_swing
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
 
 
@@ -54,7 +54,9 @@ def test_an_exact_board_stays_but_the_alarm_speaks():
 
 
 def test_alarm_names_the_encoder():
-    lines = some_lines(8.0, np.array([0, 0, np.radians(0.5), 0, 0, 0]), across_mm=0.01, turn_rad=2e-4)
+    lines = some_lines(
+        8.0, np.array([0, 0, np.radians(0.5), 0, 0, 0]), across_mm=0.01, turn_rad=2e-4
+    )
     alarm = combine(by_board(np.eye(3, 4), 0.05, 1e-4), by_swing(lines)).alarm
     # The zero is known to 0.003 degrees here; four of those.
     found = float(re.search(r"encoder's zero is off by ([+-][0-9.]+)", alarm)[1])
@@ -63,7 +65,9 @@ def test_alarm_names_the_encoder():
 
 def test_a_narrow_swing_with_a_board_by_ruler_is_doubted_with_the_width_that_would_do():
     ruler = by_board(np.eye(3, 4), 3.0, 0.05)
-    doubt = check_swing_suffices(combine(ruler, by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4))))
+    doubt = check_swing_suffices(
+        combine(ruler, by_swing(some_lines(1.5, across_mm=0.01, turn_rad=5e-4)))
+    )
     assert re.search(r"to 0\.\d{3} mm along the whisker only", doubt)
     needed = float(re.search(r"free strokes of about (\d+) degrees", doubt)[1])
     # A stroke that wide, with frames as close, does.
@@ -73,8 +77,13 @@ def test_a_narrow_swing_with_a_board_by_ruler_is_doubted_with_the_width_that_wou
 
 def test_a_swing_that_tells_less_than_a_ruler_is_refused():
     ruler = by_board(np.eye(3, 4), 3.0, 0.05)
-    with pytest.raises(Refused, match=r"along the whisker; 1 mm is needed: record free strokes of about \d+ degrees"):
-        check_swing_suffices(combine(ruler, by_swing(some_lines(0.6, across_mm=0.05, turn_rad=2e-3))))
+    with pytest.raises(
+        Refused,
+        match=r"along the whisker; 1 mm is needed: record free strokes of about \d+ degrees",
+    ):
+        check_swing_suffices(
+            combine(ruler, by_swing(some_lines(0.6, across_mm=0.05, turn_rad=2e-3)))
+        )
 
 
 def test_too_few_frames_are_refused():
@@ -95,7 +104,9 @@ def test_cameras_follow_the_frame_and_trade_the_shared_error():
     old = rig @ exp_rotation(STEP[:3]).T + STEP[3:]
     np.testing.assert_allclose(moved["a"].project(rig), camera.project(old), atol=1e-9)
     np.testing.assert_allclose(moved.covariance, shared / 4, atol=1e-12)
-    np.testing.assert_allclose(moved.by_placement @ moved.placement @ moved.by_placement.T, shared / 4, atol=1e-12)
+    np.testing.assert_allclose(
+        moved.by_placement @ moved.placement @ moved.by_placement.T, shared / 4, atol=1e-12
+    )
 
 
 def test_a_board_at_the_wrong_scale_is_refused_with_the_factor():

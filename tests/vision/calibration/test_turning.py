@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS
-from vision.calibration.turning import MovingLines, first_rig, moving_lines
-from vision.geometry.errors import Refused
+from vision.calibration.hub_turning import MovingLines, first_rig, moving_lines
+from vision.geometry.refusals import Refused
 from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
 
 T_WORLD_RIG = np.column_stack([exp_rotation(np.array([0.4, -2.0, 0.9])), [30.0, -200.0, 410.0]])
@@ -49,14 +49,18 @@ def test_a_touching_whisker_and_strays_are_left_out():
 
 def test_a_centre_is_found_as_well_as_the_fan_tells():
     rng = np.random.default_rng(3)
-    shifts = [off(first_rig([fan(np.linspace(-20, 0, 21), noise_mm=0.1, rng=rng)]))[0] for _ in range(50)]
+    shifts = [
+        off(first_rig([fan(np.linspace(-20, 0, 21), noise_mm=0.1, rng=rng)]))[0] for _ in range(50)
+    ]
     # Along the whisker 0.1 mm / √21 over the fan's standard deviation of 0.106 rad: 0.21 mm, across a tenth of that.
     assert 0.14 < np.sqrt(np.mean(np.square(shifts))) < 0.28
 
 
 def test_nothing_that_turns_is_refused():
     still = fan(np.linspace(-2, 2, 3))
-    with pytest.raises(Refused, match=r"nothing is seen to turn .*record free strokes of some 10 degrees"):
+    with pytest.raises(
+        Refused, match=r"nothing is seen to turn .*record free strokes of some 10 degrees"
+    ):
         first_rig([still])
 
 
@@ -66,12 +70,16 @@ def test_a_drawn_line_is_found():
     frames = {c.name: {f: drawn(c, m, rng) for f, m in motor.items()} for c in CAMERAS}
     lines = moving_lines(frames, motor, CAMERAS)
     assert len(lines.motor_rad) == len(motor)
-    along = np.column_stack([np.cos(lines.motor_rad), np.sin(lines.motor_rad), np.zeros(len(motor))])
+    along = np.column_stack(
+        [np.cos(lines.motor_rad), np.sin(lines.motor_rad), np.zeros(len(motor))]
+    )
     # A line of 300 px found to a pixel at its ends, by two cameras that see it from one side and triple that.
     assert np.linalg.norm(np.cross(along, lines.direction), axis=1).max() < 3 / 150
     # And to half a pixel of 0.2 mm in its middle, tripled.
     assert np.linalg.norm(np.cross(along, lines.point_mm), axis=1).max() < 0.3
-    assert invert_transform(first_rig([lines]).T_rig_world)[:, 3] == pytest.approx([0, 0, 0], abs=1.5)
+    assert invert_transform(first_rig([lines]).T_rig_world)[:, 3] == pytest.approx(
+        [0, 0, 0], abs=1.5
+    )
 
 
 def drawn(camera, motor_rad, rng):

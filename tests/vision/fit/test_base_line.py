@@ -22,7 +22,9 @@ def a_whisk(step=STEP, touch_deg=9.0, rng=None, sigma=0.02):
     straight = State(np.zeros_like(state.vector), state.arcs_mm)
     seen = with_points(problem, straight, rng, sigma).seen
     away = invert_transform(np.column_stack([exp_rotation(step[:3]), step[3:]]))
-    cameras = Cameras(tuple(replace(c, T_camera_rig=compose(c.T_camera_rig, away)) for c in CAMERAS))
+    cameras = Cameras(
+        tuple(replace(c, T_camera_rig=compose(c.T_camera_rig, away)) for c in CAMERAS)
+    )
     return replace(problem, seen=seen, cameras=cameras), straight
 
 
@@ -43,9 +45,13 @@ def test_the_step_is_found_again():
 @pytest.mark.slow
 def test_noise_scatters_as_each_frame_says(rng):
     """Along the whisker the fan alone decides: its own sigma must be the sampled one."""
-    strokes = [base_lines(p, s, np.zeros((p.size,) * 2)) for p, s in (a_whisk(rng=rng) for _ in range(40))]
+    strokes = [
+        base_lines(p, s, np.zeros((p.size,) * 2)) for p, s in (a_whisk(rng=rng) for _ in range(40))
+    ]
     own = [by_swing(lines).covariance - lines.shared_covariance for lines in strokes]
-    along = np.array([[by_swing(lines).step[3], np.sqrt(c[3, 3])] for lines, c in zip(strokes, own)])
+    along = np.array(
+        [[by_swing(lines).step[3], np.sqrt(c[3, 3])] for lines, c in zip(strokes, own)]
+    )
     # 40 draws: a standard deviation scatters by 11 %; three of these.
     assert np.std(along[:, 0]) == pytest.approx(np.mean(along[:, 1]), rel=0.35)
 
@@ -54,7 +60,9 @@ def test_a_lens_s_own_uncertainty_is_shared_by_all_frames():
     problem, state = a_whisk()
     lens = np.zeros((problem.size,) * 2)
     lens[4, 4] = 0.3**2  # of the rest shape's offset in y
-    shared = [base_lines(problem, state, own).shared_covariance for own in (np.zeros_like(lens), lens)]
+    shared = [
+        base_lines(problem, state, own).shared_covariance for own in (np.zeros_like(lens), lens)
+    ]
     # 0.3 mm across, and along the whisker the half of it by which a radian's turn may change it.
     assert np.trace((shared[1] - shared[0])[3:, 3:]) == pytest.approx(0.09 * (1 + 0.5**2), rel=1e-6)
 

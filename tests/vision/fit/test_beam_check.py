@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from bench.rig.protocol import WhiskerTable
-from tests.ladder.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
-from tests.ladder.scenes import as_problem, draw_scene, line_points
+from tests.studies.accuracy.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
+from tests.studies.accuracy.scenes import as_problem, draw_scene, line_points
 from vision.fit.beam_check import BeamCheck, Compared, _beside, _chance
 from vision.geometry.rods import Wire
 
 
 def checked(seed: int, softness=None, shape="cylinder", given="cylinder") -> BeamCheck:
     """The check of a drawn scene with noisy points and exact cameras; given: the shape that the fit is told."""
-    scene, rng = draw_scene(seed, whisker=WhiskerTable(shape=shape)), np.random.default_rng([seed, 30])
+    scene, rng = (
+        draw_scene(seed, whisker=WhiskerTable(shape=shape)),
+        np.random.default_rng([seed, 30]),
+    )
     seen = line_points(scene, rng)
     if softness is not None:
         seen = broken(scene, seen, softness)
@@ -28,7 +31,9 @@ def test_a_wire_that_is_a_beam_is_none_by_chance_alone(seed):
         assert abs(moved.spline - moved.beam) < 4 * moved.difference_sigma
 
 
-@pytest.mark.parametrize("seed, softness", [(3, softer_outside(1.5)), (4, joint(30.0, 5.0)), (3, loose_clamp(3.0))])
+@pytest.mark.parametrize(
+    "seed, softness", [(3, softer_outside(1.5)), (4, joint(30.0, 5.0)), (3, loose_clamp(3.0))]
+)
 def test_what_gives_way_is_told_where_it_moves_the_truth(seed, softness):
     """Rods that are softer outside, jointed, or loose in the clamp move touch or slip by over a sigma; the spline
     brings back what the whole rod gave, but for its noise (four sigma) and its few knots (a third of the move)."""
@@ -60,17 +65,25 @@ def test_little_is_no_alarm_however_sure():
 def test_lines_that_tell_nothing_are_no_departure():
     """No point lies on a bent wire: nothing is told, and nothing breaks."""
     own, nothing = np.eye(3), np.zeros((3, 2))
-    found, spread, _ = _beside(own, np.zeros((1, 3)), nothing, np.ones(3), np.zeros((3, 1)), np.zeros((1, 1)))
+    found, spread, _ = _beside(
+        own, np.zeros((1, 3)), nothing, np.ones(3), np.zeros((3, 1)), np.zeros((1, 1))
+    )
     assert _chance(found, spread) == 1.0
     assert np.isnan(_chance(found, np.nan * spread))
 
 
 def test_one_step_is_the_joint_fit(rng):
     """A linear problem solved without and then with more columns is the problem solved at once."""
-    own, rows, residual = rng.standard_normal((40, 3)), rng.standard_normal((40, 2)), rng.standard_normal(40)
+    own, rows, residual = (
+        rng.standard_normal((40, 3)),
+        rng.standard_normal((40, 2)),
+        rng.standard_normal(40),
+    )
     residual = residual - own @ np.linalg.lstsq(own, residual)[0]
     prior = np.zeros((1, 3))
-    found, spread, follows = _beside(own, prior, rows, residual, np.zeros((40, 1)), np.zeros((1, 1)))
+    found, spread, follows = _beside(
+        own, prior, rows, residual, np.zeros((40, 1)), np.zeros((1, 1))
+    )
     whole = np.hstack([own, rows])
     at_once = np.linalg.lstsq(whole, -residual)[0]
     # the check's own wide prior (50) pulls by 1 in 40 * 50² = 1e-5 of what is found

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
+from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit.exposure import slip_in_exposure
 from vision.fit.problem import bar_axis, curves_of
 from vision.fit.quantities import jacobians
@@ -33,9 +33,20 @@ def slipped_px(problem, state, slip, frame):
         vector[own] += change
         curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=3)
         axis = bar_axis(problem, vector)
-        lines = [np.sum(one.points.normal * problem.cameras.cameras[one.camera].project(
-            curves.at(one.points.place)[0][frame]), axis=1) for one in problem.seen if one.frame == frame]
-        return clearance(curves, BarAxis(axis.point_mm, axis.direction), arcs)[0][frame], np.concatenate(lines)
+        lines = [
+            np.sum(
+                one.points.normal
+                * problem.cameras.cameras[one.camera].project(
+                    curves.at(one.points.place)[0][frame]
+                ),
+                axis=1,
+            )
+            for one in problem.seen
+            if one.frame == frame
+        ]
+        return clearance(curves, BarAxis(axis.point_mm, axis.direction), arcs)[0][
+            frame
+        ], np.concatenate(lines)
 
     here, moved = gap_and_lines(np.zeros(2)), [gap_and_lines(step * one) for one in np.eye(2)]
     away = np.array([(one[0] - here[0]) / step for one in moved])
@@ -51,7 +62,9 @@ def test_the_frame_that_jumped_is_told_and_its_slip_alone_is_less_sure(fitted, r
     px_per_mm, seen = slipped_px(problem, state, slip, frame), []
     for one in problem.seen:
         count = len(one.points)
-        above = 0.3 + SIGMA_PX2 * rng.standard_normal(count)  # all are as blurred as the motor's speed makes them
+        above = 0.3 + SIGMA_PX2 * rng.standard_normal(
+            count
+        )  # all are as blurred as the motor's speed makes them
         if one.frame == frame:
             mine, px_per_mm = np.split(px_per_mm, [count])
             above += VARIANCE_MM2 * mine**2

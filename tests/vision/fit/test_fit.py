@@ -1,6 +1,5 @@
 """The reprojection fit against scenes made from its own model: exact without noise, gradients, stated scatter."""
 
-
 import numpy as np
 import pytest
 
@@ -27,7 +26,9 @@ def test_noiseless_points_give_the_model_back_to_a_nanometre():
     for name in ("d_x", "x", "y", "z"):
         assert here.whisk[name] == pytest.approx(true.whisk[name], abs=1e-6)
     assert here.whisk["touch"] == pytest.approx(true.whisk["touch"], abs=1e-8)
-    assert np.allclose(here.frame["slip"][problem.touching], true.frame["slip"][problem.touching], atol=1e-6)
+    assert np.allclose(
+        here.frame["slip"][problem.touching], true.frame["slip"][problem.touching], atol=1e-6
+    )
 
 
 def test_jacobian_is_the_derivative_of_the_residual(rng):
@@ -38,8 +39,10 @@ def test_jacobian_is_the_derivative_of_the_residual(rng):
     linear, _ = linearise(problem, state)
     for k in range(problem.size):
         step = (1e-5 if k >= problem.first_bend or 2 <= k < 4 else 1e-3) * np.eye(problem.size)[k]
-        ahead, behind = (linearise(problem, State(state.vector + s * step, state.arcs_mm))[0].residual
-                         for s in (1, -1))
+        ahead, behind = (
+            linearise(problem, State(state.vector + s * step, state.arcs_mm))[0].residual
+            for s in (1, -1)
+        )
         column = (ahead - behind) / (2 * np.max(step))
         scale = max(1.0, np.max(np.abs(column)))
         assert np.allclose(linear.jacobian[:, k], column, atol=3e-3 * scale)
@@ -92,7 +95,9 @@ def test_slip_is_positive_up_a_bar_that_leans_forward():
 
 
 def test_a_bent_wire_keeps_its_length():
-    curves = centrelines(np.zeros((2, 4)), np.array([-0.3, 0.1]), np.array(60.0), np.array(0.05), WIRE)
+    curves = centrelines(
+        np.zeros((2, 4)), np.array([-0.3, 0.1]), np.array(60.0), np.array(0.05), WIRE
+    )
     steps = np.linalg.norm(np.diff(curves.points_mm, axis=0), axis=1)
     # a chord of an arc of 1.25 mm bent by 0.01 rad is 5e-6 of itself short
     assert steps.sum() == pytest.approx(100.0, abs=1e-3)

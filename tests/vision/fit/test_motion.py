@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import begun, scene, with_points
+from vision.fit.bend_onset import Onset
 from vision.fit.motion import Gives, Motion, Told, Yielding, between
-from vision.fit.onset import Onset
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import measure
 from vision.fit.solve import linearise, solve
@@ -29,7 +29,9 @@ def giving():
     is said 0.1° too early."""
     standing, state = scene(frames=6)
     said = Gives(float(first_touch(standing, state.vector).motor_rad) - np.radians(0.1), 0.1)
-    problem, truth = scene(frames=6, motion=Yielding(said, standing.motor_rad, standing.axis.direction))
+    problem, truth = scene(
+        frames=6, motion=Yielding(said, standing.motor_rad, standing.axis.direction)
+    )
     return replace(problem, onset=Onset(said.touch_rad, 1e-6)), truth
 
 
@@ -52,7 +54,9 @@ def test_a_bar_that_gives_way_stands_until_touch():
     touch = first_touch(problem, truth.vector).motor_rad
     assert not shift[problem.motor_rad < touch].any()
     assert shift[problem.motor_rad > touch].any(axis=1).all()
-    assert problem.motion.shift_mm(problem.motion.values(shift))[-1] == pytest.approx(shift[-1], abs=0.02)
+    assert problem.motion.shift_mm(problem.motion.values(shift))[-1] == pytest.approx(
+        shift[-1], abs=0.02
+    )
 
 
 def test_a_motion_is_found_with_the_rest():
@@ -90,10 +94,14 @@ def test_jacobian_is_the_derivative_of_the_residual(rng, made):
     linear, _ = linearise(problem, state)
     for k in [0, 2, *range(problem.size)[problem.bar_moves], problem.first_bend]:
         step = (1e-5 if k in (2, problem.first_bend) else 1e-3) * np.eye(problem.size)[k]
-        ahead, behind = (linearise(problem, State(state.vector + s * step, state.arcs_mm))[0].residual
-                         for s in (1, -1))  # fmt: skip
+        ahead, behind = (
+            linearise(problem, State(state.vector + s * step, state.arcs_mm))[0].residual
+            for s in (1, -1)
+        )
         column = (ahead - behind) / (2 * np.max(step))
-        assert np.allclose(linear.jacobian[:, k], column, atol=3e-3 * max(1.0, np.max(np.abs(column))))
+        assert np.allclose(
+            linear.jacobian[:, k], column, atol=3e-3 * max(1.0, np.max(np.abs(column)))
+        )
 
 
 def test_between_frames_the_bar_goes_as_the_motor_does():

@@ -6,23 +6,27 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS, begun, camera, scene, with_points
+from vision.fit.covariance import uncertainty
 from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
 from vision.fit.quantities import jacobians
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
-from vision.fit.uncertainty import uncertainty
 from vision.geometry.camera import Cameras
 
 THREE = Cameras((*CAMERAS.cameras, camera("three", (-80, -250, 200))))
 # The first two stand so near to each other that by themselves they hardly know how far away wire and bar are.
-NEAR = Cameras((CAMERAS.cameras[0], camera("near", (60, -190, 330)), camera("three", (-80, -250, 200))))
+NEAR = Cameras(
+    (CAMERAS.cameras[0], camera("near", (60, -190, 330)), camera("three", (-80, -250, 200)))
+)
 
 
 def left_out(rng, cameras=THREE, off_px=0.0):
     """Problem, state, quantities and the fit without each camera; off_px: shift of all lines of the last."""
     problem, true = scene()
     problem = with_points(replace(problem, cameras=cameras), _of(problem, true, cameras), rng)
-    seen = [_shifted(one, off_px) if one.camera == len(cameras) - 1 else one for one in problem.seen]
+    seen = [
+        _shifted(one, off_px) if one.camera == len(cameras) - 1 else one for one in problem.seen
+    ]
     problem = replace(problem, seen=seen)
     state, _ = solve(problem, begun(problem, _of(problem, true, cameras)))
     problem = inflated_by_residuals(problem, state)
@@ -60,7 +64,9 @@ def test_the_step_is_what_a_fit_without_the_camera_finds(rng):
     problem, state, _, measured, _, found = left_out(rng)
     alone, _ = solve(replace(problem, seen=[one for one in problem.seen if one.camera != 2]), state)
     there, _ = jacobians(problem, alone)
-    moved = np.array([there.whisk[name] - measured.whisk[name] for name in ("d_x", "touch", "beta")])
+    moved = np.array(
+        [there.whisk[name] - measured.whisk[name] for name in ("d_x", "touch", "beta")]
+    )
     assert np.all(np.abs(moved - found[2].moved[:3]) < 0.05 * found[2].sigma[:3])
 
 
@@ -72,7 +78,9 @@ def test_a_camera_that_is_off_widens_the_sigmas_and_is_told(rng):
     assert "px beside where the others have them (chance" in said
     whole = fitted.covariance + covariance_of(found, problem.size)
     gradient, error = by.whisk["d_x"], measured.whisk["d_x"] - 60.0
-    before, after = (float(np.sqrt(gradient @ one @ gradient)) for one in (fitted.covariance, whole))
+    before, after = (
+        float(np.sqrt(gradient @ one @ gradient)) for one in (fitted.covariance, whole)
+    )
     assert abs(error) > 3.0 * before
     assert abs(error) < 3.0 * after
 

@@ -5,14 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.cameras.cameras_file import write_cameras
+from bench.cameras.cameras_toml import write_cameras
 from bench.rig.protocol import PicturesTable
-from tests.ladder.coverage import SCALES
-from tests.ladder.scenes import Sigmas, as_problem, begin, calibrated, draw_scene, given, line_points
+from tests.studies.accuracy.coverage import SCALES
+from tests.studies.accuracy.scenes import (
+    Sigmas,
+    as_problem,
+    begin,
+    calibrated,
+    draw_scene,
+    given,
+    line_points,
+)
 from vision.calibration.cameras_file import read_cameras
+from vision.fit.covariance import uncertainty, variance_by_cause
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
-from vision.fit.uncertainty import uncertainty, variance_by_cause
 from vision.geometry.camera import Cameras
 
 
@@ -38,13 +46,17 @@ def test_without_the_placement_the_covariance_is_that_of_an_exact_rig_board(loos
     scale = np.sqrt(np.diag(loose.covariance))
     assert not exact.placement.any()
     np.testing.assert_allclose(
-        own_covariance(loose) / np.outer(scale, scale), exact.covariance / np.outer(scale, scale), atol=0.02
+        own_covariance(loose) / np.outer(scale, scale),
+        exact.covariance / np.outer(scale, scale),
+        atol=0.02,
     )
 
 
 def test_files_and_subsets_keep_it(loose, tmp_path):
     write_cameras(tmp_path / "cameras.toml", loose)
-    np.testing.assert_array_equal(read_cameras(tmp_path / "cameras.toml").placement, loose.placement)
+    np.testing.assert_array_equal(
+        read_cameras(tmp_path / "cameras.toml").placement, loose.placement
+    )
     np.testing.assert_array_equal(loose.subset(loose.names[:1]).placement, loose.placement)
     write_cameras(tmp_path / "old.toml", replace(loose, placement=None))
     assert read_cameras(tmp_path / "old.toml").placement is None
@@ -60,16 +72,22 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     def budget(cameras):
         asked = replace(problem, cameras=cameras)
         known = uncertainty(asked, state, answer)
-        return variance_by_cause(asked, state, known, gradient), float(gradient @ known.covariance @ gradient)
+        return variance_by_cause(asked, state, known, gradient), float(
+            gradient @ known.covariance @ gradient
+        )
 
     told, whole = budget(loose)
     untold, _ = budget(replace(loose, placement=None))
     without, _ = budget(Cameras(loose.cameras, own_covariance(loose)))
     assert sum(told.values()) == pytest.approx(whole, rel=1e-6)
     assert told["cameras"] == pytest.approx(without["cameras"], rel=1e-6)
-    assert np.isnan(untold["placement"]) and untold["cameras"] == pytest.approx(told["cameras"] + told["placement"])
+    assert np.isnan(untold["placement"]) and untold["cameras"] == pytest.approx(
+        told["cameras"] + told["placement"]
+    )
     # all cameras moved together move bar and whisker alike: when they touch stays, to a fiftieth of the board's 0.1°
-    touch = variance_by_cause(problem, state, uncertainty(problem, state, answer), by.whisk["touch"])["placement"]
+    touch = variance_by_cause(
+        problem, state, uncertainty(problem, state, answer), by.whisk["touch"]
+    )["placement"]
     assert np.sqrt(touch) < 0.02 * np.radians(0.1)
     # a board known to 0.1 mm shifts d_x by about as much, its turns on top
     assert 0.05 < np.sqrt(told["placement"]) < 0.3

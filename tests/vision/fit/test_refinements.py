@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 from bench.rig.protocol import MotorTable, PicturesTable, TrialTable, WhiskerTable
-from tests.ladder.coverage import SCALES
-from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
+from tests.studies.accuracy.coverage import SCALES
+from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit import problem as model
 from vision.fit import solve
 from vision.fit.problem import Problem
@@ -19,7 +19,7 @@ from vision.geometry import centreline
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
 from vision.geometry.rods import Wire
-from vision.lines.one_sided import SeenWidth, WireAppearance
+from vision.wire.one_sided import SeenWidth, WireAppearance
 
 WHISKER = {"sag_mm": 0.3, "set_y_mm": 0.5, "set_z_mm": -0.4}
 
@@ -40,8 +40,10 @@ def fitted(problem: Problem) -> Fit:
 
 def moved(before: Fit, after: Fit) -> np.ndarray:
     """d_x, touch and slip at the end of the stroke, one less the other."""
-    values = ([f.measured.whisk["d_x"], f.measured.whisk["touch"], f.measured.frame["slip"][f.last]]
-              for f in (after, before))  # fmt: skip
+    values = (
+        [f.measured.whisk["d_x"], f.measured.whisk["touch"], f.measured.frame["slip"][f.last]]
+        for f in (after, before)
+    )
     return np.subtract(*values)
 
 
@@ -58,8 +60,10 @@ def sigmas(fit: Fit) -> np.ndarray:
 
 def small_angles(rest_mm, bend_rad, contact_mm, motor_rad, wire, _pull=0.0) -> Curves:
     """Centrelines whose slopes are no sines and whose arcs are distances."""
-    true, straight = (centreline.centrelines(rest_mm, bend, contact_mm, motor_rad, wire)
-                      for bend in (bend_rad, np.zeros_like(bend_rad)))  # fmt: skip
+    true, straight = (
+        centreline.centrelines(rest_mm, bend, contact_mm, motor_rad, wire)
+        for bend in (bend_rad, np.zeros_like(bend_rad))
+    )
     growth = centreline.tangent_growth(true.arc_mm, np.asarray(contact_mm)[..., None], wire)
     turn = np.swapaxes(centreline.rotation_z(motor_rad), -1, -2)
     tangents = straight.tangents @ np.swapaxes(turn, -1, -2)
@@ -74,7 +78,9 @@ def test_large_bending_is_what_a_fit_of_small_angles_differs_by(monkeypatch):
     fit = drawn(3)
     predicted = told(fit, "large bending")
     monkeypatch.setattr(model, "centrelines", small_angles)
-    np.testing.assert_allclose(predicted, moved(fit, fitted(fit.problem)), atol=0.01 * sigmas(fit).max(), rtol=0.2)
+    np.testing.assert_allclose(
+        predicted, moved(fit, fitted(fit.problem)), atol=0.01 * sigmas(fit).max(), rtol=0.2
+    )
 
 
 def test_sag_and_set_are_what_a_straight_whisker_differs_by(monkeypatch):
@@ -129,7 +135,10 @@ def test_light_from_one_side_moves_the_wire_in_its_camera_alone():
     half = WireAppearance(1.0, SeenWidth(2.0, 5.0, 0.5))
     assert np.any(told(fit, "one-sided light", {name: half}) != 0)
     both = WireAppearance(1.0, SeenWidth(5.0, 5.0, 0.5))
-    assert left_out(fit, {name: both})["one-sided light"].why == "every camera sees both edges of the wire"
+    assert (
+        left_out(fit, {name: both})["one-sided light"].why
+        == "every camera sees both edges of the wire"
+    )
 
 
 def test_lens_terms_answer_by_the_calibration_s_covariance():

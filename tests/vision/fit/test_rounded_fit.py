@@ -37,9 +37,9 @@ def scene(request):
 def off(problem, state):
     """A start that knows the bends to a fifth, the object to half a millimetre and 0.01 rad, and no rest shape."""
     vector = state.vector.copy()
-    vector[:problem.first_bend] = 0.0
+    vector[: problem.first_bend] = 0.0
     vector[:4], vector[problem.bar_moves.start] = [0.5, -0.4, 0.01, -0.01], 0.5
-    vector[problem.first_bend:] *= 0.8
+    vector[problem.first_bend :] *= 0.8
     return State(vector, state.arcs_mm)
 
 
@@ -52,8 +52,12 @@ def test_without_noise_touch_slope_and_slip_are_exact(scene):
     assert there.whisk["touch"] == pytest.approx(np.radians(2.3), abs=0.01)
     for name, tolerance in {"touch": 2e-5, "d_x": 3e-3, "beta": 1e-3}.items():
         assert here.whisk[name] == pytest.approx(there.whisk[name], abs=tolerance)
-    np.testing.assert_allclose(here.frame["slip"][problem.touching], there.frame["slip"][problem.touching], atol=1e-3)
-    np.testing.assert_allclose(bar_axis(problem, found.vector).point_mm, problem.axis.point_mm, atol=0.02)
+    np.testing.assert_allclose(
+        here.frame["slip"][problem.touching], there.frame["slip"][problem.touching], atol=1e-3
+    )
+    np.testing.assert_allclose(
+        bar_axis(problem, found.vector).point_mm, problem.axis.point_mm, atol=0.02
+    )
 
 
 def test_derivatives_of_the_outline_are_those_of_differences(scene):
@@ -63,8 +67,13 @@ def test_derivatives_of_the_outline_are_those_of_differences(scene):
     jacobian = linear_at(problem, truth).jacobian
     for k in (0, 1, 2, 3, problem.bar_moves.start, problem.bar_moves.start + 1):
         step = 1e-4 * (np.arange(problem.size) == k)
-        ahead, behind = (linear_at(problem, State(truth.vector + way * step, truth.arcs_mm)).residual
-                         for way in (1, -1))
+        ahead, behind = (
+            linear_at(problem, State(truth.vector + way * step, truth.arcs_mm)).residual
+            for way in (1, -1)
+        )
         count = np.sum(linear_at(problem, truth).is_point)
-        np.testing.assert_allclose(jacobian[rows, k][:count // 4], ((ahead - behind) / 2e-4)[rows][:count // 4],
-                                   atol=2e-2 * max(np.abs(jacobian[:, k]).max(), 1e-9))
+        np.testing.assert_allclose(
+            jacobian[rows, k][: count // 4],
+            ((ahead - behind) / 2e-4)[rows][: count // 4],
+            atol=2e-2 * max(np.abs(jacobian[:, k]).max(), 1e-9),
+        )

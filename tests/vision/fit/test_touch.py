@@ -10,7 +10,9 @@ MOTOR = np.radians(np.arange(0.8, 6.5, 0.7))
 def bends(touch_deg: float, noise_deg: float, rng) -> np.ndarray:
     """Bends (f, 2) that grow by 1.3 degrees a degree from touch on, with noise."""
     size = 1.3 * np.maximum(MOTOR - np.radians(touch_deg), 0.0)
-    return size[:, None] * [-0.8, 0.6] + np.radians(noise_deg) * rng.standard_normal((len(MOTOR), 2))
+    return size[:, None] * [-0.8, 0.6] + np.radians(noise_deg) * rng.standard_normal(
+        (len(MOTOR), 2)
+    )
 
 
 def test_noise_in_the_first_frames_is_no_touch():
@@ -32,7 +34,9 @@ def test_bends_tell_more_than_a_touch_known_to_no_frame():
     """Frames 0.7 degrees apart: three sigma are a frame at 0.23 degrees. However near each other frames are, a bend is
     sure but a quarter of a degree after touch."""
     assert bends_tell_more(MOTOR, np.radians(0.24)) and not bends_tell_more(MOTOR, np.radians(0.23))
-    assert not bends_tell_more(MOTOR / 100.0, np.radians(0.08)) and bends_tell_more(MOTOR / 100.0, np.radians(0.09))
+    assert not bends_tell_more(MOTOR / 100.0, np.radians(0.08)) and bends_tell_more(
+        MOTOR / 100.0, np.radians(0.09)
+    )
 
 
 def test_a_stroke_begins_free_where_its_second_frame_comes_before_touch():

@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.ladder.scenes import GROUP, as_problem, begin, correlated_noise, draw_scene, line_points
+from tests.studies.accuracy.scenes import (
+    GROUP,
+    as_problem,
+    begin,
+    correlated_noise,
+    draw_scene,
+    line_points,
+)
+from vision.fit.covariance import uncertainty
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve, weighted_jacobian
-from vision.fit.uncertainty import uncertainty
 
 ALIKE = 0.6  # with the next point, 0.36 with the one after …: (1 + 0.6)/(1 - 0.6) times the variance of a mean
 
@@ -53,7 +60,7 @@ def test_what_changes_along_the_wire_is_told_better(fitted):
     problem, state, answer = fitted
     ratio = np.sqrt(np.diag(uncertainty(problem, state, answer).noise) / np.diag(answer))
     assert np.all(ratio < 1.01)
-    assert np.median(ratio[problem.first_bend:]) < 0.98
+    assert np.median(ratio[problem.first_bend :]) < 0.98
 
 
 @pytest.mark.parametrize("group", [1, GROUP])
@@ -65,13 +72,21 @@ def test_what_neighbours_share_is_measured(group):
     scene = draw_scene(0)
     rng = np.random.default_rng(3)
     exact = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
-    problem = replace(exact, seen=[_with_noise(seen, group, rng) if seen.frame >= 0 else seen for seen in exact.seen])
+    problem = replace(
+        exact,
+        seen=[_with_noise(seen, group, rng) if seen.frame >= 0 else seen for seen in exact.seen],
+    )
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
     wider = [(1.0 + alike) / (1.0 - alike) for alike in inflated_by_residuals(problem, state).alike]
-    assert np.mean(wider) == pytest.approx({1: 1.0, GROUP: 0.8 * GROUP}[group], abs={1: 0.3, GROUP: 0.8}[group])
+    assert np.mean(wider) == pytest.approx(
+        {1: 1.0, GROUP: 0.8 * GROUP}[group], abs={1: 0.3, GROUP: 0.8}[group]
+    )
 
 
 def _with_noise(seen, group: int, rng):
     points = seen.points
     off = correlated_noise(len(points), rng) if group == GROUP else rng.standard_normal(len(points))
-    return replace(seen, points=replace(points, px=points.px + (points.sigma_px * off)[:, None] * points.normal))
+    return replace(
+        seen,
+        points=replace(points, px=points.px + (points.sigma_px * off)[:, None] * points.normal),
+    )

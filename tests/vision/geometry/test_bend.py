@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Bent, Elastica
-from bench.rig.rod import Rod
 from vision.geometry.centreline import one_curve
 from vision.geometry.rods import Wire
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from bench.rig.bar import Bar, turned
-from bench.rig.rounded import Cone, Ring, Sphere
+from bench.rig.round_objects import Cone, Ring, Sphere
 from tests.scenes.model_scenes import CAMERAS
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import bar_at, clearance, closest_arc
-from vision.geometry.errors import Refused
 from vision.geometry.grazing import sights_beside
+from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar as Thick
 from vision.geometry.rounded import Form, Rounded
 
@@ -21,14 +21,19 @@ def placed(radius_mm):
     return Bar.placed(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
-RING, SPHERE = Ring.bent(placed(3.0), SPOT, 25.0), Sphere(placed(15.0).point_mm, placed(15.0).axis, 15.0)
+RING, SPHERE = (
+    Ring.bent(placed(3.0), SPOT, 25.0),
+    Sphere(placed(15.0).point_mm, placed(15.0).axis, 15.0),
+)
 CONE = Cone.narrowing(placed(6.0), SPOT, 0.3)
 THINGS = [
     (RING, Rounded(RING.point_mm, RING.axis, Form("ring", 50.0), SPOT), 3.0),
     (SPHERE, Rounded(SPHERE.point_mm, SPHERE.axis, Form("sphere"), SPOT), 15.0),
     (CONE, Rounded(CONE.tip_mm, CONE.axis, Form("cone", half_angle_rad=0.3), SPOT), 0.0),
 ]
-each = pytest.mark.parametrize(("thing", "axis", "radius_mm"), THINGS, ids=["ring", "sphere", "cone"])
+each = pytest.mark.parametrize(
+    ("thing", "axis", "radius_mm"), THINGS, ids=["ring", "sphere", "cone"]
+)
 
 
 @each
@@ -36,7 +41,9 @@ def test_distance_and_slope_are_those_of_the_rig(thing, axis, radius_mm):
     points = SPOT + np.random.default_rng(1).normal(size=(20, 3))
     outside, _, _ = axis.outside_mm(points)
     np.testing.assert_allclose(outside - radius_mm, thing.outside_mm(points), atol=1e-10)
-    np.testing.assert_allclose(bar_at(axis, points).direction, [thing.axis_at(p) for p in points], atol=1e-12)
+    np.testing.assert_allclose(
+        bar_at(axis, points).direction, [thing.axis_at(p) for p in points], atol=1e-12
+    )
 
 
 @each
@@ -45,7 +52,9 @@ def test_sights_graze_the_outline_and_nothing_else_is_as_near(thing, axis, radiu
     camera = CAMERAS.cameras[0]
     points, normals = (of.reshape(-1, 3) for of in axis.limb(camera.centre_mm, radius_mm, 15.0, 9))
     np.testing.assert_allclose(thing.outside_mm(points), 0.0, atol=1e-9)
-    np.testing.assert_allclose(np.sum((points - camera.centre_mm) * normals, axis=1), 0.0, atol=1e-9)
+    np.testing.assert_allclose(
+        np.sum((points - camera.centre_mm) * normals, axis=1), 0.0, atol=1e-9
+    )
     far = np.linalg.norm(points - camera.centre_mm, axis=1)
     for away_mm in (0.0, 0.1):
         near = sights_beside(camera, axis, camera.project(points + away_mm * normals), far + 1.0)
@@ -69,9 +78,13 @@ def test_a_wire_is_nearest_where_none_of_its_points_is_nearer(thing, axis, radiu
 def test_a_ring_hides_its_far_side_and_a_sphere_nothing():
     _, ring, radius_mm = THINGS[0]
     edge_on = ring.point_mm + 300.0 * (SPOT - ring.point_mm) / np.linalg.norm(SPOT - ring.point_mm)
-    far_side = ring.point_mm - (25.0 + radius_mm + 0.1) * (SPOT - ring.point_mm) / np.linalg.norm(SPOT - ring.point_mm)
+    far_side = ring.point_mm - (25.0 + radius_mm + 0.1) * (SPOT - ring.point_mm) / np.linalg.norm(
+        SPOT - ring.point_mm
+    )
     assert ring.hides_itself(edge_on, far_side[None], radius_mm)[0]
-    assert not ring.hides_itself(ring.point_mm + 300.0 * ring.direction, far_side[None], radius_mm)[0]
+    assert not ring.hides_itself(ring.point_mm + 300.0 * ring.direction, far_side[None], radius_mm)[
+        0
+    ]
     assert not THINGS[1][1].hides_itself(edge_on, far_side[None], 15.0)[0]
 
 
@@ -80,12 +93,15 @@ def test_no_outline_from_before_the_tip():
     assert np.all(np.isnan(cone.limb(cone.point_mm + 200.0 * cone.direction, 0.0, 15.0, 5)[0]))
 
 
-@pytest.mark.parametrize(("thick_mm", "told"), [
-    (6.0, {"shape": "ring", "ring_diameter_mm": 5.0}),
-    (6.0, {"shape": "ring"}),
-    (0.0, {"shape": "sphere"}),
-    (0.0, {"shape": "cone", "half_angle_rad": 0.0}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("thick_mm", "told"),
+    [
+        (6.0, {"shape": "ring", "ring_diameter_mm": 5.0}),
+        (6.0, {"shape": "ring"}),
+        (0.0, {"shape": "sphere"}),
+        (0.0, {"shape": "cone", "half_angle_rad": 0.0}),
+    ],
+)
 def test_objects_that_cannot_be_are_refused(thick_mm, told):
     with pytest.raises(Refused):
         Thick(thick_mm, 0.0, Form(**told))

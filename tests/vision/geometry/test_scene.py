@@ -8,7 +8,7 @@ import pytest
 
 from vision.geometry.board import Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Wire
 from vision.geometry.rotation import exp_rotation
 
@@ -95,7 +95,9 @@ def test_board_corners_are_opencv_s():
 
 def test_wire_tapers_only_as_a_cone():
     assert Wire("cylinder", 100, 1).radius_mm(60) == 0.5
-    np.testing.assert_allclose(Wire("cone", 100, 1).radius_mm(np.array([0, 50, 100, 120])), [0.5, 0.25, 0, 0])
+    np.testing.assert_allclose(
+        Wire("cone", 100, 1).radius_mm(np.array([0, 50, 100, 120])), [0.5, 0.25, 0, 0]
+    )
 
 
 @pytest.mark.parametrize(

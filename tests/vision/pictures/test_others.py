@@ -2,12 +2,16 @@
 
 import numpy as np
 
-from vision.lines.bands import cut_pieces, read_band
 from vision.pictures.others import BESIDE_ROD_PX, RodLines, covered
 from vision.pictures.pixel_noise import Noise
+from vision.wire.bands import cut_pieces, read_band
 
 LINE = np.stack([np.linspace(10.0, 90.0, 9), np.linspace(20.0, 40.0, 9)], axis=1)
-RODS = {"other": RodLines(np.array([0, 2]), np.stack([LINE, LINE + np.array([0.0, 30.0])]), np.array([2.0, 3.5]))}
+RODS = {
+    "other": RodLines(
+        np.array([0, 2]), np.stack([LINE, LINE + np.array([0.0, 30.0])]), np.array([2.0, 3.5])
+    )
+}
 
 
 def test_what_lies_near_a_line_is_covered_and_no_more():
@@ -47,7 +51,9 @@ def test_hidden_pixels_weigh_nothing_and_a_piece_that_lacks_its_rod_is_none():
     hidden = np.zeros(grey.shape, bool)
     hidden[:14, :] = True  # beside the rod, seven pixels away
     hidden[:, 30:33] = True  # across it
-    bands = [read_band(grey, grey, curve, place, np.full(50, 2.0), 9, mask) for mask in (None, hidden)]
+    bands = [
+        read_band(grey, grey, curve, place, np.full(50, 2.0), 9, mask) for mask in (None, hidden)
+    ]
     whole, lacking = (cut_pieces([band], 10, Noise(0.0, 1.0)) for band in bands)
     assert (whole.weight > 0).all() and whole.show_rod(3.0).all()
     assert (lacking.weight == 0).sum() == hidden[11:30, 5:55].sum()

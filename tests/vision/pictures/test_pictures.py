@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.pictures.files import natural_order, read_picture
 from vision.pictures.frames import Frames
 
@@ -88,7 +88,13 @@ def test_pages_of_a_tiff_stack_are_frames(tmp_path, dtype):
 def test_natural_order(tmp_path):
     names = ["f10.png", "f9.png", "f1.png", "g2.png", "f010b.png"]
     in_order = sorted((tmp_path / name for name in names), key=natural_order)
-    assert [path.name for path in in_order] == ["f1.png", "f9.png", "f10.png", "f010b.png", "g2.png"]
+    assert [path.name for path in in_order] == [
+        "f1.png",
+        "f9.png",
+        "f10.png",
+        "f010b.png",
+        "g2.png",
+    ]
 
 
 def test_what_is_no_picture_is_no_frame(tmp_path):
@@ -137,7 +143,9 @@ def test_a_picture_cut_short_is_none_in_its_place(tmp_path, suffix, share):
 def test_another_size_is_refused(tmp_path):
     folder = write_folder(tmp_path / "high", ".png")
     cv2.imwrite(str(folder / "img_2.png"), np.zeros((50, 60), np.uint8))
-    with pytest.raises(Refused, match=r"frame 2 of high is 60 x 50 px, the others are 322 x 242 px"):
+    with pytest.raises(
+        Refused, match=r"frame 2 of high is 60 x 50 px, the others are 322 x 242 px"
+    ):
         list(Frames.open(folder).read())
 
 
@@ -153,7 +161,9 @@ def test_lossless_video_is_read_exactly(tmp_path):
     assert (frames.count, frames.decoded_count, frames.size_px) == (12, 12, (WIDTH, HEIGHT))
     for index, grey in frames.read():
         np.testing.assert_array_equal(grey, ramp(index))
-    np.testing.assert_allclose(frames.times_s, np.arange(12) / 30, atol=5.1e-4)  # the container rounds to 1 ms
+    np.testing.assert_allclose(
+        frames.times_s, np.arange(12) / 30, atol=5.1e-4
+    )  # the container rounds to 1 ms
 
 
 def test_sixteen_bit_video_stays_sixteen(tmp_path):
@@ -170,7 +180,9 @@ def test_lossy_video_is_its_luma_as_stored(tmp_path, name, codec, first, last):
     assert (frames.count, frames.size_px) == (12, (WIDTH, HEIGHT))
     for index, grey in frames.read(5, 7):
         off = grey - (first + (last - first) / 255.0 * ramp(index))
-        assert np.abs(np.median(off)) < 1.0 and np.quantile(np.abs(off), 0.9) <= 3.0  # compression, no other range
+        assert (
+            np.abs(np.median(off)) < 1.0 and np.quantile(np.abs(off), 0.9) <= 3.0
+        )  # compression, no other range
 
 
 def test_reading_from_the_middle_of_a_video(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 from tests.scenes.model_scenes import CAMERAS
 from vision.geometry.camera import Cameras
-from vision.pictures.scale import full_px, shrunk_cameras, shrunk_picture
+from vision.pictures.pyramid import full_px, shrunk_cameras, shrunk_picture
 
 
 def test_a_shrunk_camera_sees_the_same_places():
@@ -19,11 +19,19 @@ def test_its_covariance_is_that_of_smaller_pixels():
     size = len(CAMERAS) * 15
     covariance = np.diag(np.full(size, 9.0))
     small = np.diag(shrunk_cameras(Cameras(CAMERAS.cameras, covariance), 3).covariance)
-    assert small.reshape(-1, 15) == pytest.approx(np.tile([1.0] * 4 + [9.0] * 11, (len(CAMERAS), 1)))
+    assert small.reshape(-1, 15) == pytest.approx(
+        np.tile([1.0] * 4 + [9.0] * 11, (len(CAMERAS), 1))
+    )
 
 
 def test_pixels_are_means():
     picture = np.arange(35, dtype=np.float32).reshape(5, 7)
     assert shrunk_picture(picture, 2) == pytest.approx(
-        np.array([[picture[2 * y:2 * y + 2, 2 * x:2 * x + 2].mean() for x in range(3)] for y in range(2)]))
+        np.array(
+            [
+                [picture[2 * y : 2 * y + 2, 2 * x : 2 * x + 2].mean() for x in range(3)]
+                for y in range(2)
+            ]
+        )
+    )
     assert shrunk_picture(picture, 1) is picture

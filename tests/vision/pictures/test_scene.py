@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.pictures.scene import exposures, is_blank, likeness, texture
+from vision.pictures.scene_match import exposures, is_blank, likeness, texture
 
 
 def bench(rng, shape=(240, 320)) -> np.ndarray:
@@ -14,7 +14,9 @@ def bench(rng, shape=(240, 320)) -> np.ndarray:
 
 
 def noisy(grey, rng, sigma=3.0) -> np.ndarray:
-    return np.clip(np.rint(grey + rng.normal(scale=sigma, size=grey.shape)), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(grey + rng.normal(scale=sigma, size=grey.shape)), 0, 255).astype(
+        np.uint8
+    )
 
 
 @pytest.mark.parametrize("shift", [(0, 0), (6, 4), (-30, 12), (100, -80)])
@@ -36,7 +38,9 @@ def test_other_light_and_a_moving_rod_are_the_same_scene(rng):
     assert found.moved_px == 0.0
 
 
-@pytest.mark.parametrize("change", [lambda g: g[:, ::-1], lambda g: g[::-1], lambda g: g[::-1, ::-1]])
+@pytest.mark.parametrize(
+    "change", [lambda g: g[:, ::-1], lambda g: g[::-1], lambda g: g[::-1, ::-1]]
+)
 def test_a_mirrored_scene_is_another(rng, change):
     rig = bench(rng)
     assert not likeness(texture(noisy(change(rig), rng)), texture(rig)).seen
@@ -63,4 +67,6 @@ def test_exposures_are_those_made(rng):
 
 
 def test_a_black_series_has_no_exposure():
-    np.testing.assert_array_equal(exposures([np.zeros((40, 40), dtype=np.uint8)] * 3, 255.0), np.ones(3))
+    np.testing.assert_array_equal(
+        exposures([np.zeros((40, 40), dtype=np.uint8)] * 3, 255.0), np.ones(3)
+    )

@@ -22,8 +22,12 @@ def test_scatter_expected_is_that_of_draws(shared):
     size, rng, wanted = len(THETA_RAD), np.random.default_rng(2), np.radians(3.0)
     covariance = 0.01**2 * ((1.0 - shared) * np.eye(size) + shared * np.ones((size, size)))
     draws = rng.multivariate_normal(np.zeros(size), covariance, size=1000)
-    seen = [scatter(frames(covariance, 0.3 * THETA_RAD**2 + one, "phi"), "phi", wanted) for one in draws]
-    assert np.sqrt(np.mean([one.left**2 for one in seen])) == pytest.approx(seen[0].expected, rel=0.03)
+    seen = [
+        scatter(frames(covariance, 0.3 * THETA_RAD**2 + one, "phi"), "phi", wanted) for one in draws
+    ]
+    assert np.sqrt(np.mean([one.left**2 for one in seen])) == pytest.approx(
+        seen[0].expected, rel=0.03
+    )
     assert seen[0].expected == pytest.approx(0.01 * np.sqrt(1.0 - shared))
     assert seen[0].freedom == pytest.approx(size - 3)
 
@@ -34,7 +38,9 @@ def test_small_jumps_that_few_frames_show_are_known_by_students_t(name):
     over 8 degrees of freedom, the parabola's t of 2.306 over 1.960, and each of the seven frames nearby moves the local
     fit at its middle by what a parabola's weights are, Σ w² = 1/3. As far as chance lets them, their scatter stands."""
     wanted = np.radians(3.0)
-    zigzag = 0.01 * (-1.0) ** np.arange(len(THETA_RAD)) * (THETA_RAD / wanted if name == "slip" else 1.0)
+    zigzag = (
+        0.01 * (-1.0) ** np.arange(len(THETA_RAD)) * (THETA_RAD / wanted if name == "slip" else 1.0)
+    )
     for sigma, widened in ((1e-6, 2.306 / 1.960), (0.01, 1.0)):
         own = sigma * (THETA_RAD / wanted if name == "slip" else np.ones(len(THETA_RAD)))
         smooth = frames(np.diag(own**2), zigzag, name)
@@ -52,8 +58,13 @@ def test_frames_in_step_with_teeth_are_told_by_those_further_away(first):
     theta = np.radians(np.arange(0.1 + 0.08 * first, 4.9, 0.7))
     tooth = np.searchsorted(np.radians(ends), theta)
     phase = (np.degrees(theta) - np.append(0.0, ends)[tooth]) / np.diff(ends, prepend=0.0)[tooth]
-    smooth = Smooth(theta, np.zeros(len(theta)), {"phi": 0.5 - 0.05 * phase + 0.001 * rng.standard_normal(len(theta))},
-                    {"phi": np.eye(len(theta))}, 1e-6 * np.eye(len(theta)))  # fmt: skip
+    smooth = Smooth(
+        theta,
+        np.zeros(len(theta)),
+        {"phi": 0.5 - 0.05 * phase + 0.001 * rng.standard_normal(len(theta))},
+        {"phi": np.eye(len(theta))},
+        1e-6 * np.eye(len(theta)),
+    )
     assert _scatter(smooth, "phi", np.radians(3.0)) > 0.01
 
 
@@ -75,13 +86,18 @@ def test_what_jumps_holds_the_jump_in_its_sigma(step_deg):
     for _ in range(300):
         theta = np.radians(np.arange(rng.uniform(0.02, step_deg + 0.02), 5.0, step_deg))
         size, wanted = len(theta), np.radians(rng.uniform(2.0, 4.0))
-        values = {name: v + SIGMA_MM * rng.standard_normal(size) for name, v in teeth(theta).items()}
+        values = {
+            name: v + SIGMA_MM * rng.standard_normal(size) for name, v in teeth(theta).items()
+        }
         own = {name: np.eye(size, size + 1) for name in values}
         covariance = np.diag([SIGMA_MM**2] * size + [TOUCH_RAD**2])
         shown = theta + TOUCH_RAD * rng.standard_normal()
         at = at_angle(Smooth(shown, np.eye(size + 1)[-1], values, own, covariance), wanted, "")
         assert "slips in jumps" in at.status and at.theta_rad == wanted
-        told = [(getattr(at, field), truth) for field, truth in zip(FIELDS.values(), teeth(wanted).values())]
+        told = [
+            (getattr(at, field), truth)
+            for field, truth in zip(FIELDS.values(), teeth(wanted).values())
+        ]
         off.append([abs(value.value - float(truth)) / value.sigma for value, truth in told])
     assert np.max(off) < 4.0
     assert np.all(np.mean(np.array(off) < 1.96, axis=0) > 0.93)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from vision.geometry.settings import VisionSettings
+from vision.geometry.vision_settings import VisionSettings
 from vision.truth import strategies
 
 

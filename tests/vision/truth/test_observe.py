@@ -19,9 +19,13 @@ def narrowed(recorded, name, left, right):
     """The same trial where one camera's pictures are cut to these columns."""
     cut, old = copy(recorded), recorded.cameras[name]
     shift = np.array([[0, 0, left], [0, 0, 0], [0, 0, 0]])
-    new = Camera(name, (right - left, old.size_px[1]), old.matrix - shift, old.distortion, old.T_camera_rig)
+    new = Camera(
+        name, (right - left, old.size_px[1]), old.matrix - shift, old.distortion, old.T_camera_rig
+    )
     cut.cameras = Cameras(tuple(new if camera is old else camera for camera in recorded.cameras))
-    cut.frames = recorded.frames | {name: {k: grey[:, left:right] for k, grey in recorded.frames[name].items()}}
+    cut.frames = recorded.frames | {
+        name: {k: grey[:, left:right] for k, grey in recorded.frames[name].items()}
+    }
     cut.background = recorded.background | {name: recorded.background[name][:, left:right]}
     return cut
 
@@ -30,7 +34,9 @@ def test_a_camera_before_which_the_bar_hides_the_wire_leaves_what_is_known(steep
     """It ended the run ("cannot convert float NaN to integer"); the other camera sees the wire."""
     truth, low = steep.truth, steep.cameras["low"]
     turn = np.radians(truth["touch_deg"])
-    at, _ = low.project(truth["d_x_mm"] * np.array([[np.cos(turn), np.sin(turn), 0.0]]))[0].astype(int)
+    at, _ = low.project(truth["d_x_mm"] * np.array([[np.cos(turn), np.sin(turn), 0.0]]))[0].astype(
+        int
+    )
     seen = narrowed(steep, "low", at - 10, at + 10).see()
     assert seen.status.startswith("the bar's slope is known to")
     assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=3 * seen.d_x_mm.sigma)
@@ -40,16 +46,23 @@ def test_a_camera_with_the_whisker_behind_it_is_left_out(steep):
     """Its pose is wrong; all else goes on."""
     wrong, low = copy(steep), steep.cameras["low"]
     about = np.diag([-1.0, 1.0, -1.0]) @ low.T_camera_rig
-    wrong.cameras = Cameras((steep.cameras["high"], Camera("low", low.size_px, low.matrix, low.distortion, about)))
+    wrong.cameras = Cameras(
+        (steep.cameras["high"], Camera("low", low.size_px, low.matrix, low.distortion, about))
+    )
     seen = wrong.see()
-    assert "camera low was left out: by its pose the whisker is behind it, check T_camera_rig" in seen.status
+    assert (
+        "camera low was left out: by its pose the whisker is behind it, check T_camera_rig"
+        in seen.status
+    )
     assert seen.cameras == 1
 
 
 def test_a_camera_that_shows_one_grey_alone_tells_nothing(steep):
     """A lens cap, or a picture that is white all over."""
     white = copy(steep)
-    white.frames = steep.frames | {"low": {k: np.full_like(grey, 255) for k, grey in steep.frames["low"].items()}}
+    white.frames = steep.frames | {
+        "low": {k: np.full_like(grey, 255) for k, grey in steep.frames["low"].items()}
+    }
     seen = white.see()
     assert abs(seen.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
 
@@ -58,10 +71,14 @@ def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
     """The requirement: d_x to 0.03 mm, slip to 0.03 mm RMS, beta to 0.3 degrees, each within three stated sigma."""
     seen, truth = steep.see(), steep.truth
     assert seen.status == ""
-    beta, touch = (np.degrees([angle.value, angle.sigma]) for angle in (seen.beta_rad, seen.touch_rad))
-    for error, sigma, most in ((seen.d_x_mm.value - truth["d_x_mm"], seen.d_x_mm.sigma, 0.03),
-                               (beta[0] - truth["beta_deg"], beta[1], 0.3),
-                               (touch[0] - truth["touch_deg"], touch[1], 0.05)):
+    beta, touch = (
+        np.degrees([angle.value, angle.sigma]) for angle in (seen.beta_rad, seen.touch_rad)
+    )
+    for error, sigma, most in (
+        (seen.d_x_mm.value - truth["d_x_mm"], seen.d_x_mm.sigma, 0.03),
+        (beta[0] - truth["beta_deg"], beta[1], 0.3),
+        (touch[0] - truth["touch_deg"], touch[1], 0.05),
+    ):
         assert abs(error) < most and abs(error) < 3 * sigma
     assert seen.d_x_mm.sigma < 0.02
     touching = seen.frames.touching
@@ -75,7 +92,9 @@ def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
     assert at.slip_mm.sigma >= np.min(seen.frames.slip_mm.sigma[near])  # frames nearby err alike
     assert at.slip_mm.value == pytest.approx(truth["slip_at_3deg_mm"], abs=3 * at.slip_mm.sigma)
     # friction of the scene: atan(0.185339)
-    assert np.degrees(at.alpha_rad.value) == pytest.approx(10.5, abs=3 * np.degrees(at.alpha_rad.sigma))
+    assert np.degrees(at.alpha_rad.value) == pytest.approx(
+        10.5, abs=3 * np.degrees(at.alpha_rad.sigma)
+    )
 
 
 def test_a_stroke_that_ends_before_the_bar_never_touches(steep):
@@ -110,11 +129,21 @@ def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
     """The bar's width tells d_x to half a millimetre, its taper the slope to some degrees, each within three sigma."""
     whisk, truth = _whisk(steep, {"high": steep.frames["high"]}), steep.truth
     assert whisk.cameras == 1 and "no two cameras see it" in whisk.status
-    for found, sigma, true, most in ((whisk.d_x_mm.value, whisk.d_x_mm.sigma, truth["d_x_mm"], 0.5),
-                                     (np.degrees(whisk.beta_rad.value), np.degrees(whisk.beta_rad.sigma),
-                                      truth["beta_deg"], 10.0),
-                                     (np.degrees(whisk.touch_rad.value), np.degrees(whisk.touch_rad.sigma),
-                                      truth["touch_deg"], 0.5)):
+    for found, sigma, true, most in (
+        (whisk.d_x_mm.value, whisk.d_x_mm.sigma, truth["d_x_mm"], 0.5),
+        (
+            np.degrees(whisk.beta_rad.value),
+            np.degrees(whisk.beta_rad.sigma),
+            truth["beta_deg"],
+            10.0,
+        ),
+        (
+            np.degrees(whisk.touch_rad.value),
+            np.degrees(whisk.touch_rad.sigma),
+            truth["touch_deg"],
+            0.5,
+        ),
+    ):
         assert abs(found - true) < 3 * sigma
         assert sigma < most
     touching = whisk.frames.touching
@@ -126,14 +155,22 @@ def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
 def test_a_camera_with_gaps_is_left_out_by_name(steep):
     whisk = _whisk(steep, steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}})
     assert "camera low was left out: 3 frames" in whisk.status
-    assert whisk.cameras == 1 and abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
+    assert (
+        whisk.cameras == 1
+        and abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
+    )
 
 
 def test_a_camera_that_shows_another_wire_is_left_out(steep):
     """Its pictures jump from frame to frame, as from a camera that shakes: what is left is one camera's truth."""
-    shaken = {k: np.roll(picture, 4 * (-1) ** k, axis=0) for k, picture in steep.frames["low"].items()}
+    shaken = {
+        k: np.roll(picture, 4 * (-1) ** k, axis=0) for k, picture in steep.frames["low"].items()
+    }
     whisk = _whisk(steep, {"high": steep.frames["high"], "low": shaken})
-    assert whisk.cameras == 1 and "camera low was left out: its lines of the wire scatter by" in whisk.status
+    assert (
+        whisk.cameras == 1
+        and "camera low was left out: its lines of the wire scatter by" in whisk.status
+    )
     assert abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
 
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from bench.rig.protocol import PicturesTable
-from tests.ladder.scenes import as_problem, begin, draw_scene, line_points
+from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
+from vision.fit.covariance import Uncertainty
 from vision.fit.problem import BAR
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
-from vision.fit.uncertainty import Uncertainty
 from vision.geometry.rods import Rods
-from vision.geometry.settings import VisionSettings
-from vision.truth.rows import to_whisk
+from vision.geometry.vision_settings import VisionSettings
+from vision.truth.truth_rows import to_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 
@@ -23,8 +23,20 @@ def row_of(noise_of):
     frames, known = range(len(scene.motor_rad)), Uncertainty(answer, noise_of(answer), 0.0 * answer)
     fitted = FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state))
     rods, no_bar = Rods(scene.wire, scene.bar), None
-    return scene, to_whisk(WhiskPictures(0, frames, scene.recording.frames.time_s, scene.motor_rad, (), scene.cameras,
-                                         rods, no_bar, VisionSettings()), fitted)
+    return scene, to_whisk(
+        WhiskPictures(
+            0,
+            frames,
+            scene.recording.frames.time_s,
+            scene.motor_rad,
+            (),
+            scene.cameras,
+            rods,
+            no_bar,
+            VisionSettings(),
+        ),
+        fitted,
+    )
 
 
 def tilted(by_deg: float):
@@ -47,8 +59,10 @@ def test_a_slope_that_the_cameras_do_not_tell_is_doubted(by_deg, doubted):
     assert whisk.d_x_mm.value == pytest.approx(scene.truth.d_x, abs=2e-3)
 
 
-@pytest.mark.parametrize(("noise_of", "reason"), [(tilted(30.0), "slope is known to 3"),
-                                                  (lambda answer: 1e5 * answer, "slip is known to")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("noise_of", "reason"),
+    [(tilted(30.0), "slope is known to 3"), (lambda answer: 1e5 * answer, "slip is known to")],
+)
 def test_where_nothing_is_linear_there_is_no_truth(noise_of, reason):
     _, whisk = row_of(noise_of)
     assert np.isnan(whisk.d_x_mm.value) and reason in whisk.status

@@ -5,7 +5,7 @@ import pytest
 
 from tests.scenes.model_scenes import scene
 from vision.fit.touch import touch_and_sigma
-from vision.geometry.errors import Refused
+from vision.geometry.refusals import Refused
 from vision.truth.strategies import TouchByClearance
 
 TOUCH_DEG = 2.3  # between the second and the third of seven frames, 0.9 degrees apart
@@ -27,7 +27,9 @@ def test_clearance_parts_the_frames_where_it_knows_touch():
 def test_where_sights_hardly_cross_frames_stay_as_bends_parted_them(touch_sigma_deg):
     """Three sigma reach before the first frame: by clearance alone none would be free, and the whisk be refused."""
     problem, state = scene(touch_deg=TOUCH_DEG)
-    touching, free = TouchByClearance().parted(problem, state, answer(problem, state, touch_sigma_deg))
+    touching, free = TouchByClearance().parted(
+        problem, state, answer(problem, state, touch_sigma_deg)
+    )
     assert np.all(free == ~problem.bent) and np.all(touching == problem.touching)
 
 

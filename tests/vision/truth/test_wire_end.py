@@ -23,7 +23,9 @@ def test_the_end_is_where_the_evidence_ends(rng, end_mm):
 def test_an_end_behind_the_bar_is_known_by_the_gap(rng):
     seen = (PLACE_MM < 62.0) | (PLACE_MM > 80.0)
     found = _end(PLACE_MM[seen], evidence(70.0, rng)[seen], 60.0)
-    assert found.value == pytest.approx(71.0) and found.sigma == pytest.approx(np.hypot(2.0, 18.0 / np.sqrt(12.0)))
+    assert found.value == pytest.approx(71.0) and found.sigma == pytest.approx(
+        np.hypot(2.0, 18.0 / np.sqrt(12.0))
+    )
 
 
 def test_a_wire_that_leaves_the_picture_has_no_end(rng):
@@ -38,7 +40,9 @@ def test_a_wire_that_hardly_stands_out_has_no_end(rng):
 
 def test_a_curve_goes_straight_on():
     arc = np.linspace(0.0, 100.0, 51)
-    flat = Curves(arc, np.stack([arc, 0.0 * arc, 0.0 * arc], axis=-1), np.tile([1.0, 0.0, 0.0], (51, 1)))
+    flat = Curves(
+        arc, np.stack([arc, 0.0 * arc, 0.0 * arc], axis=-1), np.tile([1.0, 0.0, 0.0], (51, 1))
+    )
     longer = _straight_on(flat, 150.0)
     points, _ = longer.at(np.array([50.0, 120.0, 149.0]))
     assert points == pytest.approx(np.array([[50.0, 0, 0], [120.0, 0, 0], [149.0, 0, 0]]))

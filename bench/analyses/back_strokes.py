@@ -1,0 +1,142 @@
+"""Ways back as forward strokes are judged, and each with its way there: both_ways.csv, and lines of the summary.
+
+Only where a trial asks for it (both_ways in trial.toml).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.doubts import in_one_status
+from bench.base.drawing import label_of
+from bench.base.tables import write_table
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
+from vision.geometry.counted import counted
+from vision.truth.value import UNKNOWN, Value
+
+TABLE = "both_ways.csv"
+COLUMNS = (
+    *(
+        "trial",
+        "whisk",
+        "surface",
+        "touch_deg",
+        "touch_sigma_deg",
+        "touch_felt_deg",
+        "touch_felt_sigma_deg",
+    ),
+    *(
+        "d_x_mm",
+        "d_x_sigma_mm",
+        "beta_deg",
+        "beta_sigma_deg",
+        "phi_seen_deg",
+        "phi_felt_deg",
+        "phi_there_deg",
+    ),
+    *(
+        "m_y_Nmm",
+        "m_z_Nmm",
+        "estimator",
+        "d_x_est_mm",
+        "d_x_est_sigma_mm",
+        "d_x_est_low_mm",
+        "d_x_est_high_mm",
+    ),
+    *("beta_est_deg", "alpha_est_deg", "error_mm", "error_percent", "inside", "status"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class WayBack:
+    """What one estimator says of one way back, or why none does; there: the way there, as felt; d_x_mm: the contact's,
+    as seen on the way back, else on the way there."""
+
+    result: TrialResult
+    seen: SeenWhisk
+    d_x_mm: Value
+    felt: FeltWhisk
+    there: FeltWhisk
+    answer: EstimateRow
+
+    @property
+    def error_mm(self) -> float:
+        """Estimate less truth."""
+        return self.answer.d_x_est_mm.value - float(self.d_x_mm.value)
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether the 95 % interval holds the truth; None where either is not known."""
+        return self.answer.holds(self.d_x_mm.value)
+
+
+def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
+    """Every estimate of every way back; one without any where it was not felt."""
+    found = []
+    for result in results:
+        seen = result.seen.ways_back or tuple(SeenWhisk(f.whisk) for f in result.felt.ways_back)
+        for one, forth, felt, there in zip(
+            seen, result.seen.whisks, result.felt.ways_back, result.felt.whisks
+        ):
+            d_x = one.d_x_mm if one.has_truth else forth.d_x_mm
+            found += [
+                WayBack(result, one, d_x, felt, there, a)
+                for a in felt.estimates or (EstimateRow("", UNKNOWN),)
+            ]
+    return found
+
+
+def write_both_ways(out: Path, found: Sequence[WayBack]) -> None:
+    """both_ways.csv; nothing where no way back was asked for."""
+    if found:
+        write_table(out / TABLE, COLUMNS, map(_row, found))
+
+
+def _row(one: WayBack) -> dict:
+    seen, felt, answer = one.seen, one.felt, one.answer
+    row = {"trial": one.result.trial.name, "whisk": seen.whisk, "surface": one.result.trial.surface}
+    angles = {"touch": seen.touch_rad, "touch_felt": felt.touch_felt_rad, "beta": seen.beta_rad}
+    for name, value in angles.items():
+        row |= {
+            f"{name}_deg": float(np.degrees(value.value)),
+            f"{name}_sigma_deg": float(np.degrees(value.sigma)),
+        }
+    row |= {"d_x_mm": float(one.d_x_mm.value), "d_x_sigma_mm": float(one.d_x_mm.sigma)}
+    row["phi_seen_deg"] = (
+        float(np.degrees(seen.at.phi_rad.value)) if seen.at is not None else np.nan
+    )
+    row |= {"phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value))}
+    row |= {"phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value))}
+    row |= {
+        "m_y_Nmm": felt.m_y_Nmm.value,
+        "m_z_Nmm": felt.m_z_Nmm.value,
+        "estimator": answer.estimator,
+    }
+    row |= {"d_x_est_mm": answer.d_x_est_mm.value, "d_x_est_sigma_mm": answer.d_x_est_mm.sigma}
+    row |= {name: getattr(answer, name) for name in ("d_x_est_low_mm", "d_x_est_high_mm")}
+    row |= {
+        f"{name}_est_deg": float(np.degrees(getattr(answer, f"{name}_est_rad")))
+        for name in ("beta", "alpha")
+    }
+    row |= {
+        "error_mm": one.error_mm,
+        "error_percent": 100.0 * one.error_mm / float(one.d_x_mm.value),
+    }
+    inside, said = one.inside, (seen.status, felt.status, answer.status)
+    row["inside"] = None if inside is None else int(inside)
+    return row | {"status": in_one_status(*said)}
+
+
+def both_ways_lines(found: Sequence[WayBack]) -> Iterator[str]:
+    """For the summary: a line an estimator, over the ways back whose truth is known."""
+    judged = [one for one in found if np.isfinite(one.error_mm)]
+    for name in dict.fromkeys(one.answer.estimator for one in judged):
+        mine = [one for one in judged if one.answer.estimator == name]
+        percent = [100.0 * one.error_mm / float(one.d_x_mm.value) for one in mine]
+        held = sum(bool(one.inside) for one in mine)
+        yield (
+            f"{label_of(name)}: error of d_x {np.sqrt(np.mean(np.square(percent))):.2g} % RMS; its 95 % interval holds "
+            f"{held} of {counted(len(mine), 'way')} back"
+        )

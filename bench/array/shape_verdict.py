@@ -1,0 +1,107 @@
+"""What an array's cloud of contacts says of the object's shape: table and lines."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bench.array.cloud import SEEN, Contact
+from bench.base.drawing import label_of
+from bench.base.tables import sigma_name, write_table
+from estimator.uncertainty import Z_95
+from vision.geometry.counted import counted
+from vision.truth.value import Value
+
+_PLACE = ("x_mm", "y_mm", "z_mm")
+_CROSS = ("xy_covariance_mm2", "xz_covariance_mm2", "yz_covariance_mm2")
+COLUMNS = (
+    *("whisker", "trial", "whisk", "estimator"),
+    *(column for name in _PLACE for column in (name, sigma_name(name))),
+    *_CROSS,
+    *("distance_mm", "distance_sigma_mm", "along_mm", "along_sigma_mm"),
+    *("normal_off_deg", "normal_sigma_deg", "surface_from", "status"),
+)
+FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
+
+
+def write_surface(path: Path, cloud: Iterable[Contact]) -> None:
+    """surface.csv: a row a contact."""
+    write_table(path, COLUMNS, map(_row, cloud))
+
+
+def _row(contact: Contact) -> dict:
+    covariance = contact.covariance_mm2
+    sigmas = np.sqrt(np.diag(covariance)).tolist()
+    return (
+        {
+            name: getattr(contact, name)
+            for name in ("whisker", "trial", "whisk", "estimator", "status")
+        }
+        | dict(zip(_PLACE, contact.point_mm.tolist()))
+        | dict(zip(map(sigma_name, _PLACE), sigmas))
+        | dict(zip(_CROSS, (covariance[0, 1], covariance[0, 2], covariance[1, 2])))
+        | {"distance_mm": contact.distance_mm.value, "distance_sigma_mm": contact.distance_mm.sigma}
+        | {"along_mm": contact.along_mm.value, "along_sigma_mm": contact.along_mm.sigma}
+        | {"normal_off_deg": math.degrees(contact.normal_off_rad), "surface_from": contact.source}
+        | {"normal_sigma_deg": math.degrees(contact.normal_sigma_rad)}
+    )
+
+
+def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
+    """Contacts beside a known surface, by one estimator; nothing doubtful is said of them."""
+    mine = (c for c in cloud if c.estimator == estimator and not c.status)
+    return [c for c in mine if math.isfinite(c.distance_mm.value)]
+
+
+def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
+    """The array's verdict in a sentence; nothing where no object is known."""
+    known = _judged(cloud, FELT)
+    if not known:
+        return
+    across, along = (
+        _rms([c.distance_mm.value for c in known]),
+        _rms([c.along_mm.value for c in known]),
+    )
+    worst = max(known, key=lambda c: abs(c.along_mm.value))
+    whiskers, source = (
+        len({c.whisker for c in known}),
+        " and ".join(sorted({c.source for c in known})),
+    )
+    most = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm ({worst.whisker}, {worst.trial})"
+    yield (
+        f"Surface by {label_of(FELT)}: {counted(len(known), 'contact')} felt by {counted(whiskers, 'whisker')} lie "
+        f"{across:.2f} mm RMS off the object ({source}) and {along:.2f} mm along the whisker, most {most}"
+        f"{_normals(known)}."
+    )
+
+
+def _rms(values: Sequence[float]) -> float:
+    """Of those that are known; NaN without any."""
+    known = [value for value in values if math.isfinite(value)]
+    return math.sqrt(sum(value**2 for value in known) / len(known)) if known else math.nan
+
+
+def _normals(known: Sequence[Contact]) -> str:
+    off_deg = math.degrees(_rms([c.normal_off_rad for c in known]))
+    return f"; normals are {off_deg:.1f}° RMS off" if math.isfinite(off_deg) else ""
+
+
+def surface_lines(cloud: Sequence[Contact]) -> Iterator[str]:
+    """A line an estimator, and one on what is seen."""
+    names = dict.fromkeys(contact.estimator for contact in cloud)
+    rows = [(name, _judged(cloud, name)) for name in names]
+    if any(known for _, known in rows):
+        yield f"{'':<24}{'n':>4}   off it: mean     RMS  in 95 %   along: mean     RMS  in 95 %   normals RMS"
+    for name, known in rows:
+        if known:
+            off_deg = math.degrees(_rms([c.normal_off_rad for c in known]))
+            numbers = f"{_numbers(c.distance_mm for c in known)}     {_numbers(c.along_mm for c in known)}"
+            normals = f"{off_deg:8.1f}°" if math.isfinite(off_deg) else f"{'-':>8}"
+            yield f"{'seen' if name == SEEN else label_of(name):<24}{len(known):>4}     {numbers}    {normals}"
+
+
+def _numbers(values: Iterable[Value]) -> str:
+    errors, sigmas = np.array([(one.value, one.sigma) for one in values]).T
+    held = 100.0 * np.mean(np.abs(errors) <= Z_95 * sigmas)
+    return f"{errors.mean():>+9.2f}{_rms(errors):>8.2f}{held:>6.0f} %"

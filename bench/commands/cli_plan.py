@@ -1,0 +1,60 @@
+"""The verb `plan` of the command line. Parsing only."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from bench.base.errors import BadInput
+from bench.commands.options import DONE, DOUBTFUL, Verbs, add_follow_links, add_verb, add_workers
+
+
+def add_plan(verbs: Verbs) -> None:
+    """`plan`."""
+    verb = add_verb(
+        verbs,
+        "plan",
+        _plan,
+        "what sigmas a bench would give before it is built, what limits them and which one change would halve them; "
+        "of a recorded session, expected beside stated",
+        "whisker-bench plan --example > rig.toml && whisker-bench plan rig.toml --out plan-out",
+    )
+    verb.add_argument(
+        "what",
+        type=Path,
+        nargs="?",
+        metavar="RIG.toml|SESSION",
+        help="a rig, as `simulate` reads it (a camera without position_mm is given a place), or a recorded session",
+    )
+    verb.add_argument(
+        "--out", type=Path, metavar="OUT", help="folder for plan.txt, plan.csv, plan.json, plan.png"
+    )
+    verb.add_argument("--example", action="store_true", help="print a RIG.toml to begin with")
+    verb.add_argument(
+        "--theta-deg", type=float, default=3.0, metavar="X", help="of slip, φ and α (default 3)"
+    )
+    verb.add_argument(
+        "--no-changes",
+        action="store_false",
+        dest="changes",
+        help="try no change: sigmas alone, sooner",
+    )
+    add_follow_links(verb)
+    add_workers(verb)
+
+
+def _plan(options: argparse.Namespace) -> int:
+    from bench.plan.run_plan import EXAMPLE, Options, plan
+
+    if options.example:
+        print(EXAMPLE.read_text(encoding="utf-8").rstrip())
+        return DONE
+    if options.what is None or options.out is None:
+        raise BadInput("plan needs RIG.toml or SESSION, and --out OUT; --example prints a RIG.toml")
+    from bench.base.workers import single_thread
+
+    single_thread()
+    wanted = Options(options.theta_deg, options.changes, options.follow_links)
+    made = plan(
+        options.what, options.out, wanted, workers=options.workers, progress=sys.stderr.isatty()
+    )
+    return DOUBTFUL if made.doubtful else DONE

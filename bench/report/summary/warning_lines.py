@@ -1,0 +1,70 @@
+"""What is doubtful of each whisk, what the light hides, and what was taken as exact."""
+
+from collections.abc import Iterable, Iterator
+
+from bench.analyses.runs import RUNS
+from bench.records.trial_result import TrialResult, whisks
+from bench.session.session import Session
+from bench.trials.seen import NO_PICTURES
+from bench.trials.unit import OWN_GAUGES
+from vision.geometry.counted import counted
+
+SILENT = ("", NO_PICTURES, OWN_GAUGES)
+# (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
+_EXPECTED = ("no_slip", "frictionless", *RUNS)
+
+
+def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[str]:
+    """A line for each whisk that something is doubtful of. A gauge trial that cannot be judged is as it should be."""
+    for result, seen, felt in whisks(results):
+        name = f"{result.trial.name}, whisk {seen.whisk}"
+        parts = [part for part in dict.fromkeys((seen.status, felt.status)) if part not in SILENT]
+        if parts:
+            yield f"{name}: {'; '.join(parts)}"
+        if felt.saturated:
+            yield f"{name}: {counted(felt.saturated, 'saturated sample')} left out"
+        for answer in felt.estimates:
+            if answer.status and answer.estimator not in _EXPECTED:
+                yield f"{name}, {answer.estimator}: {answer.status}"
+
+
+def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
+    """A line a camera that saw the wire lit from one side: the first trial's, and in how many it was so."""
+    notes_of: dict[str, list[str]] = {}
+    for result in results:
+        for note in filter(_of_light, result.seen.notes):
+            notes_of.setdefault(note.split(" sees ")[0], []).append(f"{result.trial.name}: {note}")
+    for notes in notes_of.values():
+        yield notes[0] + (
+            f" (and so in {counted(len(notes) - 1, 'more trial')})" if len(notes) > 1 else ""
+        )
+
+
+def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:
+    """A line for frames that were dropped, damaged, made good or left out."""
+    for result in results:
+        yield from (
+            f"{result.trial.name}: {note}" for note in result.seen.notes if not _of_light(note)
+        )
+
+
+def _of_light(note: str) -> bool:
+    return " sees " in note
+
+
+def taken_as_exact(session: Session) -> Iterator[str]:
+    """One line that names what was given without a sigma; none where all has one."""
+    whisker = session.whisker
+    given = {
+        "whisker length": whisker.length_sigma_mm,
+        "whisker diameter": whisker.diameter_sigma_mm,
+        "bar diameter": session.bar_diameter_sigma_mm,
+        "stiffness C": whisker.C_sigma_Nmm2,
+    }
+    if session.T_rig_board is not None:
+        given["T_rig_board"] = session.T_rig_board_sigma_mm + session.T_rig_board_sigma_rad
+    if session.board is not None:
+        given["board square"] = session.board.square_sigma_mm
+    exact = [name for name, sigma in given.items() if not sigma]
+    if exact:
+        yield ", ".join(exact)

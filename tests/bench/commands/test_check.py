@@ -1,0 +1,137 @@
+"""`check` finds in seconds what `evaluate` would refuse or doubt after a minute."""
+
+import re
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+
+from bench.base.doubts import Doubts
+from bench.commands.check import look_ahead
+from bench.session.frame_times import FrameTimes
+from bench.session.session_check import checked_session
+from tests.scenes.faults import FAULTS, TRIAL, change_picture
+
+
+def found(folder, *, boards=False) -> Doubts:
+    """What a look ahead says of a session; boards only where asked, which takes a second."""
+    doubts = Doubts(stop_at_first=False)
+    session = checked_session(folder, doubts)
+    if not boards:
+        session.board_sources.clear()
+    look_ahead(session, doubts)
+    return doubts
+
+
+def test_a_sound_session(small_session):
+    doubts = found(small_session, boards=True)
+    assert (doubts.refusals, doubts.notes) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        ("dead gauge", "channel z reads 0 V throughout: at its rail, or not connected"),
+        ("saturated gauges", "channel y is at its rail for 50 % of a stroke"),
+        ("frame dropped", "whisk 0: 1 frame dropped by all cameras (after 0.150 s)"),
+        (
+            "camera knocked 6,4 px",
+            "camera low: the scene lies +6, +4 px from where the rig picture has it",
+        ),
+        ("camera mirrored", "camera low: its frames are mirrored left to right"),
+        ("cameras exchanged", "camera high: its frames are those of camera low"),
+        ("camera black", "camera low: its frames show nothing"),
+        ("exposure 1.5 from frame 6", "times as bright as most, left out"),
+    ],
+)
+def test_a_fault_of_a_trial(small_copy, fault, expected):
+    FAULTS[fault](small_copy)
+    notes = found(small_copy).notes
+    assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
+
+
+def test_gauges_brought_along_to_a_session_without_its_whisker(small_copy):
+    """What gauges.toml rests on cannot be looked up; that the whisker is missing is said, and nothing else."""
+    manifest = small_copy / "session.toml"
+    without = re.sub(r"(?ms)^\[whisker\].*?(?=^\[)", "", manifest.read_text())
+    manifest.write_text(without)
+    (small_copy / "gauges.toml").write_text(
+        "offset_V = [0.0, 0.0]\nmatrix_Nmm_per_V = [[11.3, 0.3], [-0.2, 10.5]]\n"
+    )
+    assert found(small_copy).refusals == ["session.toml: [whisker] is missing"]
+
+
+def test_a_rig_picture_out_of_focus(small_copy):
+    rig = small_copy / "boards" / "rig" / "low.png"
+    change_picture(rig, lambda grey: cv2.GaussianBlur(grey, (0, 0), 1.5))
+    (line,) = [
+        note
+        for note in found(small_copy, boards=True).notes
+        if note.startswith("boards/rig/low.png")
+    ]
+    assert float(line.split("blurred by ")[1].split(" px")[0]) == pytest.approx(
+        np.hypot(1.5, 0.8), abs=0.1
+    )
+
+
+def test_signals_of_another_trial(small_copy):
+    FAULTS["another trial's signals"](small_copy)
+    said = "trials b30_3, b60_4 have one and the same signals.csv: all but one have another's"
+    assert said in found(small_copy).notes
+
+
+DICTIONARY = 'is not found, but one with dictionary = "DICT_5X5_50" is'
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        pytest.param("wrong dictionary", DICTIONARY, marks=pytest.mark.slow),
+        ("wrong squares", "not laid out as on a board of 7 x 5 squares"),
+    ],
+)
+def test_a_board_that_is_not_the_one_entered(small_copy, fault, expected):
+    FAULTS[fault](small_copy)
+    refusals = found(small_copy, boards=True).refusals
+    assert len(refusals) == 1
+    assert refusals[0].startswith("boards/high: ") and expected in refusals[0]
+
+
+def test_too_few_views_of_the_board(small_copy):
+    for picture in sorted((small_copy / "boards" / "low").iterdir())[3:]:
+        picture.unlink()
+    assert (
+        "boards/low: has 3 views, 5 are the least and 15 are good"
+        in found(small_copy, boards=True).refusals
+    )
+
+
+def test_gauge_trials_that_push_in_one_direction(small_copy):
+    shutil.rmtree(small_copy / "trials" / "gauge_roll90")
+    (note,) = found(small_copy).notes
+    assert note.startswith(
+        "trials: the gauge trials push in one direction, which does not fix both channels; record"
+    )
+
+
+def test_a_rig_board_that_is_hidden(small_copy):
+    FAULTS["rig board hidden"](small_copy)
+    assert found(small_copy, boards=True).refusals == [
+        "boards/rig/low.png: the board on the rig is not seen; the board must stand in view of every camera"
+    ]
+
+
+@pytest.mark.parametrize("boards", [True, False])  # without, as where cameras are brought along
+def test_a_rig_picture_that_cannot_be_read(small_copy, boards):
+    (small_copy / "boards" / "rig" / "low.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    assert set(found(small_copy, boards=boards).refusals) == {
+        "boards/rig/low.png: cannot be read as a picture"
+    }
+
+
+@pytest.mark.parametrize("lost", [[], [4], [4, 5], [2, 7]])
+def test_frames_between_the_times_are_counted(lost):
+    time_s = np.delete(0.05 * np.arange(12), lost)
+    found = FrameTimes(time_s, "frames.csv", {}).lost_in(slice(None))
+    assert sum(count for _, count in found) == len(lost)

@@ -1,0 +1,164 @@
+"""The command line: thin, quick, one line for bad input, and the exit codes that scripts rely on."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from bench.base.errors import BadInput
+from bench.commands import cli
+
+VERBS = [
+    "new",
+    "board",
+    "check",
+    "calibrate cameras",
+    "calibrate gauges",
+    "evaluate",
+    "simulate",
+    "info",
+]
+VERBS += ["report", "compare", "view", "design"]
+VERBS += ["figures 5", "figures 6", "figures 8", "figures tilt", "figures radius"]
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_each_verb_shows_a_worked_example(verb, capsys):
+    with pytest.raises(SystemExit) as done:
+        cli.main([*verb.split(), "--help"])
+    assert done.value.code == 0
+    assert f"example:\n  whisker-bench {verb}" in capsys.readouterr().out
+
+
+def test_help_lists_every_verb(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    shown = capsys.readouterr().out
+    assert [verb for verb in VERBS if f"\n    {verb.split()[0]}" not in shown] == []
+
+
+def test_help_imports_nothing_heavy():
+    code = "import bench.commands.cli, sys; bench.commands.cli.make_parser().format_help(); print(*sys.modules)"
+    modules = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True
+    ).stdout.split()
+    assert not {"numpy", "cv2", "scipy", "matplotlib", "msgspec"} & set(modules)
+
+
+def test_a_look_at_a_session_imports_no_solver(small_session):
+    """Of the second that `check` takes to start, half was scipy.optimize and what imports it."""
+    code = f"import sys; from bench.commands.cli import main; main(['check', {str(small_session)!r}]); print(*sys.modules)"
+    said = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    heavy = {
+        "scipy.optimize",
+        "scipy.interpolate",
+        "scipy.integrate",
+        "scipy.stats",
+        "matplotlib",
+        "skimage",
+        "jinja2",
+    }
+    assert "nothing wrong or doubtful" in said and not heavy & set(said.split())
+
+
+def test_a_session_is_evaluated_without_loading_what_draws():
+    code = "import bench.api, bench.commands.evaluate, sys; from bench.report.page import write; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert "bench.trials.seen" in loaded
+    assert not {"matplotlib", "scipy.stats"} & set(loaded)
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["no-such-verb"], ["check"], ["check", "x", "--no-such-option"]]
+)
+def test_wrong_usage_is_exit_code_2(arguments, capsys):
+    with pytest.raises(SystemExit) as done:
+        cli.main(arguments)
+    assert done.value.code == 2
+    assert capsys.readouterr().err.startswith("usage: whisker-bench")
+
+
+def test_check_of_a_sound_session(small_session, capsys):
+    assert cli.main(["check", str(small_session)]) == 0
+    assert "4 trials, nothing wrong or doubtful" in capsys.readouterr().out
+
+
+def test_check_of_a_doubtful_session(small_copy, capsys):
+    manifest = small_copy / "trials" / "b30_3" / "trial.toml"
+    manifest.write_text(manifest.read_text().replace("speed_deg_s = 10.0", "speed_deg_s = 90.0"))
+    assert cli.main(["check", str(small_copy)]) == 1
+    assert capsys.readouterr().out.startswith("doubtful: trials/b30_3/signals.csv")
+
+
+def test_check_of_a_bad_session(small_copy, capsys):
+    (small_copy / "session.toml").unlink()
+    assert cli.main(["check", str(small_copy)]) == 2
+    assert capsys.readouterr().out.startswith("bad: ")
+
+
+def test_info(capsys):
+    assert cli.main(["info"]) == 0
+    assert "opencv-contrib-python-headless" in capsys.readouterr().out
+
+
+def main_with(monkeypatch, problem: BaseException) -> int:
+    def fail(_):
+        raise problem
+
+    monkeypatch.setattr(cli, "_info", fail)
+    return cli.main(["info"])
+
+
+@pytest.mark.parametrize(
+    ("problem", "code", "line"),
+    [
+        (
+            BadInput("has 3 values", file="a.csv", row=7),
+            2,
+            "whisker-bench: a.csv, row 7: has 3 values\n",
+        ),
+        (KeyboardInterrupt(), 130, "whisker-bench: interrupted; what was finished is kept\n"),
+        (
+            OSError(28, "No space left on device", "out.csv"),
+            2,
+            "whisker-bench: out.csv: No space left on device\n",
+        ),
+        (
+            ZeroDivisionError("x"),
+            70,
+            "whisker-bench: a fault of ours, please report it (ZeroDivisionError: x); ",
+        ),
+    ],
+)
+def test_whatever_ends_a_run_is_one_line_and_a_code(monkeypatch, capsys, problem, code, line):
+    assert main_with(monkeypatch, problem) == code
+    error = capsys.readouterr().err
+    assert error.startswith(line)
+    assert error.count("\n") == 1
+
+
+def test_a_polite_kill_ends_as_an_interruption():
+    code = "import sys, time, bench.commands.cli as c; c._info = lambda _: (print('up', flush=True), time.sleep(60)); "
+    command = [sys.executable, "-c", code + "sys.exit(c.main(['info']))"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "up\n"
+        started = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=10) == 130
+        assert time.monotonic() - started < 5
+        assert process.stderr.read() == "whisker-bench: interrupted; what was finished is kept\n"
+
+
+def test_a_reader_that_stops_reading_is_no_fault():
+    shell = f"{sys.executable} -m bench.commands.cli info | head -n 0; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    assert done.stdout.strip() in {"0", "141"}

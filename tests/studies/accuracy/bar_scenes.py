@@ -1,0 +1,139 @@
+"""How well the bar is found before any wire is known, in scenes with truth: its axis, and its line in each camera.
+
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/bar_scenes.py FOLDER [PATTERN]
+
+FOLDER holds sessions of one whisk each (trials/w) with exact cameras and truth.toml: d_x_mm, touch_deg, beta_deg and
+psi_deg, which are the axis. A row a camera: how far off the line is at 20 mm to either side of the contact (px), the
+stated sigma, and z with the error that the fit takes every line to have besides (BAR_OFFSET_PX); how
+wide the bar looks over how wide it is; then the share of scenes whose axis is within 1 px in every camera that sees it,
+and z's RMS and largest, of the line and of the width's logarithm.
+"""
+
+import sys
+import tomllib
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
+from vision.calibration.cameras_file import read_cameras
+from vision.fit.problem import BAR_OFFSET_PX
+from vision.geometry.camera import Camera
+from vision.geometry.contact import BarAxis, upward
+from vision.geometry.refusals import Refused
+from vision.geometry.rods import Bar, Rods, Wire
+from vision.geometry.silhouette import outline
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.view import View
+from vision.touched.find import axis_from_angles
+from vision.touched.search import SeenBar, see_bar
+from vision.touched.width import in_all, seen_over_given
+
+FOUND_PX = 1.0
+
+
+def read_scene(folder: Path) -> tuple[list[View], list[Camera], Rods, np.ndarray, BarAxis]:
+    """Views, cameras, rods, motor angles (rad) of all frames, and the true axis of a scene."""
+    session = tomllib.loads((folder / "session.toml").read_text())
+    wire = Wire(
+        **{name: session["whisker"][name] for name in ("shape", "length_mm", "diameter_mm")}
+    )
+    rods, cameras = (
+        Rods(wire, Bar(session["bar"]["diameter_mm"])),
+        read_cameras(folder / "cameras.toml"),
+    )
+    views = []
+    for camera in cameras:
+        files = sorted((folder / "trials" / "w" / camera.name).iterdir())
+        frames = {int(file.stem): cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for file in files}
+        rig = cv2.imread(
+            str(folder / "boards" / "rig" / f"{camera.name}.png"), cv2.IMREAD_GRAYSCALE
+        ).astype(float)
+        views.append(View(camera, frames, rig, measure_noise(*list(frames.values())[:2])))
+    truth = tomllib.loads((folder / "trials" / "w" / "truth.toml").read_text())
+    angles = np.radians([truth[name] for name in ("touch_deg", "beta_deg", "psi_deg")])
+    motor = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)[
+        "motor_deg"
+    ]
+    axis = axis_from_angles(truth["d_x_mm"], *angles, rods.reach_mm(truth["d_x_mm"]))
+    return views, cameras, rods, np.radians(motor), upward(axis)
+
+
+def off_px(camera: Camera, true: BarAxis, radius_mm: float, px, normal) -> np.ndarray:
+    """How far points (n, 2) lie from the middle of the true bar along their normals, px."""
+    place = np.linspace(-60.0, 60.0, 241)
+    points = true.point_mm + place[:, None] * true.direction
+    middle, _ = outline(camera, points, np.broadcast_to(true.direction, points.shape), radius_mm)
+    along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
+    away = px[:, None] - middle
+    nearest = np.argmin(np.abs(np.einsum("nki,ni->nk", away, along)), axis=1)
+    return np.sum(away[np.arange(len(px)), nearest] * normal, axis=1)
+
+
+def axis_off_px(camera: Camera, true: BarAxis, found: BarAxis, radius_mm: float) -> float:
+    """Largest distance of the found axis's middle from the true one's, within 20 mm of the found axis's point."""
+    points = found.point_mm + np.array([-20.0, 0.0, 20.0])[:, None] * found.direction
+    middle, _ = outline(camera, points, np.broadcast_to(found.direction, points.shape), radius_mm)
+    along = middle[2] - middle[0]
+    normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    return float(np.max(np.abs(off_px(camera, true, radius_mm, middle, np.tile(normal, (3, 1))))))
+
+
+def main() -> None:
+    pattern = sys.argv[2] if len(sys.argv) > 2 else "*"
+    worst, every, widths = [], [], []
+    for folder in sorted(
+        one for one in Path(sys.argv[1]).glob(pattern) if (one / "trials/w/truth.toml").exists()
+    ):
+        views, cameras, rods, motor, true = read_scene(folder)
+        try:
+            seen = see_bar(views, cameras, rods, motor, VisionSettings())
+        except Refused as reason:
+            print(f"{folder.name:<6} {reason}", flush=True)
+            worst.append(np.inf)
+            continue
+        worst.append(
+            max(axis_off_px(camera, true, seen.axis, rods.bar.radius_mm) for camera in cameras)
+        )
+        print(f"{folder.name:<6} axis off by {worst[-1]:.2f} px", flush=True)
+        looks = seen_over_given(seen)
+        for share, sigma in [in_all(looks)] if looks else []:
+            widths.append(np.log(share) / (sigma / share))
+            print(f"       looks {share:.3f} ± {sigma:.3f} times as wide as it is", flush=True)
+        every += [
+            row for camera in cameras for row in line_rows(camera, seen, true, rods.bar.radius_mm)
+        ]
+    error, sigma = np.abs(np.array(every)).T
+    z = error / np.hypot(sigma, BAR_OFFSET_PX)
+    found = np.mean(np.array(worst) < FOUND_PX)
+    print(
+        f"{found:.0%} of {len(worst)} axes within {FOUND_PX:g} px; {len(error)} points: median error "
+        f"{np.median(error):.3f} px, sigma {np.median(sigma):.3f}; z RMS {np.sqrt(np.mean(z**2)):.2f}, median "
+        f"{np.median(z):.2f}, over 3 {np.mean(z > 3):.1%}, largest {z.max():.1f}"
+    )
+    print(
+        f"z of widths: RMS {np.sqrt(np.mean(np.square(widths))):.2f}, largest {np.max(np.abs(widths)):.1f}"
+    )
+
+
+def line_rows(
+    camera: Camera, seen: SeenBar, true: BarAxis, radius_mm: float
+) -> list[tuple[float, float]]:
+    """Error and sigma, px, of both points of a camera's line, which are printed, too."""
+    line = seen.lines.get(camera.name)
+    if line is None or not line.is_bar:
+        return []
+    error = off_px(camera, true, radius_mm, line.points.px, line.points.normal)
+    parts = [f"{e:+.3f} ± {s:.3f}" for e, s in zip(error, line.points.sigma_px)]
+    print(
+        f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.for_bar:.0f}, left {line.unresolved:.3f}",
+        flush=True,
+    )
+    return list(zip(error, line.points.sigma_px))
+
+
+if __name__ == "__main__":
+    main()

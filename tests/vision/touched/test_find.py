@@ -1,0 +1,93 @@
+"""The bar's edges, and the bar by them: in the light of another lamp, with a highlight, and where there is none."""
+
+import numpy as np
+import pytest
+
+from tests.studies.accuracy.bar_lines import (
+    AWAY_MM,
+    CENTRE,
+    RADIUS_MM,
+    edges_px,
+    metal,
+    noisy_view,
+    squares,
+)
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.refusals import Refused
+from vision.geometry.rods import Bar, Rods, Wire
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.change import HALF
+from vision.pictures.pixel_noise import Noise
+from vision.pictures.view import View
+from vision.touched.find import clear_edges, climb
+from vision.touched.find import edges_px as edges_of
+from vision.touched.one_view import find_bars_alone
+from vision.touched.search import see_bar
+
+
+def test_squares_of_the_board_in_a_soft_shadow_are_no_edges(rng):
+    """At their borders they count for less than a fifth of a rod's edge; noise alone has 0.07 of the clearest."""
+    x, y = np.meshgrid(np.arange(200.0), np.arange(150.0))
+    board = np.where((x // 25 + y // 25) % 2 > 0, 160.0, 40.0)
+    shadow = 1.0 - 0.5 / (1.0 + np.exp((x - 60.0) / 12.0))
+    seen = np.where(np.abs(x - 140.0) < 8.0, 100.0, board * shadow)
+    noisy = [picture + rng.standard_normal(board.shape) for picture in (seen, board)]
+    edges = edges_of(*noisy, 1.0)
+    across = edges[20:-20, :, 0]
+    assert np.mean(np.max(across[:, 131:135], axis=1)) > 0.5
+    assert np.mean(across[:, [24, 25, 49, 50, 74, 75, 99, 100]]) < 0.1
+
+
+def test_a_polished_bar_over_squares_is_found_by_one_camera(rng):
+    """Within a quarter of its half-width, 16 px; the highlight's edges lie 4 to 8 px from its middle."""
+    angle, across_mm = 1.3, 0.7
+    view = noisy_view(metal, squares, angle, across_mm, rng)
+    camera = Camera(
+        "c",
+        view.camera.size_px,
+        view.camera.matrix,
+        np.zeros(5),
+        np.column_stack([np.eye(3), [-50.0, 0.0, AWAY_MM]]),
+    )
+    rods = Rods(Wire("cylinder", 100.0, 0.5), Bar(2.0 * RADIUS_MM))
+    clear = clear_edges(
+        camera, view.mean[::HALF, ::HALF], view.background[::HALF, ::HALF], rods, 0.0
+    )
+    found = find_bars_alone(clear, rods, 0.0)[0]
+    px = camera.project(found.point_mm + np.array([-8.0, 8.0])[:, None] * found.direction)
+    off = (px - CENTRE) @ [-np.sin(angle), np.cos(angle)] - np.mean(edges_px(across_mm))
+    assert np.max(np.abs(off)) < 4.0
+
+
+def test_where_nothing_changed_no_bar_is_seen(rng):
+    views = []
+    for name, shift in (("one", 0.0), ("two", 60.0)):
+        camera = Camera(
+            name,
+            (320, 240),
+            [[600, 0, 160], [0, 600, 120], [0, 0, 1]],
+            np.zeros(5),
+            np.column_stack([np.eye(3), [-50.0 - shift, 0.0, 300.0]]),
+        )
+        frames = {k: 90.0 + 2.0 * rng.standard_normal((240, 320)) for k in range(3)}
+        views.append(
+            View(camera, frames, 90.0 + 2.0 * rng.standard_normal((240, 320)), Noise(4.0, 0.0))
+        )
+    rods = Rods(Wire("cylinder", 100.0, 0.5), Bar(6.0))
+    with pytest.raises(Refused, match="bar"):
+        see_bar(
+            views,
+            Cameras(tuple(view.camera for view in views)),
+            rods,
+            np.array([-0.1, 0.1]),
+            VisionSettings(),
+        )
+
+
+def test_climbing_ends_on_the_top():
+    top = np.array([0.3, -1.7])
+    found, score = climb(
+        np.zeros((2, 2)), np.ones(2), lambda each: -np.sum((each - top) ** 2, axis=1)
+    )
+    assert np.all(np.abs(found - top) < 0.5)
+    assert np.all(score > -0.2)

@@ -1,0 +1,59 @@
+"""Light from one side: seen by the width against the known diameter, corrected from the lit edge, told in a line."""
+
+import numpy as np
+import pytest
+
+from tests.studies.accuracy.lines import SCENES, errors, first_look
+from vision.fit.problem import WIRE_OFFSET_PX
+from vision.wire.one_sided import SeenWidth, WireAppearance, one_sided_lines, seen_width
+from vision.wire.trace import to_points
+
+
+def looked_at(name, rng):
+    """Width seen in one of the drawn scenes, and the mean error of the axis found there over what is stated of it."""
+    *_, seen = first_look(SCENES[name], rng, off_px=0.3)
+    points, source = to_points(seen)
+    stated = np.hypot(np.median(np.linalg.norm(seen.located.shared_px, axis=1)), WIRE_OFFSET_PX)
+    return seen_width(seen.pieces, seen.blur_px), float(
+        np.mean(errors(SCENES[name], points, source))
+    ) / stated
+
+
+@pytest.mark.parametrize("name", ["highlight and step", "highlight over printed squares"])
+def test_a_rod_seen_whole_is_as_wide_as_it_is(rng, name):
+    width, _ = looked_at(name, rng)
+    # bins of a quarter of a pixel in all, and 3.3 times the error of the blur, which is some 0.1 px
+    assert width.seen_px == pytest.approx(5.6, abs=0.6)
+    assert not width.one_sided and width.line("high") == ""
+
+
+@pytest.mark.parametrize(
+    "name, off_px", [("one lamp, 45°, on dark", -0.82), ("one lamp, 15°, on dark", -1.04)]
+)
+def test_a_rod_lit_from_one_side_is_seen_narrower_and_its_axis_is_found(rng, name, off_px):
+    """What is lit ends at sin 45° (sin 15°) of the radius beyond the axis, so its middle lies off by (1 - that)/2.
+
+    -0.41 and -1.04 px for a sharp end; brightness fades towards it, so what is plainly seen ends earlier. The axis
+    comes from the lit edge and the diameter, to what is stated: over five seeds -0.10 px at 45°, -0.20 to -0.23 at 15°.
+    """
+    width, sigmas = looked_at(name, rng)
+    assert width.one_sided
+    assert width.off_px < 0.45 * off_px
+    assert abs(sigmas) < 2.0
+
+
+def test_the_report_names_camera_and_width_once():
+    narrow, whole = (
+        WireAppearance(0.9, SeenWidth(*width)) for width in ((3.1, 5.6, -1.4), (5.5, 5.6, 0.0))
+    )
+    (line,) = one_sided_lines([{"high": narrow, "low": whole}, {"high": whole}])
+    assert line.startswith("camera high sees 3.1 of the wire's 5.6 px: light from one side")
+
+
+def test_light_that_is_not_explained_is_a_doubt():
+    width = SeenWidth(5.5, 5.6, 0.0)
+    assert WireAppearance(0.9, width, misfit=5.0).doubt("low") == ""
+    said = WireAppearance(0.9, width, misfit=10.1).doubt("low")
+    assert said.startswith(
+        "camera low: the wire's light differs from that of any lit wire by 10 times the noise"
+    )
