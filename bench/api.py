@@ -2,8 +2,8 @@
 
 Examples:
     >>> run = evaluate(session, out, alpha_est_deg=12.0)
-    >>> run.verdict[-1]
-    'sample: no pictures, so no truth; 2 measured whisks felt...'
+    >>> run.verdict[0]
+    'sample: no pictures, so the true distance is not known; 2 measured whisks felt...'
     >>> run.whisks.dtype.names[:4]
     ('trial', 'whisk', 'surface', 'speed_deg_s')
     >>> given = run.estimates["estimator"] == "with_friction"

@@ -16,7 +16,7 @@ from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.tables import write_table
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial_result import whisks
+from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import ESTIMATE_COLUMNS, WHISK_COLUMNS, estimate_rows, whisk_rows
 from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
@@ -25,7 +25,6 @@ from bench.report.run_facts import RunRecord, Section
 from bench.report.summary.compose import DOUBTFUL, Summary
 from bench.report.summary.verdict import verdict
 from bench.session.session import Base, Session
-from bench.trials.estimate_errors import judge
 from vision.geometry.counted import counted
 
 TABLES = ("whisks", "estimates", "surface", "size")
@@ -160,6 +159,12 @@ def _write_tables(out: Path, runs: Sequence[WhiskerRun]) -> None:
         write_table(out / f"{name}.csv", ("whisker", *columns), named)
 
 
+def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
+    """Return a result whose trial's name says which whisker it is of: all whiskers share trials."""
+    trial = replace(result.trial, name=f"{result.trial.name}, {run.base.name}")
+    return replace(result, trial=trial)
+
+
 def _summary(
     record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Contact], sizes
 ) -> Summary:
@@ -169,23 +174,17 @@ def _summary(
         *swapped,
         *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts),
     ]
-    judged = [
-        replace(j, trial=f"{j.trial}, {run.base.name}")
-        for run in runs
-        for j in judge(run.whole.results)
-    ]
-    results = [result for run in runs for result in run.whole.results]
+    results = [_named_by_whisker(result, run) for run in runs for result in run.whole.results]
     pictures = any(run.record.has_pictures for run in runs)
     said = verdict(
         f"{record.session}, {counted(len(runs), 'whisker')}",
         pictures,
         results,
-        judged,
         runs[0].record.settings,
         len(doubtful),
     )
     sections = (
-        Section("Whiskers", tuple(f"{run.base.name}: {run.record.verdict[-1]}" for run in runs)),
+        Section("Whiskers", tuple(f"{run.base.name}: {run.record.verdict[0]}" for run in runs)),
         Section("Surface: contacts from the object, mm (surface.csv)", tuple(surface_lines(cloud))),
         Section("Size of the object by (10), its place free (size.csv)", tuple(size_lines(sizes))),
         Section(DOUBTFUL, tuple(doubtful)),

@@ -9,8 +9,8 @@ from bench.base.drawing import label_of
 from bench.base.errors import BadInput
 from bench.base.tables import write_table
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.report.estimator_accuracy import accuracies
 from bench.report.evaluation import finished
-from bench.report.page.standing import standings
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.pooled import read_run
 from bench.report.record import read_record
@@ -102,7 +102,7 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
         for other in others
         for line in _lines(first, other, [c for c in changes if c.out == other.out])
     ]
-    lines += _standing_lines([first, *others])
+    lines += _accuracy_lines([first, *others])
     return lines, CHANGED if any(c.matters for c in changes) else DONE
 
 
@@ -192,16 +192,17 @@ def _lines(first: _Run, other: _Run, changes: Sequence[Change]) -> Iterator[str]
     yield f"  {len(changes) - len(significant)} of {len(changes)} values moved by {quiet:.2f} sigma at most"
 
 
-def _standing_lines(runs: Sequence[_Run]) -> Iterator[str]:
+def _accuracy_lines(runs: Sequence[_Run]) -> Iterator[str]:
     """RMS error of each estimator in each run."""
-    stood = [{s.label: s for s in standings(run.results)} for run in runs]
-    names = list(dict.fromkeys(label for of_run in stood for label in of_run))
+    by_label = [{one.label: one for one in accuracies(run.results)} for run in runs]
+    names = list(dict.fromkeys(label for of_run in by_label for label in of_run))
     if names:
         yield "RMS error of d_x, % (whisks), in the order of the runs"
     for name in names:
-        cells = (of_run.get(name) for of_run in stood)
+        cells = (of_run.get(name) for of_run in by_label)
         yield f"  {name:<24}" + "".join(
-            f"{f'{number(s.rms_percent)} ({s.n})' if s is not None else MISSING:>18}" for s in cells
+            f"{f'{number(s.rms_percent)} ({len(s.judged)})' if s is not None else MISSING:>18}"
+            for s in cells
         )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.records.trial_result import TrialResult
-from bench.report.page.standing import Standing, standings, sureness
+from bench.report.estimator_accuracy import Accuracy, accuracies, truth_uncertainty
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.run_facts import RunRecord
 
@@ -39,16 +39,16 @@ def methods(
     record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
 ) -> str:
     """Two paragraphs and two tables, Markdown."""
-    stood = standings(results)
+    accuracy_of_all = accuracies(results)
     return "\n".join(
         [
             f"# Methods: {_plain(record.session)}",
             "",
             " ".join(_truth(record, results)),
             "",
-            " ".join(_estimates(record, results, stood)),
+            " ".join(_estimates(record, results, accuracy_of_all)),
             "",
-            *_standing_table(stood),
+            *_accuracy_table(accuracy_of_all),
             *_friction_table(friction),
             "References: results.bib (solomon2008artificial, whiskerbench).",
             "",
@@ -57,7 +57,7 @@ def methods(
 
 
 def _truth(record: RunRecord, results: Sequence[TrialResult]) -> Iterator[str]:
-    whisker, sure = record.whisker, sureness(results)
+    whisker, sure = record.whisker, truth_uncertainty(results)
     made = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]
     yield (
         f"A {made} whisker of {whisker.diameter_mm:g} mm base diameter and {whisker.length_mm:g} mm length "
@@ -82,7 +82,7 @@ def _truth(record: RunRecord, results: Sequence[TrialResult]) -> Iterator[str]:
 
 
 def _estimates(
-    record: RunRecord, results: Sequence[TrialResult], stood: Sequence[Standing]
+    record: RunRecord, results: Sequence[TrialResult], accuracy_of_all: Sequence[Accuracy]
 ) -> Iterator[str]:
     settings = record.settings
     yield (
@@ -93,28 +93,30 @@ def _estimates(
     gauges = record.lines("Gauges")
     if gauges:
         yield f"Gauge coefficients are from {gauges[0].split(';')[0].removeprefix('from ')}."
-    for s in stood:
-        if s.n:
+    for s in accuracy_of_all:
+        if s.judged:
             held = (
-                f"; {s.held} of {s.stated} of its 95 % intervals hold the truth" if s.stated else ""
+                f"; {s.intervals_holding} of {s.intervals} of its 95 % intervals hold the truth"
+                if s.intervals
+                else ""
             )
             yield (
                 f"{s.label}: error of d_x {number(s.bias_percent, 2)} % in the mean and "
-                f"{number(s.rms_percent, 2)} % RMS over {s.n} whisks{held}."
+                f"{number(s.rms_percent, 2)} % RMS over {len(s.judged)} whisks{held}."
             )
     versions = ", ".join(f"{name} {version}" for name, version in record.versions.items())
     yield f"Computed with {versions}."
 
 
-def _standing_table(stood: Sequence[Standing]) -> Iterator[str]:
-    if not stood:
+def _accuracy_table(accuracy_of_all: Sequence[Accuracy]) -> Iterator[str]:
+    if not accuracy_of_all:
         return
     yield "| estimator | whisks | mean error / % | RMS error / % | largest / % | 95 % intervals that hold |"
     yield "|---|---|---|---|---|---|"
-    for s in stood:
+    for s in accuracy_of_all:
         numbers = (number(v, 2) for v in (s.bias_percent, s.rms_percent, s.worst_percent))
-        held = f"{s.held} of {s.stated}" if s.stated else MISSING
-        yield f"| {_plain(s.label)} | {s.n} of {s.asked} | {' | '.join(numbers)} | {held} |"
+        held = f"{s.intervals_holding} of {s.intervals}" if s.intervals else MISSING
+        yield f"| {_plain(s.label)} | {len(s.judged)} of {s.with_truth} | {' | '.join(numbers)} | {held} |"
     yield ""
 
 

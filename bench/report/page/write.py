@@ -14,6 +14,7 @@ from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
 from bench.base.settings import Seeing
 from bench.records.trial_result import TrialResult
+from bench.report.estimator_accuracy import accuracies, truth_uncertainty
 from bench.report.evaluation import finished
 from bench.report.page.cards import SOUND, card, cells, columns
 from bench.report.page.combined_whisks import together
@@ -22,7 +23,6 @@ from bench.report.page.gauge_card import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
 from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
-from bench.report.page.standing import standings, sureness
 from bench.report.page.words import number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
@@ -93,7 +93,7 @@ def page(
     """The page as HTML. out: where its pictures and the tables of whisks together are taken from."""
     rows = rows_of(results)
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
-    standing = standings(results)
+    accuracy = accuracies(results)
     drawn = scene(record, rows)
     at = {(row.trial, row.seen.whisk): row for row in rows}
     return (
@@ -104,8 +104,8 @@ def page(
             rows=[(row, cells(row, estimators)) for row in rows],
             columns=columns(estimators),
             cards=[card(row, record.whisker, out, len(rows)) for row in rows],
-            standing=[(s, at.get(s.worst_at)) for s in standing],
-            sure=sureness(results),
+            accuracies=[(one, at.get(one.worst_at)) for one in accuracy],
+            truth=truth_uncertainty(results),
             doubts=[(line, cure_of(line)) for line in record.doubts],
             figures=list(figures(record, rows, friction)),
             explained=_stack(explained_bars(record, rows), SHARES, _PARTS),

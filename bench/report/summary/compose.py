@@ -19,7 +19,12 @@ from bench.report.summary.error_lines import contact_lines, error_lines
 from bench.report.summary.gauge_lines import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import gauges_of_all, looked_at, run_lines, verdict
+from bench.report.summary.verdict import (
+    gauge_source_lines,
+    known_friction_lines,
+    preset_lines,
+    verdict,
+)
 from bench.report.summary.warning_lines import (
     frame_lines,
     light_lines,
@@ -85,11 +90,11 @@ def summary_of(
         evaluation.session.name,
         any(trial.camera_sources for trial in evaluation.session.trials),
     )
-    said = verdict(name, pictures, evaluation.results, judged, evaluation.settings, len(doubtful))
+    said = verdict(name, pictures, evaluation.results, evaluation.settings, len(doubtful))
     said = (
         *said,
-        *gauges_of_all(evaluation.gauges),
-        *looked_at(evaluation.results, evaluation.settings),
+        *gauge_source_lines(evaluation.gauges),
+        *preset_lines(evaluation.results, evaluation.settings),
     )
     others = moving, both_ways, one_camera
     sections = _sections(
@@ -133,7 +138,7 @@ def _sections(
     )
     friction = [
         *alpha_lines(evaluation.friction),
-        *run_lines(judged, settings),
+        *known_friction_lines(results, settings),
         *tilted_lines(evaluation.tilted),
     ]
     yield _titled("Friction angle α (± one sigma)", friction)

@@ -1,63 +1,153 @@
-"""The verdict: how wrong each estimator is, over the measured whisks."""
+"""The verdict, for a reader who does not know the paper.
+
+First how well the truth is known; then, for each estimator, what it assumes, how far off it is and
+whether its stated uncertainty covers that; last, which one to use here.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-import numpy as np
-
 from bench.analyses.runs import FITTED, KINETIC, RUNS, SEEN
-from bench.base.drawing import label_of
 from bench.base.settings import Seeing, Settings
 from bench.gauges.matrix import FROM_ALL, Gauges
 from bench.records.trial_result import TrialResult, whisks
+from bench.report.estimator_accuracy import Accuracy, accuracies, truth_uncertainty
 from bench.trials.estimate_errors import Judged
 from vision.geometry.counted import counted
 
-_SIGNIFICANT = 2.0  # sigmas: no whisk beyond this, and the estimator may be right in all
+_ASSUMPTIONS = {
+    "no_slip": "that the contact does not slip sideways",
+    "with_friction": "a friction angle of {alpha_est_deg:g}°",
+    "frictionless": "a surface without friction",
+    "corrected": "a friction angle of {alpha_est_deg:g}°, and corrects for the object's thickness",
+    FITTED: "the friction angle fitted to the other whisks of the surface",
+    SEEN: "the friction angle that the cameras saw, which no robot has",
+    KINETIC: "a friction angle of {alpha_est_deg:g}° where the moments show that the contact slides",
+}
 
 
 def verdict(
     session: str,
-    pictures: bool,
-    results: Iterable[TrialResult],
-    judged: Sequence[Judged],
+    has_pictures: bool,
+    results: Sequence[TrialResult],
     settings: Settings,
-    doubtful: int,
+    warnings: int,
 ) -> Iterator[str]:
-    """How wrong each estimator is, and of how many whisks the truth is known. session: its name; pictures: whether it
-    has any; doubtful: how many lines are."""
-    measured = _measured(judged)
-    seen = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
-    with_truth = sum(s.has_truth for s in seen)
-    asked = [
-        j for j in judged if j.purpose == "measure" and not j.one_factor and np.isfinite(j.d_x_mm)
-    ]
-    for name in dict.fromkeys(j.estimator for j in asked if j.estimator not in RUNS):
-        mine = [j for j in measured if j.estimator == name]
-        missing = _without_or_doubted([j for j in asked if j.estimator == name])
-        yield (
-            _verdict_on(name, mine, settings) if mine else f"{label_of(name)} gave no distance."
-        ) + missing
-    if not measured:
+    """Yield the lines of the verdict.
+
+    session: its name. has_pictures: whether it has any. warnings: how many lines are doubtful.
+    """
+    yield _truth_line(session, has_pictures, results, warnings)
+    compared = [one for one in accuracies(results) if one.estimator not in RUNS]
+    for one in compared:
+        yield accuracy_line(one, settings)
+    judged = [one for one in compared if one.judged]
+    if judged:
+        yield _recommendation(judged, settings.theta_deg)
+    else:
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
-    yield (
-        f"{session}: truth for {with_truth} of {counted(len(seen), 'measured whisk')}"
-        if pictures
-        else f"{session}: no pictures, so no truth; {counted(len(seen), 'measured whisk')} felt"
-    ) + (f"; {counted(doubtful, 'doubt')}, see below." if doubtful else "; nothing doubtful.")
 
 
-def _without_or_doubted(asked: Sequence[Judged]) -> str:
-    """How many of an estimator's answers are none, and how many more come with a status."""
-    none = [j for j in asked if not np.isfinite(j.error_percent)]
-    doubted = [j for j in asked if j.status and np.isfinite(j.error_percent)]
-    parts = [f"{len(none)} of {len(asked)} without a distance ({none[0].status})"] if none else []
-    parts += [f"{len(doubted)} with a status ({doubted[0].status})"] if doubted else []
-    return f" {'; '.join(parts)}." if parts else ""
+def _truth_line(
+    session: str, has_pictures: bool, results: Sequence[TrialResult], warnings: int
+) -> str:
+    """Return of how many whisks the truth is known, and how well."""
+    truth = truth_uncertainty(results)
+    count = counted(truth.measured, "measured whisk")
+    if not has_pictures:
+        known = f"no pictures, so the true distance is not known; {count} felt"
+    elif truth.known:
+        known = (
+            f"the true distance is known for {truth.known} of {count}, to ± {truth.d_x_mm:.2g} mm"
+        )
+    else:
+        known = f"the true distance is known for none of {count}"
+    doubtful = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"
+    return f"{session}: {known}; {doubtful}."
 
 
-def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
-    """What the verdict rests on where measured trials calibrated the gauges."""
+def accuracy_line(accuracy: Accuracy, settings: Settings) -> str:
+    """Return what an estimator assumes, how far off it is, and whether its uncertainty covers that."""
+    name = f"Equation {accuracy.label}" if accuracy.label.startswith("(") else accuracy.label
+    if accuracy.estimator in _ASSUMPTIONS:
+        assumed = _ASSUMPTIONS[accuracy.estimator].format(alpha_est_deg=settings.alpha_est_deg)
+        name = f"{name} assumes {assumed}"
+    missing = _missing(accuracy)
+    if accuracy.judged:
+        return f"{name}: {_errors(accuracy)} {_coverage(accuracy)}{missing}"
+    if accuracy.left_out:
+        errors = _error_range(accuracy.left_out)
+        return f"{name}: no verdict, all {len(accuracy.left_out)} whisks are doubtful ({errors}).{missing}"
+    return f"{name}: it gave no distance.{missing}"
+
+
+def _errors(accuracy: Accuracy) -> str:
+    """Return RMS and worst error in per cent and mm, and where the worst is."""
+    worst = accuracy.worst
+    text = f"off by {accuracy.rms_percent:.1f} % ({accuracy.rms_mm:.2f} mm) RMS"
+    if len(accuracy.judged) == 1:
+        text = "off by"
+    else:
+        text += f" over {len(accuracy.judged)} whisks, at worst"
+    return (
+        f"{text} {worst.error_percent:+.1f} ± {worst.error_sigma_percent:.1f} % "
+        f"({worst.error_mm:+.2f} mm) on a slope of {worst.beta_deg:.1f}° ({worst.trial})."
+    )
+
+
+def _coverage(accuracy: Accuracy) -> str:
+    """Return whether the stated 95 % intervals hold the truth as often as they should."""
+    if not accuracy.intervals:
+        return "It states no interval."
+    covers = "covers" if accuracy.is_covered else "does not cover"
+    held = f"{accuracy.intervals_holding} of {accuracy.intervals}"
+    return f"Its stated uncertainty {covers} that: the 95 % interval holds the truth in {held}."
+
+
+def _missing(accuracy: Accuracy) -> str:
+    """Return how many whisks have no distance, a warning, or are left out as doubtful."""
+    parts = []
+    if accuracy.without_distance:
+        why = accuracy.without_distance[0].status
+        parts.append(f"no distance for {len(accuracy.without_distance)} ({why})")
+    if accuracy.warned:
+        parts.append(f"a warning for {len(accuracy.warned)} ({accuracy.warned[0].status})")
+    if accuracy.judged and accuracy.left_out:
+        errors = _error_range(accuracy.left_out)
+        parts.append(f"{len(accuracy.left_out)} doubtful left out ({errors})")
+    if not parts:
+        return ""
+    return f" Of {counted(accuracy.with_truth, 'whisk')}: {'; '.join(parts)}."
+
+
+def _error_range(judged: Sequence[Judged]) -> str:
+    """Return the least and the largest error in per cent, each with its standard deviation."""
+    least = min(judged, key=lambda one: one.error_percent)
+    largest = max(judged, key=lambda one: one.error_percent)
+    ends = [least] if least is largest else [least, largest]
+    texts = [f"{one.error_percent:+.1f} ± {one.error_sigma_percent:.1f}" for one in ends]
+    return f"{' to '.join(texts)} %"
+
+
+def _recommendation(judged: Sequence[Accuracy], theta_deg: float) -> str:
+    """Return which estimator to use, and which others these whisks cannot tell from it.
+
+    Only estimators that give a distance for as many whisks as any other are compared.
+    """
+    most = max(len(one.judged) for one in judged)
+    complete = [one for one in judged if len(one.judged) == most]
+    best = min(complete, key=lambda one: one.rms_mm)
+    alike = [one.label for one in complete if one is not best and not one.is_worse_than(best)]
+    text = f"Use {best.label} here, at a pushing angle of {theta_deg:g}°"
+    if alike:
+        text += f"; {counted(most, 'whisk')} cannot tell {' or '.join(alike)} from it"
+    if not best.is_covered:
+        text += "; but take its stated uncertainty as too small"
+    return f"{text}."
+
+
+def gauge_source_lines(gauges: Gauges | None) -> Iterator[str]:
+    """Yield what the verdict rests on where measured trials calibrated the gauges."""
     if gauges is not None and gauges.source == FROM_ALL:
         judged = sum(matrix is not None for matrix in gauges.without.values())
         yield (
@@ -66,64 +156,25 @@ def gauges_of_all(gauges: Gauges | None) -> Iterator[str]:
         )
 
 
-def looked_at(results: Iterable[TrialResult], settings: Settings) -> Iterator[str]:
-    """How hard pictures were looked at, where that is not the standard."""
-    seeing, looked = settings.seeing, [seen for _, seen, _ in whisks(results) if seen.looked]
+def preset_lines(results: Iterable[TrialResult], settings: Settings) -> Iterator[str]:
+    """Yield by which preset the pictures were measured, where that is not the standard one."""
     if settings.accuracy_mm is not None:
-        counts = Counter(seen.looked for seen in looked)
-        above = sum(not seen.d_x_mm.sigma <= settings.accuracy_mm for seen in looked)
-        by = ", ".join(f"{name} {count}" for name, count in counts.items())
-        above_it = f"{above} of {len(looked)} whisks are above."
-        yield f"Looked at until d_x's sigma is {settings.accuracy_mm:g} mm or less: {by}; {above_it}"
-    elif seeing != Seeing():
-        asked = f", cameras {', '.join(seeing.cameras)}" if seeing.cameras else ""
-        yield f"Pictures were looked at by the settings {seeing.name}{asked}."
+        measured = [seen for _, seen, _ in whisks(results) if seen.looked]
+        counts = Counter(seen.looked for seen in measured)
+        above = sum(not seen.d_x_mm.sigma <= settings.accuracy_mm for seen in measured)
+        presets = ", ".join(f"{name} {count}" for name, count in counts.items())
+        yield (
+            f"Looked at until d_x's sigma is {settings.accuracy_mm:g} mm or less: {presets}; "
+            f"{above} of {len(measured)} whisks are above."
+        )
+    elif settings.seeing != Seeing():
+        cameras = ", ".join(settings.seeing.cameras)
+        chosen = f", cameras {cameras}" if cameras else ""
+        yield f"Pictures were looked at by the settings {settings.seeing.name}{chosen}."
 
 
-def _measured(judged: Sequence[Judged]) -> list[Judged]:
-    return [
-        j
-        for j in judged
-        if j.purpose == "measure" and not j.one_factor and np.isfinite(j.error_percent)
-    ]
-
-
-def run_lines(judged: Sequence[Judged], settings: Settings) -> Iterator[str]:
-    """(10) once more with what is known of the friction, where that is anything."""
-    for name, what in (
-        (FITTED, "to the other whisks of the surface"),
-        (SEEN, "which no robot has; what is left then"),
-        (KINETIC, "where moments alone show stick–slip"),
-    ):
-        mine = [j for j in _measured(judged) if j.estimator == name]
-        if mine:
-            yield _verdict_on(name, mine, settings).replace(
-                label_of(name), f"{label_of(name)} ({what}),", 1
-            )
-
-
-def _verdict_on(name: str, judged: Sequence[Judged], settings: Settings) -> str:
-    """The range of the errors of the whisks of which nothing is doubtful; of the others how many, and theirs."""
-    sound, doubtful = ([j for j in judged if j.doubtful == doubt] for doubt in (False, True))
-    assumed = f", α_est = {settings.alpha_est_deg:g}°," if name == "with_friction" else ""
-    if not sound:
-        all_of_them = f"{_all_of(len(judged))} doubtful ({_range(judged)})"
-        return f"{label_of(name)}{assumed} has no verdict: {all_of_them}."
-    worst = max(sound, key=lambda j: abs(j.error_percent))
-    is_significant = any(abs(j.error_percent) > _SIGNIFICANT * j.error_sigma_percent for j in sound)
-    not_significant = "" if is_significant else ", not significant"
-    left_out = f"; {len(doubtful)} doubtful left out ({_range(doubtful)})" if doubtful else ""
-    return (
-        f"{label_of(name)}{assumed} is wrong by {_range(sound)} of d_x over {counted(len(sound), 'whisk')}, "
-        f"most at β = {worst.beta_deg:.1f}° ({worst.trial}){not_significant}{left_out}."
-    )
-
-
-def _all_of(count: int) -> str:
-    return "its one whisk is" if count == 1 else f"all of its {count} whisks are"
-
-
-def _range(judged: Sequence[Judged]) -> str:
-    """From the least to the largest error, each with its sigma; one where there is one."""
-    ends = dict.fromkeys(pick(judged, key=lambda j: j.error_percent) for pick in (min, max))
-    return " to ".join(f"{j.error_percent:+.1f} ± {j.error_sigma_percent:.1f}" for j in ends) + " %"
+def known_friction_lines(results: Sequence[TrialResult], settings: Settings) -> Iterator[str]:
+    """Yield the accuracy of (10) with what is known of the friction, where anything is."""
+    for one in accuracies(results):
+        if one.estimator in (FITTED, SEEN, KINETIC) and one.judged:
+            yield accuracy_line(one, settings)

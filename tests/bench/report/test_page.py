@@ -15,9 +15,9 @@ import pytest
 from PIL import Image
 
 from bench.commands.cli import main
+from bench.report.estimator_accuracy import accuracies, truth_uncertainty
 from bench.report.page import words
 from bench.report.page.cures import _OTHERWISE, cure_of
-from bench.report.page.standing import standings, sureness
 from bench.report.page.svg import Panel, ticks
 from bench.report.page.thumbnails import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script
@@ -117,9 +117,9 @@ def test_standing_is_that_of_the_tables(exact_run):
     for row in table(exact_run / "estimates.csv"):
         if row["trial"].startswith(("b", "<")) and row["error_percent"]:
             errors.setdefault(row["estimator"], []).append(float(row["error_percent"]))
-    stood = {s.estimator: s for s in standings(read_run(exact_run))}
+    stood = {s.estimator: s for s in accuracies(read_run(exact_run))}
     for name in ("no_slip", "with_friction", "frictionless"):
-        assert stood[name].n == len(errors[name])
+        assert len(stood[name].judged) == len(errors[name])
         assert stood[name].rms_percent == pytest.approx(
             np.sqrt(np.mean(np.square(errors[name]))), rel=1e-6
         )
@@ -129,14 +129,14 @@ def test_standing_is_that_of_the_tables(exact_run):
 
 
 def test_methods_tell_this_runs_numbers(exact_run):
-    text, sure = (exact_run / METHODS).read_text(), sureness(read_run(exact_run))
+    text, sure = (exact_run / METHODS).read_text(), truth_uncertainty(read_run(exact_run))
     assert (
         f"known for {sure.known} of {sure.measured} whisks" in text
         or "No pictures were recorded" in text
     )
-    for s in standings(read_run(exact_run)):
+    for s in accuracies(read_run(exact_run)):
         numbers = (words.number(v) for v in (s.bias_percent, s.rms_percent, s.worst_percent))
-        assert f"| {s.label} | {s.n} of {s.asked} | {' | '.join(numbers)} |" in text
+        assert f"| {s.label} | {len(s.judged)} of {s.with_truth} | {' | '.join(numbers)} |" in text
     assert "doi     = {10.1109/TRO.2008.2002562}" in (exact_run / BIBLIOGRAPHY).read_text()
 
 

@@ -110,8 +110,8 @@ def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
 )
 def test_doubts_are_counted_apart_from_whisks(doubts, said):
     """Of one whisk there may be two."""
-    *_, last = verdict("s", True, [result()], [], Settings(), doubts)
-    assert last == f"s: truth for 1 of 1 measured whisk; {said}"
+    first, *_ = verdict("s", True, [result()], Settings(), doubts)
+    assert first == f"s: the true distance is known for 1 of 1 measured whisk, to ± 0.01 mm; {said}"
 
 
 @pytest.mark.parametrize(("count", "said"), [(0, "0 frames"), (1, "1 frame"), (2, "2 frames")])

@@ -143,7 +143,7 @@ def test_frames_too_far_apart_show_no_phases():
 
 def test_the_rig_s_sandpaper(tmp_path):
     """Exact mechanics, ringing, hum and noise; gauges and slope as they are. The requirement is 1°."""
-    protocol = Path(__file__).parents[2] / "ladder" / "protocols" / "sandpaper.toml"
+    protocol = Path(__file__).parents[2] / "studies" / "accuracy" / "protocols" / "sandpaper.toml"
     simulate(
         tmp_path / "session",
         protocol=protocol,
@@ -168,7 +168,9 @@ def test_the_rig_s_sandpaper(tmp_path):
 
 def test_without_pictures_the_nominal_slope_serves(tmp_path):
     """Slopes as set by hand: phases.csv has both angles, and friction.csv says where the slope is from."""
-    text = (Path(__file__).parents[2] / "ladder" / "protocols" / "sandpaper.toml").read_text()
+    text = (
+        Path(__file__).parents[2] / "studies" / "accuracy" / "protocols" / "sandpaper.toml"
+    ).read_text()
     text = text.replace("vibration = true", "vibration = true\nknown = true")
     text = text.replace("beta_deg = [45, 60]", "beta_deg = 60")
     (tmp_path / "p.toml").write_text(text)

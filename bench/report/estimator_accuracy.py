@@ -1,0 +1,204 @@
+"""How far off each estimator is over the whisks of a run, and how well their truth is known.
+
+The verdict, the page, methods.md and the comparison of runs all take their numbers from here.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import binom
+
+from bench.base.drawing import label_of
+from bench.records.trial_result import TrialResult, whisks
+from bench.trials.estimate_errors import Judged, judge
+
+# [1] Intervals are stated for this share of all whisks.
+INTERVAL_SHARE = 0.95
+# [1] A stated uncertainty is called too small where so few intervals would hold by chance in less
+# than this share of all runs. Stated.
+LEAST_CHANCE = 0.05
+# [sigmas] By how much the sums of squared errors of two estimators must differ to rank them. Stated.
+RANKING_SIGMAS = 2.0
+
+Key = tuple[str, int, str]  # trial, whisk, estimator
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Hold the errors of one estimator over the measured whisks of a run.
+
+    with_truth: number of whisks whose true distance is known.
+    judged: whisks with a truth and a distance that no warning about the recording speaks against.
+    left_out: whisks with a truth and a distance that such a warning speaks against.
+    without_distance: whisks for which the estimator gives none.
+    warned: whisks with a distance that the estimator itself warns about.
+    intervals: number of judged whisks with a finite 95 % interval.
+    intervals_holding: how many of these hold the true distance.
+    """
+
+    estimator: str
+    with_truth: int
+    judged: tuple[Judged, ...]
+    left_out: tuple[Judged, ...]
+    without_distance: tuple[Judged, ...]
+    warned: tuple[Judged, ...]
+    intervals: int
+    intervals_holding: int
+
+    @property
+    def label(self) -> str:
+        """Return the estimator's name as the legends have it."""
+        return label_of(self.estimator)
+
+    @property
+    def errors_mm(self) -> np.ndarray:
+        """Return the errors (whisks,): estimate less truth, mm."""
+        return np.array([one.error_mm for one in self.judged])
+
+    @property
+    def errors_percent(self) -> np.ndarray:
+        """Return the errors (whisks,): estimate less truth, per cent of the truth."""
+        return np.array([one.error_percent for one in self.judged])
+
+    @property
+    def error_sigmas_mm(self) -> np.ndarray:
+        """Return the standard deviations (whisks,) of the errors, of estimate and truth, mm."""
+        sigmas = [math.hypot(one.d_x_est_sigma_mm, one.d_x_sigma_mm) for one in self.judged]
+        return np.array(sigmas)
+
+    @property
+    def bias_percent(self) -> float:
+        """Return the mean error, per cent of the truth; NaN where nothing is judged."""
+        return float(np.mean(self.errors_percent)) if self.judged else math.nan
+
+    @property
+    def rms_percent(self) -> float:
+        """Return the RMS error, per cent of the truth; NaN where nothing is judged."""
+        return float(np.sqrt(np.mean(self.errors_percent**2))) if self.judged else math.nan
+
+    @property
+    def rms_mm(self) -> float:
+        """Return the RMS error, mm; NaN where nothing is judged."""
+        return float(np.sqrt(np.mean(self.errors_mm**2))) if self.judged else math.nan
+
+    @property
+    def worst(self) -> Judged | None:
+        """Return the whisk with the largest error in per cent; None where nothing is judged."""
+        if not self.judged:
+            return None
+        return self.judged[int(np.argmax(np.abs(self.errors_percent)))]
+
+    @property
+    def worst_percent(self) -> float:
+        """Return the largest error with its sign, per cent of the truth; NaN where there is none."""
+        return self.worst.error_percent if self.worst else math.nan
+
+    @property
+    def worst_at(self) -> tuple[str, int]:
+        """Return trial and whisk of the largest error."""
+        return (self.worst.trial, self.worst.whisk) if self.worst else ("", 0)
+
+    @property
+    def is_covered(self) -> bool:
+        """Return whether as many 95 % intervals hold the truth as chance lets one expect."""
+        chance = binom.cdf(self.intervals_holding, self.intervals, INTERVAL_SHARE)
+        return self.intervals > 0 and bool(chance >= LEAST_CHANCE)
+
+    def is_worse_than(self, other: "Accuracy") -> bool:
+        """Return whether the sum of squared errors is larger by more than the sigmas explain.
+
+        The variance of a squared error e² of standard deviation s is 4 e² s² + 2 s⁴. Errors of two
+        estimators on one whisk share their moments, so that the test errs towards no difference.
+        """
+        difference = 0.0
+        variance = 0.0
+        for one, sign in ((self, 1.0), (other, -1.0)):
+            squared = one.errors_mm**2
+            variances = one.error_sigmas_mm**2
+            difference += sign * float(np.sum(squared))
+            variance += float(np.sum(4.0 * squared * variances + 2.0 * variances**2))
+        return difference > RANKING_SIGMAS * math.sqrt(variance)
+
+
+def accuracies(results: Iterable[TrialResult]) -> list[Accuracy]:
+    """Return the accuracy of each estimator, in the order in which the results name them."""
+    results = list(results)
+    intervals = _finite_intervals(results)
+    by_estimator: dict[str, list[Judged]] = {}
+    for one in judge(results):
+        if one.purpose == "measure" and not one.one_factor and math.isfinite(one.d_x_mm):
+            by_estimator.setdefault(one.estimator, []).append(one)
+    return [_accuracy(name, mine, intervals) for name, mine in by_estimator.items()]
+
+
+def _finite_intervals(results: Sequence[TrialResult]) -> dict[Key, tuple[float, float]]:
+    """Return the 95 % interval (low, high) of each estimate in mm where both ends are known."""
+    intervals = {}
+    for result, seen, felt in whisks(results):
+        for estimate in felt.estimates:
+            ends = (estimate.d_x_est_low_mm, estimate.d_x_est_high_mm)
+            if np.isfinite(ends).all():
+                intervals[result.trial.name, seen.whisk, estimate.estimator] = ends
+    return intervals
+
+
+def _accuracy(
+    name: str, mine: Sequence[Judged], intervals: dict[Key, tuple[float, float]]
+) -> Accuracy:
+    """Return the accuracy of one estimator from its whisks with a truth."""
+    answered = [one for one in mine if math.isfinite(one.error_percent)]
+    stated = 0
+    holding = 0
+    for one in mine:
+        interval = intervals.get((one.trial, one.whisk, name))
+        if interval is not None and not one.doubtful:
+            stated += 1
+            holding += interval[0] <= one.d_x_mm <= interval[1]
+    return Accuracy(
+        estimator=name,
+        with_truth=len(mine),
+        judged=tuple(one for one in answered if not one.doubtful),
+        left_out=tuple(one for one in answered if one.doubtful),
+        without_distance=tuple(one for one in mine if not math.isfinite(one.error_percent)),
+        warned=tuple(one for one in answered if one.status),
+        intervals=stated,
+        intervals_holding=int(holding),
+    )
+
+
+@dataclass(frozen=True)
+class TruthUncertainty:
+    """Hold the median standard deviations of the truth over the measured whisks that have one.
+
+    known, measured: numbers of whisks with a truth and of all.
+    """
+
+    known: int
+    measured: int
+    d_x_mm: float
+    touch_deg: float
+    beta_deg: float
+    slip_mm: float
+
+
+def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
+    """Return how well the truth of a run is known; NaN where no whisk has one."""
+    measured = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
+    known = [seen for seen in measured if seen.has_truth]
+    slips = [seen.at.slip_mm.sigma for seen in known if seen.at is not None]
+    return TruthUncertainty(
+        known=len(known),
+        measured=len(measured),
+        d_x_mm=_finite_median([seen.d_x_mm.sigma for seen in known]),
+        touch_deg=math.degrees(_finite_median([seen.touch_rad.sigma for seen in known])),
+        beta_deg=math.degrees(_finite_median([seen.beta_rad.sigma for seen in known])),
+        slip_mm=_finite_median(slips),
+    )
+
+
+def _finite_median(values: Sequence[float]) -> float:
+    """Return the median of the finite values; NaN where there are none."""
+    finite = [value for value in values if math.isfinite(value)]
+    return float(np.median(finite)) if finite else math.nan
