@@ -13,7 +13,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.linalg.lapack import dtrtri
 
 from vision.wire.bands import Pieces
-from vision.wire.gathered import Gathered, exactly_if_needed
+from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.shading import WAVE_SHARE, Knots, between_knots, contrast_of
 
 # [1] Of the widest shift: the grid below. Derived.
@@ -94,7 +94,7 @@ def doubts_of(
     contrast = np.tile(np.repeat(contrasts, len(blurs_px)), len(shifts_px))
 
     def asked(each_pixel: bool) -> np.ndarray:
-        normal = Gathered(
+        normal = GatheredEquations(
             pieces, knots.weights(pieces) @ turned, robust, each_pixel=each_pixel
         ).normal(shifts_px, models, terms)
         return _doubts(

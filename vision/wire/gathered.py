@@ -1,11 +1,14 @@
-"""Normal equations of a rod's light at many common shifts, blurs and widths: pixels are gathered by their distance from
-the axis once, and each of many models is then asked for at some eighty distances in place of all pixels.
+"""Normal equations of a rod's shading at many common shifts, blurs and widths, from pixels summed once.
 
-What a piece's normal equations need of its pixels are sums of products: of one, of the background, its slope and
-curvature and of what is seen, with each other, times functions of the distance alone. Here such functions are known
-where they are asked for, at equal steps of the distance, and between them by the cubic through the nearest four, whose
-shares each pixel's products are given to (the adjoint of interpolation). Pieces of nearly one half-width are counted
-together, with distances stretched by as little as their half-widths differ (as in `cylinder.shading_basis`).
+A segment of the rod is a few hundred pixels. Its normal equations need sums over these pixels of
+products such as background × grey level, times functions of the pixel's distance from the axis
+alone: the share of the pixel that the rod covers, and the shading functions (`cylinder.profiles`).
+Only these functions depend on shift, blur and width.
+
+So the products are summed once, at equal steps of the distance: each pixel gives its products to
+the four nearest steps, by the weights of cubic interpolation (the adjoint of interpolation). A
+model is then evaluated at some eighty distances in place of all pixels. Segments of nearly one
+half-width are taken together, their distances scaled to a common half-width.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,199 +21,289 @@ from vision.wire.bands import Pieces
 from vision.wire.cylinder import alike, profiles
 from vision.wire.shading import WEAK, Equations
 
-# [px] Between distances at which functions of the distance are known: normal equations are right
-# to 7e-4; in one view twice the log evidence is 1699 with 0.2, 1729 with 0.3, 1697 with 0.15.
-# Derived.
+# [px] Step of the distance: normal equations are right to 7e-4; in one view twice the log evidence
+# is 1699 with 0.2, 1729 with 0.3, 1697 with 0.15. Derived.
 _STEP_PX = 0.2
-# [px, 1] Beyond the edges; of a piece's pixels: of pieces that show none cubics leave negative
-# eigenvalues, of such as show half none. Set by eye. Derived.
-_BESIDE_PX, _LEAST_BESIDE = 2.0, 0.2
-# [1] Of the offset's own square that the gain leaves: a cubic's error. Derived.
-_LEAST_ALONE = 1e-4
-# [1] Pictures of the background: itself, slope, curvature. Derived.
-_BEHIND = 3
-_PAIRS = [(i, j) for i in range(_BEHIND) for j in range(i, _BEHIND)]
+# [px] Pixels farther than this from the rod's edges show the background alone. Derived.
+_BACKGROUND_MARGIN_PX = 2.0
+# [1] Share of a segment's pixels that must show the background alone, else it is not summed:
+# without such pixels cubic interpolation leaves negative eigenvalues. Set by eye.
+_LEAST_BACKGROUND_SHARE = 0.2
+# [1] Share of the offset's own square that the gain leaves at least: the error of a cubic. Derived.
+_LEAST_OFFSET_SHARE = 1e-4
+# [1] Pictures of the background: itself, its slope and its curvature. Derived.
+_BACKGROUND_TERMS = 3
+_BACKGROUND_PAIRS = [(i, j) for i in range(_BACKGROUND_TERMS) for j in range(i, _BACKGROUND_TERMS)]
+
+# Normal matrices (models, size, size), right sides (models, size) and squares (models,).
+Normal = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-class Gathered:
-    """Pieces with weights hats (s, knots) of the knots of light in each, and robust (s,) of each."""
+class GatheredEquations:
+    """Normal equations of the shading coefficients of all knots, for many shifts and models at once."""
 
     def __init__(
-        self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray, *, each_pixel: bool = False
+        self,
+        pieces: Pieces,
+        knot_weights: np.ndarray,
+        robust: np.ndarray,
+        *,
+        each_pixel: bool = False,
     ):
-        """each_pixel: nothing is gathered, so that normal matrices have no eigenvalue below 0 whatever is seen."""
-        gathers = _shows_enough(pieces) & (not each_pixel)
-        here, others = np.flatnonzero(gathers), np.flatnonzero(~gathers)
-        together = [here[some] for some in alike(pieces.radius_px[here])] if len(here) else []
-        self._groups = [_Alike(pieces.select(some), hats[some], robust[some]) for some in together]
+        """Sum the pixels of the segments.
+
+        knot_weights (s, knots): weight of each knot in the shading of each segment.
+        robust (s,): weight of each segment.
+        each_pixel: sum nothing beforehand. It is slower, and the matrices are positive semidefinite
+        whatever the pixels show.
+        """
+        gathers = _shows_enough_background(pieces) & (not each_pixel)
+        self._groups: list[_SummedSegments | _PixelSegments] = []
+        summed = np.flatnonzero(gathers)
+        if len(summed):
+            for group in alike(pieces.radius_px[summed]):
+                some = summed[group]
+                self._groups.append(
+                    _SummedSegments(pieces.select(some), knot_weights[some], robust[some])
+                )
+        others = np.flatnonzero(~gathers)
         if len(others):
-            self._groups.append(_EachPixel(pieces.select(others), hats[others], robust[others]))
+            self._groups.append(
+                _PixelSegments(pieces.select(others), knot_weights[others], robust[others])
+            )
 
     def normal(
         self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]], terms: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Normal matrices (m, g, size, size) and right sides (m, g, size) of all knots' coefficients, and squares
-        (m, g) that the background leaves, of pieces moved by each of m common shifts; models: of g rods how many times
-        as thick each is, and blur, px.
+    ) -> Normal:
+        """Return the normal equations (shifts, models, …) of segments moved by each common shift.
 
-        As `shading.Equations.shared`, and `power` by weight.
+        models: of each how many times as thick the rod is, and the blur, px.
+        terms: number of shading functions.
+        Returned are matrices (…, size, size), right sides (…, size) and the squares (…) that the
+        background leaves unexplained, with size = knots × terms.
         """
-        parts = [group.normal(shifts_px, models, terms) for group in self._groups]
-        left, right, power = (sum(part[1:], part[0]) for part in zip(*parts))
+        left, right, power = self._groups[0].normal(shifts_px, models, terms)
+        for group in self._groups[1:]:
+            more_left, more_right, more_power = group.normal(shifts_px, models, terms)
+            left = left + more_left
+            right = right + more_right
+            power = power + more_power
         return left, right, power
 
 
-def _shows_enough(pieces: Pieces) -> np.ndarray:
-    """Which pieces (s,) show so much of the background that what cubics are off by at the edges is nothing beside
-    it."""
-    beside = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + _BESIDE_PX
-    return np.mean(beside & (pieces.weight > 0), axis=1) > _LEAST_BESIDE
+def exactly_if_needed(compute: Callable[[bool], np.ndarray]) -> np.ndarray:
+    """Return `compute(False)` from summed pixels, or `compute(True)` from each pixel where that fails.
 
-
-class _EachPixel:
-    """Pieces of which little of the background is seen, model by model."""
-
-    def __init__(self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray):
-        self.pieces, self.hats, self.robust = pieces, hats, robust
-
-    def normal(self, shifts_px, models, terms: int):
-        """See `Gathered.normal`."""
-        found = []
-        for shift in shifts_px:
-            moved = self.pieces.moved(np.full(len(self.pieces), shift))
-            for wider, blur_px in models:
-                equations = Equations(
-                    replace(moved, radius_px=wider * moved.radius_px), blur_px, terms
-                )
-                found.append(
-                    (*equations.shared(self.hats, self.robust), self.robust @ equations.power)
-                )
-        parts = (np.array(part) for part in zip(*found))
-        return tuple(part.reshape(len(shifts_px), len(models), *part.shape[1:]) for part in parts)
-
-
-class _Alike:
-    """Pieces of nearly one half-width. Of each, at distances (j,) from the axis, sums of squared weights: one, with
-    what is seen, with backgrounds; and of products of backgrounds, with each other and with what is seen."""
-
-    def __init__(self, pieces: Pieces, hats: np.ndarray, robust: np.ndarray):
-        self.radius_px = float(np.mean(pieces.radius_px))
-        offset = pieces.offset_px * (self.radius_px / pieces.radius_px)[:, None]
-        first = np.floor(np.min(offset, initial=0.0) / _STEP_PX) - 1.0
-        place = offset / _STEP_PX - first
-        count = int(np.max(place, initial=0.0)) + 3
-        self.offset_px = (first + np.arange(count)) * _STEP_PX
-        behind = (pieces.background, pieces.slope, pieces.curvature)
-        values = [
-            np.ones_like(offset),
-            pieces.grey,
-            *behind,
-            *(behind[i] * behind[j] for i, j in _PAIRS),
-            *(one * pieces.grey for one in behind),
-        ]
-        values = np.stack(values, axis=-1) * (pieces.weight**2)[..., None]
-        sums = (_to_nearest(place, count) @ values.reshape(offset.size, -1)).reshape(
-            len(pieces), count, -1
-        )
-        parts = np.split(sums, np.cumsum([1, 1, _BEHIND, len(_PAIRS)]), axis=2)
-        self.one, self.grey, self.behind, self.behind_twice, self.behind_grey = (
-            part.transpose(0, 2, 1).reshape(len(pieces), -1) for part in parts
-        )
-        self.squares = np.sum((pieces.grey * pieces.weight) ** 2, axis=1)
-        self.robust, self.hats, self.root_hats = (
-            robust,
-            hats * robust[:, None],
-            hats * np.sqrt(robust)[:, None],
-        )
-        self.one_shared = (hats[:, :, None] * self.hats[:, None, :]).reshape(
-            len(pieces), -1
-        ).T @ self.one
-
-    def normal(self, shifts_px, models, terms: int):
-        """See `Gathered.normal`."""
-        away = self.offset_px - np.asarray(shifts_px)[:, None]
-        shapes = np.stack(
-            [profiles(away, wider * self.radius_px, blur, terms) for wider, blur in models], axis=2
-        )
-        blurs_px = np.array([[blur] for _, blur in models])
-        return tuple(np.array(part) for part in zip(*(self._at(one, blurs_px) for one in shapes)))
-
-    def _at(self, shapes: np.ndarray, blurs: np.ndarray):
-        """The same at one shift, of models of these shapes (j, g, terms + 2) and blurs (g, 1), px."""
-        count, (size, knots), terms = len(blurs), self.hats.shape, shapes.shape[2] - 2
-        light, left_open = shapes[..., :terms], 1.0 - shapes[..., :1]
-        told = np.concatenate([light, left_open], axis=2)
-        # the background, as it is, and by its slope and curvature what of it does not leak
-        ways = np.concatenate(
-            [left_open, blurs * shapes[..., -2:-1], -0.5 * blurs**2 * shapes[..., -1:]], axis=2
-        )
-        by_behind = (ways.transpose(2, 0, 1)[..., None] * told).reshape(-1, count * (terms + 1))
-        twice = np.stack(
-            [ways[..., i] * ways[..., j] * (1.0 + (i != j)) for i, j in _PAIRS]
-        ).reshape(-1, count)
-        by_behind = (self.behind @ by_behind).reshape(size, count, -1)
-        by_one = (self.one @ (left_open * told).reshape(len(told), -1)).reshape(size, count, -1)
-        seen = (self.grey @ told.reshape(len(told), -1)).reshape(size, count, -1)
-        # gain and offset of the background, eliminated by Cholesky's root of their own two equations
-        root = np.sqrt(np.maximum(self.behind_twice @ twice, 0.0) + WEAK)[..., None]
-        gain = np.empty((size, count, terms + 1))
-        gain[..., :terms], between = by_behind[..., :terms] / root, by_behind[..., terms:] / root
-        gain[..., terms] = (
-            self.behind_grey @ ways.transpose(2, 0, 1).reshape(-1, count) / root[..., 0]
-        )
-        alone = np.maximum(by_one[..., terms:], 0.0)
-        root = np.sqrt(np.maximum(alone - between**2, _LEAST_ALONE * alone) + WEAK)
-        offset = np.empty((size, count, terms + 1))
-        offset[..., :terms], offset[..., terms:] = by_one[..., :terms], seen[..., terms:]
-        offset = (offset - between * gain) / root
-        told_of = np.stack([gain, offset]).transpose(2, 0, 1, 3)  # (g, 2, s, terms + 1)
-        taken = (self.root_hats[:, :, None] * told_of[..., None, :terms]).reshape(
-            count, 2 * size, -1
-        )
-        left_over = (np.sqrt(self.robust) * told_of[..., terms]).reshape(count, -1, 1)
-        taken = taken.transpose(0, 2, 1) @ np.concatenate([taken, left_over], axis=2)
-        products = (light[..., :, None] * light[..., None, :]).reshape(len(light), -1)
-        left = (
-            (self.one_shared @ products)
-            .reshape(knots, knots, count, terms, terms)
-            .transpose(2, 0, 3, 1, 4)
-        )
-        right = (
-            (self.hats.T @ seen[..., :terms].reshape(size, -1))
-            .reshape(knots, count, terms)
-            .transpose(1, 0, 2)
-        )
-        power = self.robust @ self.squares - np.sum(left_over**2, axis=(1, 2))
-        return (
-            left.reshape(count, knots * terms, -1) - taken[..., :-1],
-            right.reshape(count, -1) - taken[..., -1],
-            power,
-        )
-
-
-def exactly_if_needed(asked: Callable[[bool], np.ndarray]) -> np.ndarray:
-    """What is asked of gathered pixels (False), or of each pixel (True) where these leave no positive definite
-    matrix."""
+    Summed pixels may leave a matrix that is not positive definite, which raises LinAlgError.
+    """
     try:
-        return asked(False)
+        return compute(False)
     except np.linalg.LinAlgError:
-        return asked(True)
+        return compute(True)
 
 
-def _to_nearest(place: np.ndarray, count: int) -> csc_array:
-    """The matrix (s count, s p) that gives each pixel's value at its place (s, p) to the nearest four of count rows
-    of its piece, by the shares that the cubic through their values has there."""
+def _shows_enough_background(pieces: Pieces) -> np.ndarray:
+    """Return which segments (s,) show enough background for the error of cubics to be negligible."""
+    is_background = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + _BACKGROUND_MARGIN_PX
+    is_seen = pieces.weight > 0
+    return np.mean(is_background & is_seen, axis=1) > _LEAST_BACKGROUND_SHARE
+
+
+class _PixelSegments:
+    """Segments that show little of the background: each model is evaluated at every pixel."""
+
+    def __init__(self, pieces: Pieces, knot_weights: np.ndarray, robust: np.ndarray):
+        self._pieces = pieces
+        self._knot_weights = knot_weights
+        self._robust = robust
+
+    def normal(
+        self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]], terms: int
+    ) -> Normal:
+        """Return the normal equations as `GatheredEquations.normal` does."""
+        lefts = []
+        rights = []
+        powers = []
+        for shift in shifts_px:
+            moved = self._pieces.moved(np.full(len(self._pieces), shift))
+            for wider, blur_px in models:
+                thick = replace(moved, radius_px=wider * moved.radius_px)
+                equations = Equations(thick, blur_px, terms)
+                left, right = equations.shared(self._knot_weights, self._robust)
+                lefts.append(left)
+                rights.append(right)
+                powers.append(self._robust @ equations.power)
+        shape = (len(shifts_px), len(models))
+        left = np.array(lefts)
+        right = np.array(rights)
+        return (
+            left.reshape(*shape, *left.shape[1:]),
+            right.reshape(*shape, *right.shape[1:]),
+            np.array(powers).reshape(shape),
+        )
+
+
+class _SummedSegments:
+    """Segments of nearly one half-width, their products of pixels summed at equal distances.
+
+    All sums are over pixels by their squared weights, at distances (d,) from the axis. With the
+    background b, its slope b' and its curvature b'':
+    one, grey (s, d): sums of 1 and of the grey level;
+    behind (3 s, d → s, 3 d): of b, b', b''; behind_twice: of their products with each other;
+    behind_grey: of their products with the grey level.
+    """
+
+    def __init__(self, pieces: Pieces, knot_weights: np.ndarray, robust: np.ndarray):
+        self._radius_px = float(np.mean(pieces.radius_px))
+        scaled_px = pieces.offset_px * (self._radius_px / pieces.radius_px)[:, None]
+        first = np.floor(np.min(scaled_px, initial=0.0) / _STEP_PX) - 1.0
+        place = scaled_px / _STEP_PX - first
+        distances = int(np.max(place, initial=0.0)) + 3
+        self._distance_px = (first + np.arange(distances)) * _STEP_PX
+
+        products = _pixel_products(pieces)  # (s, p, products)
+        flat = products.reshape(scaled_px.size, -1)
+        sums = _spread_to_nearest(place, distances) @ flat
+        sums = sums.reshape(len(pieces), distances, -1)
+        ends = np.cumsum([1, 1, _BACKGROUND_TERMS, len(_BACKGROUND_PAIRS)])
+        parts = []
+        for part in np.split(sums, ends, axis=2):
+            parts.append(part.transpose(0, 2, 1).reshape(len(pieces), -1))
+        self._one, self._grey, self._behind, self._behind_twice, self._behind_grey = parts
+
+        self._squares = np.sum((pieces.grey * pieces.weight) ** 2, axis=1)  # (s,)
+        self._robust = robust
+        self._weighted_knots = knot_weights * robust[:, None]
+        self._root_weighted_knots = knot_weights * np.sqrt(robust)[:, None]
+        knot_pairs = knot_weights[:, :, None] * self._weighted_knots[:, None, :]
+        self._one_by_knot_pair = knot_pairs.reshape(len(pieces), -1).T @ self._one
+
+    def normal(
+        self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]], terms: int
+    ) -> Normal:
+        """Return the normal equations as `GatheredEquations.normal` does."""
+        distance_px = self._distance_px - np.asarray(shifts_px)[:, None]  # (shifts, d)
+        shapes = []
+        for wider, blur_px in models:
+            shapes.append(profiles(distance_px, wider * self._radius_px, blur_px, terms))
+        shapes = np.stack(shapes, axis=2)  # (shifts, d, models, terms + 2)
+        blurs_px = np.array([[blur_px] for _, blur_px in models])
+        lefts = []
+        rights = []
+        powers = []
+        for at_one_shift in shapes:
+            left, right, power = self._normal_at_one_shift(at_one_shift, blurs_px)
+            lefts.append(left)
+            rights.append(right)
+            powers.append(power)
+        return np.array(lefts), np.array(rights), np.array(powers)
+
+    def _normal_at_one_shift(self, shapes: np.ndarray, blurs_px: np.ndarray) -> Normal:
+        """Return the normal equations (models, …) of models of these shapes (d, models, terms + 2).
+
+        A pixel's grey level is modelled as Σ cᵢ lightᵢ + gain · background + offset · uncovered.
+        The coefficients c are wanted; gain and offset of each segment are eliminated, by taking
+        from the normal equations what each of the two explains.
+        """
+        terms = shapes.shape[2] - 2
+        models = len(blurs_px)
+        segments, knots = self._weighted_knots.shape
+        light = shapes[..., :terms]  # (d, models, terms)
+        uncovered = 1.0 - shapes[..., :1]  # (d, models, 1): share that the rod leaves open
+        columns = np.concatenate([light, uncovered], axis=2)
+        by_grey = self._sum(self._grey, columns)  # (s, models, terms + 1)
+
+        gain, offset = self._eliminated(shapes, uncovered, columns, by_grey, blurs_px)
+        explained = np.stack([gain, offset]).transpose(2, 0, 1, 3)  # (models, 2, s, terms + 1)
+        by_knot = self._root_weighted_knots[:, :, None] * explained[..., None, :terms]
+        by_knot = by_knot.reshape(models, 2 * segments, -1)
+        by_seen = (np.sqrt(self._robust) * explained[..., terms]).reshape(models, -1, 1)
+        taken = by_knot.transpose(0, 2, 1) @ np.concatenate([by_knot, by_seen], axis=2)
+
+        light_pairs = (light[..., :, None] * light[..., None, :]).reshape(len(light), -1)
+        left = self._one_by_knot_pair @ light_pairs
+        left = left.reshape(knots, knots, models, terms, terms).transpose(2, 0, 3, 1, 4)
+        right = self._weighted_knots.T @ by_grey[..., :terms].reshape(segments, -1)
+        right = right.reshape(knots, models, terms).transpose(1, 0, 2)
+        return (
+            left.reshape(models, knots * terms, -1) - taken[..., :-1],
+            right.reshape(models, -1) - taken[..., -1],
+            self._robust @ self._squares - np.sum(by_seen**2, axis=(1, 2)),
+        )
+
+    def _eliminated(
+        self,
+        shapes: np.ndarray,
+        uncovered: np.ndarray,
+        columns: np.ndarray,
+        by_grey: np.ndarray,
+        blurs_px: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return what gain and offset of the background explain, (s, models, terms + 1) each.
+
+        These are the rows of the Cholesky factor's inverse of their own two equations, times their
+        products with the shading functions and, last, with the grey level.
+        """
+        models = len(blurs_px)
+        segments = len(self._one)
+        terms = columns.shape[2] - 1
+        # The lens blurs what the rod leaves open, the known background was blurred whole: slope and
+        # curvature correct for light that the rod hides (`shading._not_leaked`).
+        by_slope = blurs_px * shapes[..., -2:-1]
+        by_curvature = -0.5 * blurs_px**2 * shapes[..., -1:]
+        ways = np.concatenate([uncovered, by_slope, by_curvature], axis=2)  # (d, models, 3)
+        ways_first = ways.transpose(2, 0, 1)  # (3, d, models)
+
+        crossed = (ways_first[..., None] * columns).reshape(-1, models * (terms + 1))
+        by_background = (self._behind @ crossed).reshape(segments, models, -1)
+        squares = [ways[..., i] * ways[..., j] * (1.0 + (i != j)) for i, j in _BACKGROUND_PAIRS]
+        gain_square = self._behind_twice @ np.stack(squares).reshape(-1, models)
+        root = np.sqrt(np.maximum(gain_square, 0.0) + WEAK)[..., None]
+        gain = np.empty((segments, models, terms + 1))
+        gain[..., :terms] = by_background[..., :terms] / root
+        gain[..., terms] = self._behind_grey @ ways_first.reshape(-1, models) / root[..., 0]
+        gain_of_offset = by_background[..., terms:] / root
+
+        by_one = self._sum(self._one, uncovered * columns)
+        offset_square = np.maximum(by_one[..., terms:], 0.0)
+        left_by_gain = np.maximum(
+            offset_square - gain_of_offset**2, _LEAST_OFFSET_SHARE * offset_square
+        )
+        offset = np.concatenate([by_one[..., :terms], by_grey[..., terms:]], axis=2)
+        offset = (offset - gain_of_offset * gain) / np.sqrt(left_by_gain + WEAK)
+        return gain, offset
+
+    def _sum(self, sums: np.ndarray, functions: np.ndarray) -> np.ndarray:
+        """Return the sums (s, models, k) over distances of sums (s, d) times functions (d, models, k)."""
+        flat = sums @ functions.reshape(len(functions), -1)
+        return flat.reshape(len(sums), functions.shape[1], -1)
+
+
+def _pixel_products(pieces: Pieces) -> np.ndarray:
+    """Return of each pixel (s, p, products) the products whose sums are needed, by squared weight."""
+    behind = (pieces.background, pieces.slope, pieces.curvature)
+    products = [np.ones_like(pieces.grey), pieces.grey, *behind]
+    products += [behind[i] * behind[j] for i, j in _BACKGROUND_PAIRS]
+    products += [one * pieces.grey for one in behind]
+    return np.stack(products, axis=-1) * (pieces.weight**2)[..., None]
+
+
+def _spread_to_nearest(place: np.ndarray, count: int) -> csc_array:
+    """Return the matrix (s count, s p) that gives each pixel's value to the nearest four of count rows.
+
+    place (s, p): of each pixel, counted in rows. The weights are those that the cubic through the
+    values of the four rows has at the pixel's place.
+    """
     before = place.astype(np.intp)
     t = (place - before).ravel()
-    shares = np.stack(
-        [
-            -t * (t - 1.0) * (t - 2.0) / 6.0,
-            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-            -(t + 1.0) * t * (t - 2.0) / 2.0,
-            (t + 1.0) * t * (t - 1.0) / 6.0,
-        ],
-        axis=1,
-    )
-    rows = (before + count * np.arange(len(place))[:, None]).reshape(-1, 1) + np.arange(-1, 3)
-    ends = np.arange(0, shares.size + 1, 4)
-    return csc_array((shares.ravel(), rows.ravel(), ends), shape=(len(place) * count, place.size))
+    weights = [
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -(t + 1.0) * t * (t - 2.0) / 2.0,
+        (t + 1.0) * t * (t - 1.0) / 6.0,
+    ]
+    weights = np.stack(weights, axis=1)
+    first_rows = before + count * np.arange(len(place))[:, None]
+    rows = first_rows.reshape(-1, 1) + np.arange(-1, 3)
+    ends = np.arange(0, weights.size + 1, 4)
+    return csc_array((weights.ravel(), rows.ravel(), ends), shape=(len(place) * count, place.size))

@@ -20,7 +20,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from vision.wire.bands import Pieces
 from vision.wire.common_shift import common_spread_px
-from vision.wire.gathered import Gathered, exactly_if_needed
+from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.shading import (
     LEAST_POWER,
     LONGEST_PX,
@@ -205,7 +205,7 @@ def _doubts_of_starts(task: Task, log_blurs: np.ndarray, each_pixel: bool) -> np
     `_Point.doubt`."""
     pieces, every = task.pieces, np.ones(len(task.pieces))
     models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
-    gathered = Gathered(pieces, task.hats, every, each_pixel=each_pixel)
+    gathered = GatheredEquations(pieces, task.hats, every, each_pixel=each_pixel)
     left, right, power = gathered.normal(_SHIFTS_PX, models, task.terms)
     doubts = power + ((log_blurs - np.log(task.blur_px)) / task.blur_sigma) ** 2
     for k, shift in enumerate(_SHIFTS_PX):

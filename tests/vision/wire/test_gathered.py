@@ -11,7 +11,7 @@ from vision.wire import shading
 from vision.wire.bands import cut_pieces
 from vision.wire.binned import binned
 from vision.wire.common_shift import doubts_of
-from vision.wire.gathered import Gathered
+from vision.wire.gathered import GatheredEquations
 from vision.wire.shading import Equations
 from vision.wire.trace import BIN_PX, WIRE_WAVES
 
@@ -34,7 +34,9 @@ def both(pieces, **how):
     hats, robust = KNOTS.weights(pieces), 1.0 / (1.0 + np.arange(len(pieces)) % 4)
     told = [
         part[0, 0]
-        for part in Gathered(pieces, hats, robust, **how).normal([SHIFT_PX], [(WIDER, BLUR_PX)], 11)
+        for part in GatheredEquations(pieces, hats, robust, **how).normal(
+            [SHIFT_PX], [(WIDER, BLUR_PX)], 11
+        )
     ]
     moved = replace(
         pieces.moved(np.full(len(pieces), SHIFT_PX)), radius_px=WIDER * pieces.radius_px
@@ -58,7 +60,7 @@ def test_pieces_that_show_no_background_are_asked_pixel_by_pixel(pieces):
 def test_shifts_are_as_probable_by_gathered_pixels(pieces, monkeypatch):
     shifts, blurs, robust = np.linspace(-0.3, 0.3, 7), np.array([BLUR_PX]), np.ones(len(pieces))
     gathered = doubts_of(pieces, shifts, blurs, WIRE_WAVES, KNOTS, robust)
-    monkeypatch.setattr("vision.wire.gathered._LEAST_BESIDE", 1.0)
+    monkeypatch.setattr("vision.wire.gathered._LEAST_BACKGROUND_SHARE", 1.0)
     pixels = doubts_of(pieces, shifts, blurs, WIRE_WAVES, KNOTS, robust)
     assert np.ptp(pixels) > 100.0
     assert np.allclose(
