@@ -248,7 +248,7 @@ class _SummedSegments:
         segments = len(self._one)
         terms = columns.shape[2] - 1
         # The lens blurs what the rod leaves open, the known background was blurred whole: slope and
-        # curvature correct for light that the rod hides (`shading._not_leaked`).
+        # curvature correct for light that the rod hides (`shading._hidden_light`).
         by_slope = blurs_px * shapes[..., -2:-1]
         by_curvature = -0.5 * blurs_px**2 * shapes[..., -1:]
         ways = np.concatenate([uncovered, by_slope, by_curvature], axis=2)  # (d, models, 3)

@@ -26,7 +26,7 @@ from vision.wire.shading import (
     LONGEST_PX,
     Equations,
     Knots,
-    Slopes,
+    PositionEquations,
     contrast_of,
     stiffness,
     wave_prior,
@@ -366,7 +366,7 @@ class _Arrow:
         return Shared(shift_px, shared, point.waves, blur_px, point.doubt)
 
 
-def _widened(slopes: Slopes, blur_px: float, chi2) -> np.ndarray:
+def _widened(slopes: PositionEquations, blur_px: float, chi2) -> np.ndarray:
     """By how much each piece's own blur² is above that of all, and sigma, (s, 2), its position free as well."""
     gram, power = slopes.gram, slopes.power
     own = gram[:, 1, 1] - gram[:, 0, 1] ** 2 / power + LEAST_POWER

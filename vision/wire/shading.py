@@ -1,4 +1,13 @@
-"""The rod's own shading, shared by all pieces of a camera, and the position of each piece under it."""
+"""The rod's own shading, shared by all segments of a camera, and the position of each segment under it.
+
+The rod is a lit cylinder. Its radiance round the rod is a short Fourier series (`cylinder.py`)
+whose coefficients vary slowly along the rod and as it turns: they are known at knots, and between
+knots they are interpolated linearly. Each segment of the picture has, of its own, its position
+across the rod and a gain and an offset of the background (shadow, drifting light).
+
+All but position and blur is linear. `Equations` holds each segment's normal equations with gain
+and offset eliminated; `fit_shading` solves them for the coefficients of all knots together.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,28 +19,41 @@ from scipy.linalg import lu_factor, lu_solve
 from vision.wire.bands import Pieces
 from vision.wire.cylinder import shading_basis, slopes_of
 
-# [px⁻²] Of a piece that does not tell where it is: a sigma of 30 000 px. Derived.
+# [px⁻²] Information of a segment that does not say where it is: a sigma of 30 000 px. Derived.
 LEAST_POWER = 1e-9
-# [1] Keeps a background that a piece cannot tell from making its equations singular. Derived.
+# [1] Keeps a background that does not vary in a segment from making its equations singular. Derived.
 WEAK = 1e-6
 # [rad] A rod that turned by more is lit otherwise: before a lamp's highlight a fan of 24°, taken
 # as lit alike, moved all lines by half a pixel, and by a quarter of one from end to end. Study:
-# thresholds.py lines.shading _LIT_ALIKE_RAD ….
+# thresholds.py wire.shading _LIT_ALIKE_RAD ….
 _LIT_ALIKE_RAD = np.radians(8.0)
-# [blurs] Beyond its edge, where a blurred rod has 3e-6 of its light: pixels farther off tell of
-# the background alone. Derived.
+# [blurs] Beyond its edge, where a blurred rod has 3e-6 of its light: pixels farther off show the
+# background alone. Derived.
 _REACH_BLURS = 4.5
-# [px] A step of a piece's position: an edge's slope holds for about as long. Half of it moves no
-# value of five whisks by more than 0.02 sigma, twice as much touch of one by 0.29 and a slope's
-# sigma by 0.5. Study: thresholds.py lines.shading LONGEST_PX ….
+# [px] Longest step of a segment's position: an edge's slope holds for about as long. Half of it
+# moves no value of five whisks by more than 0.02 sigma, twice as much touch of one by 0.29 and a
+# slope's sigma by 0.5. Study: thresholds.py wire.shading LONGEST_PX ….
 LONGEST_PX = 0.7
+# [1] Prior sigma of each Fourier coefficient of a thin, lit rod over its contrast: diffuse light
+# fills the first three, a highlight a quarter of the rod wide reaches the eleventh. Study: lines.py.
+WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
+# [1] What of it changes from knot to knot: light and finish are much the same a centimetre
+# farther on. Free at every knot, shading bends the line of a wire before an even floor by up to a
+# pixel. Study: thresholds.py wire.shading _CHANGE_SHARE ….
+_CHANGE_SHARE = 0.1
+# [1] What of it changes from turn to turn of `_LIT_ALIKE_RAD`: light and rod keep, the angle at
+# which they meet does not. Set by eye. Study: thresholds.py wire.shading _TURNED_SHARE ….
+_TURNED_SHARE = 0.3
+# [1] Added to the normal matrix over its mean diagonal where there is no prior. Derived.
+_RIDGE = 1e-6
 
 
 @dataclass(frozen=True)
 class Knots:
-    """Between what a rod's shading is linear: places along it (m,), mm, and where it turns far, angles (k,), rad.
+    """Hold the places between which a rod's shading is interpolated linearly.
 
-    turns: angle of each band (`Pieces.source`), needed where k > 1.
+    place_mm (m,): along the rod. turn_rad (k,): angles of the rod, where it turns far.
+    turns: angle of each band (`Pieces.source`), rad; needed where k > 1.
     """
 
     place_mm: np.ndarray
@@ -40,64 +62,64 @@ class Knots:
 
     @staticmethod
     def of_turning(place_mm: np.ndarray, turns: Mapping[int, float]) -> "Knots":
-        """Knots of a rod whose bands stand at these angles, rad."""
+        """Return the knots of a rod whose bands stand at these angles, rad."""
         angles = np.array(list(turns.values()))
         width = float(np.ptp(angles)) if len(angles) else 0.0
         if width <= _LIT_ALIKE_RAD:
             return Knots(place_mm)
-        return Knots(
-            place_mm,
-            np.linspace(angles.min(), angles.max(), 1 + int(np.ceil(width / _LIT_ALIKE_RAD))),
-            turns,
-        )
+        count = 1 + int(np.ceil(width / _LIT_ALIKE_RAD))
+        return Knots(place_mm, np.linspace(angles.min(), angles.max(), count), turns)
 
     def __len__(self) -> int:
         return len(self.place_mm) * len(self.turn_rad)
 
     def weights(self, pieces: Pieces) -> np.ndarray:
-        """How much each knot has in the shading of each piece, (s, k m)."""
-        along = _hats(pieces.place, self.place_mm)
+        """Return the weight (s, k m) of each knot in the shading of each segment."""
+        along = _linear_weights(pieces.place, self.place_mm)
         if len(self.turn_rad) == 1:
             return along
-        turned = _hats(
-            np.array([self.turns[band] for band in pieces.source.tolist()]), self.turn_rad
-        )
+        turns = np.array([self.turns[band] for band in pieces.source.tolist()])
+        turned = _linear_weights(turns, self.turn_rad)
         return (turned[:, :, None] * along[:, None, :]).reshape(len(along), -1)
 
 
 @dataclass(frozen=True)
 class Shading:
-    """Radiance round the rod. waves (k m, terms): at each knot the coefficients of 1, sin t, cos t, …, grey levels."""
+    """Hold the radiance round the rod.
+
+    coefficients (k m, terms): at each knot, of 1, sin t, cos t, …, in grey levels. blur_px: of the lens.
+    """
 
     knots: Knots
-    waves: np.ndarray
+    coefficients: np.ndarray
     blur_px: float
 
     def of(self, pieces: Pieces) -> np.ndarray:
-        """Coefficients (s, terms) of each piece."""
-        return self.knots.weights(pieces) @ self.waves
+        """Return the coefficients (s, terms) of each segment."""
+        return self.knots.weights(pieces) @ self.coefficients
 
 
-def _hats(place_mm, knots_mm) -> np.ndarray:
-    """Weights (s, m) of linear interpolation between knots, constant outside."""
-    if len(knots_mm) == 1:
-        return np.ones((len(place_mm), 1))
-    position = np.clip(
-        np.interp(place_mm, knots_mm, np.arange(len(knots_mm))), 0, len(knots_mm) - 1
-    )
-    return np.clip(1.0 - np.abs(position[:, None] - np.arange(len(knots_mm))), 0.0, None)
+def _linear_weights(place: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Return the weights (s, m) of linear interpolation between knots (m,), constant outside."""
+    if len(knots) == 1:
+        return np.ones((len(place), 1))
+    last = len(knots) - 1
+    position = np.clip(np.interp(place, knots, np.arange(len(knots))), 0, last)
+    distance = np.abs(position[:, None] - np.arange(len(knots)))
+    return np.clip(1.0 - distance, 0.0, None)
 
 
-def _not_leaked(pieces: Pieces, bells, blur_px: float) -> np.ndarray:
-    """What the blurred known picture holds (s, p) of light that the rod hides, near a border in the background.
+def _hidden_light(pieces: Pieces, bells: np.ndarray, blur_px: float) -> np.ndarray:
+    """Return the light (s, p) that the blurred background holds of what the rod hides.
 
-    The lens blurs what is left when the rod has hidden its part; the known picture was blurred whole. The blurred
-    product of two pictures is the product of the blurred ones, and blur² times that of their slopes, and blur⁴/2
-    times that of their curvatures, and so on. bells (s, p, 2): see `rim_bells`.
+    The lens blurs what the rod leaves open; the known picture of the background was blurred whole.
+    The blurred product of two pictures is the product of the blurred ones, plus blur² times that of
+    their slopes, plus blur⁴/2 times that of their curvatures, and so on.
+    bells (s, p, 2): slope and curvature of the covered share, see `cylinder.rim_bells`.
     """
-    return bells[..., 0] * (blur_px * pieces.slope) - bells[..., 1] * (
-        (0.5 * blur_px**2) * pieces.curvature
-    )
+    by_slope = bells[..., 0] * (blur_px * pieces.slope)
+    by_curvature = bells[..., 1] * ((0.5 * blur_px**2) * pieces.curvature)
+    return by_slope - by_curvature
 
 
 def fit_shading(
@@ -108,116 +130,129 @@ def fit_shading(
     robust: np.ndarray | None = None,
     prior: np.ndarray | None = None,
 ) -> tuple[Shading, float]:
-    """Most probable radiance over all pieces with their positions as they stand; also how badly it fits, per pixel.
+    """Return the most probable radiance of segments where they lie, and its misfit per pixel.
 
-    Each piece has its own gain and offset of the background (shadow, drifting light). robust (s,): weight of
-    each piece. prior (terms,): sigma of each coefficient in grey levels (see `wave_prior`), which also is nearly the
-    same at neighbouring knots; None leaves them free. The misfit is chi², and with a prior minus twice the log
-    evidence: what a shift of the rod and a change of its shading explain alike is then not credited to the shading in
-    full.
+    robust (s,): weight of each segment. prior (terms,): sigma of each coefficient in grey levels
+    (`wave_prior`), by which coefficients are also nearly the same at neighbouring knots; None
+    leaves them free. The misfit is chi², and with a prior minus twice the log evidence: what a
+    shift of the rod and a change of its shading explain alike does not count for the shading.
     """
     equations = Equations(pieces, blur_px, terms)
-    robust = np.ones(len(pieces)) if robust is None else robust
+    if robust is None:
+        robust = np.ones(len(pieces))
     left, right = equations.shared(knots.weights(pieces), robust)
-    stiff = (
-        1e-6 * np.trace(left) / len(left) * np.eye(len(left))
-        if prior is None
-        else stiffness(prior, knots)
-    )
+    if prior is None:
+        stiff = _RIDGE * np.trace(left) / len(left) * np.eye(len(left))
+    else:
+        stiff = stiffness(prior, knots)
     factors = lu_factor(left + stiff, check_finite=False)
-    waves = lu_solve(factors, right, check_finite=False)
-    misfit = float(robust @ equations.power - 2.0 * right @ waves + waves @ left @ waves)
+    found = lu_solve(factors, right, check_finite=False)
+    misfit = float(robust @ equations.power - 2.0 * right @ found + found @ left @ found)
     if prior is not None:
-        misfit += float(waves @ stiff @ waves + np.sum(np.log(np.abs(np.diag(factors[0])))))
+        log_determinant = np.sum(np.log(np.abs(np.diag(factors[0]))))
+        misfit += float(found @ stiff @ found + log_determinant)
     pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
-    shading = Shading(knots, waves.reshape(len(knots), terms), blur_px)
+    shading = Shading(knots, found.reshape(len(knots), terms), blur_px)
     return shading, misfit / max(1.0, pixels)
 
 
 class Equations:
-    """Each piece's normal equations for its shading, the background's gain and offset eliminated.
+    """Normal equations of each segment for its shading, the background's gain and offset eliminated.
 
-    gram (s, terms, terms), moment (s, terms), and the squares power (s,) that the background leaves.
+    gram (s, terms, terms), moment (s, terms): matrix and right side.
+    power (s,): the squares that the background leaves unexplained.
     """
 
     def __init__(self, pieces: Pieces, blur_px: float, terms: int):
-        self.pieces, self.blur_px = pieces, blur_px
-        self._near, self._far = _parted(pieces, blur_px)
-        pieces, weight = self._near, self._near.weight
-        # of each pixel the light, the background by gain and offset, what is seen
+        self.pieces = pieces
+        self.blur_px = blur_px
+        near, self._far = _split_off_background(pieces, blur_px)
+        self._near = near
+        # columns (s, p, terms + 3), times the weight: shading functions, background, 1, grey level
         columns = shading_basis(
-            pieces.offset_px, pieces.radius_px[:, None], blur_px, terms, weight, 1
+            near.offset_px, near.radius_px[:, None], blur_px, terms, near.weight, 1
         )
-        leaked, open_share = (
-            _not_leaked(pieces, columns[..., -3:-1], blur_px),
-            weight - columns[..., 0],
-        )
-        columns[..., -3] = open_share * pieces.background + leaked
-        columns[..., -2] = open_share
-        columns[..., -1] = pieces.grey * weight
-        self._columns, normal = columns, columns.transpose(0, 2, 1) @ columns
+        hidden = _hidden_light(near, columns[..., -3:-1], blur_px)
+        uncovered = near.weight - columns[..., 0]
+        columns[..., -3] = uncovered * near.background + hidden
+        columns[..., -2] = uncovered
+        columns[..., -1] = near.grey * near.weight
+        self._columns = columns
+
+        normal = columns.transpose(0, 2, 1) @ columns
         normal[:, -3:, -3:] += self._far
-        self._around = normal[:, -3:-1]
-        self._inverse = _inverse_of_two(self._around[:, :, -3:-1] + WEAK * np.eye(2))
-        normal = normal - self._around.transpose(0, 2, 1) @ (self._inverse @ self._around)
-        self.gram, self.moment, self.power = (
-            normal[:, :terms, :terms],
-            normal[:, :terms, -1],
-            normal[:, -1, -1],
-        )
+        self._by_background = normal[:, -3:-1]  # (s, 2, terms + 3): gain and offset with all
+        self._inverse = _inverse_of_two(self._by_background[:, :, -3:-1] + WEAK * np.eye(2))
+        explained = self._by_background.transpose(0, 2, 1) @ (self._inverse @ self._by_background)
+        normal = normal - explained
+        self.gram = normal[:, :terms, :terms]
+        self.moment = normal[:, :terms, -1]
+        self.power = normal[:, -1, -1]
 
-    def shared(self, hats: np.ndarray, robust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Normal matrix (size, size) and right side (size,) of all knots' coefficients, the pieces' positions kept.
+    def shared(self, knot_weights: np.ndarray, robust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the normal matrix (size, size) and right side (size,) of all knots' coefficients.
 
-        hats (s, knots): weight of each knot in each piece; robust (s,): weight of each piece.
+        The segments keep their positions. knot_weights (s, knots): of each knot in each segment;
+        robust (s,): weight of each segment; size = knots × terms.
         """
-        knots, terms = hats.shape[1], self.moment.shape[1]
-        size = knots * terms
-        pairs = (hats[:, :, None] * hats[:, None, :] * robust[:, None, None]).reshape(len(hats), -1)
-        left = (pairs.T @ self.gram.reshape(len(hats), -1)).reshape(knots, knots, terms, terms)
-        return (
-            left.transpose(0, 2, 1, 3).reshape(size, size),
-            ((hats * robust[:, None]).T @ self.moment).reshape(size),
-        )
+        count, knots = knot_weights.shape
+        terms = self.moment.shape[1]
+        pairs = knot_weights[:, :, None] * knot_weights[:, None, :] * robust[:, None, None]
+        left = pairs.reshape(count, -1).T @ self.gram.reshape(count, -1)
+        left = left.reshape(knots, knots, terms, terms).transpose(0, 2, 1, 3)
+        right = (knot_weights * robust[:, None]).T @ self.moment
+        return left.reshape(knots * terms, knots * terms), right.reshape(knots * terms)
 
-    def chi2(self, waves: np.ndarray) -> np.ndarray:
-        """What pieces of this shading, waves (s, terms), leave (s,)."""
-        return self.power + np.einsum(
-            "st,st->s", waves, (self.gram @ waves[..., None])[..., 0] - 2.0 * self.moment
-        )
+    def chi2(self, coefficients: np.ndarray) -> np.ndarray:
+        """Return the chi² (s,) that segments of this shading, coefficients (s, terms), leave."""
+        predicted = (self.gram @ coefficients[..., None])[..., 0]
+        return self.power + np.einsum("st,st->s", coefficients, predicted - 2.0 * self.moment)
 
-    def linearised(self, waves: np.ndarray) -> "Slopes":
-        """How pieces of this shading, waves (s, terms), change with position and blur; what leaks is taken to stay."""
-        pieces, pixels, terms = self._near, self._columns, waves.shape[1]
-        seen, behind = pixels[..., -1], pixels[..., -3:-1]
-        left = seen - (pixels[..., :terms] @ waves[..., None])[..., 0]
-        beyond = self._far[:, :2, 2:]  # where nothing is lit, so that all that is seen is left
-        explained = self._inverse @ (
-            behind.transpose(0, 2, 1) @ left[..., None] + beyond
-        )  # gain and constant
-        by_cover = -(explained[:, 0] * pieces.background + explained[:, 1])
-        slopes, curvatures = slopes_of(pieces.offset_px, pieces.radius_px, self.blur_px, waves)
-        columns = np.empty((len(pieces), 3, left.shape[1]))
-        columns[:, 0] = -(slopes[0] + slopes[1] * by_cover)
+    def linearised(self, coefficients: np.ndarray) -> "PositionEquations":
+        """Return how segments of this shading, coefficients (s, terms), depend on position and blur.
+
+        Light that the rod hides near a border of the background (`_hidden_light`) is held fixed.
+        """
+        near = self._near
+        columns = self._columns
+        terms = coefficients.shape[1]
+        seen = columns[..., -1]
+        behind = columns[..., -3:-1]
+        residual = seen - (columns[..., :terms] @ coefficients[..., None])[..., 0]
+        far_residual = self._far[:, :2, 2:]  # no light of the rod there
+        by_behind = behind.transpose(0, 2, 1) @ residual[..., None] + far_residual
+        gain_offset = self._inverse @ by_behind  # (s, 2, 1)
+        # what a pixel gains in light where the rod covers more of it
+        by_cover = -(gain_offset[:, 0] * near.background + gain_offset[:, 1])
+
+        slopes, curvatures = slopes_of(near.offset_px, near.radius_px, self.blur_px, coefficients)
+        derivatives = np.empty((len(near), 3, residual.shape[1]))
+        derivatives[:, 0] = -(slopes[0] + slopes[1] * by_cover)
         # a normal density of variance v changes with v by half its second derivative
-        columns[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
-        columns[:, :2] *= pieces.weight[:, None]
-        columns[:, 2] = left
-        mixed, gram = columns @ pixels, columns @ columns.transpose(0, 2, 1)
+        derivatives[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
+        derivatives[:, :2] *= near.weight[:, None]
+        derivatives[:, 2] = residual
+
+        mixed = derivatives @ columns
+        gram = derivatives @ derivatives.transpose(0, 2, 1)
         mixed[:, 2, -3:] += self._far[:, 2]
         gram[:, 2, 2] += self._far[:, 2, 2]
         reduced = mixed[..., -3:-1] @ self._inverse
         gram -= reduced @ mixed[..., -3:-1].transpose(0, 2, 1)
-        rod = (mixed - reduced @ self._around)[:, :2, :terms]
-        covered = left - seen - pixels[..., 0] * by_cover
-        return Slopes(rod, gram, np.sqrt(np.sum(covered**2, axis=1)))
+        by_shading = (mixed - reduced @ self._by_background)[:, :2, :terms]
+        covered = residual - seen - columns[..., 0] * by_cover
+        return PositionEquations(by_shading, gram, np.sqrt(np.sum(covered**2, axis=1)))
 
 
 @dataclass(frozen=True)
-class Slopes:
-    """Products of each piece's derivatives by position (px) and by the logarithm of the blur, the background's gain and
-    offset eliminated: with those by its shading, rod (s, 2, terms); gram (s, 3, 3): with each other and with what is
-    left. contrast (s,): see `Located`."""
+class PositionEquations:
+    """Hold the normal equations of each segment for its position (px) and the blur's logarithm.
+
+    Gain and offset of the background are eliminated.
+    rod (s, 2, terms): products of the two derivatives with those by the shading's coefficients.
+    gram (s, 3, 3): products of the two derivatives and the residual with each other.
+    contrast (s,): see `Located`.
+    """
 
     rod: np.ndarray
     gram: np.ndarray
@@ -225,96 +260,95 @@ class Slopes:
 
     @property
     def power(self) -> np.ndarray:
-        """What each piece by itself tells of its position (s,), 1/px²."""
+        """Return the information (s,) of each segment by itself about its position, 1/px²."""
         return np.maximum(self.gram[:, 0, 0], LEAST_POWER)
 
     @property
     def step_px(self) -> np.ndarray:
-        """Gauss–Newton's step of each piece by itself (s,)."""
+        """Return Gauss–Newton's step (s,) of each segment by itself, px."""
         return np.clip(self.gram[:, 0, 2] / self.power, -LONGEST_PX, LONGEST_PX)
 
     def own_sigma_px(self, chi2: np.ndarray) -> np.ndarray:
-        """Sigma of each piece's position by itself (s,), where it leaves chi2 (s,) per pixel."""
+        """Return the sigma (s,) of each segment's position by itself, where it leaves chi2 (s,) per pixel."""
         return np.sqrt(np.maximum(chi2, 1.0) / self.power)
 
 
-def _parted(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.ndarray]:
-    """The pieces without pixels at their two ends that no light of a rod reaches, and these pixels' products
-    (s, 3, 3) of background, 1 and what is seen with each other."""
+def _split_off_background(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.ndarray]:
+    """Return the segments without the columns of pixels at both ends that no light of the rod reaches.
+
+    Also returned are the products (s, 3, 3) of these pixels' background, 1 and grey level with each
+    other, by squared weight.
+    """
     near = np.abs(pieces.offset_px) < pieces.radius_px[:, None] + _REACH_BLURS * blur_px
     near &= pieces.weight > 0
     first, last = np.flatnonzero(np.any(near, axis=0))[[0, -1]] if np.any(near) else (0, -1)
-    ends = (slice(None, first), slice(last + 1, None))
-    background, seen, weight = (
-        np.concatenate([part[:, end] for end in ends], axis=1)
-        for part in (pieces.background, pieces.grey, pieces.weight)
-    )
-    far = np.stack([background * weight, weight, seen * weight], axis=1)
+    background = _both_ends(pieces.background, first, last)
+    grey = _both_ends(pieces.grey, first, last)
+    weight = _both_ends(pieces.weight, first, last)
+    far = np.stack([background * weight, weight, grey * weight], axis=1)
     return pieces.columns(slice(first, last + 1)), far @ far.transpose(0, 2, 1)
 
 
-def _inverse_of_two(matrices) -> np.ndarray:
-    """Inverses of symmetric matrices (s, 2, 2)."""
-    a, b, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
-    return np.stack([d, -b, -b, a], axis=1).reshape(-1, 2, 2) / (a * d - b * b)[:, None, None]
+def _both_ends(values: np.ndarray, first: int, last: int) -> np.ndarray:
+    """Return the columns of values (s, p) before the first and after the last."""
+    return np.concatenate([values[:, :first], values[:, last + 1 :]], axis=1)
 
 
-# [1] Prior sigma of each wave round a thin, lit rod beside its contrast: diffuse light fills the
-# first three, a highlight a quarter of the rod wide reaches the eleventh (its Fourier series).
-# Study: lines.py.
-WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
-# [1] What of it changes from knot to knot: light and finish are much the same a centimetre
-# farther on. Free at every knot, shading bends the line of a wire before an even floor by up to a
-# pixel. Study: thresholds.py lines.shading _CHANGE_SHARE ….
-_CHANGE_SHARE = 0.1
-# [1] The same from turn to turn of `_LIT_ALIKE_RAD`: light and rod keep, the angle at which they
-# meet does not. Set by eye. Study: thresholds.py lines.shading _TURNED_SHARE ….
-_TURNED_SHARE = 0.3
+def _inverse_of_two(matrices: np.ndarray) -> np.ndarray:
+    """Return the inverses of symmetric matrices (s, 2, 2)."""
+    a = matrices[:, 0, 0]
+    b = matrices[:, 0, 1]
+    d = matrices[:, 1, 1]
+    adjugate = np.stack([d, -b, -b, a], axis=1).reshape(-1, 2, 2)
+    return adjugate / (a * d - b * b)[:, None, None]
 
 
 def stiffness(prior: np.ndarray, knots: Knots) -> np.ndarray:
-    """Inverse covariance (size, size) of all coefficients of waves with these priors (terms,): each knot's own, and its
-    differences to its neighbours."""
+    """Return the prior's inverse covariance (size, size) of all coefficients.
+
+    prior (terms,): sigma of each coefficient. It holds each knot's own coefficients, and their
+    differences between neighbouring knots.
+    """
     return np.kron(between_knots(knots), np.diag(prior**-2.0))
 
 
 def between_knots(knots: Knots) -> np.ndarray:
-    """Inverse covariance (knots, knots) of one wave's coefficients over its own variance."""
+    """Return the inverse covariance (knots, knots) of one coefficient, over its own variance."""
     return _between(len(knots.turn_rad), len(knots.place_mm))
 
 
 @lru_cache
 def _between(turns: int, places: int) -> np.ndarray:
-    along, turned = (
-        steps.T @ steps for steps in (np.diff(np.eye(count), axis=0) for count in (places, turns))
-    )
-    return (
-        np.eye(turns * places)
-        + np.kron(np.eye(turns), along) / _CHANGE_SHARE**2
-        + np.kron(turned, np.eye(places)) / _TURNED_SHARE**2
-    )
+    """Return `between_knots` of so many turns and places."""
+    along_steps = np.diff(np.eye(places), axis=0)
+    turn_steps = np.diff(np.eye(turns), axis=0)
+    along = np.kron(np.eye(turns), along_steps.T @ along_steps)
+    turned = np.kron(turn_steps.T @ turn_steps, np.eye(places))
+    return np.eye(turns * places) + along / _CHANGE_SHARE**2 + turned / _TURNED_SHARE**2
 
 
 def contrast_of(pieces: Pieces) -> float:
-    """By how much the rod differs from its background in these pieces, RMS, grey levels; one at least."""
+    """Return the RMS difference of the rod from its background in grey levels; one at least."""
     inside = (np.abs(pieces.offset_px) < pieces.radius_px[:, None]) & (pieces.weight > 0)
-    contrast = (
-        np.sqrt(np.mean((pieces.grey - pieces.background)[inside] ** 2)) if np.any(inside) else 1.0
-    )
-    return max(float(contrast), 1.0)
+    if not np.any(inside):
+        return 1.0
+    difference = (pieces.grey - pieces.background)[inside]
+    return max(float(np.sqrt(np.mean(difference**2))), 1.0)
 
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
-    """Sigma (terms,) of the shading's coefficients in grey levels, from the rod's contrast in these pieces."""
+    """Return the prior sigma (terms,) of the shading's coefficients, by the rod's contrast, grey levels."""
     return contrast_of(pieces) * WAVE_SHARE[:terms]
 
 
 @dataclass(frozen=True)
 class Located:
-    """Where each piece lies: shift_px, sigma_px (s,) along the normal; chi2 (s,) per pixel; contrast (s,).
+    """Hold where each segment lies.
 
-    contrast: signal of the rod against its background over the noise, over the whole piece. shared_px (s, k): by how
-    much each moves with what all share, light and lens, by one sigma of each of k independent causes; beside sigma_px.
+    shift_px, sigma_px (s,): along the normal. chi2 (s,): per pixel.
+    contrast (s,): signal of the rod against its background over the noise, over the whole segment.
+    shared_px (s, k): by how much each moves with one sigma of each of k independent causes that all
+    share (light and lens), not counted in sigma_px.
     widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
     """
 
@@ -327,13 +361,16 @@ class Located:
 
 
 def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
-    """Gauss–Newton on the position of each piece with the rod's shading known, background gain and offset free.
+    """Find the position of each segment by Gauss–Newton, the rod's shading known.
 
-    Sigma, misfit and contrast are those of the last round, before its step.
+    The background's gain and offset stay free. Sigma, misfit and contrast are those of the last
+    round, before its step. No segment moves by more than limit_px.
     """
-    waves, shift = shading.of(pieces), np.zeros(len(pieces))
+    coefficients = shading.of(pieces)
+    shift = np.zeros(len(pieces))
     for _ in range(rounds):
-        slopes = Equations(pieces.moved(shift), shading.blur_px, waves.shape[1]).linearised(waves)
-        shift = np.clip(shift + slopes.step_px, -limit_px, limit_px)
-    chi2 = slopes.gram[:, 2, 2] / pieces.freedom
-    return Located(shift, slopes.own_sigma_px(chi2), chi2, slopes.contrast)
+        equations = Equations(pieces.moved(shift), shading.blur_px, coefficients.shape[1])
+        linear = equations.linearised(coefficients)
+        shift = np.clip(shift + linear.step_px, -limit_px, limit_px)
+    chi2 = linear.gram[:, 2, 2] / pieces.freedom
+    return Located(shift, linear.own_sigma_px(chi2), chi2, linear.contrast)
