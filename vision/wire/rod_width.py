@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
 from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, doubts_of
-from vision.wire.joint import BLUR_SIGMA, Task
+from vision.wire.joint import BLUR_SIGMA, ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.trace import BIN_PX, WIRE_WAVES
 
@@ -41,7 +41,7 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     pieces: where the rod lies, but for a shift of all; blur_px: of the lens.
     """
     some = pieces.select(slice(None, None, 1 + len(pieces) // _TOLD_BY))
-    pieces = Task(binned(some, BIN_PX)[0], WIRE_WAVES, knots, blur_px).tempered().pieces
+    pieces = ShadedSegments(binned(some, BIN_PX)[0], WIRE_WAVES, knots, blur_px).tempered().pieces
     rough = _against(pieces, _LOG_WIDTHS, np.zeros(1), blur_px, knots, NO_CHANCE)
     best = float(_LOG_WIDTHS[np.argmin(rough)])
     if best in _LOG_WIDTHS[[0, -1]]:

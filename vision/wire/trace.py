@@ -13,7 +13,7 @@ from vision.pictures.others import RodLines, covered
 from vision.pictures.view import View
 from vision.wire.bands import Pieces, cut_pieces, read_band
 from vision.wire.binned import binned, without
-from vision.wire.joint import BLUR_SIGMA, Task, settled, solve_jointly
+from vision.wire.joint import BLUR_SIGMA, ShadedSegments, settled, solve_jointly
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.shading import Knots, Located
 
@@ -148,11 +148,14 @@ def trace(
     believed, seen = (
         one and float(np.hypot(one, np.sqrt(blurred))) for one in (blur_px, seen_blur_px)
     )
-    solved = solve_jointly(Task(rough, terms, knots, believed, blur_sigma, seen), last=last)
+    solved = solve_jointly(
+        ShadedSegments(rough, terms, knots, believed, blur_sigma, seen), last=last
+    )
     blur_px = without(solved.blur_px, blurred)
     if last:
         solved = settled(
-            Task(pieces, terms, knots, blur_px, blur_sigma), replace(solved, blur_px=blur_px)
+            ShadedSegments(pieces, terms, knots, blur_px, blur_sigma),
+            replace(solved, blur_px=blur_px),
         )
     located = Located(
         np.zeros(len(pieces)),

@@ -5,7 +5,7 @@ import pytest
 
 from vision.wire.bands import Pieces
 from vision.wire.cylinder import shading_basis
-from vision.wire.joint import Task, solve_jointly
+from vision.wire.joint import ShadedSegments, solve_jointly
 from vision.wire.shading import Knots, stiffness, wave_prior
 
 FRAMES, PLACES, TERMS, BLUR_PX, NOISE = 6, np.arange(5.0, 100.0, 10.0), 5, 0.9, 2.0
@@ -58,7 +58,7 @@ def test_what_all_pieces_share_is_off_by_as_much_as_it_is_said_to(rng):
     the contrast seen, which is that of the draw to a third."""
     z = []
     for _ in range(40):
-        found = solve_jointly(Task(drawn(rng), TERMS, KNOTS, 0.8))
+        found = solve_jointly(ShadedSegments(drawn(rng), TERMS, KNOTS, 0.8))
         sigma = np.hypot(
             np.linalg.norm(found.shared_px.mean(axis=0)),
             np.linalg.norm(found.own_sigma_px) / len(found.shift_px),
@@ -71,7 +71,7 @@ def test_what_all_pieces_share_is_off_by_as_much_as_it_is_said_to(rng):
 def test_a_frame_that_shows_two_places_is_said_to_be_wider_by_their_variance(rng):
     """Places J apart, half of the time each, have a variance of J² / 4; to J⁴ their mean is no blur."""
     pieces = drawn(rng, 0.6)
-    widened, sigma = solve_jointly(Task(pieces, TERMS, KNOTS, 0.8)).widened_px2.T
+    widened, sigma = solve_jointly(ShadedSegments(pieces, TERMS, KNOTS, 0.8)).widened_px2.T
     jumped = pieces.source == FRAMES - 1
     mean = [np.average(widened[which], weights=sigma[which] ** -2.0) for which in (jumped, ~jumped)]
     noise = np.sum(sigma[jumped] ** -2.0) ** -0.5
