@@ -1,11 +1,13 @@
-"""Where a round, lit rod lies in a picture: its axis to a small part of a pixel, with a sigma.
+"""The pixels near a predicted rod: bands along it, cut into short segments.
 
-A wire or bar is a cylinder that hides its background. What is seen across it is the background outside the two
-edges, the rod's own shading between them, both blurred by the lens. The background is known (a picture without
-the rod), the width is known (diameter and distance), the shading is smooth along the rod and over the frames.
-So the shading is estimated once for all frames of a camera, and only then the position of each short piece.
-Where the background is bright on one piece and dark on the next, both edges are seen somewhere, and a dark rim
-or a highlight no longer pulls the position to one side.
+A wire or bar is a cylinder that hides its background. What is seen across it is the background
+outside the two edges and the rod's own shading between them, both blurred by the lens. The
+background is known (a picture without the rod), the width is known (diameter and distance), and the
+shading is smooth along the rod and over the frames. So the shading is estimated once for all frames
+of a camera (`shading.py`), and only then the position of each short segment (`joint.py`).
+
+Where the background is bright behind one segment and dark behind the next, both edges are seen
+somewhere, and a dark rim or a highlight no longer pulls the position to one side.
 """
 
 from collections.abc import Sequence
@@ -18,12 +20,14 @@ from vision.pictures.pixel_noise import Noise
 
 @dataclass(frozen=True)
 class Band:
-    """The pixels beside a predicted curve: n steps along it, k pixels across.
+    """Hold the pixels near a predicted curve: n steps along it, k pixels across.
 
-    offset_px (n, k): signed distance of each pixel from the curve along its normal; grey, background (n, k);
-    foot_px (n, 2): the curve; normal (n, 2): its unit normal; place (n,): the curve's own parameter (mm);
-    radius_px (n,): half the width that the rod has in the picture. still (n, k), or (n, 0) where it was not asked for:
-    another background, of what stands still. Pixels outside the picture, or hidden, are NaN.
+    offset_px (n, k): signed distance of each pixel from the curve along its normal.
+    grey, background (n, k): grey levels of the frame and of the picture without rods; pixels
+    outside the picture, or hidden, are NaN.
+    foot_px (n, 2): the curve. normal (n, 2): its unit normal. place (n,): the curve's parameter, mm.
+    radius_px (n,): half the width that the rod has in the picture.
+    still (n, k): another background, of what stands still; (n, 0) where it was not read.
     """
 
     offset_px: np.ndarray
@@ -50,36 +54,55 @@ def read_band(
     hidden: np.ndarray | None = None,
     still: np.ndarray | None = None,
 ) -> Band:
-    """Pixels within `half_width_px` of a curve (m, 2), stepping one pixel along the axis it runs along. hidden (h, w):
-    those that show something else, bool; still (h, w): another background.
+    """Read the pixels within half_width_px of a curve (m, 2), one step a pixel of the axis it runs along.
 
-    No pixel is interpolated and none is read twice, so that their noise stays independent. Normals point to the same
-    hand of the way along which `place` grows, whichever way that is in the picture.
+    hidden (h, w) bool: pixels that show something else. still (h, w): another background.
+    No pixel is interpolated and none is read twice, so that their noise stays independent. Normals
+    point to the same side of the direction in which `place` grows, however that lies in the picture.
     """
     along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
+    across = 1 - along
     order = np.argsort(curve_px[:, along])
-    curve, place, radius = curve_px[order], np.asarray(place)[order], np.asarray(radius_px)[order]
-    first, last = np.clip(np.round(curve[[0, -1], along]), 0, grey.shape[1 - along] - 1).astype(int)
+    curve = curve_px[order]
+    place = np.asarray(place)[order]
+    radius = np.asarray(radius_px)[order]
+    ends = np.round(curve[[0, -1], along])
+    first, last = np.clip(ends, 0, grey.shape[across] - 1).astype(int)
     step = np.arange(first, last + 1)
-    across = np.interp(step, curve[:, along], curve[:, 1 - along])
-    slope = np.gradient(across) if len(step) > 1 else np.zeros(len(step))
+    middle = np.interp(step, curve[:, along], curve[:, across])
+    slope = np.gradient(middle) if len(step) > 1 else np.zeros(len(step))
     cosine = 1.0 / np.hypot(1.0, slope)
-    line = np.round(across).astype(int)[:, None] + np.arange(-half_width_px, half_width_px + 1)
-    offset = (line - across[:, None]) * cosine[:, None]
-    foot, normal = np.empty((len(step), 2)), np.empty((len(step), 2))
-    foot[:, along], foot[:, 1 - along] = step, across
-    normal[:, along], normal[:, 1 - along] = -slope * cosine, cosine
+    line = np.round(middle).astype(int)[:, None] + np.arange(-half_width_px, half_width_px + 1)
+    offset = (line - middle[:, None]) * cosine[:, None]
+
+    foot = np.empty((len(step), 2))
+    foot[:, along] = step
+    foot[:, across] = middle
+    normal = np.empty((len(step), 2))
+    normal[:, along] = -slope * cosine
+    normal[:, across] = cosine
+
     pictures = [picture for picture in (grey, background, still) if picture is not None]
     pixels = _pick(pictures, step, line, along)
     if hidden is not None:
         pixels[0][_pick([hidden], step, line, along)[0] > 0] = np.nan
-    at = [np.interp(step, curve[:, along], values) for values in (place, radius)]
-    left = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
-    return Band(left * offset, *pixels[:2], foot, left * normal, *at, *pixels[2:])
+    side = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
+    return Band(
+        offset_px=side * offset,
+        grey=pixels[0],
+        background=pixels[1],
+        foot_px=foot,
+        normal=side * normal,
+        place=np.interp(step, curve[:, along], place),
+        radius_px=np.interp(step, curve[:, along], radius),
+        still=pixels[2] if still is not None else None,
+    )
 
 
-def _pick(pictures, step, line, along) -> list[np.ndarray]:
-    """Values (n, k) of pictures of one size at the band's pixels; NaN outside them."""
+def _pick(
+    pictures: Sequence[np.ndarray], step: np.ndarray, line: np.ndarray, along: int
+) -> list[np.ndarray]:
+    """Return the values (n, k) of pictures of one size at a band's pixels; NaN outside them."""
     size = pictures[0].shape[along]
     outside = (line < 0) | (line >= size)
     line = np.clip(line, 0, size - 1)
@@ -93,12 +116,13 @@ def _pick(pictures, step, line, along) -> list[np.ndarray]:
 
 @dataclass(frozen=True)
 class Pieces:
-    """Short pieces of bands, all of one size: p pixels each, s pieces.
+    """Hold short segments of bands, all of one size: s segments of p pixels each.
 
-    offset_px, grey, background, weight (s, p): weight is one over the noise's sigma, 0 where there is no pixel;
-    slope, curvature (s, p): of the background across the rod, per px and px²;
-    place, radius_px (s,); foot_px, normal (s, 2) at the middle; source (s,) which band; still (s, p) or
-    (s, 0): another background, of bands that have one.
+    offset_px, grey, background (s, p): as in `Band`.
+    slope, curvature (s, p): of the background across the rod, per px and per px².
+    weight (s, p): one over the sigma of the noise; 0 where there is no pixel.
+    place, radius_px (s,), foot_px, normal (s, 2): of the segment's middle.
+    source (s,): the band of each. still (s, p): another background; (s, 0) where there is none.
     """
 
     offset_px: np.ndarray
@@ -123,29 +147,29 @@ class Pieces:
 
     @property
     def freedom(self) -> np.ndarray:
-        """Pixels (s,) less the position and the background's gain and offset that each piece has of its own."""
+        """Return the degrees of freedom (s,): pixels less position, and background's gain and offset."""
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
 
     def select(self, keep: np.ndarray | slice) -> "Pieces":
-        """The pieces where `keep` (s,) holds, or of a slice."""
+        """Return the segments where keep (s,) holds, at these indices, or of a slice."""
         return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
     def columns(self, keep: np.ndarray | slice) -> "Pieces":
-        """The same pieces with those of their pixels where `keep` (p,) holds, or of a slice."""
+        """Return the segments with those of their pixels where keep (p,) holds, or of a slice."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
     def show_rod(self, margin_px: float) -> np.ndarray:
-        """Which pieces (s,) lack no pixel of the rod, where it is expected, nor within a margin beside it."""
+        """Return which segments (s,) lack no pixel of the expected rod, nor within a margin of it."""
         needed = np.abs(self.offset_px) <= self.radius_px[:, None] + margin_px
         return ~np.any(needed & (self.weight == 0), axis=1)
 
     def below(self, grey: float) -> "Pieces":
-        """The same pieces; pixels of this grey level or above weigh nothing."""
+        """Return the segments with weight 0 for pixels of this grey level or above."""
         return replace(self, weight=np.where(self.grey < grey, self.weight, 0.0))
 
     def moved(self, shift_px: np.ndarray) -> "Pieces":
-        """The same pixels seen from curves moved by shift_px (s,) along their normals."""
+        """Return the same pixels seen from curves moved by shift_px (s,) along their normals."""
         return replace(
             self,
             offset_px=self.offset_px - shift_px[:, None],
@@ -154,61 +178,86 @@ class Pieces:
 
 
 def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
-    """All bands cut into pieces of `length_px` steps; what is left over at the end is not used.
+    """Cut bands into segments of length_px steps; what is left over at a band's end is not used.
 
-    Bands with another background, as all have or none, are for a look that asks for no light: their slopes and
-    curvatures are 0.
+    Bands with another background, as all have or none, are for a pass that fits no shading: the
+    slopes and curvatures of their segments are 0.
     """
     counts = [len(band.place) // length_px for band in bands]
     if not any(counts):
-        return Pieces(
-            *[np.zeros((0, 1))] * 6,
-            np.zeros(0),
-            np.zeros(0),
-            np.zeros((0, 2)),
-            np.zeros((0, 2)),
-            np.zeros(0, dtype=int),
-            np.zeros((0, 1)),
-        )
-    used = [(band, count * length_px) for band, count in zip(bands, counts) if count]
-    whole = Band(
-        *(
-            np.concatenate([getattr(band, name)[:end] for band, end in used])
-            for name in Band.__dataclass_fields__
-        )
+        return _no_pieces()
+    joined = {}
+    for name in Band.__dataclass_fields__:
+        parts = [getattr(band, name)[: count * length_px] for band, count in zip(bands, counts)]
+        joined[name] = np.concatenate([part for part in parts if len(part)])
+    return _cut(Band(**joined), length_px, noise, np.repeat(np.arange(len(bands)), counts))
+
+
+def _no_pieces() -> Pieces:
+    """Return no segments."""
+    pixels = np.zeros((0, 1))
+    return Pieces(
+        offset_px=pixels,
+        grey=pixels,
+        background=pixels,
+        slope=pixels,
+        curvature=pixels,
+        weight=pixels,
+        place=np.zeros(0),
+        radius_px=np.zeros(0),
+        foot_px=np.zeros((0, 2)),
+        normal=np.zeros((0, 2)),
+        source=np.zeros(0, dtype=int),
+        still=pixels,
     )
-    return Pieces(*_cut(whole, length_px, noise, np.repeat(np.arange(len(bands)), counts)))
 
 
-def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray):
+def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces:
+    """Cut one band, of a whole number of segments, into segments; source (s,): of each."""
     count = len(source)
-    flat = [a.reshape(count, -1) for a in (band.offset_px, band.grey, band.background)]
+    offset = band.offset_px.reshape(count, -1)
+    grey = band.grey.reshape(count, -1)
+    background = band.background.reshape(count, -1)
     still = band.still.reshape(count, -1)
-    flat += (
-        [np.zeros(flat[0].shape)] * 2
-        if still.size
-        else [a.reshape(count, -1) for a in _changes(band)]
-    )
-    in_picture = np.isfinite(flat[1]) & np.isfinite(flat[2])
-    weight = np.where(in_picture, 1.0 / noise.sigma(np.where(in_picture, flat[1], 0.0)), 0.0)
-    flat[1:] = [np.where(in_picture, values, 0.0) for values in flat[1:]]
-    means = [a.reshape(count, length_px, -1).mean(axis=1) for a in (band.foot_px, band.normal)]
-    singles = [a.reshape(count, length_px).mean(axis=1) for a in (band.place, band.radius_px)]
+    if still.size:
+        slope = np.zeros(offset.shape)
+        curvature = np.zeros(offset.shape)
+    else:
+        slope, curvature = (change.reshape(count, -1) for change in _derivatives(band))
+    in_picture = np.isfinite(grey) & np.isfinite(background)
+    sigma = noise.sigma(np.where(in_picture, grey, 0.0))
     if still.size:
         still = np.where(in_picture, still, 0.0)
-    return (*flat, weight, singles[0], singles[1], *means, source, still)
+    return Pieces(
+        offset_px=offset,
+        grey=np.where(in_picture, grey, 0.0),
+        background=np.where(in_picture, background, 0.0),
+        slope=np.where(in_picture, slope, 0.0),
+        curvature=np.where(in_picture, curvature, 0.0),
+        weight=np.where(in_picture, 1.0 / sigma, 0.0),
+        place=band.place.reshape(count, length_px).mean(axis=1),
+        radius_px=band.radius_px.reshape(count, length_px).mean(axis=1),
+        foot_px=band.foot_px.reshape(count, length_px, -1).mean(axis=1),
+        normal=band.normal.reshape(count, length_px, -1).mean(axis=1),
+        source=source,
+        still=still,
+    )
 
 
-def _changes(band: Band) -> list[np.ndarray]:
-    """Slope and curvature (n, k) each of the background across the rod, per px and per px²; 0 at the band's rims.
+def _derivatives(band: Band) -> tuple[np.ndarray, np.ndarray]:
+    """Return slope and curvature (n, k) of the background across the rod, per px and per px².
 
-    By five points: three would lose a sixth of the slope of an edge blurred by a pixel.
+    They are 0 at the band's borders. By five points: three would lose a sixth of the slope of an
+    edge blurred by a pixel.
     """
     pitch = band.offset_px[:, 1:2] - band.offset_px[:, :1]
-    behind, width = np.nan_to_num(band.background), band.background.shape[1]
-    wide = np.concatenate([behind[:, :1]] * 2 + [behind] + [behind[:, -1:]] * 2, axis=1)
-    two_before, before, after, two_after = (wide[:, k : k + width] for k in (0, 1, 3, 4))
-    return [
-        (8.0 * (after - before) - (two_after - two_before)) / (12.0 * pitch),
-        (16.0 * (after + before) - (two_after + two_before) - 30.0 * behind) / (12.0 * pitch**2),
-    ]
+    behind = np.nan_to_num(band.background)
+    width = behind.shape[1]
+    wide = np.pad(behind, ((0, 0), (2, 2)), mode="edge")
+    two_before = wide[:, :width]
+    before = wide[:, 1 : 1 + width]
+    after = wide[:, 3 : 3 + width]
+    two_after = wide[:, 4 : 4 + width]
+    slope = (8.0 * (after - before) - (two_after - two_before)) / (12.0 * pitch)
+    curvature = 16.0 * (after + before) - (two_after + two_before) - 30.0 * behind
+    return slope, curvature / (12.0 * pitch**2)

@@ -1,40 +1,45 @@
-"""Fewer numbers for a first look: pixels of a piece that lie equally far from the rod's axis are averaged."""
+"""Fewer numbers for a first pass: pixels of a segment that lie equally far from the axis are averaged."""
 
 import numpy as np
 
 from vision.wire.bands import Pieces
 
+# [1] In place of a bin's weight where the bin is empty. Derived.
+_TINY = 1e-300
+# [1] Share of blur² that is left at least where that of the bins is taken off. Derived.
+_LEAST_BLUR_SHARE = 0.25
+
 
 def binned(pieces: Pieces, width_px: float) -> tuple[Pieces, float]:
-    """The pieces with pixels of like offset averaged by their weights, and the variance of offsets in a bin, px².
+    """Return the segments with pixels of one offset averaged, and the variance of offsets in a bin, px².
 
-    All but the blur is linear in what is averaged; a bin blurs by as much as the offsets in it vary (see `without`).
+    Pixels count by their squared weights. All but the blur is linear in what is averaged; a bin
+    blurs by as much as the offsets in it vary (see `without`).
     """
+    bins = np.floor(pieces.offset_px / width_px)
     first = np.floor(np.min(pieces.offset_px, axis=1) / width_px)
-    bins = (np.floor(pieces.offset_px / width_px) - first[:, None]).astype(int)
+    bins = (bins - first[:, None]).astype(int)
     count = int(bins.max(initial=0)) + 1
     place = bins + count * np.arange(len(pieces))[:, None]
     weight = pieces.weight**2
     total = sums(weight, place, count)
-    share = weight / np.maximum(total, 1e-300).ravel()[place]
-    mean = {
-        name: sums(share * getattr(pieces, name), place, count)
-        for name in ("offset_px", "grey", "background", "slope", "curvature")
-    }
-    spread = (pieces.offset_px - mean["offset_px"].ravel()[place]) ** 2
-    values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__} | mean
-    fewer = Pieces(**values | {"weight": np.sqrt(total)})
-    return fewer.columns(np.any(total > 0, axis=0)), float(
-        np.sum(spread * weight) / max(np.sum(weight), 1e-300)
-    )
+    share = weight / np.maximum(total, _TINY).ravel()[place]
+    values = {name: getattr(pieces, name) for name in pieces.__dataclass_fields__}
+    for name in ("offset_px", "grey", "background", "slope", "curvature"):
+        values[name] = sums(share * values[name], place, count)
+    deviation = pieces.offset_px - values["offset_px"].ravel()[place]
+    values["weight"] = np.sqrt(total)
+    fewer = Pieces(**values).columns(np.any(total > 0, axis=0))
+    variance_px2 = float(np.sum(deviation**2 * weight) / max(np.sum(weight), _TINY))
+    return fewer, variance_px2
 
 
 def without(blur_px: float, variance_px2: float) -> float:
-    """The lens blur where binned pieces show this one."""
-    return float(np.sqrt(max(blur_px**2 - variance_px2, 0.25 * blur_px**2)))
+    """Return the lens blur where binned segments show this blur, px."""
+    return float(np.sqrt(max(blur_px**2 - variance_px2, _LEAST_BLUR_SHARE * blur_px**2)))
 
 
 def sums(values: np.ndarray, place: np.ndarray, count: int) -> np.ndarray:
-    """Sums (s, count) of values (s, p) by their places in it."""
+    """Return the sums (s, count) of values (s, p) by their places in it."""
     size = len(values)
     return np.bincount(place.ravel(), values.ravel(), size * count).reshape(size, count)

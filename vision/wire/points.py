@@ -4,18 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# [causes] That pieces share and hand on: 93 to 100 % of that variance before an even background.
-# Study: starts.py.
+# [causes] Of errors that the segments of a camera share, so many are handed on: 93 to 100 % of that
+# variance before an even background. Study: starts.py.
 SHARED = 4
 
 
 @dataclass(frozen=True)
 class LinePoints:
-    """Points of a rod's axis in one picture.
+    """Hold points of a rod's axis in one picture.
 
-    px (n, 2), normal (n, 2) unit, sigma_px (n,) along the normal; place (n,) mm along the rod. shared_px (n, SHARED):
-    by how much each moves with one sigma of each cause that all points of a camera share, beside sigma_px; None: by 0.
-    widened_px2 (n, 2): by how much blur² is above that of all, and sigma; None: nothing is known of it.
+    px (n, 2). normal (n, 2): unit. sigma_px (n,): along the normal. place (n,): mm along the rod.
+    shared_px (n, SHARED): by how much each point moves with one sigma of each cause that all points
+    of a camera share, not counted in sigma_px; None: by 0.
+    widened_px2 (n, 2): by how much blur² is above that of all, and sigma; None: not known.
     """
 
     px: np.ndarray
@@ -35,16 +36,16 @@ class LinePoints:
         return len(self.place)
 
     def select(self, keep: np.ndarray) -> "LinePoints":
-        """The points where `keep` holds."""
+        """Return the points where keep (n,) holds."""
         return LinePoints(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)
 class Observed:
-    """Line points of one camera in one frame (frame is -1 for the bar, which stands still).
+    """Hold the line points of one camera in one frame; frame is -1 for the bar, which stands still.
 
-    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points' normals. bar_in: the
-    frame in which a bar that moves is seen.
+    side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points'
+    normals. bar_in: the frame in which a bar that moves is seen.
     """
 
     frame: int
