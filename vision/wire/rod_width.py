@@ -1,8 +1,9 @@
-"""How thick a rod looks: by the evidence of other widths about the same lines.
+"""How thick a rod appears: the evidence of other widths at the same lines.
 
-A highlight or a dark rim is no edge, and light from one side draws one edge alone, so that what is bright or dark tells
-no width. But light that the lens leaves outside the edges has the background behind it, which is known: of each width
-the most probable light is taken, with each common shift of the line and each blur that may go with it.
+A highlight or a dark rim is no edge, and light from one side draws one edge alone, so that what is
+bright or dark says nothing about the width. But where the lens sees past the edges, it sees the
+background, which is known. So for each width the most probable light is taken, with each common
+shift of the line and each blur that may go with it.
 """
 
 import numpy as np
@@ -10,55 +11,57 @@ from scipy.interpolate import CubicSpline
 
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
-from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, doubts_of
+from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, evidences_of
 from vision.wire.joint import BLUR_SIGMA, ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.trace import BIN_PX, WIRE_WAVES
 
-# [1] Logarithms of widths that are tried first, from half to nearly twice: half a step is less
-# than what light leaves of a wire 5 px wide. Derived.
-_STEP, _LOG_WIDTHS = (
-    0.2,
-    np.array([-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6]),
-)
+# [1] Step of the logarithms of widths that are tried first: half of it is less than what light
+# leaves of a wire 5 px wide. Derived.
+_STEP = 0.2
+# [1] Logarithms of widths that are tried first, from half to nearly twice. Derived.
+_LOG_WIDTHS = np.array([-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6])
 # [1] About the best of these, tried with several blurs. Derived.
 _NEAR = np.linspace(-0.2, 0.2, 5)
-# [px] Of all pieces: a wire told half as thick again is taken by one of its edges, 1.3 px off.
+# [px] Common shifts: a wire entered half as thick again is taken by one of its edges, 1.3 px off.
 # Derived.
 _SHIFTS_PX = np.linspace(-1.5, 1.5, 9)
-# [1] Blurs beside the one found under the stated width, of their logarithm. Derived.
+# [1] Blurs by their logarithm over the one found under the stated width. Derived.
 _LOG_BLURS = np.array([-0.3, 0.0, 0.3])
-# [pieces] That tell the width: as many as a tenth of a second allows. Derived.
-_TOLD_BY = 50
+# [segments] By which the width is found: as many as a tenth of a second allows. Derived.
+_MOST_SEGMENTS = 50
 # [nodes] Of the splines through the grids. Derived.
 _FINE = 601
 
 
 def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, float] | None:
-    """Mean and sigma of the logarithm of the rod's width over the given one, which is not asked closer where it is the
-    likeliest of some. None where the likeliest is half or twice as thick: that is another thing, or a shadow beside it.
+    """Return mean and sigma of the logarithm of the rod's width over the given one.
 
-    pieces: where the rod lies, but for a shift of all; blur_px: of the lens.
+    pieces: where the rod lies, but for a common shift. blur_px: of the lens.
+    The given width is not refined where it is the most probable of a coarse grid. None where the
+    most probable is half or nearly twice as thick: that is another thing, or a shadow along the rod.
     """
-    some = pieces.select(slice(None, None, 1 + len(pieces) // _TOLD_BY))
-    pieces = ShadedSegments(binned(some, BIN_PX)[0], WIRE_WAVES, knots, blur_px).tempered().pieces
-    rough = _against(pieces, _LOG_WIDTHS, np.zeros(1), blur_px, knots, NO_CHANCE)
-    best = float(_LOG_WIDTHS[np.argmin(rough)])
+    some = pieces.select(slice(None, None, 1 + len(pieces) // _MOST_SEGMENTS))
+    averaged, _ = binned(some, BIN_PX)
+    pieces = ShadedSegments(averaged, WIRE_WAVES, knots, blur_px).tempered().pieces
+    coarse = _evidences_of_widths(pieces, _LOG_WIDTHS, np.zeros(1), blur_px, knots, NO_CHANCE)
+    best = float(_LOG_WIDTHS[np.argmin(coarse)])
     if best in _LOG_WIDTHS[[0, -1]]:
         return None
     if best == 0.0:
         return 0.0, 0.5 * _STEP
     logs = best + _NEAR
-    against = _against(pieces, logs, _LOG_BLURS, blur_px, knots, np.inf)
-    overstated = max(1.0, against.min() / max(int(np.sum(pieces.weight > 0)), 1))
+    evidences = _evidences_of_widths(pieces, logs, _LOG_BLURS, blur_px, knots, np.inf)
+    misfit = max(1.0, evidences.min() / max(int(np.sum(pieces.weight > 0)), 1))
     fine = np.linspace(logs[0], logs[-1], _FINE)
-    left = CubicSpline(logs, EVIDENCE_COUNTS / overstated * (against - against.min()))(fine)
-    chance = np.exp(-0.5 * (left - left.min()))
-    mean = float(np.average(fine, weights=chance))
-    return mean, float(np.sqrt(np.average((fine - mean) ** 2, weights=chance)))
+    spline = CubicSpline(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
+    values = spline(fine)
+    probability = np.exp(-0.5 * (values - values.min()))
+    mean = float(np.average(fine, weights=probability))
+    return mean, float(np.sqrt(np.average((fine - mean) ** 2, weights=probability)))
 
 
-def _against(
+def _evidences_of_widths(
     pieces: Pieces,
     logs: np.ndarray,
     log_blurs: np.ndarray,
@@ -66,8 +69,8 @@ def _against(
     knots: Knots,
     no_chance: float,
 ) -> np.ndarray:
-    """Minus twice the log evidence (w,) of pieces so much thicker, at the best common shift and blur."""
-    doubts = doubts_of(
+    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of each."""
+    evidences = evidences_of(
         pieces,
         _SHIFTS_PX,
         blur_px * np.exp(log_blurs),
@@ -77,6 +80,6 @@ def _against(
         no_chance,
         np.exp(logs),
     )
-    doubts += (log_blurs / BLUR_SIGMA) ** 2
+    evidences += (log_blurs / BLUR_SIGMA) ** 2
     fine = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
-    return np.min(CubicSpline(_SHIFTS_PX, doubts, axis=1)(fine), axis=(1, 2))
+    return np.min(CubicSpline(_SHIFTS_PX, evidences, axis=1)(fine), axis=(1, 2))

@@ -1,4 +1,8 @@
-"""Line points of the wire in every frame, read in narrow bands beside where it is expected."""
+"""Line points of the wire in every frame, read in narrow bands along its predicted centreline.
+
+`wire_pieces` cuts the pixels along the prediction into segments, `trace` finds where the wire lies in
+them, and `to_points` makes line points with sigmas of those that can be trusted.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,22 +23,25 @@ from vision.wire.shading import Knots, Located
 
 # [mm] Hub and set-screw hide or shade the wire up to here. Stated.
 NEAR_CLAMP_MM = 6.0
-# [waves] Round a wire: with eight, a highlight moves it by 0.17 px. Study: lines.py.
-# round a wire: with fewer, what they lack of a highlight passes for blur and for position
+# [terms] Of the Fourier series round a wire: with eight, a highlight moves it by 0.17 px, for what
+# they lack of a highlight passes for blur and for position. Study: lines.py.
 WIRE_WAVES = 11
-# [px] Narrow: one too wide can be the best nearby. Study: starts.py.
+# [px] Blur believed before anything is seen. Narrow: one too wide can be the best nearby. Study:
+# starts.py.
 _BLUR_PX = 0.8
-# [px] Of the first look: a third of a lens blur. Study: thresholds.py lines.trace BIN_PX ….
+# [px] Bins of the first pass: a third of a lens blur. Study: thresholds.py wire.trace BIN_PX ….
 BIN_PX = 0.3
 # [nodes] Of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel.
 # Derived.
 _NODES = 81
-# [px] A piece that is known less well is left out. Set by eye. Study: thresholds.py lines.trace
+# [px] A segment that is known less well is left out. Set by eye. Study: thresholds.py wire.trace
 # _WORST_SIGMA_PX ….
 _WORST_SIGMA_PX = 0.5
-# [1] A piece whose misfit is this many times the median piece's is no picture of the rod alone.
-# Set by eye. Study: thresholds.py lines.trace _WORST_MISFIT ….
+# [1] A segment whose misfit is this many times the median one's is no picture of the rod alone.
+# Set by eye. Study: thresholds.py wire.trace _WORST_MISFIT ….
 _WORST_MISFIT = 6.0
+# [1] The median misfit counts as this at least. Set by eye.
+_LEAST_MEDIAN_MISFIT = 0.5
 
 
 def wire_pieces(
@@ -45,61 +52,54 @@ def wire_pieces(
     margin_px: int,
     still: np.ndarray | None = None,
 ) -> Pieces:
-    """Pieces of the wire in all frames of one camera; curves: predicted centreline of each frame. still (h, w): another
-    background, for a look that asks for no light."""
+    """Cut the wire's pixels in all frames of one camera into segments of length_px.
+
+    curves: predicted centreline by frame. margin_px: beyond the wire's edges. still (h, w): another
+    background, for a pass that fits no shading. The segments' source is the frame.
+    """
     arc, middles, radii = _outlines(view.camera, curves, wire)
-    # one width for all bands: a wire may pass from one whole pixel of radius to the next within a whisk
-    half = int(np.ceil(np.nanmax(radii))) + margin_px
-    bands = [
-        read_band(
-            view.frames[frame],
-            view.background,
-            middle,
-            arc,
-            radius,
-            half,
-            _hidden(view, frame),
-            still,
+    # one width for all bands: a wire may pass from one whole pixel of radius to the next in a whisk
+    half_px = int(np.ceil(np.nanmax(radii))) + margin_px
+    bands = []
+    for frame, middle, radius in zip(curves, middles, radii):
+        hidden = _hidden(view, frame)
+        picture = view.frames[frame]
+        bands.append(
+            read_band(picture, view.background, middle, arc, radius, half_px, hidden, still)
         )
-        for frame, middle, radius in zip(curves, middles, radii)
-    ]
     pieces = cut_pieces(bands, length_px, view.noise)
-    return replace(
-        pieces, source=np.array(list(curves))[pieces.source]
-    )  # the frame's index, not the band's number
+    frames = np.array(list(curves))
+    return replace(pieces, source=frames[pieces.source])
 
 
 def lines_of(camera: Camera, wire: Wire, curves: Mapping[int, Curves]) -> RodLines:
-    """What a wire of these centrelines, by frame, is in a camera's pictures."""
+    """Return where a wire of these centrelines, by frame, lies in a camera's pictures."""
     _, middles, radii = _outlines(camera, curves, wire)
     return RodLines(np.array(list(curves), dtype=int), middles, np.max(radii, axis=1))
 
 
 def _hidden(view: View, frame: int) -> np.ndarray | None:
-    """Pixels (h, w), bool, of a frame that other rods may have covered; None where there are none."""
+    """Return the pixels (h, w) bool of a frame that other rods may cover; None where there are none."""
     return covered(view.others, frame, view.frames[frame].shape)
 
 
 def _outlines(
     camera: Camera, curves: Mapping[int, Curves], wire: Wire
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Arc (n,) in mm, middle (f, n, 2) and half-width (f, n) in px of the wire in each of f frames."""
-    every = list(curves.values())
+    """Return arc (n,) in mm, and middle (f, n, 2) and half-width (f, n) in px of the wire in f frames."""
+    frames = list(curves.values())
     arc = np.linspace(2.0, wire.length_mm - 1.0, _NODES)
-    points, tangents = Curves(
-        every[0].arc_mm,
-        *(np.stack(part) for part in zip(*((curve.points_mm, curve.tangents) for curve in every))),
-    ).at(arc)
-    directions = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
-    one, other = (
-        edge.reshape(len(every), _NODES, 2)
-        for edge in edges(
-            camera,
-            points.reshape(-1, 3),
-            directions.reshape(-1, 3),
-            np.tile(wire.radius_mm(arc), len(every)),
-        )
+    all_curves = Curves(
+        frames[0].arc_mm,
+        np.stack([curve.points_mm for curve in frames]),
+        np.stack([curve.tangents for curve in frames]),
     )
+    points, tangents = all_curves.at(arc)
+    directions = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
+    radii_mm = np.tile(wire.radius_mm(arc), len(frames))
+    one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radii_mm)
+    one = one.reshape(len(frames), _NODES, 2)
+    other = other.reshape(len(frames), _NODES, 2)
     middle = 0.5 * (one + other)
     half_px = 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=-1))
     return arc, middle, half_px
@@ -108,15 +108,18 @@ def _outlines(
 def clear_of_bar(
     pieces: Pieces, middle_px: np.ndarray, radius_px: np.ndarray, margin_px: float
 ) -> np.ndarray:
-    """Which pieces (s,) lie outside the bar's outline, given by its middle (m, 2) and half-width (m,); NaN where it
-    passes behind the camera and hides nothing."""
-    away = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
-    return np.fmin.reduce(away - radius_px[None], axis=1, initial=np.inf) > margin_px
+    """Return which segments (s,) lie outside the bar's outline by more than a margin.
+
+    The outline is given by its middle (m, 2) and half-width (m,), px; NaN where it passes behind the
+    camera and hides nothing.
+    """
+    distance = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
+    return np.fmin.reduce(distance - radius_px[None], axis=1, initial=np.inf) > margin_px
 
 
 @dataclass(frozen=True)
 class Traced:
-    """Pieces brought to where the rod is, with what is known of each, and the lens blur in px."""
+    """Hold segments brought to where the rod is, what is known of each, and the lens blur in px."""
 
     pieces: Pieces
     located: Located
@@ -124,7 +127,7 @@ class Traced:
 
     @property
     def misfit(self) -> float:
-        """Median chi² per pixel."""
+        """Return the median chi² per pixel."""
         return float(np.median(self.located.chi2))
 
 
@@ -138,69 +141,73 @@ def trace(
     seen_blur_px: float | None = None,
     last: bool = True,
 ) -> Traced:
-    """Where the rod is that shows in these pieces, a few pixels off at most.
+    """Find where the rod lies in segments that are a few pixels off at most.
 
-    blur_px: what the lens blur is believed to be, to blur_sigma of its logarithm; seen_blur_px: what it was in an
-    earlier look that told where these pieces are expected, which are then some tenths of a pixel off at most. All steps
-    are taken with averaged pixels, but for the last where this is the last look.
+    blur_px, blur_sigma: prior of the lens blur, and of its logarithm. seen_blur_px: the blur of an
+    earlier pass that predicted these segments, which are then some tenths of a pixel off at most.
+    last: this is the last pass. Averaged pixels serve for all but the last step of the last pass.
     """
-    rough, blurred = binned(pieces, BIN_PX)
-    believed, seen = (
-        one and float(np.hypot(one, np.sqrt(blurred))) for one in (blur_px, seen_blur_px)
-    )
-    solved = solve_jointly(
-        ShadedSegments(rough, terms, knots, believed, blur_sigma, seen), last=last
-    )
-    blur_px = without(solved.blur_px, blurred)
+    averaged, variance_px2 = binned(pieces, BIN_PX)
+    prior_px = float(np.hypot(blur_px, np.sqrt(variance_px2)))
+    if seen_blur_px is not None:
+        seen_blur_px = float(np.hypot(seen_blur_px, np.sqrt(variance_px2)))
+    task = ShadedSegments(averaged, terms, knots, prior_px, blur_sigma, seen_blur_px)
+    solved = solve_jointly(task, last=last)
+    blur_px = without(solved.blur_px, variance_px2)
     if last:
-        solved = settled(
-            ShadedSegments(pieces, terms, knots, blur_px, blur_sigma),
-            replace(solved, blur_px=blur_px),
-        )
+        task = ShadedSegments(pieces, terms, knots, blur_px, blur_sigma)
+        solved = settled(task, replace(solved, blur_px=blur_px))
     located = Located(
-        np.zeros(len(pieces)),
-        solved.own_sigma_px,
-        solved.chi2,
-        solved.contrast,
-        solved.shared_px,
-        solved.widened_px2,
+        shift_px=np.zeros(len(pieces)),
+        sigma_px=solved.own_sigma_px,
+        chi2=solved.chi2,
+        contrast=solved.contrast,
+        shared_px=solved.shared_px,
+        widened_px2=solved.widened_px2,
     )
     return Traced(pieces.moved(solved.shift_px), located, blur_px)
 
 
 def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
-    """Trusted line points and the source of each, with sigmas that hold the misfit."""
-    pieces, located = traced.pieces, traced.located
-    good = (located.chi2 < _WORST_MISFIT * max(traced.misfit, 0.5)) & (
-        located.sigma_px < _WORST_SIGMA_PX
-    )
-    shared, rest = _leading(located.shared_px)
+    """Return the line points that can be trusted, and the source of each; sigmas hold the misfit."""
+    pieces = traced.pieces
+    located = traced.located
+    most_chi2 = _WORST_MISFIT * max(traced.misfit, _LEAST_MEDIAN_MISFIT)
+    good = (located.chi2 < most_chi2) & (located.sigma_px < _WORST_SIGMA_PX)
+    shared_px, rest_px = _leading_causes(located.shared_px)
     points = LinePoints(
-        pieces.foot_px,
-        pieces.normal,
-        np.hypot(located.sigma_px, rest),
-        pieces.place,
-        shared,
-        located.widened_px2,
+        px=pieces.foot_px,
+        normal=pieces.normal,
+        sigma_px=np.hypot(located.sigma_px, rest_px),
+        place=pieces.place,
+        shared_px=shared_px,
+        widened_px2=located.widened_px2,
     )
     return points.select(good), pieces.source[good]
 
 
-def _leading(shared_px) -> tuple[np.ndarray, np.ndarray]:
-    """The SHARED causes (s, SHARED) that make the most of what pieces share (s, k), and what others leave (s,)."""
-    _, _, turned = np.linalg.svd(shared_px.T @ shared_px)
-    causes = shared_px @ turned.T
-    most = np.zeros((len(causes), SHARED))
-    most[:, : causes.shape[1]] = causes[:, :SHARED]
-    return most, np.linalg.norm(causes[:, SHARED:], axis=1)
+def _leading_causes(shared_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the SHARED causes (s, SHARED) with most of the variance that segments share.
+
+    shared_px (s, k): by all causes. Also returned is the sigma (s,) that the others leave.
+    """
+    _, _, rotation = np.linalg.svd(shared_px.T @ shared_px)
+    causes = shared_px @ rotation.T
+    leading = np.zeros((len(causes), SHARED))
+    leading[:, : causes.shape[1]] = causes[:, :SHARED]
+    return leading, np.linalg.norm(causes[:, SHARED:], axis=1)
 
 
 def observed(
     points: LinePoints, source: np.ndarray, camera: int, frames: Sequence[int]
 ) -> list[Observed]:
-    """One Observed per frame that has points; frames: the frame index of each position of the whisk."""
-    return [
-        Observed(position, camera, points.select(source == frame))
-        for position, frame in enumerate(frames)
-        if np.any(source == frame)
-    ]
+    """Return one Observed for each frame that has points.
+
+    source (n,): frame of each point. frames: frame index of each position of the whisk.
+    """
+    found = []
+    for position, frame in enumerate(frames):
+        mine = source == frame
+        if np.any(mine):
+            found.append(Observed(position, camera, points.select(mine)))
+    return found
