@@ -11,41 +11,43 @@ import numpy as np
 
 from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
-from bench.base.tables import write_table
+from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
-TABLE = "both_ways.csv"
-COLUMNS = (
-    *(
-        "trial",
-        "whisk",
-        "surface",
-        "touch_deg",
-        "touch_sigma_deg",
-        "touch_felt_deg",
-        "touch_felt_sigma_deg",
+BOTH_WAYS = Table(
+    "both_ways",
+    "A row a way back and estimator, of trials with `both_ways = true` ([moving.md](moving.md)).",
+    (
+        TRIAL,
+        Column("whisk", "the whisk whose way back it is", Kind.WHOLE),
+        SURFACE,
+        *with_sigma("touch_deg", "where the whisker lets go of the bar, as seen"),
+        *with_sigma("touch_felt_deg", "where the whisker lets go of the bar, as felt"),
+        *with_sigma("d_x_mm", "as seen on the way back, else on the way there"),
+        *with_sigma("beta_deg", "slope as seen on the way back"),
+        Column("phi_seen_deg", "direction of the deflection as seen on the way back"),
+        Column("phi_felt_deg", "felt at the wanted angle on the way back"),
+        Column("phi_there_deg", "felt at that angle on the way there"),
+        *alike(("m_y_Nmm", "m_z_Nmm"), "moments felt at that angle on the way back"),
+        Column(
+            "estimator",
+            "both_ways: both together; the others by the way back alone, as if it were a forward "
+            "stroke",
+            Kind.TEXT,
+        ),
+        *with_sigma("d_x_est_mm", "as in estimates.csv"),
+        *alike(("d_x_est_low_mm", "d_x_est_high_mm", "beta_est_deg"), "as in estimates.csv"),
+        Column(
+            "alpha_est_deg",
+            "the friction angle that it assumed; of both_ways the one that it found",
+        ),
+        Column("error_mm", "d_x_est_mm less d_x_mm"),
+        Column("error_percent", "that error, % of d_x_mm"),
+        Column("inside", "1 where the estimate's 95 % interval holds d_x_mm, else 0"),
+        status("what is doubtful of way back and estimate"),
     ),
-    *(
-        "d_x_mm",
-        "d_x_sigma_mm",
-        "beta_deg",
-        "beta_sigma_deg",
-        "phi_seen_deg",
-        "phi_felt_deg",
-        "phi_there_deg",
-    ),
-    *(
-        "m_y_Nmm",
-        "m_z_Nmm",
-        "estimator",
-        "d_x_est_mm",
-        "d_x_est_sigma_mm",
-        "d_x_est_low_mm",
-        "d_x_est_high_mm",
-    ),
-    *("beta_est_deg", "alpha_est_deg", "error_mm", "error_percent", "inside", "status"),
 )
 
 
@@ -91,7 +93,7 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
 def write_both_ways(out: Path, found: Sequence[WayBack]) -> None:
     """both_ways.csv; nothing where no way back was asked for."""
     if found:
-        write_table(out / TABLE, COLUMNS, map(_row, found))
+        BOTH_WAYS.write(out, map(_row, found))
 
 
 def _row(one: WayBack) -> dict:
