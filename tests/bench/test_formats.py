@@ -70,6 +70,12 @@ def test_keys_of_toml(heading):
     assert sorted(documented(heading)) == sorted(TOML[heading].__struct_fields__)
 
 
+def test_every_key_is_explained():
+    for keys in formats.named_parts(DOCUMENT):
+        if not isinstance(keys, Table):
+            assert all(meaning for _, meaning in formats.explained_keys(keys)), keys
+
+
 def test_keys_of_results(steel_signals, exact_vision, tmp_path):
     """Without a picture; what pictures add is looked at where the small session is evaluated (test_end_to_end.py)."""
     evaluate(steel_signals, tmp_path, Settings(), workers=0)
