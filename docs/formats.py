@@ -1,4 +1,4 @@
-"""Write the parts of formats.md that the code declares: the columns of tables, and the keys of TOML files.
+"""Write what the code declares into formats.md: columns of tables, and keys of TOML files.
 
     python docs/formats.py
 
@@ -74,7 +74,7 @@ def _part(match: re.Match) -> str:
     made_from = _named(match[1])
     if isinstance(made_from, Table):
         rows = ((column.name, column.meaning) for column in made_from.columns)
-        lines = [f"### {made_from.file}", "", *textwrap.wrap(made_from.rows, 120), ""]
+        lines = [f"### `{made_from.file}`", "", *textwrap.wrap(made_from.rows, 120), ""]
         lines += _as_markdown("column", rows)
     else:
         lines = _as_markdown("key", explained_keys(made_from))

@@ -43,7 +43,7 @@ ONE_CAMERA = Table(
         *with_sigma("force_N", "across the whisker in the whisking plane"),
         *with_sigma(
             "stiffness_N_mm",
-            "that force over moved_est_mm; empty where the latter is within its noise",
+            "that force over moved_est_mm; empty where moved_est_mm is within its noise",
             "stiffness_sigma_N_mm",
         ),
         Column("stiffness_low_N_mm", "the stiffness is no less than that, at 97.5 %"),

@@ -143,13 +143,13 @@ class Table:
 
 
 def _is_single(names: Sequence[str], row: Sequence[str]) -> bool:
-    """Return whether a row is of one thing, not a sum of others. Raise ValueError where it is cut."""
+    """Return whether a row is of one whisk, not of all. Raise ValueError where it is cut short."""
     cells = dict(zip(names, row, strict=True))
     return cells.get("whisk") != ""
 
 
 def _values(cells: Sequence[str], kind: Kind) -> np.ndarray:
-    """Return the cells of a column as an array (rows,) of its kind. Raise ValueError for another."""
+    """Return the cells of a column as an array (rows,). Raise ValueError for another kind."""
     if kind is Kind.NUMBER:
         return np.array([float(cell) if cell else math.nan for cell in cells], dtype=float)
     if kind is Kind.WHOLE:

@@ -20,7 +20,7 @@ from bench.base.doubts import Doubts
 from bench.base.drawing import colour_of, label_of, publish, style
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.base.tables import SPEED, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
+from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.base.workers import Workers
 from bench.commands.robot import Converter, Task, answered, range_of
 from bench.report.evaluation import finished
@@ -79,7 +79,7 @@ ROBOT_TRADE = Table(
             "about nearly all whisks, else 0",
         ),
         Column("estimator", "as in estimates.csv", Kind.TEXT),
-        SPEED,
+        Column("speed_deg_s", "speed of the motor, to two digits"),
         Column("cutoff_Hz", "of a causal low-pass (fourth order); empty as recorded"),
         Column("rate_Hz", "samples a second"),
         Column("bits", "over the range that the session's signals fill; empty as recorded"),

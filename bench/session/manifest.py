@@ -1,4 +1,4 @@
-"""session.toml and trial.toml as people write them: which keys there are, and what values are plausible.
+"""session.toml and trial.toml as people write them: their keys, and what values are plausible.
 
 The comment above a key is what docs/formats.md says of it (`docs/formats.py`); it holds for the
 keys below, too, down to the next comment.
@@ -98,8 +98,8 @@ class CameraKeys(Keys, kw_only=True):
 
     # name of the folder or film
     name: str
-    # exposure, for the record: checked, and otherwise not used; how far the whisker slips meanwhile is seen
-    # in its frames
+    # exposure, for the record: checked, and otherwise not used; how far the whisker slips meanwhile
+    # is seen in its frames
     exposure_s: float | None = None
     exposure_sigma_s: float = 0.0
 

@@ -37,10 +37,10 @@ DESIGN = Table(
         Column("beta_deg", "slope"),
         Column("alpha_deg", "the surface's friction angle"),
         Column("d_x_mm", "distance"),
-        Column("bias_percent", "what α_est makes of it there, by first order"),
-        Column("sigma_percent", "standard deviation by the noise"),
-        Column("bound_percent", "bound on the error by both"),
-        Column("exact_percent", "error by exact mechanics; of the corners alone"),
+        Column("bias_percent", "its bias there, expected"),
+        Column("sigma_percent", "its standard deviation there, expected"),
+        Column("bound_percent", "abs(bias) + 1.96 sigma"),
+        Column("exact_percent", "its error by exact mechanics; of the corners alone"),
     ),
 )
 _STEPS = 6  # of the march from touch, as in bench.theory.model_error

@@ -71,9 +71,9 @@ def test_keys_of_toml(heading):
 
 
 def test_every_key_is_explained():
-    for keys in formats.named_parts(DOCUMENT):
-        if not isinstance(keys, Table):
-            assert all(meaning for _, meaning in formats.explained_keys(keys)), keys
+    for part in formats.named_parts(DOCUMENT):
+        if not isinstance(part, Table):
+            assert all(meaning for _, meaning in formats.explained_keys(part)), part
 
 
 def test_keys_of_results(steel_signals, exact_vision, tmp_path):
