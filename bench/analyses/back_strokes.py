@@ -97,38 +97,40 @@ def write_both_ways(out: Path, found: Sequence[WayBack]) -> None:
 
 
 def _row(one: WayBack) -> dict:
-    seen, felt, answer = one.seen, one.felt, one.answer
-    row = {"trial": one.result.trial.name, "whisk": seen.whisk, "surface": one.result.trial.surface}
-    angles = {"touch": seen.touch_rad, "touch_felt": felt.touch_felt_rad, "beta": seen.beta_rad}
-    for name, value in angles.items():
-        row |= {
-            f"{name}_deg": float(np.degrees(value.value)),
-            f"{name}_sigma_deg": float(np.degrees(value.sigma)),
-        }
-    row |= {"d_x_mm": float(one.d_x_mm.value), "d_x_sigma_mm": float(one.d_x_mm.sigma)}
-    row["phi_seen_deg"] = (
-        float(np.degrees(seen.at.phi_rad.value)) if seen.at is not None else np.nan
-    )
-    row |= {"phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value))}
-    row |= {"phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value))}
-    row |= {
+    """Return the row of a way back and estimator."""
+    seen = one.seen
+    felt = one.felt
+    answer = one.answer
+    phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
+    return {
+        "trial": one.result.trial.name,
+        "whisk": seen.whisk,
+        "surface": one.result.trial.surface,
+        "touch_deg": float(np.degrees(seen.touch_rad.value)),
+        "touch_sigma_deg": float(np.degrees(seen.touch_rad.sigma)),
+        "touch_felt_deg": float(np.degrees(felt.touch_felt_rad.value)),
+        "touch_felt_sigma_deg": float(np.degrees(felt.touch_felt_rad.sigma)),
+        "d_x_mm": float(one.d_x_mm.value),
+        "d_x_sigma_mm": float(one.d_x_mm.sigma),
+        "beta_deg": float(np.degrees(seen.beta_rad.value)),
+        "beta_sigma_deg": float(np.degrees(seen.beta_rad.sigma)),
+        "phi_seen_deg": float(np.degrees(phi_seen_rad)),
+        "phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value)),
+        "phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value)),
         "m_y_Nmm": felt.m_y_Nmm.value,
         "m_z_Nmm": felt.m_z_Nmm.value,
         "estimator": answer.estimator,
-    }
-    row |= {"d_x_est_mm": answer.d_x_est_mm.value, "d_x_est_sigma_mm": answer.d_x_est_mm.sigma}
-    row |= {name: getattr(answer, name) for name in ("d_x_est_low_mm", "d_x_est_high_mm")}
-    row |= {
-        f"{name}_est_deg": float(np.degrees(getattr(answer, f"{name}_est_rad")))
-        for name in ("beta", "alpha")
-    }
-    row |= {
+        "d_x_est_mm": answer.d_x_est_mm.value,
+        "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
+        "d_x_est_low_mm": answer.d_x_est_low_mm,
+        "d_x_est_high_mm": answer.d_x_est_high_mm,
+        "beta_est_deg": float(np.degrees(answer.beta_est_rad)),
+        "alpha_est_deg": float(np.degrees(answer.alpha_est_rad)),
         "error_mm": one.error_mm,
         "error_percent": 100.0 * one.error_mm / float(one.d_x_mm.value),
+        "inside": None if one.inside is None else int(one.inside),
+        "status": in_one_status(seen.status, felt.status, answer.status),
     }
-    inside, said = one.inside, (seen.status, felt.status, answer.status)
-    row["inside"] = None if inside is None else int(inside)
-    return row | {"status": in_one_status(*said)}
 
 
 def both_ways_lines(found: Sequence[WayBack]) -> Iterator[str]:

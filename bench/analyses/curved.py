@@ -208,19 +208,20 @@ def write_curvature(out: Path, found: Sequence[tuple[TrialResult, FeltWhisk, Cur
 
 
 def _row(result: TrialResult, felt: FeltWhisk, c: Curved) -> dict:
-    row = {"trial": result.trial.name, "whisk": felt.whisk, "angles": c.angles, "status": c.status}
-    row |= {"radius_mm": c.radius_mm.value, "radius_sigma_mm": c.radius_mm.sigma}
-    row |= {
+    """Return the row of a whisk."""
+    return {
+        "trial": result.trial.name,
+        "whisk": felt.whisk,
+        "angles": c.angles,
+        "radius_mm": c.radius_mm.value,
+        "radius_sigma_mm": c.radius_mm.sigma,
         "bar_radius_mm": 0.5 * result.trial.bar_diameter_mm,
-        "lateral_printed_per_mm": c.lateral_printed_per_mm,
-    }
-    row |= {
         "phi_0_deg": float(np.degrees(c.phi_0_rad.value)),
         "phi_0_sigma_deg": float(np.degrees(c.phi_0_rad.sigma)),
-    }
-    return row | {
         "lateral_per_mm": c.lateral_per_mm.value,
         "lateral_sigma_per_mm": c.lateral_per_mm.sigma,
+        "lateral_printed_per_mm": c.lateral_printed_per_mm,
+        "status": c.status,
     }
 
 

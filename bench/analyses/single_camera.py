@@ -104,36 +104,36 @@ def write_one_camera(out: Path, found: Sequence[ShapeSeen]) -> None:
 
 
 def _row(one: ShapeSeen) -> dict:
-    seen, said = one.seen, one.said
-    row = {"trial": one.result.trial.name, "whisk": seen.whisk, "surface": one.result.trial.surface}
-    for name, value in {"touch": seen.touch_rad, "touch_est": said.touch_rad}.items():
-        row |= {
-            f"{name}_deg": float(np.degrees(value.value)),
-            f"{name}_sigma_deg": float(np.degrees(value.sigma)),
-        }
-    lengths = {
-        "d_x": seen.d_x_mm,
-        "d_x_est": said.d_x_mm,
-        "moved": one.moved_mm,
-        "moved_est": said.moved_mm,
-    }
-    for name, value in lengths.items():
-        row |= {f"{name}_mm": float(value.value), f"{name}_sigma_mm": float(value.sigma)}
-    row |= {
-        "force_N": said.force_N.value,
-        "force_sigma_N": said.force_N.sigma,
+    """Return the row of a whisk."""
+    seen = one.seen
+    said = one.said
+    return {
+        "trial": one.result.trial.name,
+        "whisk": seen.whisk,
+        "surface": one.result.trial.surface,
         "camera": said.camera,
-    }
-    row |= {
-        name: getattr(said, name)
-        for name in ("stiffness_N_mm", "stiffness_sigma_N_mm", "stiffness_low_N_mm")
-    }
-    row |= {
+        "touch_deg": float(np.degrees(seen.touch_rad.value)),
+        "touch_sigma_deg": float(np.degrees(seen.touch_rad.sigma)),
+        "touch_est_deg": float(np.degrees(said.touch_rad.value)),
+        "touch_est_sigma_deg": float(np.degrees(said.touch_rad.sigma)),
+        "d_x_mm": float(seen.d_x_mm.value),
+        "d_x_sigma_mm": float(seen.d_x_mm.sigma),
+        "d_x_est_mm": float(said.d_x_mm.value),
+        "d_x_est_sigma_mm": float(said.d_x_mm.sigma),
         "error_mm": one.error_mm,
         "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value),
+        "inside": None if one.inside is None else int(one.inside),
+        "moved_mm": float(one.moved_mm.value),
+        "moved_sigma_mm": float(one.moved_mm.sigma),
+        "moved_est_mm": float(said.moved_mm.value),
+        "moved_est_sigma_mm": float(said.moved_mm.sigma),
+        "force_N": said.force_N.value,
+        "force_sigma_N": said.force_N.sigma,
+        "stiffness_N_mm": said.stiffness_N_mm,
+        "stiffness_sigma_N_mm": said.stiffness_sigma_N_mm,
+        "stiffness_low_N_mm": said.stiffness_low_N_mm,
+        "status": in_one_status(seen.status, said.status),
     }
-    row["inside"] = None if one.inside is None else int(one.inside)
-    return row | {"status": in_one_status(seen.status, said.status)}
 
 
 def one_camera_lines(found: Sequence[ShapeSeen]) -> Iterator[str]:

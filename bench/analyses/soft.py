@@ -24,7 +24,6 @@ from estimator.beam import Beam
 from estimator.uncertainty import Z_95, model_share
 from vision.truth.value import UNKNOWN, Value
 
-STIFFNESS = ("stiffness_N_mm", "stiffness_low_N_mm", "stiffness_high_N_mm")
 COMPLIANCE = Table(
     "compliance",
     "A row for each two neighbouring nominal distances of one surface and speed: section VII's soft "
@@ -40,7 +39,7 @@ COMPLIANCE = Table(
         *with_sigma("d_x_mm", "of the nearer whisks, the object's softness taken out"),
         *with_sigma("give_mm_N", "one over the stiffness; below zero by noise", "give_sigma_mm_N"),
         *alike(
-            STIFFNESS,
+            ("stiffness_N_mm", "stiffness_low_N_mm", "stiffness_high_N_mm"),
             "stiffness, and the ends of its 95 % interval; an end that is empty is infinite",
         ),
         status("that it is not softer than a rigid object, or why there is none"),
@@ -236,25 +235,31 @@ def write_compliance(out: Path, found: Sequence[Soft]) -> None:
 
 
 def _row(soft: Soft) -> dict:
-    near, far = soft.near, soft.far
-    row = {
+    """Return the row of two neighbouring distances, with what was seen of the object."""
+    near = soft.near
+    far = soft.far
+    stiffness, low, high = soft.stiffness_N_mm
+    return {
         "surface": soft.surface,
         "speed_deg_s": soft.speed_deg_s,
         "near_nominal_mm": near.nominal_mm,
-    }
-    row |= {"far_nominal_mm": far.nominal_mm, "whisks_near": near.whisks, "whisks_far": far.whisks}
-    row |= {"shift_mm": far.nominal_mm - near.nominal_mm, "status": soft.status}
-    row |= {"shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))}
-    row |= {
-        name: getattr(soft, name)
-        for name in ("d_x_mm", "d_x_sigma_mm", "give_mm_N", "give_sigma_mm_N")
-    }
-    row |= {
+        "far_nominal_mm": far.nominal_mm,
+        "whisks_near": near.whisks,
+        "whisks_far": far.whisks,
+        "shift_mm": far.nominal_mm - near.nominal_mm,
+        "shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm)),
+        "d_x_mm": soft.d_x_mm,
+        "d_x_sigma_mm": soft.d_x_sigma_mm,
+        "give_mm_N": soft.give_mm_N,
+        "give_sigma_mm_N": soft.give_sigma_mm_N,
+        "stiffness_N_mm": stiffness,
+        "stiffness_low_N_mm": low,
+        "stiffness_high_N_mm": high,
+        "status": soft.status,
         "whisks_seen": soft.whisks_seen,
         "give_seen_mm_N": soft.seen.value,
         "give_seen_sigma_mm_N": soft.seen.sigma,
     }
-    return row | dict(zip(STIFFNESS, soft.stiffness_N_mm))
 
 
 def soft_lines(found: Sequence[Soft]) -> Iterator[str]:

@@ -108,22 +108,29 @@ def write_tilts(out: Path, found: Sequence[Tilted]) -> None:
 
 
 def _row(one: Tilted) -> dict:
-    told = one.found
-    sigmas = np.sqrt(np.diag(told.covariance))
-    row = {
-        name: getattr(one, name)
-        for name in ("surface", "speed_deg_s", "nominal_mm", "trials", "whisks")
+    """Return the row of a surface, speed and nominal distance."""
+    contact = one.found
+    d_x_sigma_mm, alpha_sigma_rad = np.sqrt(np.diag(contact.covariance))
+    error_mm = contact.d_x_mm - one.d_x_true_mm
+    return {
+        "surface": one.surface,
+        "speed_deg_s": one.speed_deg_s,
+        "nominal_mm": one.nominal_mm,
+        "trials": one.trials,
+        "whisks": one.whisks,
+        "beta_from_deg": one.beta_deg[0],
+        "beta_to_deg": one.beta_deg[1],
+        "d_x_mm": contact.d_x_mm,
+        "d_x_sigma_mm": float(d_x_sigma_mm),
+        "d_x_low_mm": contact.low_mm,
+        "d_x_high_mm": contact.high_mm,
+        "alpha_deg": float(np.degrees(contact.alpha_rad)),
+        "alpha_sigma_deg": float(np.degrees(alpha_sigma_rad)),
+        "correlation": float(contact.covariance[0, 1] / (d_x_sigma_mm * alpha_sigma_rad)),
+        "error_mm": error_mm,
+        "error_percent": 100.0 * error_mm / one.d_x_true_mm,
+        "status": contact.status,
     }
-    row |= {"beta_from_deg": one.beta_deg[0], "beta_to_deg": one.beta_deg[1], "status": told.status}
-    row |= {"d_x_mm": told.d_x_mm, "d_x_sigma_mm": float(sigmas[0])}
-    row |= {"d_x_low_mm": told.low_mm, "d_x_high_mm": told.high_mm}
-    row |= {
-        "alpha_deg": float(np.degrees(told.alpha_rad)),
-        "alpha_sigma_deg": float(np.degrees(sigmas[1])),
-    }
-    row["correlation"] = float(told.covariance[0, 1] / (sigmas[0] * sigmas[1]))
-    error = told.d_x_mm - one.d_x_true_mm
-    return row | {"error_mm": error, "error_percent": 100.0 * error / one.d_x_true_mm}
 
 
 def tilted_lines(found: Sequence[Tilted]) -> Iterator[str]:
