@@ -16,7 +16,6 @@ from bench.base.tables import (
     Kind,
     Table,
     alike,
-    sigma_name,
     status,
     with_sigma,
 )
@@ -24,9 +23,7 @@ from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
-_PLACE = ("x_mm", "y_mm", "z_mm")
 _ON_CENTRELINE = "on the whisker's centreline"
-_CROSS = ("xy_covariance_mm2", "xz_covariance_mm2", "yz_covariance_mm2")
 SURFACE_POINTS = Table(
     "surface",
     "Of an array: a row a measured whisk's contact at first touch in the rig frame, by each "
@@ -39,7 +36,10 @@ SURFACE_POINTS = Table(
         *with_sigma("x_mm", _ON_CENTRELINE),
         *with_sigma("y_mm", _ON_CENTRELINE),
         *with_sigma("z_mm", _ON_CENTRELINE),
-        *alike(_CROSS, "the rest of their covariance"),
+        *alike(
+            ("xy_covariance_mm2", "xz_covariance_mm2", "yz_covariance_mm2"),
+            "the rest of their covariance",
+        ),
         *with_sigma("distance_mm", "from the object's surface to the whisker's, positive outside"),
         *with_sigma("along_mm", "along the whisker, from where it comes nearest to the object"),
         Column(
@@ -65,21 +65,33 @@ def write_surface(out: Path, cloud: Iterable[Contact]) -> None:
 
 
 def _row(contact: Contact) -> dict:
+    """Return the row of a contact."""
     covariance = contact.covariance_mm2
-    sigmas = np.sqrt(np.diag(covariance)).tolist()
-    return (
-        {
-            name: getattr(contact, name)
-            for name in ("whisker", "trial", "whisk", "estimator", "status")
-        }
-        | dict(zip(_PLACE, contact.point_mm.tolist()))
-        | dict(zip(map(sigma_name, _PLACE), sigmas))
-        | dict(zip(_CROSS, (covariance[0, 1], covariance[0, 2], covariance[1, 2])))
-        | {"distance_mm": contact.distance_mm.value, "distance_sigma_mm": contact.distance_mm.sigma}
-        | {"along_mm": contact.along_mm.value, "along_sigma_mm": contact.along_mm.sigma}
-        | {"normal_off_deg": math.degrees(contact.normal_off_rad), "surface_from": contact.source}
-        | {"normal_sigma_deg": math.degrees(contact.normal_sigma_rad)}
-    )
+    x_mm, y_mm, z_mm = contact.point_mm.tolist()
+    x_sigma_mm, y_sigma_mm, z_sigma_mm = np.sqrt(np.diag(covariance)).tolist()
+    return {
+        "whisker": contact.whisker,
+        "trial": contact.trial,
+        "whisk": contact.whisk,
+        "estimator": contact.estimator,
+        "x_mm": x_mm,
+        "x_sigma_mm": x_sigma_mm,
+        "y_mm": y_mm,
+        "y_sigma_mm": y_sigma_mm,
+        "z_mm": z_mm,
+        "z_sigma_mm": z_sigma_mm,
+        "xy_covariance_mm2": covariance[0, 1],
+        "xz_covariance_mm2": covariance[0, 2],
+        "yz_covariance_mm2": covariance[1, 2],
+        "distance_mm": contact.distance_mm.value,
+        "distance_sigma_mm": contact.distance_mm.sigma,
+        "along_mm": contact.along_mm.value,
+        "along_sigma_mm": contact.along_mm.sigma,
+        "normal_off_deg": math.degrees(contact.normal_off_rad),
+        "normal_sigma_deg": math.degrees(contact.normal_sigma_rad),
+        "surface_from": contact.source,
+        "status": contact.status,
+    }
 
 
 def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
