@@ -47,6 +47,7 @@ lint: $(VENV)/ready-for-tests
 	$(BIN)/ruff format --check .
 
 docs: $(VENV)/ready-for-docs
+	$(BIN)/python docs/formats.py
 	$(BIN)/python docs/thresholds.py > docs/thresholds.md
 	$(BIN)/mkdocs build --strict
 

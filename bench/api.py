@@ -31,13 +31,14 @@ from bench.array.array_results import folder_of, is_array, read_array_record, wr
 from bench.base.atomic import lock_output
 from bench.base.drawing import style
 from bench.base.settings import Settings
-from bench.base.tables import TABLES, read_table
 from bench.commands.evaluate import evaluate as _evaluate
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import RunRecord
+from bench.report.run_tables import RUN_TABLES as TABLES
+from bench.report.whisk_tables import TRACK
 from bench.trials.seeing import STANDARD, by_preset
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class Run:
         """A table by its name, one of TABLES. Raises KeyError for another."""
         if name not in TABLES:
             raise KeyError(f"{name!r} is no table; there are {', '.join(TABLES)}")
-        return read_table(self.out / f"{name}.csv")
+        return TABLES[name].read(self.out)
 
     def track(self, trial: str) -> np.ndarray:
         """A row a frame of a trial. Raises KeyError where there is no such trial."""
@@ -93,7 +94,7 @@ class Run:
             raise KeyError(
                 f"there is no trial {trial!r}; there are {', '.join(self.record.recordings)}"
             )
-        return read_table(self.out / "track" / f"{trial}.csv")
+        return TRACK.read_file(self.out / "track" / f"{trial}.csv")
 
     def results(self) -> Finished:
         """Everything of every whisk as typed records (`bench.records.trial_result`), and the friction of each surface."""
@@ -128,7 +129,7 @@ class ArrayRun:
         """A table of all whiskers by its name: whisks, estimates or surface. Raises KeyError for another."""
         if name not in ARRAY_TABLES:
             raise KeyError(f"{name!r} is no table; there are {', '.join(ARRAY_TABLES)}")
-        return read_table(self.out / f"{name}.csv")
+        return ARRAY_TABLES[name].read(self.out)
 
 
 def evaluate(

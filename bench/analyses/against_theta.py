@@ -12,7 +12,7 @@ import numpy as np
 
 from bench.base.drawing import blank, colour_of, is_drawn, label_of, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
-from bench.base.tables import write_table
+from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
 from bench.records.trial_result import TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
 from vision.geometry.counted import counted
@@ -21,19 +21,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TABLE, FIGURE = "against_theta.csv", "against_theta.png"
-COLUMNS = (
-    *(
-        "estimator",
-        "theta_deg",
-        "whisks",
-        "none",
-        "error_mean_percent",
-        "error_rms_percent",
-        "error_sigma_percent",
+AGAINST_THETA = Table(
+    "against_theta",
+    "A row an estimator and pushing angle, over the measured whisks with a truth of which nothing "
+    "is doubtful.",
+    (
+        Column("estimator", "as in estimates.csv", Kind.TEXT),
+        Column("theta_deg", "pushing angle, from 0.2° as far as strokes go"),
+        WHISKS_KNOWN,
+        WHISKS_WITHOUT,
+        Column("error_mean_percent", "mean of estimate less truth, % of the truth"),
+        Column("error_rms_percent", "RMS of estimate less truth, % of the truth"),
+        Column("error_sigma_percent", "RMS of the stated sigmas, with what α_est may be off by"),
+        Column(
+            "error_sigma_alpha_exact_percent", "RMS of the stated sigmas, as if α_est were right"
+        ),
     ),
-    "error_sigma_alpha_exact_percent",
 )
+FIGURE = "against_theta.png"
 _FEWEST_SHARE = 0.9  # of an estimator's whisks: a θ that fewer reach is one of other whisks
 
 
@@ -123,7 +128,7 @@ def write_against_theta(
 ) -> tuple[list[AtTheta], list[str]]:
     """Table, and the figure where it is to be `drawn`; the rows, and the figure's name where there is one."""
     rows = against_theta(results)
-    write_table(out / TABLE, COLUMNS, map(vars, rows))
+    AGAINST_THETA.write(out, map(vars, rows))
     if not drawn or not any(row.whisks for row in rows):
         return rows, []
     stamp = hash_of([vars(row) for row in rows], hash_of_code(DRAWING))

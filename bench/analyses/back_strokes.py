@@ -11,41 +11,43 @@ import numpy as np
 
 from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
-from bench.base.tables import write_table
+from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
-TABLE = "both_ways.csv"
-COLUMNS = (
-    *(
-        "trial",
-        "whisk",
-        "surface",
-        "touch_deg",
-        "touch_sigma_deg",
-        "touch_felt_deg",
-        "touch_felt_sigma_deg",
+BOTH_WAYS = Table(
+    "both_ways",
+    "A row a way back and estimator, of trials with `both_ways = true` ([moving.md](moving.md)).",
+    (
+        TRIAL,
+        Column("whisk", "the whisk whose way back it is", Kind.WHOLE),
+        SURFACE,
+        *with_sigma("touch_deg", "where the whisker lets go of the bar, as seen"),
+        *with_sigma("touch_felt_deg", "where the whisker lets go of the bar, as felt"),
+        *with_sigma("d_x_mm", "as seen on the way back, else on the way there"),
+        *with_sigma("beta_deg", "slope as seen on the way back"),
+        Column("phi_seen_deg", "direction of the deflection as seen on the way back"),
+        Column("phi_felt_deg", "felt at the wanted angle on the way back"),
+        Column("phi_there_deg", "felt at that angle on the way there"),
+        *alike(("m_y_Nmm", "m_z_Nmm"), "moments felt at that angle on the way back"),
+        Column(
+            "estimator",
+            "both_ways: both together; the others by the way back alone, as if it were a forward "
+            "stroke",
+            Kind.TEXT,
+        ),
+        *with_sigma("d_x_est_mm", "as in estimates.csv"),
+        *alike(("d_x_est_low_mm", "d_x_est_high_mm", "beta_est_deg"), "as in estimates.csv"),
+        Column(
+            "alpha_est_deg",
+            "the friction angle that it assumed; of both_ways the one that it found",
+        ),
+        Column("error_mm", "d_x_est_mm less d_x_mm"),
+        Column("error_percent", "that error, % of d_x_mm"),
+        Column("inside", "1 where the estimate's 95 % interval holds d_x_mm, else 0"),
+        status("what is doubtful of way back and estimate"),
     ),
-    *(
-        "d_x_mm",
-        "d_x_sigma_mm",
-        "beta_deg",
-        "beta_sigma_deg",
-        "phi_seen_deg",
-        "phi_felt_deg",
-        "phi_there_deg",
-    ),
-    *(
-        "m_y_Nmm",
-        "m_z_Nmm",
-        "estimator",
-        "d_x_est_mm",
-        "d_x_est_sigma_mm",
-        "d_x_est_low_mm",
-        "d_x_est_high_mm",
-    ),
-    *("beta_est_deg", "alpha_est_deg", "error_mm", "error_percent", "inside", "status"),
 )
 
 
@@ -91,42 +93,44 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
 def write_both_ways(out: Path, found: Sequence[WayBack]) -> None:
     """both_ways.csv; nothing where no way back was asked for."""
     if found:
-        write_table(out / TABLE, COLUMNS, map(_row, found))
+        BOTH_WAYS.write(out, map(_row, found))
 
 
 def _row(one: WayBack) -> dict:
-    seen, felt, answer = one.seen, one.felt, one.answer
-    row = {"trial": one.result.trial.name, "whisk": seen.whisk, "surface": one.result.trial.surface}
-    angles = {"touch": seen.touch_rad, "touch_felt": felt.touch_felt_rad, "beta": seen.beta_rad}
-    for name, value in angles.items():
-        row |= {
-            f"{name}_deg": float(np.degrees(value.value)),
-            f"{name}_sigma_deg": float(np.degrees(value.sigma)),
-        }
-    row |= {"d_x_mm": float(one.d_x_mm.value), "d_x_sigma_mm": float(one.d_x_mm.sigma)}
-    row["phi_seen_deg"] = (
-        float(np.degrees(seen.at.phi_rad.value)) if seen.at is not None else np.nan
-    )
-    row |= {"phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value))}
-    row |= {"phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value))}
-    row |= {
+    """Return the row of a way back and estimator."""
+    seen = one.seen
+    felt = one.felt
+    answer = one.answer
+    phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
+    return {
+        "trial": one.result.trial.name,
+        "whisk": seen.whisk,
+        "surface": one.result.trial.surface,
+        "touch_deg": float(np.degrees(seen.touch_rad.value)),
+        "touch_sigma_deg": float(np.degrees(seen.touch_rad.sigma)),
+        "touch_felt_deg": float(np.degrees(felt.touch_felt_rad.value)),
+        "touch_felt_sigma_deg": float(np.degrees(felt.touch_felt_rad.sigma)),
+        "d_x_mm": float(one.d_x_mm.value),
+        "d_x_sigma_mm": float(one.d_x_mm.sigma),
+        "beta_deg": float(np.degrees(seen.beta_rad.value)),
+        "beta_sigma_deg": float(np.degrees(seen.beta_rad.sigma)),
+        "phi_seen_deg": float(np.degrees(phi_seen_rad)),
+        "phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value)),
+        "phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value)),
         "m_y_Nmm": felt.m_y_Nmm.value,
         "m_z_Nmm": felt.m_z_Nmm.value,
         "estimator": answer.estimator,
-    }
-    row |= {"d_x_est_mm": answer.d_x_est_mm.value, "d_x_est_sigma_mm": answer.d_x_est_mm.sigma}
-    row |= {name: getattr(answer, name) for name in ("d_x_est_low_mm", "d_x_est_high_mm")}
-    row |= {
-        f"{name}_est_deg": float(np.degrees(getattr(answer, f"{name}_est_rad")))
-        for name in ("beta", "alpha")
-    }
-    row |= {
+        "d_x_est_mm": answer.d_x_est_mm.value,
+        "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
+        "d_x_est_low_mm": answer.d_x_est_low_mm,
+        "d_x_est_high_mm": answer.d_x_est_high_mm,
+        "beta_est_deg": float(np.degrees(answer.beta_est_rad)),
+        "alpha_est_deg": float(np.degrees(answer.alpha_est_rad)),
         "error_mm": one.error_mm,
         "error_percent": 100.0 * one.error_mm / float(one.d_x_mm.value),
+        "inside": None if one.inside is None else int(one.inside),
+        "status": in_one_status(seen.status, felt.status, answer.status),
     }
-    inside, said = one.inside, (seen.status, felt.status, answer.status)
-    row["inside"] = None if inside is None else int(inside)
-    return row | {"status": in_one_status(*said)}
 
 
 def both_ways_lines(found: Sequence[WayBack]) -> Iterator[str]:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.settings import TILT_SIGMA_RAD
-from bench.base.tables import write_table
+from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import FeltAt, FeltWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.estimate_errors import is_sound
@@ -23,15 +23,24 @@ from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95, gradient_with_friction
 from vision.truth.value import UNKNOWN, Value
 
-COLUMNS = (
-    *("trial", "whisk", "angles", "radius_mm", "radius_sigma_mm", "bar_radius_mm"),
-    *(
-        "phi_0_deg",
-        "phi_0_sigma_deg",
-        "lateral_per_mm",
-        "lateral_sigma_per_mm",
-        "lateral_printed_per_mm",
-        "status",
+CURVATURE = Table(
+    "curvature",
+    "A row a measured whisk: how its object is curved, from the moments at successive pushing "
+    "angles.",
+    (
+        TRIAL,
+        WHISK,
+        Column("angles", "how many pushing angles served"),
+        *with_sigma("radius_mm", "radius of curvature in the whisking plane, felt"),
+        Column("bar_radius_mm", "radius of the bar as stated"),
+        *with_sigma("phi_0_deg", "slip angle at touch"),
+        *with_sigma(
+            "lateral_per_mm",
+            "curvature in the sensing plane, by (23) to (25) with the exact φ; 0 of a straight bar",
+            "lateral_sigma_per_mm",
+        ),
+        Column("lateral_printed_per_mm", "the same with (24) as printed"),
+        status("what is missing"),
     ),
 )
 _FIRST_RAD = np.radians(
@@ -194,24 +203,25 @@ def curved_whisks(
 
 
 def write_curvature(out: Path, found: Sequence[tuple[TrialResult, FeltWhisk, Curved]]) -> None:
-    """curvature.csv."""
-    write_table(out / "curvature.csv", COLUMNS, (_row(*one) for one in found))
+    """Write curvature.csv."""
+    CURVATURE.write(out, (_row(*one) for one in found))
 
 
 def _row(result: TrialResult, felt: FeltWhisk, c: Curved) -> dict:
-    row = {"trial": result.trial.name, "whisk": felt.whisk, "angles": c.angles, "status": c.status}
-    row |= {"radius_mm": c.radius_mm.value, "radius_sigma_mm": c.radius_mm.sigma}
-    row |= {
+    """Return the row of a whisk."""
+    return {
+        "trial": result.trial.name,
+        "whisk": felt.whisk,
+        "angles": c.angles,
+        "radius_mm": c.radius_mm.value,
+        "radius_sigma_mm": c.radius_mm.sigma,
         "bar_radius_mm": 0.5 * result.trial.bar_diameter_mm,
-        "lateral_printed_per_mm": c.lateral_printed_per_mm,
-    }
-    row |= {
         "phi_0_deg": float(np.degrees(c.phi_0_rad.value)),
         "phi_0_sigma_deg": float(np.degrees(c.phi_0_rad.sigma)),
-    }
-    return row | {
         "lateral_per_mm": c.lateral_per_mm.value,
         "lateral_sigma_per_mm": c.lateral_per_mm.sigma,
+        "lateral_printed_per_mm": c.lateral_printed_per_mm,
+        "status": c.status,
     }
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import hash_of
-from bench.base.tables import write_table
+from bench.base.tables import Column, Kind, Table, alike
 from bench.records.trial_result import TrialResult
 from bench.trials.estimate_errors import judge
 from estimator.threshold import distance_error
@@ -26,9 +26,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "error_map"
-COLUMNS = (
-    *("beta_from_deg", "beta_to_deg", "alpha_from_deg", "alpha_to_deg", "whisks"),
-    *("error_percent", "error_sd_percent", "predicted_percent"),
+ERROR_MAP = Table(
+    NAME,
+    "A row a cell of slope and friction with whisks in it.",
+    (
+        *alike(("beta_from_deg", "beta_to_deg", "alpha_from_deg", "alpha_to_deg"), "the cell"),
+        Column("whisks", "how many whisks in it", Kind.WHOLE),
+        Column("error_percent", "error of (10), mean"),
+        Column("error_sd_percent", "error of (10), standard deviation"),
+        Column("predicted_percent", "error by (13) and (14)"),
+    ),
 )
 _BETA_DEG, _ALPHA_DEG = (
     5.0,
@@ -57,12 +64,12 @@ def write_error_map(
 ) -> list[str]:
     """error_map.csv, and error_map.png where there is a cell and it is to be `drawn`. Names of the pictures."""
     cells = measured_cells(results, friction, alpha_est_rad)
-    write_table(out / f"{NAME}.csv", COLUMNS, map(_row, cells))
+    ERROR_MAP.write(out, map(_row, cells))
     if not cells or not drawn:
         return []
     path, stamp = (
         out / f"{NAME}.png",
-        hash_of([vars(cell) for cell in cells], alpha_est_rad, COLUMNS),
+        hash_of([vars(cell) for cell in cells], alpha_est_rad, ERROR_MAP.names),
     )
     if not is_drawn(path, stamp):
         with style():

@@ -14,7 +14,7 @@ import numpy as np
 from bench.analyses.alphas import seen_friction
 from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import hash_of
-from bench.base.tables import write_table
+from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
 from bench.gauges.gauge_readings import reference_from_pictures
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
@@ -25,14 +25,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
-COLUMNS = (
-    "trial",
-    "whisk",
-    "d_x_mm",
-    "alpha_seen_deg",
-    "alpha_seen_sigma_deg",
-    "error_mm",
-    *SHARES,
+EXPLAINED = Table(
+    "explained",
+    "A row a whisk with truth and estimate by (10): its error in parts; the last row is their mean.",
+    (
+        TRIAL,
+        WHISK,
+        Column("d_x_mm", "distance: the truth"),
+        *with_sigma("alpha_seen_deg", "friction angle, seen"),
+        Column("error_mm", "of (10): the sum of the next four"),
+        Column("by_touch_mm", "what it changes by when touch felt becomes touch seen"),
+        Column("by_moments_mm", "and when then the moments felt become those of the shape seen"),
+        Column("by_alpha_mm", "and when then α_est becomes α seen"),
+        Column("remainder_mm", "beam theory, and slip along the whisker"),
+    ),
 )
 TOTAL = "mean"
 _LOOK = {
@@ -56,7 +62,7 @@ def write_explained(
     total = (
         [mean_row([row for row in rows if (row["trial"], row["whisk"]) in sound])] if rows else []
     )
-    write_table(out / "explained.csv", COLUMNS, [*rows, *total])
+    EXPLAINED.write(out, [*rows, *total])
     if not rows or not drawn:
         return []
     path, stamp = out / "explained.png", hash_of(rows, _LOOK)

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.analyses.surfaces import Point, Surface
 from bench.base.drawing import SLOPES_DEG, blank, colour_of
+from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
 
@@ -14,10 +15,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLUMNS = (
-    *("panel", "surface", "speed_deg_s", "theta_deg", "d_x_mm", "alpha_deg", "alpha_sigma_deg"),
-    *("beta_deg", "whisks", "m_EI_per_metre", "m_sd_EI_per_metre", "phi_deg", "phi_sd_deg"),
-    *("m_fit_EI_per_metre", "phi_fit_deg"),
+FIGURE_8 = Table(
+    "figure_8",
+    "A row a slope of a surface and speed.",
+    (
+        Column("panel", "where it is drawn", Kind.TEXT),
+        SURFACE,
+        SPEED,
+        Column("theta_deg", "pushing angle"),
+        Column("d_x_mm", "the distance that all whisks are brought to"),
+        *with_sigma("alpha_deg", "the friction angle that fits"),
+        Column("beta_deg", "slope"),
+        Column("whisks", "how many whisks at that slope", Kind.WHOLE),
+        *alike(
+            ("m_EI_per_metre", "m_sd_EI_per_metre"),
+            "magnitude of the moment, mean and standard deviation",
+        ),
+        *alike(("phi_deg", "phi_sd_deg"), "φ, mean and standard deviation"),
+        *alike(("m_fit_EI_per_metre", "phi_fit_deg"), "the fit there"),
+    ),
 )
 _MOST_COLUMNS = 4  # panels beside each other that can still be read on a page
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
@@ -50,7 +66,7 @@ def figure_8(fitted: Sequence[Surface]) -> "Figure":
 
 
 def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
-    """The figure as a table by COLUMNS, a row a point; |m| at the panel's common d_x. Fits are NaN where there is none.
+    """Yield the rows of FIGURE_8, one a point; |m| at the panel's common d_x. Fits are NaN where there is none.
 
     With one whisk a point, m_sd and phi_sd are its stated sigmas.
     """

@@ -16,7 +16,18 @@ from bench.analyses.section_vii import (
     weights,
 )
 from bench.analyses.surfaces import Surface, surfaces
-from bench.base.tables import sigma_name, write_table
+from bench.base.tables import (
+    SPEED,
+    SURFACE,
+    TRIAL,
+    WHISK,
+    Column,
+    Kind,
+    Table,
+    alike,
+    sigma_name,
+    with_sigma,
+)
 from bench.records.phases import KINETIC, STATIC
 from bench.records.trial_result import TrialResult
 from bench.session.whisker import Whisker
@@ -27,23 +38,82 @@ WAYS = ("tilting", "consistency", "smoothness")
 _APART = tuple((kind, record) for kind in (STATIC, KINETIC) for record in RECORDS)
 
 
-def _angle_columns(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(
-        column for name in names for column in (f"alpha_{name}_deg", f"alpha_{name}_sigma_deg")
-    )
-
-
+# What the records of whisks hold of α: in the friction of a whisk, and as means in that of a surface.
 _OF_WHISK = (*RECORDS, *(f"{kind}_{record}" for kind, record in _APART))
-WHISK_COLUMNS = (
-    *("trial", "whisk", "surface", "speed_deg_s", "beta_deg", "beta_from"),
-    *_angle_columns(_OF_WHISK),
-    *("rests_seen", "jumps_seen", "rests_felt", "jumps_felt", "confidence"),
+FRICTION = Table(
+    "friction",
+    "A row a whisk: friction angles α, each with its sigma.",
+    (
+        TRIAL,
+        WHISK,
+        SURFACE,
+        SPEED,
+        Column("beta_deg", "slope of the bar"),
+        Column("beta_from", "pictures; or manifest, where no picture shows the slope", Kind.TEXT),
+        *with_sigma(
+            "alpha_seen_deg",
+            "from the deflection, pictures alone, with the friction that acts along the whisker",
+        ),
+        *with_sigma(
+            "alpha_felt_deg",
+            "from the moments and the slope seen, with the friction that acts along the whisker",
+        ),
+        *with_sigma("alpha_static_seen_deg", "where rests end, seen"),
+        *with_sigma("alpha_static_felt_deg", "where rests end, felt"),
+        *with_sigma("alpha_kinetic_seen_deg", "where jumps end, seen"),
+        *with_sigma("alpha_kinetic_felt_deg", "where jumps end, felt"),
+        *alike(
+            ("rests_seen", "jumps_seen", "rests_felt", "jumps_felt"),
+            "how many of each",
+            Kind.WHOLE,
+        ),
+        Column("confidence", "weight of section VII, from φ felt"),
+    ),
 )
-PHASE_COLUMNS = ("trial", "whisk", "record", "kind", "theta_deg", "alpha_deg", "alpha_sigma_deg")
-SURFACE_COLUMNS = (
-    *("surface", "speed_deg_s", "whisks"),
-    *_angle_columns((*_OF_WHISK, "least_squares", *WAYS)),
-    *("error_rms_percent", "error_rms_weighted_percent", "notes"),
+PHASES = Table(
+    "phases",
+    "A row an end of a rest or of a jump.",
+    (
+        TRIAL,
+        WHISK,
+        Column("record", "seen or felt", Kind.TEXT),
+        Column("kind", "static (the rest breaks) or kinetic (the jump stops)", Kind.TEXT),
+        Column("theta_deg", "pushing angle there"),
+        *with_sigma("alpha_deg", "friction angle there"),
+    ),
+)
+_MEAN = "mean over the whisks, as in friction.csv"
+SURFACES = Table(
+    "surfaces",
+    "A row a surface and speed.",
+    (
+        SURFACE,
+        SPEED,
+        Column("whisks", "how many whisks", Kind.WHOLE),
+        *with_sigma("alpha_seen_deg", _MEAN),
+        *with_sigma("alpha_felt_deg", _MEAN),
+        *with_sigma("alpha_static_seen_deg", _MEAN),
+        *with_sigma("alpha_static_felt_deg", _MEAN),
+        *with_sigma("alpha_kinetic_seen_deg", _MEAN),
+        *with_sigma("alpha_kinetic_felt_deg", _MEAN),
+        *with_sigma("alpha_least_squares_deg", "the fit of Fig. 8"),
+        *with_sigma("alpha_tilting_deg", "by tilting, section VII"),
+        *with_sigma("alpha_consistency_deg", "by consistency, section VII"),
+        *with_sigma(
+            "alpha_smoothness_deg",
+            "by smoothness, section VII: consistency over several distances",
+        ),
+        Column("error_rms_percent", "of (10) with α_est as given, all whisks alike"),
+        Column(
+            "error_rms_weighted_percent",
+            "of (10) with α_est as given, whisks weighted by confidence",
+        ),
+        Column(
+            "notes",
+            "why a way of section VII has no result, or what is doubtful of it",
+            Kind.SENTENCE,
+        ),
+    ),
 )
 
 
@@ -123,16 +193,12 @@ def write_friction(
     friction: Sequence[SurfaceFriction],
     alpha_est_rad: float,
 ) -> None:
-    """friction.csv, phases.csv and surfaces.csv."""
+    """Write friction.csv, phases.csv and surfaces.csv."""
     alphas = alphas_of(results)
     phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for s in friction for f in s.surface.felt}
-    write_table(
-        out / "friction.csv",
-        WHISK_COLUMNS,
-        (_whisk_row(a, phi.get(a.key), alpha_est_rad) for a in alphas),
-    )
-    write_table(out / "phases.csv", PHASE_COLUMNS, (row for a in alphas for row in _phase_rows(a)))
-    write_table(out / "surfaces.csv", SURFACE_COLUMNS, map(_surface_row, friction))
+    FRICTION.write(out, (_whisk_row(a, phi.get(a.key), alpha_est_rad) for a in alphas))
+    PHASES.write(out, (row for a in alphas for row in _phase_rows(a)))
+    SURFACES.write(out, map(_surface_row, friction))
 
 
 def _whisk_row(a: WhiskAlphas, phi_rad: float | None, alpha_est_rad: float) -> dict:

@@ -10,25 +10,29 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.base.tables import write_table
+from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
-TABLE = "gives_way.csv"
-COLUMNS = (
-    *(
-        "trial",
-        "whisk",
-        "surface",
-        "frame",
-        "theta_deg",
-        "gave_mm",
-        "gave_sigma_mm",
-        "gave_aside_mm",
+GIVES_WAY = Table(
+    "gives_way",
+    "A row a touching frame of trials with `object_gives_way` that have a truth "
+    "([soft.md](soft.md)).",
+    (
+        TRIAL,
+        WHISK,
+        SURFACE,
+        Column("frame", "number of the frame in the trial", Kind.WHOLE),
+        Column("theta_deg", "pushing angle"),
+        *with_sigma(
+            "gave_mm",
+            "how far the object is from where it stood, away from the contact; seen, without any "
+            "gauge",
+        ),
+        *with_sigma("gave_aside_mm", "how far it is across that and the bar"),
     ),
-    "gave_aside_sigma_mm",
 )
 
 
@@ -41,7 +45,7 @@ def write_gives_way(out: Path, results: Sequence[TrialResult]) -> None:
         for row in _rows(result, seen)
     ]
     if rows:
-        write_table(out / TABLE, COLUMNS, rows)
+        GIVES_WAY.write(out, rows)
 
 
 def _rows(result: TrialResult, seen: SeenWhisk) -> Iterator[dict]:
@@ -49,7 +53,7 @@ def _rows(result: TrialResult, seen: SeenWhisk) -> Iterator[dict]:
     columns = gave.index, np.degrees(gave.theta_rad), gave.normal_mm.value, gave.normal_mm.sigma
     for values in zip(*columns, gave.aside_mm.value, gave.aside_mm.sigma):
         frame, *numbers = (value.item() for value in values)
-        yield dict(zip(COLUMNS, (trial.name, seen.whisk, trial.surface, frame, *numbers)))
+        yield dict(zip(GIVES_WAY.names, (trial.name, seen.whisk, trial.surface, frame, *numbers)))
 
 
 def gave_at(seen: SeenWhisk, theta_rad: float) -> Value:
@@ -115,6 +119,6 @@ def gave_lines(results: Sequence[TrialResult]) -> Iterator[str]:
                 f"{surface or 'surface not named'}{f', {speed:g}°/s' if speed is not None else ''}"
             )
             yield (
-                f"{named}: seen to give way ({TABLE}); over the force felt by {give.value:.3f} ± {give.sigma:.3f} mm/N "
+                f"{named}: seen to give way ({GIVES_WAY.file}); over the force felt by {give.value:.3f} ± {give.sigma:.3f} mm/N "
                 f"({counted(count, 'whisk')})"
             )

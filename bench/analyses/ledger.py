@@ -13,13 +13,12 @@ import numpy as np
 
 from bench.analyses.left_out import COST_PERCENT, NAMES, WhiskAtHand, of_estimate, of_truth
 from bench.base.doubts import in_one_status
-from bench.base.tables import write_table
+from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, alike, status
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch
 from vision.truth.value import NAN, UNKNOWN
 
-TABLE = "ledger.csv"
 MATTERS = 0.1  # of a sigma: the user's own bound
 NEEDED, MAY_GO, NOT_KNOWN = "needed", "may be left out, kept", "not known"
 QUANTITIES = ("d_x_mm", "touch_deg", "slip_mm", "touch_felt_deg", "d_x_est_mm")
@@ -27,14 +26,47 @@ _SIDE = {"touch_deg": "d_x_mm", "slip_mm": "d_x_mm"}  # there where that is
 
 
 def _columns(quantity: str) -> tuple[str, str]:
+    """Return the columns of the effect on a quantity, and of the quantity's sigma."""
     stem, _, unit = quantity.rpartition("_")
     return f"{stem}_effect_{unit}", f"{stem}_sigma_{unit}"
 
 
-COLUMNS = (
-    *("trial", "whisk", "refinement"),
-    *(column for quantity in QUANTITIES for column in _columns(quantity)),
-    *("largest_over_sigma", "verdict", "cost_percent", "status"),
+LEDGER = Table(
+    "ledger",
+    "A row a refinement and whisk: by how much each result would differ without it (without less "
+    "with), and that result's sigma. Effects on the truth are the fit's own linear sensitivities; "
+    "where they are many sigmas, they give a size. An empty effect is not known, and `status` says "
+    "why; the reason of an effect of 0 may stand there, too.",
+    (
+        TRIAL,
+        WHISK,
+        Column(
+            "refinement",
+            "large bending, bar radius, psi, friction along the whisker, taper, sag and set, "
+            "lens k1 k2, lens k3, lens p1 p2, gauges' delay, cross-talk, drift, one-sided light, "
+            "clock, second friction coefficient",
+            Kind.TEXT,
+        ),
+        *alike(_columns("d_x_mm"), "on the d_x of the truth"),
+        *alike(_columns("touch_deg"), "on the touch of the truth"),
+        *alike(_columns("slip_mm"), "on the slip of the truth at the largest pushing angle"),
+        *alike(_columns("touch_felt_deg"), "on touch felt"),
+        *alike(_columns("d_x_est_mm"), "on d_x by (10)"),
+        Column("largest_over_sigma", "the largest of the effects, each over its sigma"),
+        Column(
+            "verdict",
+            '"needed": largest_over_sigma is above 0.1; "may be left out, kept": it is not, but '
+            "leaving the refinement out would save next to nothing, so no preset does; "
+            '"not known": one of the effects is not',
+            Kind.TEXT,
+        ),
+        Column(
+            "cost_percent",
+            "what it costs at most, of a whisk's processor time as measured once "
+            "(`tests/studies/speed/refinements.py`); 0: below 0.1 %",
+        ),
+        status("why an effect is 0 or not known"),
+    ),
 )
 
 
@@ -133,7 +165,7 @@ def _entry(name: str, here: WhiskAtHand) -> Entry:
 def write_ledger(out: Path, results: Sequence[TrialResult], whisker: Whisker) -> list[Entry]:
     """The table; its rows."""
     entries = ledger(results, whisker)
-    write_table(out / TABLE, COLUMNS, (entry.row for entry in entries))
+    LEDGER.write(out, (entry.row for entry in entries))
     return entries
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bench.base.drawing import blank, colour_of, label_of, save, style
 from bench.base.results import hash_of
-from bench.base.tables import write_table
+from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import EstimateRow, SeenWhisk, TrialResult, whisks
 from bench.session.session import Session
@@ -24,25 +24,40 @@ from vision.geometry.counted import counted
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
     from matplotlib.figure import Figure
 
-TABLE, FIGURE = "moving.csv", "moving.png"
 _WAYS = ("x", "y", "z")
-COLUMNS = (
-    *("trial", "whisk", "surface", "beta_deg", "velocity_share_percent"),
-    *(f"velocity_{way}_mm_s" for way in _WAYS),
-    *("velocity_sigma_mm_s", *(f"velocity_seen_{way}_mm_s" for way in _WAYS)),
-    *(f"velocity_seen_{way}_sigma_mm_s" for way in _WAYS),
-    *(
-        "estimator",
-        "d_x_mm",
-        "d_x_sigma_mm",
-        "d_x_est_mm",
-        "d_x_est_sigma_mm",
-        "error_mm",
-        "error_percent",
-        "inside",
+_AS_STATED = "velocity of the object as stated, rig frame"
+_AS_SEEN = "velocity of the object by what was stated and the pictures"
+MOVING = Table(
+    "moving",
+    "A row a whisk and estimator, of trials with `object_velocity_mm_s`, that have a truth and "
+    "moments ([moving.md](moving.md)).",
+    (
+        TRIAL,
+        WHISK,
+        SURFACE,
+        Column("beta_deg", "slope as seen"),
+        Column(
+            "velocity_share_percent",
+            "the object's speed along the push, of the whisker's own at the contact",
+        ),
+        *alike((f"velocity_{way}_mm_s" for way in _WAYS), _AS_STATED),
+        Column("velocity_sigma_mm_s", "its standard deviation each way"),
+        *alike((f"velocity_seen_{way}_mm_s" for way in _WAYS), _AS_SEEN),
+        *alike((f"velocity_seen_{way}_sigma_mm_s" for way in _WAYS), "its standard deviations"),
+        Column(
+            "estimator",
+            "as in estimates.csv; known_motion: (10), or (2), for an object that moves as stated",
+            Kind.TEXT,
+        ),
+        *with_sigma("d_x_mm", "distance at first touch: the truth"),
+        *with_sigma("d_x_est_mm", "distance at first touch: estimated"),
+        Column("error_mm", "estimate less truth"),
+        Column("error_percent", "that error, % of the truth"),
+        Column("inside", "1 where the estimate's 95 % interval holds the truth, else 0"),
+        status("what is doubtful of the estimate"),
     ),
-    "status",
 )
+FIGURE = "moving.png"
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +107,7 @@ def write_moving(out: Path, found: Sequence[Moved], *, drawn: bool) -> list[str]
     """moving.csv and moving.png, the names of figures; nothing where no object moved."""
     if not found:
         return []
-    write_table(out / TABLE, COLUMNS, map(_row, found))
+    MOVING.write(out, map(_row, found))
     if not drawn:
         return []
     with style():

@@ -10,42 +10,45 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.doubts import in_one_status
-from bench.base.tables import write_table
+from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks
 from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
-TABLE = "one_camera.csv"
-COLUMNS = (
-    *(
-        "trial",
-        "whisk",
-        "surface",
-        "camera",
-        "touch_deg",
-        "touch_sigma_deg",
-        "touch_est_deg",
-        "touch_est_sigma_deg",
+ONE_CAMERA = Table(
+    "one_camera",
+    "A row a whisk, with `--one-camera NAME` ([sensors.md](sensors.md)). The one camera's values "
+    "are from pictures of the trial itself; the truth is that of all cameras.",
+    (
+        TRIAL,
+        WHISK,
+        SURFACE,
+        Column("camera", "name of the one camera", Kind.TEXT),
+        *with_sigma("touch_deg", "first touch: the truth"),
+        *with_sigma(
+            "touch_est_deg", "first touch: where the one camera sees the whisker begin to bend"
+        ),
+        *with_sigma("d_x_mm", "distance: the truth"),
+        *with_sigma("d_x_est_mm", "distance: where the one camera sees the bend end"),
+        Column("error_mm", "d_x_est_mm less d_x_mm"),
+        Column("error_percent", "that error, % of the truth"),
+        Column("inside", "1 where 1.96 sigma of both hold that error, else 0"),
+        *with_sigma(
+            "moved_mm",
+            "how far the contact has gone the way it is pushed, by slip along a slope or because "
+            "the object gives way: the truth",
+        ),
+        *with_sigma("moved_est_mm", "the same by the one camera"),
+        *with_sigma("force_N", "across the whisker in the whisking plane"),
+        *with_sigma(
+            "stiffness_N_mm",
+            "that force over moved_est_mm; empty where moved_est_mm is within its noise",
+            "stiffness_sigma_N_mm",
+        ),
+        Column("stiffness_low_N_mm", "the stiffness is no less than that, at 97.5 %"),
+        status("of the truth, and why something is not known"),
     ),
-    *(
-        "d_x_mm",
-        "d_x_sigma_mm",
-        "d_x_est_mm",
-        "d_x_est_sigma_mm",
-        "error_mm",
-        "error_percent",
-        "inside",
-    ),
-    *(
-        "moved_mm",
-        "moved_sigma_mm",
-        "moved_est_mm",
-        "moved_est_sigma_mm",
-        "force_N",
-        "force_sigma_N",
-    ),
-    *("stiffness_N_mm", "stiffness_sigma_N_mm", "stiffness_low_N_mm", "status"),
 )
 
 
@@ -97,40 +100,40 @@ def shapes_seen(results: Sequence[TrialResult]) -> list[ShapeSeen]:
 def write_one_camera(out: Path, found: Sequence[ShapeSeen]) -> None:
     """one_camera.csv; nothing where no camera was asked for."""
     if found:
-        write_table(out / TABLE, COLUMNS, map(_row, found))
+        ONE_CAMERA.write(out, map(_row, found))
 
 
 def _row(one: ShapeSeen) -> dict:
-    seen, said = one.seen, one.said
-    row = {"trial": one.result.trial.name, "whisk": seen.whisk, "surface": one.result.trial.surface}
-    for name, value in {"touch": seen.touch_rad, "touch_est": said.touch_rad}.items():
-        row |= {
-            f"{name}_deg": float(np.degrees(value.value)),
-            f"{name}_sigma_deg": float(np.degrees(value.sigma)),
-        }
-    lengths = {
-        "d_x": seen.d_x_mm,
-        "d_x_est": said.d_x_mm,
-        "moved": one.moved_mm,
-        "moved_est": said.moved_mm,
-    }
-    for name, value in lengths.items():
-        row |= {f"{name}_mm": float(value.value), f"{name}_sigma_mm": float(value.sigma)}
-    row |= {
-        "force_N": said.force_N.value,
-        "force_sigma_N": said.force_N.sigma,
+    """Return the row of a whisk."""
+    seen = one.seen
+    said = one.said
+    return {
+        "trial": one.result.trial.name,
+        "whisk": seen.whisk,
+        "surface": one.result.trial.surface,
         "camera": said.camera,
-    }
-    row |= {
-        name: getattr(said, name)
-        for name in ("stiffness_N_mm", "stiffness_sigma_N_mm", "stiffness_low_N_mm")
-    }
-    row |= {
+        "touch_deg": float(np.degrees(seen.touch_rad.value)),
+        "touch_sigma_deg": float(np.degrees(seen.touch_rad.sigma)),
+        "touch_est_deg": float(np.degrees(said.touch_rad.value)),
+        "touch_est_sigma_deg": float(np.degrees(said.touch_rad.sigma)),
+        "d_x_mm": float(seen.d_x_mm.value),
+        "d_x_sigma_mm": float(seen.d_x_mm.sigma),
+        "d_x_est_mm": float(said.d_x_mm.value),
+        "d_x_est_sigma_mm": float(said.d_x_mm.sigma),
         "error_mm": one.error_mm,
         "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value),
+        "inside": None if one.inside is None else int(one.inside),
+        "moved_mm": float(one.moved_mm.value),
+        "moved_sigma_mm": float(one.moved_mm.sigma),
+        "moved_est_mm": float(said.moved_mm.value),
+        "moved_est_sigma_mm": float(said.moved_mm.sigma),
+        "force_N": said.force_N.value,
+        "force_sigma_N": said.force_N.sigma,
+        "stiffness_N_mm": said.stiffness_N_mm,
+        "stiffness_sigma_N_mm": said.stiffness_sigma_N_mm,
+        "stiffness_low_N_mm": said.stiffness_low_N_mm,
+        "status": in_one_status(seen.status, said.status),
     }
-    row["inside"] = None if one.inside is None else int(one.inside)
-    return row | {"status": in_one_status(seen.status, said.status)}
 
 
 def one_camera_lines(found: Sequence[ShapeSeen]) -> Iterator[str]:

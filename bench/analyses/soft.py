@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.gave import mean_give
-from bench.base.tables import write_table
+from bench.base.tables import SPEED, SURFACE, Column, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE
 from bench.records.trial_result import FeltWhisk, TrialFacts, TrialResult, whisks
 from bench.session.session import Session
@@ -24,24 +24,44 @@ from estimator.beam import Beam
 from estimator.uncertainty import Z_95, model_share
 from vision.truth.value import UNKNOWN, Value
 
-COLUMNS = (
-    *(
-        "surface",
-        "speed_deg_s",
-        "near_nominal_mm",
-        "far_nominal_mm",
-        "whisks_near",
-        "whisks_far",
-        "shift_mm",
+COMPLIANCE = Table(
+    "compliance",
+    "A row for each two neighbouring nominal distances of one surface and speed: section VII's soft "
+    "object, without pictures.",
+    (
+        SURFACE,
+        SPEED,
+        Column("near_nominal_mm", "the nearer of the two distances"),
+        Column("far_nominal_mm", "the farther of the two distances"),
+        Column("whisks_near", "whisks there that do not slip sideways"),
+        Column("whisks_far", "whisks there that do not slip sideways"),
+        *with_sigma("shift_mm", "from the near to the far distance, as the manifests have them"),
+        *with_sigma("d_x_mm", "of the nearer whisks, the object's softness taken out"),
+        *with_sigma("give_mm_N", "one over the stiffness; below zero by noise", "give_sigma_mm_N"),
+        *alike(
+            ("stiffness_N_mm", "stiffness_low_N_mm", "stiffness_high_N_mm"),
+            "stiffness, and the ends of its 95 % interval; an end that is empty is infinite",
+        ),
+        status("that it is not softer than a rigid object, or why there is none"),
     ),
-    *("shift_sigma_mm", "d_x_mm", "d_x_sigma_mm", "give_mm_N", "give_sigma_mm_N", "stiffness_N_mm"),
-    *("stiffness_low_N_mm", "stiffness_high_N_mm", "status"),
 )
-SEEN_COLUMNS = (
-    "whisks_seen",
-    "give_seen_mm_N",
-    "give_seen_sigma_mm_N",
-)  # only where an object gave way in pictures
+COMPLIANCE_SEEN = Table(
+    COMPLIANCE.name,
+    COMPLIANCE.rows,
+    (
+        *COMPLIANCE.columns,
+        Column(
+            "whisks_seen",
+            "whisks of that surface and speed in which the object was seen to give way; these three "
+            "columns are there only where there is such a whisk",
+        ),
+        *with_sigma(
+            "give_seen_mm_N",
+            "by them: the way seen over the force felt",
+            "give_seen_sigma_mm_N",
+        ),
+    ),
+)
 _LEAST_SHIFT_MM = 2.0  # nominal distances that differ by less are one distance set up again
 _HELD_SIGMAS = 3.0  # of φ felt: beyond, the contact slips sideways
 NOT_SOFT = "no softer than a rigid object within the noise"
@@ -209,37 +229,36 @@ def _compliance_of_distance(beam: Beam, place: Place) -> float:
 
 
 def write_compliance(out: Path, found: Sequence[Soft]) -> None:
-    """compliance.csv."""
-    beside = SEEN_COLUMNS if any(soft.whisks_seen for soft in found) else ()
-    write_table(
-        out / "compliance.csv",
-        (*COLUMNS, *beside),
-        ({**_row(soft), **_seen(soft, beside)} for soft in found),
-    )
-
-
-def _seen(soft: Soft, names: Sequence[str]) -> dict:
-    return dict(zip(names, (soft.whisks_seen, soft.seen.value, soft.seen.sigma)))
+    """Write compliance.csv: with what was seen, where anything was."""
+    table = COMPLIANCE_SEEN if any(soft.whisks_seen for soft in found) else COMPLIANCE
+    table.write(out, map(_row, found))
 
 
 def _row(soft: Soft) -> dict:
-    near, far = soft.near, soft.far
-    row = {
+    """Return the row of two neighbouring distances, with what was seen of the object."""
+    near = soft.near
+    far = soft.far
+    stiffness, low, high = soft.stiffness_N_mm
+    return {
         "surface": soft.surface,
         "speed_deg_s": soft.speed_deg_s,
         "near_nominal_mm": near.nominal_mm,
-    }
-    row |= {"far_nominal_mm": far.nominal_mm, "whisks_near": near.whisks, "whisks_far": far.whisks}
-    row |= {"shift_mm": far.nominal_mm - near.nominal_mm, "status": soft.status}
-    row |= {"shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))}
-    row |= {
-        name: getattr(soft, name)
-        for name in ("d_x_mm", "d_x_sigma_mm", "give_mm_N", "give_sigma_mm_N")
-    }
-    names = ("stiffness_N_mm", "stiffness_low_N_mm", "stiffness_high_N_mm")
-    return row | {
-        name: value if np.isfinite(value) else np.nan
-        for name, value in zip(names, soft.stiffness_N_mm)
+        "far_nominal_mm": far.nominal_mm,
+        "whisks_near": near.whisks,
+        "whisks_far": far.whisks,
+        "shift_mm": far.nominal_mm - near.nominal_mm,
+        "shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm)),
+        "d_x_mm": soft.d_x_mm,
+        "d_x_sigma_mm": soft.d_x_sigma_mm,
+        "give_mm_N": soft.give_mm_N,
+        "give_sigma_mm_N": soft.give_sigma_mm_N,
+        "stiffness_N_mm": stiffness,
+        "stiffness_low_N_mm": low,
+        "stiffness_high_N_mm": high,
+        "status": soft.status,
+        "whisks_seen": soft.whisks_seen,
+        "give_seen_mm_N": soft.seen.value,
+        "give_seen_sigma_mm_N": soft.seen.sigma,
     }
 
 

@@ -11,16 +11,32 @@ import numpy as np
 
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.drawing import label_of
-from bench.base.tables import write_table
+from bench.base.tables import SURFACE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.records.trial_result import EstimateRow, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound, slope_deg
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
-TABLE = "sensors.csv"
-COLUMNS = (
-    *("estimator", "surface", "beta_from_deg", "beta_to_deg", "alpha_deg", "whisks", "none"),
-    *("error_mean_percent", "error_rms_percent", "error_sigma_percent", "inside_percent"),
+SENSORS = Table(
+    "sensors",
+    "A row a sensor, surface and range of slopes, over the measured whisks with a truth of which "
+    "nothing is doubtful; none without a load cell ([sensors.md](sensors.md)).",
+    (
+        Column(
+            "estimator",
+            "touch_alone, no_slip, moment_rate, with_friction, force_and_moment",
+            Kind.TEXT,
+        ),
+        SURFACE,
+        *alike(("beta_from_deg", "beta_to_deg"), "size of the slope seen, in steps of 15°"),
+        Column("alpha_deg", "friction angle of the surface as seen, else by the fit of Fig. 8"),
+        WHISKS_KNOWN,
+        WHISKS_WITHOUT,
+        Column("error_mean_percent", "mean of estimate less truth, % of the truth"),
+        Column("error_rms_percent", "RMS of estimate less truth, % of the truth"),
+        Column("error_sigma_percent", "RMS of the stated sigmas, % of the truth"),
+        Column("inside_percent", "how many of the 95 % intervals hold the truth"),
+    ),
 )
 _ASKED = ("touch_alone", "no_slip", "moment_rate", "with_friction", "force_and_moment")
 _BETA_DEG = 15.0  # °: slopes of one row, of the paper's steps of 5° three; 0, 15, 30 … lie in the middles of theirs
@@ -104,8 +120,8 @@ def _pooled(
 
 
 def write_sensors(out: Path, worth: Sequence[SensorWorth]) -> None:
-    """sensors.csv."""
-    write_table(out / TABLE, COLUMNS, map(vars, worth))
+    """Write sensors.csv."""
+    SENSORS.write(out, map(vars, worth))
 
 
 def sensor_lines(worth: Sequence[SensorWorth]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.runs import told_of
-from bench.base.tables import write_table
+from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.session import Session
@@ -20,18 +20,29 @@ from bench.trials.estimates import whisk_of
 from estimator.two_tilts import SharedContact, shared_contact
 from vision.geometry.counted import counted
 
-COLUMNS = (
-    *("surface", "speed_deg_s", "nominal_mm", "trials", "whisks", "beta_from_deg", "beta_to_deg"),
-    *(
-        "d_x_mm",
-        "d_x_sigma_mm",
-        "d_x_low_mm",
-        "d_x_high_mm",
-        "alpha_deg",
-        "alpha_sigma_deg",
-        "correlation",
+TILTS = Table(
+    "tilts",
+    "A row a surface, speed and nominal distance with whisks at several nominal slopes: distance "
+    "and friction angle solved together, without α_est and without pictures "
+    "([designing.md](designing.md)).",
+    (
+        SURFACE,
+        SPEED,
+        Column("nominal_mm", "nominal distance"),
+        Column("trials", "how many trials served"),
+        Column("whisks", "how many whisks served", Kind.WHOLE),
+        *alike(("beta_from_deg", "beta_to_deg"), "range of their nominal slopes"),
+        *with_sigma(
+            "d_x_mm",
+            "distance; each trial may be off by `d_x_sigma_mm` of trial.toml, else by 1 %",
+        ),
+        *alike(("d_x_low_mm", "d_x_high_mm"), "its 95 % interval"),
+        *with_sigma("alpha_deg", "friction angle"),
+        Column("correlation", "of distance and friction angle"),
+        Column("error_mm", "estimate less the mean of the distances seen"),
+        Column("error_percent", "that error, % of that mean"),
+        status("why there is none, or what is doubtful"),
     ),
-    *("error_mm", "error_percent", "status"),
 )
 _LEAST_TILT_DEG = 10.0  # °: nominal slopes that differ by less are one, set up again
 
@@ -92,27 +103,34 @@ def _tilted(
 
 
 def write_tilts(out: Path, found: Sequence[Tilted]) -> None:
-    """tilts.csv."""
-    write_table(out / "tilts.csv", COLUMNS, map(_row, found))
+    """Write tilts.csv."""
+    TILTS.write(out, map(_row, found))
 
 
 def _row(one: Tilted) -> dict:
-    told = one.found
-    sigmas = np.sqrt(np.diag(told.covariance))
-    row = {
-        name: getattr(one, name)
-        for name in ("surface", "speed_deg_s", "nominal_mm", "trials", "whisks")
+    """Return the row of a surface, speed and nominal distance."""
+    contact = one.found
+    d_x_sigma_mm, alpha_sigma_rad = np.sqrt(np.diag(contact.covariance))
+    error_mm = contact.d_x_mm - one.d_x_true_mm
+    return {
+        "surface": one.surface,
+        "speed_deg_s": one.speed_deg_s,
+        "nominal_mm": one.nominal_mm,
+        "trials": one.trials,
+        "whisks": one.whisks,
+        "beta_from_deg": one.beta_deg[0],
+        "beta_to_deg": one.beta_deg[1],
+        "d_x_mm": contact.d_x_mm,
+        "d_x_sigma_mm": float(d_x_sigma_mm),
+        "d_x_low_mm": contact.low_mm,
+        "d_x_high_mm": contact.high_mm,
+        "alpha_deg": float(np.degrees(contact.alpha_rad)),
+        "alpha_sigma_deg": float(np.degrees(alpha_sigma_rad)),
+        "correlation": float(contact.covariance[0, 1] / (d_x_sigma_mm * alpha_sigma_rad)),
+        "error_mm": error_mm,
+        "error_percent": 100.0 * error_mm / one.d_x_true_mm,
+        "status": contact.status,
     }
-    row |= {"beta_from_deg": one.beta_deg[0], "beta_to_deg": one.beta_deg[1], "status": told.status}
-    row |= {"d_x_mm": told.d_x_mm, "d_x_sigma_mm": float(sigmas[0])}
-    row |= {"d_x_low_mm": told.low_mm, "d_x_high_mm": told.high_mm}
-    row |= {
-        "alpha_deg": float(np.degrees(told.alpha_rad)),
-        "alpha_sigma_deg": float(np.degrees(sigmas[1])),
-    }
-    row["correlation"] = float(told.covariance[0, 1] / (sigmas[0] * sigmas[1]))
-    error = told.d_x_mm - one.d_x_true_mm
-    return row | {"error_mm": error, "error_percent": 100.0 * error / one.d_x_true_mm}
 
 
 def tilted_lines(found: Sequence[Tilted]) -> Iterator[str]:

@@ -9,25 +9,34 @@ from bench.analyses.runs import alpha_est_sigma
 from bench.array.array_page import write_page
 from bench.array.cloud import Contact, Mount, contacts
 from bench.array.exchanged_whiskers import exchanged
-from bench.array.shape_verdict import surface_lines, surface_verdict, write_surface
-from bench.array.size import felt_sizes, size_lines, write_sizes
+from bench.array.shape_verdict import (
+    SURFACE_POINTS,
+    surface_lines,
+    surface_verdict,
+    write_surface,
+)
+from bench.array.size import SIZE, felt_sizes, size_lines, write_sizes
 from bench.array.surface import Surface, seen_surface, stated_surface
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
-from bench.base.tables import write_table
+from bench.base.tables import WHISKER
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import TrialResult, whisks
-from bench.report.assembly import ESTIMATE_COLUMNS, WHISK_COLUMNS, estimate_rows, whisk_rows
+from bench.report.assembly import estimate_rows, whisk_rows
 from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
 from bench.report.record import ARRAY, RUNS, read_record
 from bench.report.run_facts import RunRecord, Section
 from bench.report.summary.compose import DOUBTFUL, Summary
 from bench.report.summary.verdict import verdict
+from bench.report.whisk_tables import ESTIMATES, WHISKS
 from bench.session.session import Base, Session
 from vision.geometry.counted import counted
 
-TABLES = ("whisks", "estimates", "surface", "size")
+ARRAY_WHISKS = replace(WHISKS, columns=(WHISKER, *WHISKS.columns))
+ARRAY_ESTIMATES = replace(ESTIMATES, columns=(WHISKER, *ESTIMATES.columns))
+# Of all whiskers, by name.
+TABLES = {table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE_POINTS, SIZE)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +125,9 @@ def write_array(out: Path) -> Summary:
         for run in runs
         for contact in contacts(run.mount, run.whole.results, record.surfaces)
     ]
-    write_surface(out / "surface.csv", cloud)
+    write_surface(out, cloud)
     sizes = felt_sizes(cloud, record.surfaces)
-    write_sizes(out / "size.csv", sizes)
+    write_sizes(out, sizes)
     summary = _summary(record, runs, cloud, sizes)
     figures = []
     if runs[0].record.settings.figures:
@@ -148,15 +157,12 @@ def _seen(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
 
 
 def _write_tables(out: Path, runs: Sequence[WhiskerRun]) -> None:
-    """whisks.csv and estimates.csv of all whiskers, each row with its whisker."""
-    for name, columns, rows in (
-        ("whisks", WHISK_COLUMNS, whisk_rows),
-        ("estimates", ESTIMATE_COLUMNS, estimate_rows),
-    ):
+    """Write whisks.csv and estimates.csv of all whiskers, each row with its whisker."""
+    for table, rows in ((ARRAY_WHISKS, whisk_rows), (ARRAY_ESTIMATES, estimate_rows)):
         named = (
             {"whisker": run.base.name} | row for run in runs for row in rows(run.whole.results)
         )
-        write_table(out / f"{name}.csv", ("whisker", *columns), named)
+        table.write(out, named)
 
 
 def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:

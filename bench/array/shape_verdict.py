@@ -8,44 +8,90 @@ import numpy as np
 
 from bench.array.cloud import SEEN, Contact
 from bench.base.drawing import label_of
-from bench.base.tables import sigma_name, write_table
+from bench.base.tables import (
+    TRIAL,
+    WHISK,
+    WHISKER,
+    Column,
+    Kind,
+    Table,
+    alike,
+    status,
+    with_sigma,
+)
 from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
-_PLACE = ("x_mm", "y_mm", "z_mm")
-_CROSS = ("xy_covariance_mm2", "xz_covariance_mm2", "yz_covariance_mm2")
-COLUMNS = (
-    *("whisker", "trial", "whisk", "estimator"),
-    *(column for name in _PLACE for column in (name, sigma_name(name))),
-    *_CROSS,
-    *("distance_mm", "distance_sigma_mm", "along_mm", "along_sigma_mm"),
-    *("normal_off_deg", "normal_sigma_deg", "surface_from", "status"),
+_ON_CENTRELINE = "on the whisker's centreline"
+SURFACE_POINTS = Table(
+    "surface",
+    "Of an array: a row a measured whisk's contact at first touch in the rig frame, by each "
+    "estimator and as seen ([arrays.md](arrays.md)).",
+    (
+        WHISKER,
+        TRIAL,
+        WHISK,
+        Column("estimator", "as in estimates.csv, or seen", Kind.TEXT),
+        *with_sigma("x_mm", _ON_CENTRELINE),
+        *with_sigma("y_mm", _ON_CENTRELINE),
+        *with_sigma("z_mm", _ON_CENTRELINE),
+        *alike(
+            ("xy_covariance_mm2", "xz_covariance_mm2", "yz_covariance_mm2"),
+            "the rest of their covariance",
+        ),
+        *with_sigma("distance_mm", "from the object's surface to the whisker's, positive outside"),
+        *with_sigma("along_mm", "along the whisker, from where it comes nearest to the object"),
+        Column(
+            "normal_off_deg",
+            "angle between the normal felt and the object's where the whisker comes nearest",
+        ),
+        Column("normal_sigma_deg", "sigma of the felt slope, where it is stated"),
+        Column(
+            "surface_from",
+            "manifest: `[object]`; pictures: the bar as this whisker's cameras see it; empty where "
+            "the object is not known, and of contacts seen on that bar",
+            Kind.TEXT,
+        ),
+        status("what is doubtful of it"),
+    ),
 )
 FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
 
 
-def write_surface(path: Path, cloud: Iterable[Contact]) -> None:
-    """surface.csv: a row a contact."""
-    write_table(path, COLUMNS, map(_row, cloud))
+def write_surface(out: Path, cloud: Iterable[Contact]) -> None:
+    """Write surface.csv into a folder: a row a contact."""
+    SURFACE_POINTS.write(out, map(_row, cloud))
 
 
 def _row(contact: Contact) -> dict:
+    """Return the row of a contact."""
     covariance = contact.covariance_mm2
-    sigmas = np.sqrt(np.diag(covariance)).tolist()
-    return (
-        {
-            name: getattr(contact, name)
-            for name in ("whisker", "trial", "whisk", "estimator", "status")
-        }
-        | dict(zip(_PLACE, contact.point_mm.tolist()))
-        | dict(zip(map(sigma_name, _PLACE), sigmas))
-        | dict(zip(_CROSS, (covariance[0, 1], covariance[0, 2], covariance[1, 2])))
-        | {"distance_mm": contact.distance_mm.value, "distance_sigma_mm": contact.distance_mm.sigma}
-        | {"along_mm": contact.along_mm.value, "along_sigma_mm": contact.along_mm.sigma}
-        | {"normal_off_deg": math.degrees(contact.normal_off_rad), "surface_from": contact.source}
-        | {"normal_sigma_deg": math.degrees(contact.normal_sigma_rad)}
-    )
+    x_mm, y_mm, z_mm = contact.point_mm.tolist()
+    x_sigma_mm, y_sigma_mm, z_sigma_mm = np.sqrt(np.diag(covariance)).tolist()
+    return {
+        "whisker": contact.whisker,
+        "trial": contact.trial,
+        "whisk": contact.whisk,
+        "estimator": contact.estimator,
+        "x_mm": x_mm,
+        "x_sigma_mm": x_sigma_mm,
+        "y_mm": y_mm,
+        "y_sigma_mm": y_sigma_mm,
+        "z_mm": z_mm,
+        "z_sigma_mm": z_sigma_mm,
+        "xy_covariance_mm2": covariance[0, 1],
+        "xz_covariance_mm2": covariance[0, 2],
+        "yz_covariance_mm2": covariance[1, 2],
+        "distance_mm": contact.distance_mm.value,
+        "distance_sigma_mm": contact.distance_mm.sigma,
+        "along_mm": contact.along_mm.value,
+        "along_sigma_mm": contact.along_mm.sigma,
+        "normal_off_deg": math.degrees(contact.normal_off_rad),
+        "normal_sigma_deg": math.degrees(contact.normal_sigma_rad),
+        "surface_from": contact.source,
+        "status": contact.status,
+    }
 
 
 def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:

@@ -18,22 +18,27 @@ from bench.array.cloud import Contact
 from bench.array.shape_verdict import FELT
 from bench.array.surface import STATED, Surface
 from bench.base.doubts import in_one_status
-from bench.base.tables import sigma_name, write_table
+from bench.base.tables import TRIAL, Column, Kind, Table, sigma_name, status, with_sigma
 from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
 from vision.truth.value import UNKNOWN, Value
 
-COLUMNS = (
-    *(
-        "trial",
-        "shape",
-        "contacts",
-        "distances",
-        "radius_mm",
-        "radius_sigma_mm",
-        "stated_radius_mm",
+SIZE = Table(
+    "size",
+    "Of an array: a row a trial whose manifest names its object: how large that is by the contacts "
+    "of (10), its place free ([arrays.md](arrays.md)).",
+    (
+        TRIAL,
+        Column("shape", "as the manifest has it", Kind.TEXT),
+        Column("contacts", "how many touches served"),
+        Column("distances", "how many of their distances served: those of the others are doubtful"),
+        *with_sigma("radius_mm", "of a bar or sphere, or of a ring's circle"),
+        Column("stated_radius_mm", "the radius as the manifest has it"),
+        *with_sigma("half_angle_deg", "of a cone"),
+        Column("stated_half_angle_deg", "the half angle as the manifest has it"),
+        Column("chance", "that contacts on such a surface lie as far off it"),
+        status("why there is none, or what is doubtful of it"),
     ),
-    *("half_angle_deg", "half_angle_sigma_deg", "stated_half_angle_deg", "chance", "status"),
 )
 _SIZES = {
     "bar": "radius_mm",
@@ -200,9 +205,9 @@ def _covariance(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
     return whole + np.outer(shared, shared)
 
 
-def write_sizes(path: Path, found: Iterable[Felt]) -> None:
-    """size.csv: a row a trial."""
-    write_table(path, COLUMNS, map(_row, found))
+def write_sizes(out: Path, found: Iterable[Felt]) -> None:
+    """Write size.csv into a folder: a row a trial."""
+    SIZE.write(out, map(_row, found))
 
 
 def _row(felt: Felt) -> dict:

@@ -6,7 +6,7 @@ the slope and friction seen, and the noise as stated.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from bench.base.doubts import Doubts
 from bench.base.drawing import colour_of, label_of, publish, style
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.base.tables import write_table
+from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.base.workers import Workers
 from bench.commands.robot import Converter, Task, answered, range_of
 from bench.report.evaluation import finished
@@ -30,7 +30,7 @@ from bench.session.signals import read_signals
 from bench.trials.lost import evaluated
 from bench.trials.of_session import judged, placed_units, require_some, with_gauges
 
-TABLE, FIGURE = "robot_trade.csv", "robot_trade"
+FIGURE = "robot_trade"
 AS_RECORDED = Converter()
 CONVERTERS = (
     AS_RECORDED,
@@ -68,7 +68,40 @@ class Point:
         return bool(np.isnan(self.cutoff_Hz) and np.isnan(self.bits))
 
 
-COLUMNS = ("on_front", *(f.name for f in fields(Point)))
+ROBOT_TRADE = Table(
+    "robot_trade",
+    "A row an estimator, converter, speed and push of `whisker-bench robot`, over the measured "
+    "whisks whose truth is sound.",
+    (
+        Column(
+            "on_front",
+            "1 where no other row is better in milliseconds and in RMS error, of those that answer "
+            "about nearly all whisks, else 0",
+        ),
+        Column("estimator", "as in estimates.csv", Kind.TEXT),
+        Column("speed_deg_s", "speed of the motor, to two digits"),
+        Column("cutoff_Hz", "of a causal low-pass (fourth order); empty as recorded"),
+        Column("rate_Hz", "samples a second"),
+        Column("bits", "over the range that the session's signals fill; empty as recorded"),
+        Column(
+            "push_deg",
+            "from touch seen to where the motor is when it answers; the estimate's θ is half a "
+            "window less",
+        ),
+        Column("time_ms", "from touch to answer: the push, the filter's delay, and a sample"),
+        WHISKS_KNOWN,
+        WHISKS_WITHOUT,
+        *alike(
+            ("error_mean_percent", "error_sd_percent", "error_rms_percent"),
+            "measured: mean, scatter and RMS of the errors over the whisks, % of d_x",
+        ),
+        *alike(
+            ("expected_mean_percent", "expected_sd_percent", "expected_rms_percent"),
+            "expected: the same by (13), (14) and docs/maps.md at the slope and friction seen, "
+            "with the noise as stated",
+        ),
+    ),
+)
 
 
 def robot_trade(
@@ -97,10 +130,8 @@ def robot_trade(
         )
     points = pooled(answers)
     on_front = front(points)
-    write_table(
-        out / TABLE,
-        COLUMNS,
-        ({"on_front": int(there)} | vars(p) for p, there in zip(points, on_front)),
+    ROBOT_TRADE.write(
+        out, ({"on_front": int(there)} | vars(p) for p, there in zip(points, on_front))
     )
     with style():
         publish(draw(points, on_front), out / FIGURE)

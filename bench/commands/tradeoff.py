@@ -21,7 +21,7 @@ from bench.base.doubts import Doubts
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.settings import Seeing, Settings
-from bench.base.tables import write_table
+from bench.base.tables import Column, Kind, Table
 from bench.base.workers import Workers
 from bench.records.trial_result import SeenTrial, TrialResult
 from bench.report.figures import draw_trial
@@ -36,17 +36,26 @@ from bench.trials.seen import see_trial
 from bench.trials.unit import Unit, trial_result
 from estimator.uncertainty import Z_95
 
-COLUMNS = (
-    "setting",
-    "on_front",
-    "whisks",
-    "whisks_with_truth",
-    "cpu_s_per_whisk",
-    "wall_s_per_whisk",
-    "cpu_share_of_standard",
-    "d_x_error_rms_mm",
-    "d_x_sigma_median_mm",
-    "inside_95_percent",
+TRADEOFF = Table(
+    "tradeoff",
+    "A row a setting of `whisker-bench tradeoff`. Errors are against the known truth of a synthetic "
+    "session, else against the preset `fine`. `with-figures` is `standard` with planes and overlays "
+    "drawn, too: `evaluate` without `--no-figures`.",
+    (
+        Column("setting", "its name", Kind.TEXT),
+        Column("on_front", "1 where no other setting is as good in truths, error and time, else 0"),
+        Column("whisks", "how many whisks were seen", Kind.WHOLE),
+        Column("whisks_with_truth", "how many of them have a truth"),
+        Column("cpu_s_per_whisk", "seconds of processor, decoding included"),
+        Column("wall_s_per_whisk", "seconds of wall time, decoding included"),
+        Column(
+            "cpu_share_of_standard",
+            "processor time over that of the preset `standard` in the same run",
+        ),
+        Column("d_x_error_rms_mm", "RMS of the errors"),
+        Column("d_x_sigma_median_mm", "median of the stated sigmas"),
+        Column("inside_95_percent", "how many 95 % intervals hold"),
+    ),
 )
 _CHANGES = {
     "rounds": (0, 2),
@@ -102,7 +111,7 @@ class Trade:
             sigma,
             100.0 * np.mean(inside) if len(inside) else np.nan,
         )
-        return dict(zip(COLUMNS, values))
+        return dict(zip(TRADEOFF.names, values))
 
 
 def tradeoff(
@@ -232,7 +241,7 @@ def _write(out: Path, trades: Sequence[Trade]) -> None:
     on_front = front(trades)
     standard_cpu_s = _standard(trades).cpu_s
     rows = [trade.row(standard_cpu_s, there) for trade, there in zip(trades, on_front)]
-    write_table(out / "tradeoff.csv", COLUMNS, rows)
+    TRADEOFF.write(out, rows)
     for trade, there in zip(trades, on_front):
         if there:
             write_whole(

@@ -31,11 +31,17 @@ class WithoutKeys(Keys, kw_only=True):
 class FileKeys(manifest.GaugeKeys, kw_only=True):
     """The keys of [gauges], and what `calibrate gauges` adds to them."""
 
+    # 4 × 4, of the matrix row by row
     covariance: Rows4 | None = None
+    # 3 E I that the coefficients rest on: with another, they are scaled, so that C cancels in d_x
     C_Nmm2: float | None = None
     C_sigma_Nmm2: float | None = None
+    # largest moments that were calibrated
     full_scale_Nmm: manifest.Pair | None = None
+    # the paper's way: one factor a channel, no cross-talk
     one_factor_Nmm_per_V: list[float] | None = None
+    # by gauge trial: `matrix_Nmm_per_V` and `covariance` without it, by which that trial itself is
+    # judged
     without: dict[str, WithoutKeys] | None = None
 
 

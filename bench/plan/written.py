@@ -8,7 +8,18 @@ import numpy as np
 
 from bench.base.atomic import write_whole
 from bench.base.results import write_result
-from bench.base.tables import sigma_name, write_table
+from bench.base.tables import (
+    SPEED,
+    SURFACE,
+    TRIAL,
+    WHISK,
+    Column,
+    Kind,
+    Table,
+    alike,
+    sigma_name,
+    status,
+)
 from bench.plan.outlook import QUANTITIES, WORDS
 from bench.plan.plan_rows import Row
 from bench.plan.tries import Try
@@ -17,8 +28,45 @@ FACTS = ("trial", "whisk", "purpose", "surface", "speed_deg_s", "beta_deg", "psi
 SIGMAS = tuple(sigma_name(name) for name in QUANTITIES)
 STATED = tuple(name.replace("_sigma_", "_stated_sigma_") for name in SIGMAS)
 LIMITS = tuple(f"{name.rpartition('_')[0]}_limited_by" for name in QUANTITIES)
-COLUMNS = (*FACTS, *SIGMAS, *STATED, *LIMITS, "best_change", "best_share", "obstacles", "status")
-CHANGES = ("trial", "whisk", "kind", "change", *SIGMAS)
+_EXPECTED = "standard deviations expected; of slip, φ and α at the wanted angle"
+PLAN = Table(
+    "plan",
+    "A row a trial of `whisker-bench plan RIG.toml`, or a whisk of `plan SESSION` "
+    "([plan.md](plan.md)).",
+    (
+        TRIAL,
+        WHISK,
+        Column("purpose", "as the manifest has it", Kind.TEXT),
+        SURFACE,
+        SPEED,
+        *alike(("beta_deg", "psi_deg", "d_x_mm"), "as wanted, or as seen of a recorded whisk"),
+        *alike(SIGMAS, _EXPECTED),
+        *alike(STATED, "of a recorded session: as `evaluate` states them"),
+        *alike(
+            LIMITS,
+            "the cause of the largest part of the variance, and how large that part is",
+            Kind.TEXT,
+        ),
+        Column("best_change", "the change that leaves least of d_x's sigma", Kind.TEXT),
+        Column(
+            "best_share",
+            "what part of d_x's sigma it leaves; 0 where there is a truth only with it",
+        ),
+        Column("obstacles", "what stands in a camera's way", Kind.TEXT),
+        status("why there is no truth, or what is doubtful"),
+    ),
+)
+CHANGES = Table(
+    "changes",
+    "A row a trial and change tried; sigmas are empty where there is no truth.",
+    (
+        TRIAL,
+        WHISK,
+        Column("kind", "move, lens, views, board, third or light", Kind.TEXT),
+        Column("change", "the change in words", Kind.TEXT),
+        *alike(SIGMAS, f"{_EXPECTED}, with that change"),
+    ),
+)
 _SHOWN = {
     "d_x_mm": "d_x mm",
     "touch_deg": "touch °",
@@ -57,7 +105,7 @@ class Plan:
 
 def write_plan(out: Path, plan: Plan) -> str:
     """All but the pictures. The text."""
-    write_table(out / "plan.csv", COLUMNS, map(_cells, plan.rows))
+    PLAN.write(out, map(_cells, plan.rows))
     changes = (
         {
             "trial": row.facts.trial,
@@ -69,7 +117,7 @@ def write_plan(out: Path, plan: Plan) -> str:
         for row in plan.rows
         for one in row.tried
     )
-    write_table(out / "changes.csv", CHANGES, changes)
+    CHANGES.write(out, changes)
     write_result(out / "plan.json", _plain(plan))
     text = "\n".join(lines_of(plan)) + "\n"
     write_whole(out / "plan.txt", text)

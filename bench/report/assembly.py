@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.doubts import in_one_status
-from bench.base.tables import sigma_name, write_table
+from bench.base.tables import sigma_name
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.report.whisk_tables import BEAM, BUDGET, ESTIMATES, PLACE, TRACK, WHISKS
 from estimator.distance import cartesian, contact_point
 from vision.fit.covariance import CAUSES
 from vision.truth.value import NAN, UNKNOWN, Value
@@ -34,68 +35,10 @@ _FELT = (
     ("m_z_Nmm", "m_z_Nmm"),
     ("phi_felt_deg", "phi_felt_rad"),
 )
-_PLACE = ("x_mm", "y_mm", "z_mm")
 _AT_CONTACT = ("d_y", "d_z", "slip")
 # A robot takes its whiskers to turn in the plane in which they were mounted. Off it is what sag and set of a wire make:
 # 0.1 mm, and as much again by its clamp, of the paper's wire at 60 mm.
 Z_C_MM = Value(0.0, 0.2)
-
-
-def _with_sigmas(names: Iterable[str]) -> tuple[str, ...]:
-    return tuple(column for name in names for column in (name, sigma_name(name)))
-
-
-WHISK_COLUMNS = (
-    *("trial", "whisk", "surface", "speed_deg_s", "beta_nominal_deg", "theta_deg"),
-    *_with_sigmas(
-        ["touch_deg", "touch_felt_deg", *(name for name, _ in (*_SEEN[1:], *_AT_ANGLE, *_FELT[1:]))]
-    ),
-    *_with_sigmas(_PLACE),
-    *("cameras", "frames_used", "looked", "status"),
-)
-ESTIMATE_COLUMNS = (
-    "trial",
-    "whisk",
-    "estimator",
-    "alpha_est_deg",
-    "d_x_est_mm",
-    "d_x_est_sigma_mm",
-    "d_x_est_sigma_alpha_exact_mm",
-    "d_x_est_low_mm",
-    "d_x_est_high_mm",
-    "beta_est_deg",
-    "error_mm",
-    "error_percent",
-    *(
-        "theta_c_deg",
-        "theta_c_sigma_deg",
-        "z_c_mm",
-        "z_c_sigma_mm",
-        "r_theta_correlation",
-        "point_error_mm",
-    ),
-    *(
-        column
-        for name in _AT_CONTACT
-        for column in (f"{name}_est_mm", f"{name}_est_sigma_mm", f"{name}_error_mm")
-    ),
-    "status",
-)
-TRACK_COLUMNS = (
-    "frame",
-    "whisk",
-    "time_s",
-    "motor_deg",
-    "theta_deg",
-    "touching",
-    *_PLACE,
-    "slip_mm",
-    *map(sigma_name, (*_PLACE, "slip_mm")),
-    "d_y_mm",
-    "d_z_mm",
-    "phi_seen_deg",
-    "status",
-)
 
 
 _BEAM = (
@@ -103,26 +46,16 @@ _BEAM = (
     ("touch_deg", "touch"),
     ("slip_mm", "slip"),
 )  # column and field of the whisk's `beam`
-BEAM_COLUMNS = (
-    *("trial", "whisk", "theta_deg"),
-    *(
-        f"{stem}_{what}_{unit}"
-        for stem, unit in (name.rsplit("_", 1) for name, _ in _BEAM)
-        for what in ("beam", "spline", "difference_sigma")
-    ),
-    "chance",
-)
-BUDGET_COLUMNS = ("trial", "whisk", "d_x_sigma_mm", *(f"{cause}_percent" for cause in CAUSES))
 
 
 def write_tables(out: Path, results: Sequence[TrialResult]) -> None:
-    """whisks.csv, estimates.csv, budget.csv, beam.csv, and a track a trial."""
-    write_table(out / "whisks.csv", WHISK_COLUMNS, whisk_rows(results))
-    write_table(out / "estimates.csv", ESTIMATE_COLUMNS, estimate_rows(results))
-    write_table(out / "budget.csv", BUDGET_COLUMNS, budget_rows(results))
-    write_table(out / "beam.csv", BEAM_COLUMNS, beam_rows(results))
+    """Write whisks.csv, estimates.csv, budget.csv, beam.csv, and a track a trial."""
+    WHISKS.write(out, whisk_rows(results))
+    ESTIMATES.write(out, estimate_rows(results))
+    BUDGET.write(out, budget_rows(results))
+    BEAM.write(out, beam_rows(results))
     for result in results:
-        write_table(out / "track" / f"{result.trial.name}.csv", TRACK_COLUMNS, track_rows(result))
+        TRACK.write_file(out / "track" / f"{result.trial.name}.csv", track_rows(result))
 
 
 def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
@@ -187,7 +120,7 @@ def _cells(column: str, key: str, value: Value) -> dict[str, float]:
 
 def _place(point, sigma) -> dict[str, float]:
     """x, y, z with their sigmas of a point (3,); empty where there is none."""
-    return dict(zip(_PLACE, point.tolist())) | dict(zip(map(sigma_name, _PLACE), sigma.tolist()))
+    return dict(zip(PLACE, point.tolist())) | dict(zip(map(sigma_name, PLACE), sigma.tolist()))
 
 
 def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:

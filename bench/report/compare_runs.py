@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bench.base.drawing import label_of
 from bench.base.errors import BadInput
-from bench.base.tables import write_table
+from bench.base.tables import TRIAL, WHISK, Column, Kind, Table
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.estimator_accuracy import accuracies
 from bench.report.evaluation import finished
@@ -16,17 +16,29 @@ from bench.report.pooled import read_run
 from bench.report.record import read_record
 from vision.truth.value import UNKNOWN, Value
 
-COLUMNS = (
-    "trial",
-    "whisk",
-    "quantity",
-    "out",
-    "reference",
-    "value",
-    "difference",
-    "sigma",
-    "sigmas",
-    "same_recording",
+COMPARISON = Table(
+    "comparison",
+    "`compare … --out FILE` writes a row a whisk and quantity of each run after the first.",
+    (
+        TRIAL,
+        WHISK,
+        Column(
+            "quantity",
+            "d_x_mm, touch_deg, beta_deg, slip_mm, touch_felt_deg, or an estimator's d_x_est_mm",
+            Kind.TEXT,
+        ),
+        Column("out", "the run that is held against the first", Kind.TEXT),
+        Column("reference", "its value in the first run"),
+        Column("value", "its value in this run"),
+        Column("difference", "this less the first"),
+        Column(
+            "sigma",
+            "of the difference: of one recording the larger of the two stated sigmas, for both err "
+            "alike; of two recordings both",
+        ),
+        Column("sigmas", "the difference in sigmas"),
+        Column("same_recording", "1 where the trial's files are the same, else 0"),
+    ),
 )
 DONE, CHANGED = 0, 1
 # A re-evaluated whisk that moves so far has another truth, or another estimate; less is within what was stated.
@@ -96,7 +108,7 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
             f"shares no whisk with {outs[0]}: trials are told by their names", file=outs[1]
         )
     if table is not None:
-        write_table(table, COLUMNS, (_row(change, Path(outs[0])) for change in changes))
+        COMPARISON.write_file(table, (_row(change, Path(outs[0])) for change in changes))
     lines = [
         line
         for other in others

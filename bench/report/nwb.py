@@ -14,17 +14,18 @@ import numpy as np
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
 from bench.base.results import hash_of
-from bench.base.tables import read_table
+from bench.base.tables import Table
 from bench.records.plain import to_plain
 from bench.report.record import read_record
 from bench.report.run_facts import RunRecord
+from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
 from bench.session.inside import check_outside
 from bench.session.session import Session, load_session
 from bench.session.signals import read_signals
 
 _TABLES = {
-    "whisks": "a row a whisk: truth by the cameras and moments by the gauges",
-    "estimates": "a row a whisk and estimator: distance and error",
+    WHISKS: "a row a whisk: truth by the cameras and moments by the gauges",
+    ESTIMATES: "a row a whisk and estimator: distance and error",
 }
 _OWN_CLOCK = "times are those of the trial's own clock"
 _UNITS = {"deg": "degrees", "mm": "mm", "Nmm": "N mm", "s": "s", "percent": "%"}
@@ -77,13 +78,14 @@ def _file(record: RunRecord, session: Session, out: Path):
     module = file.create_processing_module(
         "whisker_bench", "truth, estimates and tracks of every whisk"
     )
-    for name, what in _TABLES.items():
-        module.add(_table(name, what, out / f"{name}.csv"))
+    for table, what in _TABLES.items():
+        module.add(_table(table.name, what, table, out / table.file))
     for name in record.recordings:
         module.add(
             _table(
                 f"track_{name}",
                 f"a row a frame of {name}; {_OWN_CLOCK}",
+                TRACK,
                 out / "track" / f"{name}.csv",
             )
         )
@@ -112,11 +114,11 @@ def _series(session: Session, name: str) -> Iterator:
     )
 
 
-def _table(name: str, what: str, path: Path):
-    """A CSV file of the run as a table; missing numbers are NaN, missing words empty."""
+def _table(name: str, what: str, table: Table, path: Path):
+    """Return a CSV file of the run as a table; missing numbers are NaN, missing words empty."""
     from hdmf.common import DynamicTable, VectorData
 
-    rows = read_table(path)
+    rows = table.read_file(path)
     columns = [
         VectorData(name=column, description=_said(column), data=rows[column].tolist())
         for column in rows.dtype.names

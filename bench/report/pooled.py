@@ -4,12 +4,11 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench.analyses.figure_8 import COLUMNS, figure_8, rows
+from bench.analyses.figure_8 import FIGURE_8, figure_8, rows
 from bench.analyses.surfaces import Surface, friction_lines, surfaces
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.results import read_result
-from bench.base.tables import write_table
 from bench.records.plain import from_plain
 from bench.records.trial_result import TrialResult, WhiskerFacts
 from estimator.beam import Beam
@@ -32,7 +31,7 @@ def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list
     stem = Path(folder) / "figure_8"
     with style():
         paths = publish(figure_8(fitted), stem)
-    write_table(stem.with_suffix(".csv"), COLUMNS, rows(fitted))
+    FIGURE_8.write(Path(folder), rows(fitted))
     return [*paths, stem.with_suffix(".csv")], list(friction_lines(fitted))
 
 

@@ -22,11 +22,11 @@ Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]+$")]
 FOLDER = Path(__file__).with_name("protocols")
 
 
-class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class ProtocolTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """One table of a protocol file."""
 
 
-class WhiskerTable(Table):
+class WhiskerTable(ProtocolTable):
     """[whisker] of a protocol."""
 
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
@@ -40,7 +40,7 @@ class WhiskerTable(Table):
     set_z_mm: float = 0.0
 
 
-class BoardTable(Table):
+class BoardTable(ProtocolTable):
     """[board] of a protocol."""
 
     squares: Size = (8, 6)
@@ -57,7 +57,7 @@ class BoardTable(Table):
     pose_sigma_deg: Zero = 0.0
 
 
-class CameraTable(Table, kw_only=True):
+class CameraTable(ProtocolTable, kw_only=True):
     """One [[cameras]] of a protocol."""
 
     name: Name
@@ -82,7 +82,7 @@ class CameraTable(Table, kw_only=True):
         )
 
 
-class LightTable(Table):
+class LightTable(ProtocolTable):
     """[light] of a protocol."""
 
     towards: Three = (-0.3, -0.5, 0.8)  # direction of the lamp
@@ -102,7 +102,7 @@ class LightTable(Table):
     bar_rim: Zero = 0.5
 
 
-class PicturesTable(Table):
+class PicturesTable(ProtocolTable):
     """[pictures] of a protocol."""
 
     format: Literal["jpg", "png", "mkv"] = "jpg"  # JPEG quality 95, PNG, lossless FFV1
@@ -143,7 +143,7 @@ class PicturesTable(Table):
         return 2 * count - 1 if self.back_stroke else count
 
 
-class MotorTable(Table):
+class MotorTable(ProtocolTable):
     """[motor] of a protocol."""
 
     before_deg: Zero = 1.605  # the stroke: from before touch …
@@ -154,7 +154,7 @@ class MotorTable(Table):
     encoder_step_deg: Zero = 0.005  # 0: no steps
 
 
-class FrictionTable(Table):
+class FrictionTable(ProtocolTable):
     """[friction] of a protocol."""
 
     scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
@@ -162,7 +162,7 @@ class FrictionTable(Table):
     finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
 
 
-class GaugesTable(Table):
+class GaugesTable(ProtocolTable):
     """[gauges] of a protocol."""
 
     matrix_Nmm_per_V: tuple[Pair, Pair] = ((11.3, 0.32), (-0.25, 10.5))
@@ -180,7 +180,7 @@ class GaugesTable(Table):
     known: bool = False  # written into session.toml
 
 
-class LoadCellTable(Table):
+class LoadCellTable(ProtocolTable):
     """[load_cell] of a protocol: the force at the base is recorded too. Sampled and filtered as the gauges."""
 
     noise_N: Zero = 0.003  # of a six-axis cell of 17 mm: resolution as its maker states it, 1/320 N
@@ -190,7 +190,7 @@ class LoadCellTable(Table):
     step_N: Zero = 0.0  # of its converter; 0: none
 
 
-class ColumnTable(Table, kw_only=True):
+class ColumnTable(ProtocolTable, kw_only=True):
     """One [[columns]] of a protocol: a motor and its whiskers, one a height along its axis, named <name>1, <name>2 …"""
 
     name: Name = "w"
@@ -208,7 +208,7 @@ def _many(value):
     return value if isinstance(value, list) else [value]
 
 
-class TrialTable(Table):
+class TrialTable(ProtocolTable):
     """Trials with every combination of the listed values."""
 
     surface: Name = "steel"
@@ -256,7 +256,7 @@ class TrialTable(Table):
     touch_scatter_deg: Zero = 0.07
 
 
-class Protocol(Table, kw_only=True):
+class Protocol(ProtocolTable, kw_only=True):
     """A session to be simulated."""
 
     name: str = "synthetic"

@@ -14,7 +14,7 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.session import manifest
 from bench.session.strict_toml import values
-from bench.session.table import Table, column_names, read_table
+from bench.session.table import NumberTable, column_names, read_table
 
 _TIME, _FRAME = "time_s", "frame_V"
 _MOST_BYTES = 1 << 31  # bytes: no larger file is read at once
@@ -59,7 +59,7 @@ def daq_file(keys: manifest.SignalKeys | None, shown: str) -> DaqFile | None:
     return DaqFile(keys.file, keys.rate_Hz, channels)
 
 
-def read_daq(path: Path, daq: DaqFile, shown: str) -> Table:
+def read_daq(path: Path, daq: DaqFile, shown: str) -> NumberTable:
     """Columns of the file by their names in [signals], and time_s; frame_V is left to `frame_edges`.
 
     Raises BadInput where a channel is not there, is no series of finite numbers, or lengths differ.
@@ -78,7 +78,7 @@ def read_daq(path: Path, daq: DaqFile, shown: str) -> Table:
                 "[signals] has neither a time_s channel nor rate_Hz", file="session.toml"
             )
         columns = {_TIME: np.arange(count) / daq.rate_Hz} | columns
-    return Table(columns, np.arange(1, count + 1))
+    return NumberTable(columns, np.arange(1, count + 1))
 
 
 def frame_edges(path: Path, daq: DaqFile, time_s: np.ndarray, shown: str) -> np.ndarray:

@@ -10,7 +10,7 @@ from bench.base.errors import BadInput
 from bench.session.daq import DaqFile, frame_edges, read_daq
 from bench.session.footage import declared_rate_Hz, decoded_count, frame_count, read_frames
 from bench.session.signals import Signals
-from bench.session.table import Table, forward_in_time, read_table, require_columns
+from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 from vision.geometry.counted import counted
 from vision.geometry.refusals import Refused
@@ -245,7 +245,7 @@ def _container_times(source: Path, trial: Trial) -> np.ndarray:
         ) from None
 
 
-def _read(path: Path, shown: str) -> tuple[Table, int]:
+def _read(path: Path, shown: str) -> tuple[NumberTable, int]:
     table = read_table(path, shown)
     require_columns(table, (FRAME, TIME), shown)
     table, repeats = forward_in_time(table, TIME, shown)

@@ -1,4 +1,8 @@
-"""session.toml and trial.toml as people write them: which keys there are, and what values are plausible."""
+"""session.toml and trial.toml as people write them: their keys, and what values are plausible.
+
+The comment above a key is what docs/formats.md says of it (`docs/formats.py`); it holds for the
+keys below, too, down to the next comment.
+"""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -16,14 +20,21 @@ Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 class WhiskerKeys(Keys, kw_only=True):
     """[whisker] of session.toml."""
 
+    # "cylinder" (default), "cone": base diameter to a point at `length_mm`, or "tapered": to
+    # `tip_diameter_mm` there
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
+    # length from the base to the tip
     length_mm: float
     length_sigma_mm: float = 0.0
+    # diameter at the base
     diameter_mm: float
     diameter_sigma_mm: float = 0.0
+    # diameter at `length_mm`; of "tapered", and of no other shape
     tip_diameter_mm: float | None = None
+    # Young's modulus; this, or the rigidity
     youngs_modulus_GPa: float | None = None
     youngs_modulus_sigma_GPa: float = 0.0
+    # rigidity E I at the base
     flexural_rigidity_Nmm2: float | None = None
     flexural_rigidity_sigma_Nmm2: float = 0.0
 
@@ -39,6 +50,7 @@ class WhiskerKeys(Keys, kw_only=True):
 class BarKeys(Keys, kw_only=True):
     """[bar] of session.toml."""
 
+    # diameter of the round bar that is touched
     diameter_mm: float
     diameter_sigma_mm: float = 0.0
 
@@ -48,13 +60,19 @@ class BarKeys(Keys, kw_only=True):
 class BoardKeys(Keys, kw_only=True):
     """[board] of session.toml."""
 
+    # how many squares [along x, along y]
     squares: Annotated[list[int], msgspec.Meta(min_length=2, max_length=2)]
+    # side of a square; all lengths seen depend on it
     square_mm: float
     square_sigma_mm: float = 0.0
+    # side of a marker, used to find the board alone; its sigma enters nothing
     marker_mm: float
     marker_sigma_mm: float = 0.0
+    # OpenCV's name, such as "DICT_5X5_100"
     dictionary: str
+    # OpenCV's pattern from before 4.6
     legacy: bool = False
+    # printed white on black
     inverted: bool = False
 
     windows: ClassVar = {
@@ -66,15 +84,22 @@ class BoardKeys(Keys, kw_only=True):
 class RigKeys(Keys, kw_only=True):
     """[rig] of session.toml."""
 
+    # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: it is
+    # estimated from the free strokes
     T_rig_board: Annotated[list[Row4], msgspec.Meta(min_length=3, max_length=3)] | None = None
+    # standard deviation of each shift
     T_rig_board_sigma_mm: float = 0.0
+    # standard deviation of each turn
     T_rig_board_sigma_deg: float = 0.0
 
 
 class CameraKeys(Keys, kw_only=True):
     """One [[cameras]] of session.toml."""
 
+    # name of the folder or film
     name: str
+    # exposure, for the record: checked, and otherwise not used; how far the whisker slips meanwhile
+    # is seen in its frames
     exposure_s: float | None = None
     exposure_sigma_s: float = 0.0
 
@@ -84,8 +109,10 @@ class CameraKeys(Keys, kw_only=True):
 class GaugeKeys(Keys, kw_only=True):
     """[gauges] of session.toml, and gauges.toml."""
 
+    # [y, z] where there is no moment
     offset_V: Pair
     offset_sigma_V: Pair | None = None
+    # [m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − offset)
     matrix_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)]
     matrix_sigma_Nmm_per_V: (
         Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)] | None
@@ -95,7 +122,9 @@ class GaugeKeys(Keys, kw_only=True):
 class ChannelNames(Keys, kw_only=True):
     """[whiskers.channels] of session.toml: the file's own names of a whisker's columns."""
 
+    # whiskers on one motor share it; no other channel is shared
     motor_deg: str | None = None
+    # its own channels, as of one whisker
     y_V: str | None = None
     z_V: str | None = None
     m_y_Nmm: str | None = None
@@ -108,12 +137,19 @@ class ChannelNames(Keys, kw_only=True):
 class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
     """One [[whiskers]] of session.toml."""
 
+    # its own name; letters, digits, `_`, `-`, `.`
     name: str
+    # [x, y, z] of its base in the rig frame
     base_mm: Three
     base_sigma_mm: float = 0.0
+    # its base frame, turned about the rig's x, then y, then z ([0, 0, 0]): z is the axis that it
+    # turns about, x the whisker at motor angle 0
     base_deg: Three = msgspec.field(default_factory=lambda: [0.0, 0.0, 0.0])
     base_sigma_deg: float = 0.0
+    # the table `[whiskers.gauges]`, with the keys of `[gauges]`
     gauges: GaugeKeys | None = None
+    # the table `[whiskers.channels]`; left out: `y_V@<name>` and so on in signals.csv, and
+    # `motor_deg` for all, where there is no `motor_deg@<name>`
     channels: ChannelNames = ChannelNames()
 
     windows: ClassVar = WhiskerKeys.windows | {
@@ -126,11 +162,18 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
 class ObjectKeys(Keys, kw_only=True):
     """[object] of trial.toml: what the object is, and perhaps where it stands, in the rig frame."""
 
+    # "bar" (default), "ring": a bar bent to a circle, "sphere" or "cone"
     shape: Literal["bar", "ring", "sphere", "cone"] = "bar"
+    # [x, y, z] of the bar's axis anywhere, the centre, or the cone's tip; left out: not known
     point_mm: Three | None = None
     point_sigma_mm: float = 0.0
+    # with `point_mm`: the bar's direction, the normal of the ring's plane, or where the cone points
+    # ([0, 0, 1])
     axis: Three | None = None
+    # diameter of the circle that the ring's axis is
     ring_diameter_mm: float | None = None
+    # angle of the cone between its axis and its surface. `bar_diameter_mm` then is twice its radius
+    # across, along its normal, where it is touched; nothing of the cloud asks for it
     half_angle_deg: float | None = None
 
     windows: ClassVar = {
@@ -143,31 +186,54 @@ class ObjectKeys(Keys, kw_only=True):
 class TrialKeys(Keys, kw_only=True):
     """trial.toml, and [trial] of session.toml for all trials."""
 
+    # groups trials in fits and plots
     surface: str = ""
+    # nominal speed of the motor; a warning is given where signals say another; its sigma enters
+    # nothing
     speed_deg_s: float | None = None
     speed_sigma_deg_s: float = 0.0
+    # nominal slope; where the slope is seen that one counts, and a warning is given where the two
+    # differ by more than their sigmas allow
     beta_deg: float | None = None
     beta_sigma_deg: float = 0.0
+    # nominal distance; where it is seen that one counts
     d_x_mm: float | None = None
     d_x_sigma_mm: float = 0.0
+    # diameter of the bar where it differs from the session's (paper wrapped round it)
     bar_diameter_mm: float | None = None
     bar_diameter_sigma_mm: float = 0.0
+    # "measure" (default), "gauge" (calibrates the gauges), "weight" (a force hung on the whisker)
     purpose: Literal["measure", "gauge", "weight"] = "measure"
+    # force of a weight, along rig −z
     force_N: float | None = None
     force_sigma_N: float = 0.0
+    # where the weight hangs, from the base
     at_mm: float | None = None
     at_sigma_mm: float = 0.0
+    # gives the times of frames where no file has them; its sigma enters nothing
     frame_rate_Hz: float | None = None
     frame_rate_sigma_Hz: float = 0.0
+    # time of frame 0 on the signals' clock; the sigma enters the touch seen
     first_frame_s: float | None = None
     first_frame_sigma_s: float = 0.0
+    # −3 dB of the low-pass between gauges and converter, taken as a Butterworth of fourth order; 0:
+    # none. Its delay is taken out of touch felt. Left out: the paper's 800 Hz, and any delay from
+    # none to twice as much is in the sigma
     gauge_filter_Hz: float | None = None
+    # true: each way back is evaluated, too, and with the way there ([moving.md](moving.md))
     both_ways: bool = False
+    # [x, y, z] in the rig frame of an object that moves at constant speed, and one sigma each way;
+    # left out: it stands ([moving.md](moving.md))
     object_velocity_mm_s: Triple | None = None
     object_velocity_sigma_mm_s: float = 0.0
+    # true: the object stands until it is touched, gives way as it is pushed, and comes back; how
+    # far is fitted to the pictures ([soft.md](soft.md))
     object_gives_way: bool = False
+    # how far the follicle is turned about the whisker (+x)
     follicle_roll_deg: float = 0.0
     follicle_roll_sigma_deg: float = 0.0
+    # the table `[object]` (`[trial.object]` in session.toml): what the object is, and where it
+    # stands, which arrays are judged by
     object: ObjectKeys | None = None
 
     tables: ClassVar = {"object": ObjectKeys}
@@ -197,17 +263,28 @@ class ChannelKeys(Keys, kw_only=True):
 class SignalKeys(Keys, kw_only=True):
     """[signals] of session.toml: the DAQ's file in each trial's folder, and its channels."""
 
+    # its name in each trial's folder: .csv, .mat, .h5, .hdf5 or .tdms. HDF5 (and .mat of version
+    # 7.3) and TDMS need the extras `hdf5` and `tdms`. A variable within a MATLAB structure is a/b,
+    # a TDMS channel is group/channel
     file: str
+    # where no channel holds the times; the first sample is at 0 s
     rate_Hz: float | None = None
+    # times in seconds
     time_s: ChannelKeys | None = None
+    # the motor's angle
     motor_deg: ChannelKeys
+    # the gauges
     y_V: ChannelKeys | None = None
     z_V: ChannelKeys | None = None
+    # moments, in place of volts
     m_y_Nmm: ChannelKeys | None = None
     m_z_Nmm: ChannelKeys | None = None
+    # forces of a load cell; all three or none
     f_x_N: ChannelKeys | None = None
     f_y_N: ChannelKeys | None = None
     f_z_N: ChannelKeys | None = None
+    # each rising edge through the middle of its range is a frame of every camera, where there is no
+    # frames.csv
     frame_V: ChannelKeys | None = None
 
     windows: ClassVar = {"rate_Hz": plausible.RATE}
@@ -231,9 +308,14 @@ class SignalKeys(Keys, kw_only=True):
 class SessionKeys(Keys, kw_only=True):
     """session.toml."""
 
+    # version of this format: 1
     format: int
+    # shown in the summary; the folder's name where it is absent
     name: str = ""
+    # the order of surfaces in tables and figures, such as ["steel", "sandpaper"]; others follow by
+    # the names of their trials
     surfaces: tuple[str, ...] = ()
+    # the tables below; `whisker` or `whiskers`
     whisker: WhiskerKeys | None = None
     whiskers: tuple[ArrayWhiskerKeys, ...] = ()
     bar: BarKeys | None = None

@@ -15,7 +15,7 @@ from bench.session.plausible import (
     MILLIVOLTS,
     Window,
 )
-from bench.session.table import Table, forward_in_time, read_table, require_columns
+from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 
 TIME, MOTOR = "time_s", "motor_deg"
@@ -114,7 +114,7 @@ def read_signals(trial: Trial) -> Signals:
     )
 
 
-def _columns(table: Table, shown: str) -> tuple[str, tuple[str, str]]:
+def _columns(table: NumberTable, shown: str) -> tuple[str, tuple[str, str]]:
     """("V" or "Nmm", its two columns)."""
     has_volts, has_moments = (
         any(name in table.columns for name in pair) for pair in (VOLTS, MOMENTS)
@@ -126,7 +126,7 @@ def _columns(table: Table, shown: str) -> tuple[str, tuple[str, str]]:
     return kind, channels
 
 
-def _force_columns(table: Table, shown: str) -> tuple[str, ...]:
+def _force_columns(table: NumberTable, shown: str) -> tuple[str, ...]:
     """The load cell's columns, all three or none."""
     found = tuple(name for name in FORCES if name in table.columns)
     if found:
@@ -140,7 +140,7 @@ def _unwrapped(motor_deg: np.ndarray) -> tuple[np.ndarray, int]:
     return (np.unwrap(motor_deg, period=_TURN_DEG), wraps) if wraps else (motor_deg, 0)
 
 
-def _check_units(table: Table, kind: str, channels: tuple[str, str], shown: str) -> None:
+def _check_units(table: NumberTable, kind: str, channels: tuple[str, str], shown: str) -> None:
     if len(table) < 2:
         raise BadInput("has one row; a recording has many", file=shown)
     SAMPLING_STEP.check(float(np.median(np.diff(table[TIME]))), f"the usual step of {TIME}", shown)

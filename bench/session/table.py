@@ -16,7 +16,7 @@ _MOST_BYTES = 1 << 29  # two hours at 2 kHz, which as text and numbers fill 4 GB
 
 
 @dataclass(frozen=True)
-class Table:
+class NumberTable:
     """columns: name to array (n,); row: the file's row of each entry (the header is row 1), (n,)."""
 
     columns: dict[str, np.ndarray]
@@ -28,12 +28,14 @@ class Table:
     def __len__(self) -> int:
         return len(self.row)
 
-    def keep(self, kept: np.ndarray) -> "Table":
+    def keep(self, kept: np.ndarray) -> "NumberTable":
         """The entries where `kept` (n,) is true."""
-        return Table({name: values[kept] for name, values in self.columns.items()}, self.row[kept])
+        return NumberTable(
+            {name: values[kept] for name, values in self.columns.items()}, self.row[kept]
+        )
 
 
-def read_table(path: Path, shown: str, only: Collection[str] | None = None) -> Table:
+def read_table(path: Path, shown: str, only: Collection[str] | None = None) -> NumberTable:
     """The columns of a comma-separated file of finite numbers: all, or those of `only` that are there, which is as fast
     as they are few. A byte-order mark and CRLF are taken.
 
@@ -48,7 +50,7 @@ def read_table(path: Path, shown: str, only: Collection[str] | None = None) -> T
     values = _fast(lines[1:], len(names), chosen)
     if values is None:
         values = _row_by_row(lines[1:], names, shown)[:, chosen]
-    return Table(
+    return NumberTable(
         {names[k]: column for k, column in zip(chosen, values.T)}, np.arange(2, len(values) + 2)
     )
 
@@ -63,7 +65,7 @@ def column_names(path: Path, shown: str) -> list[str]:
         raise BadInput("is not UTF-8 text; export it as CSV, UTF-8", file=shown) from None
 
 
-def forward_in_time(table: Table, time: str, shown: str) -> tuple[Table, int]:
+def forward_in_time(table: NumberTable, time: str, shown: str) -> tuple[NumberTable, int]:
     """The table without rows that repeat the one before them, and how many those were.
 
     Raises BadInput where time goes back, or stands still while another value changes.
@@ -84,7 +86,7 @@ def forward_in_time(table: Table, time: str, shown: str) -> tuple[Table, int]:
     return table, int(repeats.sum())
 
 
-def require_columns(table: Table, names: tuple[str, ...], shown: str) -> None:
+def require_columns(table: NumberTable, names: tuple[str, ...], shown: str) -> None:
     """Raises BadInput for the first column that is not there, with what it may have been called."""
     for name in names:
         if name not in table.columns:

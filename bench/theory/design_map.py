@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
-from bench.base.tables import write_table
+from bench.base.tables import Column, Table
 from bench.rig.bar import Bar, first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
@@ -29,14 +29,19 @@ from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk
 
-COLUMNS = (
-    "beta_deg",
-    "alpha_deg",
-    "d_x_mm",
-    "bias_percent",
-    "sigma_percent",
-    "bound_percent",
-    "exact_percent",
+DESIGN = Table(
+    "design",
+    "A row a place of `whisker-bench design`: the corners of its region first, then a grid over it "
+    "([designing.md](designing.md)). Errors are of (10), % of d_x.",
+    (
+        Column("beta_deg", "slope"),
+        Column("alpha_deg", "the surface's friction angle"),
+        Column("d_x_mm", "distance"),
+        Column("bias_percent", "its bias there, expected"),
+        Column("sigma_percent", "its standard deviation there, expected"),
+        Column("bound_percent", "abs(bias) + 1.96 sigma"),
+        Column("exact_percent", "its error by exact mechanics; of the corners alone"),
+    ),
 )
 _STEPS = 6  # of the march from touch, as in bench.theory.model_error
 _THINNEST = 1e-3  # share of the base's diameter: a tip that is thinner is a cone's
@@ -171,10 +176,10 @@ def write_design(out: Path, made: Designed) -> list[Path]:
     """design.txt, design.csv, design.png and .svg in a folder, each whole; their paths."""
     with lock_output(out):
         write_whole(out / "design.txt", "\n".join(design_lines(made)) + "\n")
-        write_table(out / "design.csv", COLUMNS, _rows(made))
+        DESIGN.write(out, _rows(made))
         with style():
             figures = publish(draw(made), out / "design")
-    return [out / "design.txt", out / "design.csv", *figures]
+    return [out / "design.txt", out / DESIGN.file, *figures]
 
 
 def _rows(made: Designed) -> Iterator[dict]:
@@ -189,7 +194,7 @@ def _of_points(made: Designed, points: np.ndarray, exact: np.ndarray) -> Iterato
     columns = np.degrees(points[0]), np.degrees(points[1]), points[2]
     errors = found.bias_percent, found.sigma_percent, found.bound_percent, exact
     for row in zip(*columns, *errors):
-        yield dict(zip(COLUMNS, map(float, row)))
+        yield dict(zip(DESIGN.names, map(float, row)))
 
 
 def draw(made: Designed) -> Figure:

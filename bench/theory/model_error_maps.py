@@ -11,15 +11,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bench.base.drawing import publish, style
-from bench.base.tables import write_table
+from bench.base.tables import Column, Table, alike
 from bench.base.workers import Workers
 from bench.theory.model_error import Panel, Push, radius_map, tilt_map
 
-COLUMNS = (
-    *(f.name for f in fields(Push)),
-    "error_percent",
-    "predicted_percent",
-    "corrected_percent",
+_ERRORS = ("error_percent", "predicted_percent", "corrected_percent")
+ERROR_BY = Table(
+    "error_by_<map>",
+    "A row a cell of the map; error_by_tilt.csv and error_by_radius.csv are written by "
+    "`figures tilt` and `figures radius`.",
+    (
+        *alike((field.name for field in fields(Push)), "the push"),
+        Column("error_percent", "error of (10), α known, by exact mechanics"),
+        Column("predicted_percent", "that error to its first order in θ"),
+        Column("corrected_percent", "error of (10) corrected, for which the bar's radius is given"),
+    ),
 )
 _LEVELS = np.array([-5.0, -2.0, -1.0, -0.5, -0.2, -0.1, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
 _LINES = {"levels": _LEVELS, "linewidths": 0.8}
@@ -54,17 +60,17 @@ def write_map(name: str, out: Path, *, workers: int = 1, progress: bool = False)
     stem = Path(out) / f"error_by_{name}"
     with style():
         paths = publish(draw(panels, chosen.title), stem)
-    write_table(stem.with_suffix(".csv"), COLUMNS, rows(panels))
+    ERROR_BY.write_file(stem.with_suffix(".csv"), rows(panels))
     return [*paths, stem.with_suffix(".csv")]
 
 
 def rows(panels: Sequence[Panel]) -> Iterator[dict]:
-    """A row a cell, by COLUMNS; errors that are not known are NaN."""
+    """Yield a row of ERROR_BY a cell; errors that are not known are NaN."""
     for panel in panels:
         errors_percent = panel.error_percent, panel.predicted_percent, panel.corrected_percent
         for pushes, *errors in zip(panel.pushes, *errors_percent):
             for push, *each in zip(pushes, *errors):
-                yield asdict(push) | dict(zip(COLUMNS[-3:], map(float, each)))
+                yield asdict(push) | dict(zip(_ERRORS, map(float, each)))
 
 
 def draw(panels: Sequence[Panel], title: str) -> Figure:

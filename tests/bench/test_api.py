@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from bench import api
-from bench.analyses.soft import SEEN_COLUMNS
+from bench.analyses.soft import COMPLIANCE
 from bench.base.errors import BadInput
-from bench.base.tables import TEXT, WHOLE, read_table, write_table
-from bench.report.assembly import WHISK_COLUMNS
-from tests.scenes.formats import documented
+from bench.base.tables import Kind
+from bench.report.whisk_tables import WHISKS
 
 
 def test_the_examples_are_right(without_pictures, tmp_path):
@@ -30,13 +29,12 @@ def test_tables_are_those_of_the_files(exact_run):
     for name in api.TABLES:
         table = run.table(name)
         lines = (exact_run / f"{name}.csv").read_text().splitlines()
-        always = [column for column in documented(f"{name}.csv") if column not in SEEN_COLUMNS]
-        assert list(table.dtype.names) == lines[0].split(",") == always
+        declared = COMPLIANCE if name == "compliance" else api.TABLES[name]
+        assert table.dtype.names == tuple(lines[0].split(",")) == declared.names
         assert len(table) == len(lines) - 1 - (name == "explained")  # whose last row is a mean
-        for column in table.dtype.names:
-            assert table.dtype[column].kind == (
-                "U" if column in TEXT else "i" if column in WHOLE else "f"
-            )
+        letters = {Kind.NUMBER: "f", Kind.WHOLE: "i", Kind.TEXT: "U", Kind.SENTENCE: "U"}
+        for column in declared.columns:
+            assert table.dtype[column.name].kind == letters[column.kind]
     row = run.whisks[run.whisks["trial"] == "b60_4"][0]
     assert row["d_x_mm"] == pytest.approx(64.949086, abs=1e-5) and np.isnan(
         run.estimates["beta_est_deg"][0]
@@ -49,8 +47,8 @@ def test_tables_are_those_of_the_files(exact_run):
 
 def test_how_hard_pictures_were_looked_at_is_text(tmp_path):
     row = {"trial": "b60_4", "whisk": 0, "cameras": 2, "frames_used": 11, "looked": "standard"}
-    write_table(tmp_path / "whisks.csv", WHISK_COLUMNS, [row])
-    assert read_table(tmp_path / "whisks.csv")["looked"].tolist() == ["standard"]
+    WHISKS.write(tmp_path, [row])
+    assert WHISKS.read(tmp_path)["looked"].tolist() == ["standard"]
 
 
 def test_a_script_of_ones_own_starts_no_process_that_would_read_it_again():
@@ -73,7 +71,7 @@ def test_a_damaged_table_is_one_line(tmp_path):
     for text in ("", "trial,whisk\nb,one\n", "trial,whisk\nb\n"):
         (tmp_path / "whisks.csv").write_text(text)
         with pytest.raises(BadInput, match="evaluate the session again"):
-            read_table(tmp_path / "whisks.csv")
+            WHISKS.read(tmp_path)
 
 
 def test_figures_are_matplotlibs(exact_run):

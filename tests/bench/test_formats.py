@@ -1,6 +1,7 @@
 """docs/formats.md names every key and column that there is, and none that there is not."""
 
 import dataclasses
+import importlib
 import json
 import re
 import tomllib
@@ -8,36 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from bench.analyses import (
-    against_theta,
-    curved,
-    error_map,
-    explained,
-    figure_8,
-    gave,
-    ledger,
-    soft,
-    tilted,
-)
-from bench.analyses import back_strokes as both_ways
-from bench.analyses import friction_tables as tables
-from bench.analyses import moving_objects as moving
-from bench.analyses import single_camera as one_camera
-from bench.analyses import table_i_sensors as sensors
-from bench.array import shape_verdict as contacts
-from bench.array import size
 from bench.base.settings import Settings
-from bench.commands import robot_trade, tradeoff
+from bench.base.tables import Table
 from bench.commands.evaluate import evaluate
 from bench.gauges.gauges_file import FileKeys
-from bench.plan import written
-from bench.report import assembly
-from bench.report import compare_runs as compare
 from bench.report.run_facts import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
-from bench.theory import model_error_maps
 from bench.trials import seeing
+from docs import formats
 from tests.scenes.formats import DOCUMENT, documented, keys
 from tests.scenes.rig_sessions import protocol_file
 
@@ -58,37 +38,31 @@ TOML = {
     "gauges.toml": FileKeys,
     "[seeing]": seeing.SeeingKeys,
 }
-CSV = {
-    "whisks.csv": assembly.WHISK_COLUMNS,
-    "estimates.csv": assembly.ESTIMATE_COLUMNS,
-    "surface.csv": contacts.COLUMNS,
-    "size.csv": size.COLUMNS,
-    "track/<trial>.csv": assembly.TRACK_COLUMNS,
-    "budget.csv": assembly.BUDGET_COLUMNS,
-    "beam.csv": assembly.BEAM_COLUMNS,
-    "friction.csv": tables.WHISK_COLUMNS,
-    "phases.csv": tables.PHASE_COLUMNS,
-    "surfaces.csv": tables.SURFACE_COLUMNS,
-    "explained.csv": explained.COLUMNS,
-    "error_map.csv": error_map.COLUMNS,
-    "compliance.csv": (*soft.COLUMNS, *soft.SEEN_COLUMNS),
-    "gives_way.csv": gave.COLUMNS,
-    "curvature.csv": curved.COLUMNS,
-    "tilts.csv": tilted.COLUMNS,
-    "against_theta.csv": against_theta.COLUMNS,
-    "ledger.csv": ledger.COLUMNS,
-    "sensors.csv": sensors.COLUMNS,
-    "moving.csv": moving.COLUMNS,
-    "both_ways.csv": both_ways.COLUMNS,
-    "one_camera.csv": one_camera.COLUMNS,
-    "comparison": compare.COLUMNS,
-    "figure_8.csv": figure_8.COLUMNS,
-    "tradeoff.csv": tradeoff.COLUMNS,
-    "robot_trade.csv": robot_trade.COLUMNS,
-    "plan.csv": written.COLUMNS,
-    "changes.csv": written.CHANGES,
-    "error_by_tilt.csv, error_by_radius.csv": model_error_maps.COLUMNS,
-}
+
+
+def tables_of_the_code() -> list[Table]:
+    """Return all tables that any module of bench declares."""
+    modules = [
+        importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+        for path in sorted((ROOT / "bench").rglob("*.py"))
+    ]
+    return [each for module in modules for each in vars(module).values() if isinstance(each, Table)]
+
+
+def test_the_page_is_what_the_script_writes():
+    assert formats.page(DOCUMENT) == DOCUMENT, "run python docs/formats.py"
+
+
+def test_every_table_is_on_the_page():
+    """A table that is another with columns before it, or without its last, has that one's section."""
+    on_page = {each.name for each in formats.named_parts(DOCUMENT) if isinstance(each, Table)}
+    assert on_page == {table.name for table in tables_of_the_code()}
+
+
+def test_every_column_has_a_name_of_its_own_and_a_meaning():
+    for table in tables_of_the_code():
+        assert len(set(table.names)) == len(table.names), table.name
+        assert all(column.meaning for column in table.columns), table.name
 
 
 @pytest.mark.parametrize("heading", TOML)
@@ -96,9 +70,10 @@ def test_keys_of_toml(heading):
     assert sorted(documented(heading)) == sorted(TOML[heading].__struct_fields__)
 
 
-@pytest.mark.parametrize("heading", CSV)
-def test_columns_of_tables(heading):
-    assert sorted(documented(heading)) == sorted(CSV[heading])
+def test_every_key_is_explained():
+    for part in formats.named_parts(DOCUMENT):
+        if not isinstance(part, Table):
+            assert all(meaning for _, meaning in formats.explained_keys(part)), part
 
 
 def test_keys_of_results(steel_signals, exact_vision, tmp_path):

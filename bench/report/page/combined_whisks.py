@@ -7,8 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.friction_tables import SURFACES
+from bench.analyses.soft import COMPLIANCE
+from bench.analyses.table_i_sensors import SENSORS
+from bench.analyses.tilted import TILTS
 from bench.base.drawing import label_of
-from bench.base.tables import read_table
+from bench.base.tables import Table
 from bench.report.page.words import MISSING, number, with_sigma
 
 _ALPHAS = {
@@ -34,7 +38,7 @@ def together(out: Path) -> list[TogetherTable]:
 
 
 def _friction(out: Path) -> TogetherTable:
-    table = _read(out, "surfaces.csv")
+    table = _read(out, SURFACES)
     ways = [way for way in _ALPHAS if any(np.isfinite(row[f"alpha_{way}_deg"]) for row in table)]
     rows = (
         (_surface(row), str(row["whisks"]), *(_told(row, f"alpha_{way}", "deg") for way in ways))
@@ -75,7 +79,7 @@ def _tilts(out: Path) -> TogetherTable:
             ),
             *(number(row["error_percent"]), row["status"] or MISSING),
         )
-        for row in _read(out, "tilts.csv")
+        for row in _read(out, TILTS)
     )
     return TogetherTable(title, "tilts.csv", head, rows)
 
@@ -90,7 +94,7 @@ def _softness(out: Path) -> TogetherTable:
             *(_range(row["near_nominal_mm"], row["far_nominal_mm"], 0), _told(row, "d_x", "mm")),
             *(_told(row, "give", "mm_N"), _stiffness(row), row["status"] or MISSING),
         )
-        for row in _read(out, "compliance.csv")
+        for row in _read(out, COMPLIANCE)
     )
     return TogetherTable(title, "compliance.csv", head, rows)
 
@@ -105,7 +109,7 @@ def _stiffness(row: np.void) -> str:
 
 def _sensors(out: Path) -> TogetherTable:
     """A row a surface and range of slopes, a column a sensor."""
-    table = _read(out, "sensors.csv")
+    table = _read(out, SENSORS)
     names = list(dict.fromkeys(str(row["estimator"]) for row in table))
     title = "Sensors of Table I: RMS error of d_x (± RMS of the stated sigmas)"
     head = (
@@ -140,9 +144,9 @@ def _of_sensor(row: np.void) -> str:
     return f"{number(row['error_rms_percent'], 1)} ± {number(row['error_sigma_percent'], 1)}{few}"
 
 
-def _read(out: Path, name: str) -> np.ndarray:
-    """Rows of one of the run's tables; none where it has no such table."""
-    return read_table(out / name) if (out / name).exists() else np.array([])
+def _read(out: Path, table: Table) -> np.ndarray:
+    """Read the rows of one of the run's tables; none where it has no such table."""
+    return table.read(out) if (out / table.file).exists() else np.array([])
 
 
 def _surface(row: np.void) -> str:

@@ -12,9 +12,9 @@ from bench.analyses.ledger import Entry, ledger_lines
 from bench.analyses.soft import soft_lines
 from bench.analyses.table_i_sensors import SensorWorth, sensor_lines
 from bench.analyses.tilted import tilted_lines
-from bench.base.tables import TABLES
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
+from bench.report.run_tables import RUN_TABLES
 from bench.report.summary.error_lines import contact_lines, error_lines
 from bench.report.summary.gauge_lines import gauge_lines
 from bench.report.summary.shared import shared_doubts, shared_lines
@@ -167,7 +167,7 @@ def _titled(title: str, lines: Iterable[str]) -> Section:
 def _files(figures: Sequence[str]) -> list[str]:
     single = [name for name in figures if "/" not in name]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
-    tables = [f"{name}.csv" for name in TABLES]
+    tables = [table.file for table in RUN_TABLES.values()]
     return [
         ", ".join(
             ["report.html", *tables, "track/", *single, *(f"{folder}/" for folder in folders)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.analyses.ledger import (
-    COLUMNS,
+    LEDGER,
     MAY_GO,
     NEEDED,
     NOT_KNOWN,
@@ -17,7 +17,6 @@ from bench.analyses.ledger import (
     write_ledger,
 )
 from bench.analyses.left_out import NAMES
-from bench.base.tables import read_table
 from bench.gauges.felt import gauge_delay
 from bench.records.trial_result import EstimateRow, WithDrift
 from bench.session.whisker import Whisker
@@ -136,8 +135,8 @@ def test_summary_and_page_say_it(exact_run):
 
 
 def test_the_table_and_the_lines(exact_run, tmp_path):
-    table = read_table(exact_run / "ledger.csv")
-    assert table.dtype.names == COLUMNS and set(table["refinement"]) == set(NAMES)
+    table = LEDGER.read(exact_run)
+    assert table.dtype.names == LEDGER.names and set(table["refinement"]) == set(NAMES)
     trials = set(table["trial"].tolist())
     assert len(table) == len(NAMES) * len(trials)
     delay = table[(table["refinement"] == "gauges' delay") & (table["trial"] == "b60_4")]

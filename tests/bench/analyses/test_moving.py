@@ -49,8 +49,8 @@ def test_an_object_that_moves_is_judged_by_itself(tmp_path, exact_vision):
     """2 mm/s of the whisker's 10.5 at 60 mm: (10) is wrong by 24 %, what knows the speed is not; no verdict is made of
     it."""
     out = run(tmp_path, MOVING)
-    rows = {row["estimator"]: row for row in table(out / moving.TABLE)}
-    assert tuple(rows["known_motion"]) == moving.COLUMNS
+    rows = {row["estimator"]: row for row in table(out / moving.MOVING.file)}
+    assert tuple(rows["known_motion"]) == moving.MOVING.names
     assert float(rows["known_motion"]["velocity_share_percent"]) == pytest.approx(19.1, abs=0.3)
     assert float(rows["with_friction"]["error_percent"]) == pytest.approx(24.0, abs=3.0)
     assert (
@@ -77,9 +77,9 @@ def drawn(row):
 def test_a_push_and_its_way_back_need_no_friction_angle(tmp_path, exact_vision):
     """With α_est = 25° (10) is off by a third; both ways together are not, and tell slope and friction."""
     out = run(tmp_path, "both_ways = true", alpha_est_deg=25.0)
-    rows = {row["estimator"]: row for row in table(out / both_ways.TABLE)}
+    rows = {row["estimator"]: row for row in table(out / both_ways.BOTH_WAYS.file)}
     both = rows["both_ways"]
-    assert tuple(both) == both_ways.COLUMNS
+    assert tuple(both) == both_ways.BOTH_WAYS.names
     assert (
         abs(float(both["error_percent"])) < 2.0 < abs(float(rows["with_friction"]["error_percent"]))
     )
@@ -100,9 +100,12 @@ def test_a_recording_without_a_way_back_says_so(tmp_path, exact_vision):
     evaluate(
         tmp_path / "session", out, Settings(figures=False), workers=0, announce=lambda text: None
     )
-    (row,) = table(out / both_ways.TABLE)
+    (row,) = table(out / both_ways.BOTH_WAYS.file)
     assert row["status"] == "no way back was recorded" and row["d_x_est_mm"] == ""
 
 
 def test_sessions_of_standing_objects_have_neither(exact_run):
-    assert not (exact_run / moving.TABLE).exists() and not (exact_run / both_ways.TABLE).exists()
+    assert (
+        not (exact_run / moving.MOVING.file).exists()
+        and not (exact_run / both_ways.BOTH_WAYS.file).exists()
+    )

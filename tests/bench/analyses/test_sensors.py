@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from bench.analyses.table_i_sensors import TABLE
+from bench.analyses.table_i_sensors import SENSORS
 from bench.base.settings import Settings
 from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
@@ -42,7 +42,9 @@ def rows(path) -> list[dict]:
 def test_each_sensor_is_judged_by_slope(run):
     """Friction assumed 10° and 16.7° in truth: at 60° that is worth some 10 % to an angle and moments, and nothing to
     force and moment; a touch alone is off by what it does not know."""
-    table = {(row["estimator"], float(row["beta_from_deg"])): row for row in rows(run / TABLE)}
+    table = {
+        (row["estimator"], float(row["beta_from_deg"])): row for row in rows(run / SENSORS.file)
+    }
     assert {slope for _, slope in table} == {0.0, 52.5}
     errors = {key: float(row["error_rms_percent"]) for key, row in table.items()}
     assert errors["with_friction", 52.5] > 8.0 > 2.0 > errors["force_and_moment", 52.5]
@@ -54,7 +56,7 @@ def test_each_sensor_is_judged_by_slope(run):
         if name == "force_and_moment"
     )
     text = (run / "summary.txt").read_text()
-    assert "Sensors of Table I" in text and "force and moment" in text and TABLE in text
+    assert "Sensors of Table I" in text and "force and moment" in text and SENSORS.file in text
     page = (
         (run / "report.html").read_text().split('<section id="together">')[1].split("</section>")[0]
     )
@@ -78,7 +80,7 @@ def test_they_stand_beside_the_other_estimates(run):
 
 
 def test_without_a_load_cell_there_is_nothing_to_say(exact_run):
-    assert rows(exact_run / TABLE) == []
+    assert rows(exact_run / SENSORS.file) == []
     assert "Sensors of Table I" not in (exact_run / "summary.txt").read_text()
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.analyses.tilted import COLUMNS, tilted_lines, tilted_whisks, write_tilts
+from bench.analyses.tilted import TILTS, tilted_lines, tilted_whisks, write_tilts
 from estimator.two_tilts import ALIKE
 from tests.scenes.friction_results import ALPHA, WHISKER, result
 
@@ -42,7 +42,7 @@ def test_distance_and_friction_are_those_of_the_whisks(tmp_path):
     assert found.found.alpha_rad == pytest.approx(ALPHA, abs=np.radians(0.3) + 2 * sigma_rad)
     write_tilts(tmp_path, [found])
     (row,) = csv.DictReader((tmp_path / "tilts.csv").read_text().splitlines())
-    assert tuple(row) == COLUMNS
+    assert tuple(row) == TILTS.names
     assert float(row["error_mm"]) == pytest.approx(found.found.d_x_mm - 60.0, abs=1e-6)
     (line,) = tilted_lines([found])
     assert "3 whisks at slopes from 5 to 60° together, without α_est: d_x" in line

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from bench.base.tables import read_table, write_table
+from bench.base.tables import TRIAL, WHISK, Column, Table, status
 
+TABLE = Table("t", "", (TRIAL, WHISK, Column("d_x_mm", "distance"), status("sentence")))
 ROWS = [
     {
         "trial": "Prüfung",
@@ -18,7 +19,7 @@ ROWS = [
 
 
 def test_bytes_of_a_table(tmp_path):
-    write_table(tmp_path / "t.csv", ROWS[0], ROWS)
+    TABLE.write(tmp_path, ROWS)
     assert (tmp_path / "t.csv").read_bytes().decode("utf-8") == (
         "trial,whisk,d_x_mm,status\n"
         'Prüfung,0,60.25,"chi2 79, beta = 30 deg +- 0.2 deg; alpha - phi >= 0 ..."\n'
@@ -27,8 +28,8 @@ def test_bytes_of_a_table(tmp_path):
 
 
 def test_a_table_is_read_back_with_its_types(tmp_path):
-    write_table(tmp_path / "t.csv", ROWS[0], ROWS)
-    table = read_table(tmp_path / "t.csv")
+    TABLE.write(tmp_path, ROWS)
+    table = TABLE.read(tmp_path)
     assert [table.dtype[name].kind for name in table.dtype.names] == ["U", "i", "f", "U"]
     assert table["trial"].tolist() == ["Prüfung", "b"]
     np.testing.assert_array_equal(table["d_x_mm"], [60.25, math.nan])

@@ -13,7 +13,7 @@ from bench.base.settings import Settings
 from bench.base.workers import DIED, Workers
 from bench.commands.evaluate import evaluate
 from bench.records.trial_result import SeenWhisk
-from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
+from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
 from bench.trials.unit import evaluate_unit
 from tests.faults.interrupted import contents, full_disk
 from tests.scenes.results import table
@@ -46,8 +46,8 @@ def steel(steel_signals, exact_vision, evaluated):
 def test_tables_have_the_columns_of_the_format_in_their_order(steel):
     """Names are what other people's scripts rely on, so they stand here as in the format's description."""
     first = "trial,whisk,surface,speed_deg_s,beta_nominal_deg,theta_deg,touch_deg,touch_sigma_deg,touch_felt_deg"
-    assert ",".join(WHISK_COLUMNS).startswith(first)
-    assert WHISK_COLUMNS[-10:] == (
+    assert ",".join(WHISKS.names).startswith(first)
+    assert WHISKS.names[-10:] == (
         "x_mm",
         "x_sigma_mm",
         "y_mm",
@@ -60,9 +60,9 @@ def test_tables_have_the_columns_of_the_format_in_their_order(steel):
         "status",
     )
     for name, columns in (
-        ("whisks", WHISK_COLUMNS),
-        ("estimates", ESTIMATE_COLUMNS),
-        ("track/b60_4", TRACK_COLUMNS),
+        ("whisks", WHISKS.names),
+        ("estimates", ESTIMATES.names),
+        ("track/b60_4", TRACK.names),
     ):
         assert (steel / f"{name}.csv").read_text().splitlines()[0] == ",".join(columns)
 

@@ -7,7 +7,6 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.base.tables import read_table
 from bench.commands import robot, robot_trade
 from bench.commands.robot import Answer, Converter
 from bench.commands.robot_trade import front, pooled, trade_lines
@@ -95,7 +94,7 @@ def test_a_recorded_session(steel_signals, exact_vision, monkeypatch, tmp_path):
     robot_trade.robot_trade(
         steel_signals, tmp_path, Settings(trials="b60_4", alpha_est_deg=10.5), workers=0
     )
-    table = read_table(tmp_path / "robot_trade.csv")
+    table = robot_trade.ROBOT_TRADE.read(tmp_path)
     ten = table[table["estimator"] == "with_friction"]
     near, far = (
         ten[np.isnan(ten["cutoff_Hz"]) & (ten["rate_Hz"] == RATE_HZ) & (ten["push_deg"] == d)]

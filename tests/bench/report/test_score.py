@@ -6,11 +6,10 @@ import re
 import numpy as np
 import pytest
 
-from bench.analyses.friction_tables import WHISK_COLUMNS as FRICTION_COLUMNS
-from bench.base.tables import write_table
+from bench.analyses.friction_tables import FRICTION
 from bench.gauges.matrix import GaugeMatrix, Gauges
-from bench.report.assembly import ESTIMATE_COLUMNS, TRACK_COLUMNS, WHISK_COLUMNS
 from bench.report.score import Score, score
+from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
 from bench.session.session import load_session
 
 
@@ -50,9 +49,9 @@ def finished(small_session, tmp_path):
                 }
                 for r in csv.DictReader(file)
             ]
-        write_table(tmp_path / "track" / f"{trial}.csv", TRACK_COLUMNS, track)
-    write_table(tmp_path / "whisks.csv", WHISK_COLUMNS, rows)
-    write_table(tmp_path / "estimates.csv", ESTIMATE_COLUMNS, estimates)
+        TRACK.write_file(tmp_path / "track" / f"{trial}.csv", track)
+    WHISKS.write(tmp_path, rows)
+    ESTIMATES.write(tmp_path, estimates)
     return tmp_path
 
 
@@ -111,7 +110,7 @@ def test_friction_is_scored_as_one_angle_or_as_two(finished, small_session):
     """The sample's surfaces have one coefficient, 10.5°; with another at rest the two angles are scored instead."""
     row = {"trial": "b60_4", "whisk": 0, "alpha_seen_deg": 10.7, "alpha_seen_sigma_deg": 0.2}
     row |= {"alpha_static_felt_deg": 15.0, "alpha_static_felt_sigma_deg": 0.5}
-    write_table(finished / "friction.csv", FRICTION_COLUMNS, [row])
+    FRICTION.write(finished, [row])
     lines = score(load_session(small_session), finished)
     assert line(lines, "alpha_seen_deg") == ["1", "+0.2000", "0.2000", "deg", "100", "%", "1.00"]
     assert not any(text.startswith("alpha_static_felt_deg") for text in lines)
@@ -126,7 +125,7 @@ def test_static_and_kinetic_are_scored_where_they_differ(finished, small_copy):
         "alpha_static_felt_deg": 15.5,
         "alpha_static_felt_sigma_deg": 0.5,
     }
-    write_table(finished / "friction.csv", FRICTION_COLUMNS, [row | {"alpha_seen_deg": 12.0}])
+    FRICTION.write(finished, [row | {"alpha_seen_deg": 12.0}])
     lines = score(load_session(small_copy), finished)
     assert line(lines, "alpha_static_felt_deg")[1] == "+0.5000"
     assert not any(text.startswith("alpha_seen_deg") for text in lines)

@@ -2,11 +2,11 @@
 
 import pytest
 
-from bench.analyses import friction_tables as tables
-from bench.analyses import soft, tilted
-from bench.analyses import table_i_sensors as sensors
+from bench.analyses.friction_tables import SURFACES
+from bench.analyses.soft import COMPLIANCE
+from bench.analyses.table_i_sensors import SENSORS
+from bench.analyses.tilted import TILTS
 from bench.base.errors import BadInput
-from bench.base.tables import write_table
 from bench.report.page.combined_whisks import together
 
 SURFACE = {"surface": "paint", "speed_deg_s": 10.0, "whisks": 3}
@@ -29,15 +29,15 @@ SOFT |= {"d_x_sigma_mm": 0.29, "give_mm_N": 0.134, "give_sigma_mm_N": 0.061}
 SENSOR = {"beta_from_deg": 7.5, "beta_to_deg": 22.5, "alpha_deg": 16.7, "whisks": 3, "none": 0}
 
 
-def write(out, name, columns, *rows):
-    write_table(out / name, columns, [SURFACE | row for row in rows])
+def write(out, table, *rows):
+    table.write(out, [SURFACE | row for row in rows])
 
 
 def test_a_folder_that_has_no_rows_has_no_tables(tmp_path):
     assert together(tmp_path) == []
-    write(tmp_path, "tilts.csv", tilted.COLUMNS)
-    write(tmp_path, "sensors.csv", sensors.COLUMNS)
-    write(tmp_path, "surfaces.csv", tables.SURFACE_COLUMNS, {})  # a surface of which no way tells α
+    write(tmp_path, TILTS)
+    write(tmp_path, SENSORS)
+    write(tmp_path, SURFACES, {})  # a surface of which no way tells α
     assert together(tmp_path) == []
 
 
@@ -45,8 +45,7 @@ def test_friction_has_a_column_for_each_way_that_says_something(tmp_path):
     known = {"alpha_seen_deg": 16.71, "alpha_seen_sigma_deg": 0.12}
     write(
         tmp_path,
-        "surfaces.csv",
-        tables.SURFACE_COLUMNS,
+        SURFACES,
         known,
         {"surface": "felt", "speed_deg_s": None},
     )
@@ -56,7 +55,7 @@ def test_friction_has_a_column_for_each_way_that_says_something(tmp_path):
 
 
 def test_slopes_together_stand_with_sigma_and_interval(tmp_path):
-    write(tmp_path, "tilts.csv", tilted.COLUMNS, TILT)
+    write(tmp_path, TILTS, TILT)
     (told,) = together(tmp_path)
     values = ("3", "0 to 60", "54.99 ± 0.56", "53.88 to 56.09", "14.1 ± 1.3", "–", "–")
     assert told.rows == (("paint, 10°/s", *values),) and len(told.head) == len(told.rows[0])
@@ -68,7 +67,7 @@ def test_an_object_is_soft_stiffer_than_or_not_told(tmp_path):
         {"stiffness_low_N_mm": 4.0},
         {},
     ]
-    write(tmp_path, "compliance.csv", soft.COLUMNS, *(SOFT | end for end in ends))
+    write(tmp_path, COMPLIANCE, *(SOFT | end for end in ends))
     (told,) = together(tmp_path)
     assert [row[5] for row in told.rows] == ["4 to 71", "more than 4", "–"]
     assert told.rows[0][1:5] == ("2 + 4", "50 to 70", "49.00 ± 0.29", "0.134 ± 0.061")
@@ -82,7 +81,7 @@ def test_sensors_stand_side_by_side_by_surface_and_slope(tmp_path):
     ]
     steeper = {"beta_from_deg": 22.5, "beta_to_deg": 37.5, "whisks": 2, "none": 1}
     rows += [{"estimator": "with_friction"} | known | steeper]
-    write(tmp_path, "sensors.csv", sensors.COLUMNS, *rows)
+    write(tmp_path, SENSORS, *rows)
     (told,) = together(tmp_path)
     assert told.head[3:] == ("whisks", "(10) with friction [%]", "touch alone [%]")
     assert told.rows[0] == ("paint", "7.5 to 22.5", "16.7", "3", "4.0 ± 2.3", "–")

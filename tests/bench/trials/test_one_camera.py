@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.analyses.single_camera import COLUMNS, ShapeSeen, one_camera_lines, write_one_camera
+from bench.analyses.single_camera import ONE_CAMERA, ShapeSeen, one_camera_lines, write_one_camera
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.records.trial_result import ByOneCamera, SeenWhisk
@@ -89,8 +89,8 @@ def test_rows_and_the_line_of_the_summary(tmp_path):
     ]
     write_one_camera(tmp_path, found)
     head, *rows = (tmp_path / "one_camera.csv").read_text().splitlines()
-    assert head == ",".join(COLUMNS)
-    assert [dict(zip(COLUMNS, row.split(",")))["inside"] for row in rows] == ["1", "0"]
+    assert head == ",".join(ONE_CAMERA.names)
+    assert [dict(zip(ONE_CAMERA.names, row.split(",")))["inside"] for row in rows] == ["1", "0"]
     (line,) = one_camera_lines(found)
     assert line == "one: d_x off by 0.87 mm RMS (stated 0.4); its 95 % interval holds 1 of 2 whisks"
     write_one_camera(tmp_path / "none", [])

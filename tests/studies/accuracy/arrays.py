@@ -17,8 +17,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench.array.shape_verdict import SURFACE_POINTS
+from bench.array.size import SIZE
 from bench.base.settings import Settings
-from bench.base.tables import read_table
 from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
 
@@ -61,7 +62,7 @@ def felt(text: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
         )
         settings = Settings(figures=False, alpha_est_sigma_deg=2.0)
         evaluate(folder / "session", folder / "out", settings, workers=0, announce=lambda _: None)
-        return tuple(read_table(folder / "out" / f"{name}.csv") for name in ("surface", "size"))
+        return (SURFACE_POINTS.read(folder / "out"), SIZE.read(folder / "out"))
 
 
 def line(name: str, rows: np.ndarray) -> str:

@@ -1,0 +1,100 @@
+"""Write what the code declares into formats.md: columns of tables, and keys of TOML files.
+
+    python docs/formats.py
+
+A part stands between two comments, of which the first names what it is made from:
+
+    <!-- made from bench.report.whisk_tables.WHISKS -->
+    <!-- end -->
+
+That is a `bench.base.tables.Table`, whose columns have their meanings; or a `Keys` of a TOML file,
+whose keys are explained by the comment above them, which holds down to the next comment. All else
+in the page is written by hand, and stays.
+"""
+
+import ast
+import importlib
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from bench.base.tables import Table
+from bench.session.strict_toml import Keys
+
+PAGE = Path(__file__).with_suffix(".md")
+PART = re.compile(r"<!-- made from ([\w.]+) -->\n.*?<!-- end -->", re.DOTALL)
+
+
+def page(text: str) -> str:
+    """Return the page with each part made anew from what its comment names."""
+    return PART.sub(_part, text)
+
+
+def named_parts(text: str) -> list[object]:
+    """Return what the parts of a page are made from, in their order."""
+    return [_named(name) for name in PART.findall(text)]
+
+
+def explained_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
+    """Yield the keys of a table of a TOML file, each with its meaning; first those of its bases."""
+    for base in reversed(keys.__mro__):
+        if issubclass(base, Keys) and base is not Keys:
+            yield from _own_keys(base)
+
+
+def _own_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
+    """Yield the keys that a class itself declares, each with the comment above it."""
+    source = textwrap.dedent(inspect.getsource(keys))
+    lines = source.splitlines()
+    meaning = ""
+    for node in ast.parse(source).body[0].body:
+        if isinstance(node, ast.AnnAssign) and node.target.id in keys.__struct_fields__:
+            meaning = _comment_above(lines, node) or meaning
+            yield node.target.id, meaning
+
+
+def _comment_above(lines: list[str], node: ast.AnnAssign) -> str:
+    """Return the comment that ends on the line before a key, or nothing."""
+    above = []
+    row = node.lineno - 2
+    while lines[row].strip().startswith("# "):
+        above.insert(0, lines[row].strip().removeprefix("# "))
+        row -= 1
+    return " ".join(above)
+
+
+def _part(match: re.Match) -> str:
+    """Return a part of the page, with its two comments."""
+    made_from = _named(match[1])
+    if isinstance(made_from, Table):
+        rows = ((column.name, column.meaning) for column in made_from.columns)
+        lines = [f"### `{made_from.file}`", "", *textwrap.wrap(made_from.rows, 120), ""]
+        lines += _as_markdown("column", rows)
+    else:
+        lines = _as_markdown("key", explained_keys(made_from))
+    return "\n".join([f"<!-- made from {match[1]} -->", "", *lines, "", "<!-- end -->"])
+
+
+def _named(name: str) -> object:
+    """Return a name of a module, such as package.module.NAME."""
+    module, _, attribute = name.rpartition(".")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def _as_markdown(head: str, explained: Iterable[tuple[str, str]]) -> list[str]:
+    """Return the lines of a table: a row for each run of names that one meaning explains."""
+    lines = [f"| {head} | what |", "|---|---|"]
+    for meaning, run in groupby(explained, key=lambda pair: pair[1]):
+        names = ", ".join(f"`{name}`" for name, _ in run)
+        lines.append(f"| {names} | {meaning} |")
+    return lines
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(PAGE.read_text()))
