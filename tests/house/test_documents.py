@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+STUDIES = ROOT / "tests" / "studies" / "README.md"
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), STUDIES])
 # Pages that `make docs` writes.
 MADE_FROM_CODE = {"thresholds.md"}
 OF_OURS = ("bench/", "vision/", "estimator/", "tests/", "docs/", "fixtures/")
@@ -26,7 +27,7 @@ def test_files_and_links_are_there(document):
 
 def test_every_document_is_on_the_site():
     nav = (ROOT / "mkdocs.yml").read_text().split("\nnav:")[1]
-    named = re.findall(r"([\w]+\.md)$", nav, flags=re.MULTILINE)
+    named = re.findall(r"([\w-]+\.md)$", nav, flags=re.MULTILINE)
     written = {path.name for path in (ROOT / "docs").glob("*.md")}
     assert set(named) == written | MADE_FROM_CODE
 
