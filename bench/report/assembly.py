@@ -11,6 +11,7 @@ from bench.base.tables import sigma_name, write_table
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from estimator.distance import cartesian, contact_point
 from vision.fit.covariance import CAUSES
+from vision.geometry.reasons import Reason
 from vision.truth.value import NAN, UNKNOWN, Value
 
 # Column and field of the value; in the table each is followed by its sigma.
@@ -165,7 +166,7 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         yield row
 
 
-def status_of(seen: SeenWhisk, felt: FeltWhisk) -> str:
+def status_of(seen: SeenWhisk, felt: FeltWhisk) -> Reason:
     """What is doubtful of a whisk, seen and felt, each thing once."""
     return in_one_status(seen.status, felt.status)
 

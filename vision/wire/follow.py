@@ -185,10 +185,13 @@ def noise_of(grey: np.ndarray) -> Noise:
 def _refuse_nothing(count: int, contrast: float, start_px, end_px) -> None:
     where = f"between ({start_px[0]:.0f}, {start_px[1]:.0f}) and ({end_px[0]:.0f}, {end_px[1]:.0f})"
     if count < _FEWEST:
-        raise Refused(f"{count} pieces of a line are seen {where}, {_FEWEST} are needed")
+        raise Refused(
+            f"{count} pieces of a line are seen {where}, {_FEWEST} are needed", code="no_line_seen"
+        )
     if contrast < _LEAST_CONTRAST:
         raise Refused(
-            f"no line stands out {where}: {contrast:.1f} times the noise, {_LEAST_CONTRAST:.0f} are needed"
+            f"no line stands out {where}: {contrast:.1f} times the noise, {_LEAST_CONTRAST:.0f} are needed",
+            code="no_line_seen",
         )
 
 
@@ -198,7 +201,8 @@ def _cheapest_path(grey, start_px, end_px) -> np.ndarray:
     size = np.array(grey.shape[::-1])
     if np.any(ends < 0) or np.any(ends > size - 1):
         raise Refused(
-            f"an end of the line lies outside the picture of {size[0]} x {size[1]} px: {ends.tolist()}"
+            f"an end of the line lies outside the picture of {size[0]} x {size[1]} px: {ends.tolist()}",
+            code="line_outside_picture",
         )
     low = np.maximum(np.floor(ends.min(axis=0)) - _AROUND_PX, 0).astype(int)
     high = np.minimum(np.ceil(ends.max(axis=0)) + _AROUND_PX + 1, size).astype(int)
