@@ -2,7 +2,10 @@
 
 
 class NamedReason(str):
-    """Text of a sentence for people, with its code for programs, which does not change with the words."""
+    """Text of a sentence for people, with its code for programs.
+
+    The code does not change with the words.
+    """
 
     code: str
 

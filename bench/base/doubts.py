@@ -10,7 +10,7 @@ from vision.geometry.reasons import Reason, joined
 
 
 def in_one_status(*said: str | None) -> Reason:
-    """Return several statuses as one with the codes of all, each once; what is empty is left out."""
+    """Return several statuses as one with the codes of all, each once, and none that is empty."""
     return joined(*dict.fromkeys(filter(None, said)))
 
 
@@ -43,5 +43,5 @@ class Doubts:
         return given
 
     def note(self, line: str) -> None:
-        """Keep a line that the user should read, a `Reason` where it has a code; the run goes on."""
+        """Keep a line that the user should read (with a code: a `Reason`); the run goes on."""
         self.notes.append(line)

@@ -409,7 +409,7 @@ def status_of_code(code: str) -> Status:
 
 
 def reason(code: str, **numbers: object) -> Reason:
-    """Return the status of a code, its sentence as it stands in the table with numbers filled in."""
+    """Return the status of a code, its sentence from the table with numbers filled in."""
     return Reason(code, STATUSES[code].sentence.format(**numbers))
 
 

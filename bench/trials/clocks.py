@@ -153,7 +153,10 @@ def _wider(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
 
 
 def shared_doubt(results: Sequence[TrialResult], shared: SharedTouch | None) -> Reason:
-    """Return what to say of an error that all whisks share, with its most probable causes; nothing where there is none."""
+    """Return what to say of an error that all whisks share, with its most probable causes.
+
+    Nothing is said where there is no such error.
+    """
     if shared is None or not shared.is_error:
         return NO_REASON
     forward = [shared.at(row[3]) for row in _rows(results) if row[3] > 0]

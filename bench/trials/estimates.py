@@ -301,7 +301,7 @@ def _asked(name: str, estimator: Estimator, whisk: Whisk, told: EstimatorSetting
 
 
 def held_to_its_word(estimate: Estimate, length_mm: float) -> Estimate:
-    """Return the estimate with NaN for a distance or a sigma that can be none, and a status on each."""
+    """Return the estimate with NaN for a distance or a sigma that is none, and a status on each."""
     d_x, sigma = _float(estimate.d_x_mm), _float(estimate.sigma_mm)
     status = as_reason(estimate.status)
     if not (np.isfinite(d_x) and d_x > 0):
