@@ -10,14 +10,16 @@ from dataclasses import replace
 from math import hypot, isnan, nan, sqrt
 
 from estimator import distance, first_order, uncertainty
+from estimator.reasons import NamedReason
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
-BEYOND = "longer than the whisker: (2) ignores slip"
-TIP = (
+BEYOND = NamedReason("longer_than_whisker", "longer than the whisker: (2) ignores slip")
+TIP = NamedReason(
+    "tip_contact",
     "tip contact: the distance came out as {:.1f} mm, longer than the whisker, and was set to its length; "
-    "farther than {:.1f} mm (95 %)"
+    "farther than {:.1f} mm (95 %)",
 )
-NEARER = "known only to be nearer than {:.1f} mm (95 %)"
+NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} mm (95 %)")
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

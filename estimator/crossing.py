@@ -10,10 +10,13 @@ from numpy.typing import ArrayLike
 from scipy.linalg import solve_banded
 
 from estimator.onset import Touch, columns, felt_touch, usable
+from estimator.reasons import NamedReason
 
 FILTER_ORDER = 2
 THRESHOLD_IN_SIGMAS = 10.0
-NOT_CROSSED = "never touches: the filtered moment does not cross the threshold"
+NOT_CROSSED = NamedReason(
+    "threshold_not_crossed", "never touches: the filtered moment does not cross the threshold"
+)
 
 
 def zero_phase_lowpass(x: ArrayLike, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:

@@ -18,12 +18,19 @@ import numpy as np
 
 from estimator import distance, first_order, uncertainty
 from estimator.beam import Beam
+from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
-NOT_TOLD = "nobody says how the object moves (object_velocity_mm_s)"
-RUNS_AWAY = "an object that moves as told would be touched nowhere on the whisker"
-AMBIGUOUS = "or {:.1f} mm: an object that runs away is felt alike at both"
+NOT_TOLD = NamedReason(
+    "motion_not_stated", "nobody says how the object moves (object_velocity_mm_s)"
+)
+RUNS_AWAY = NamedReason(
+    "object_runs_away", "an object that moves as told would be touched nowhere on the whisker"
+)
+AMBIGUOUS = NamedReason(
+    "two_distances", "or {:.1f} mm: an object that runs away is felt alike at both"
+)
 _BESIDE = 0.1  # of the distance: at one as near the object would run at nine tenths of the whisker's own speed
 _HELD_SIGMAS = 2.0  # of m_y, as in `estimator.builtin.is_held`
 _STEPS = np.array(

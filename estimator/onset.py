@@ -10,12 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import noise
+from estimator.reasons import NamedReason
 
-TOO_FEW = "too few samples to find a touch"
-NO_RISE = "never touches: the moments do not rise above their noise"
-NO_FREE_STROKE = "touching from the start: no free stroke to measure the rise from"
-SHORT_RISE = "touches too near the end of the stroke to fit the rise"
-VAGUE = "no clear onset: the touch angle is uncertain by more than a third of the fitted rise"
+TOO_FEW = NamedReason("too_few_samples", "too few samples to find a touch")
+NO_RISE = NamedReason("no_rise", "never touches: the moments do not rise above their noise")
+NO_FREE_STROKE = NamedReason(
+    "no_free_stroke", "touching from the start: no free stroke to measure the rise from"
+)
+SHORT_RISE = NamedReason("rise_too_short", "touches too near the end of the stroke to fit the rise")
+VAGUE = NamedReason(
+    "onset_vague",
+    "no clear onset: the touch angle is uncertain by more than a third of the fitted rise",
+)
 
 WINDOW_RAD = np.radians(2.0)
 WINDOW_S = 0.06

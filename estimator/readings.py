@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 
 from estimator import noise
 from estimator.onset import GUARD_RAD, MIN_FREE_SAMPLES, Rise, Touch, columns, free_level, usable
+from estimator.reasons import NamedReason
 from estimator.signal import MIN_SAMPLES, MomentAt, moment_at
+
+NO_FREE_FORCE = NamedReason("no_free_force", "no free stroke to read the force's zero from")
 
 
 def force_at(
@@ -28,7 +31,7 @@ def force_at(
     motor, samples = columns(motor_rad, forces)
     free = usable(motor, samples) & (motor < touch.motor_rad - GUARD_RAD)
     if not touch.status and np.count_nonzero(free) < MIN_FREE_SAMPLES:
-        touch = replace(touch, status="no free stroke to read the force's zero from")
+        touch = replace(touch, status=NO_FREE_FORCE)
     if not touch.status:
         nothing = np.zeros(samples.shape[1])
         untold = Rise(nothing, nothing, np.zeros(len(motor)), noise.Memory.of(motor, samples, free))

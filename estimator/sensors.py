@@ -10,11 +10,14 @@ import numpy as np
 
 from estimator import distance, load_cell
 from estimator.builtin import TIP, with_friction
+from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
-NO_CELL = "no force at the base was recorded (f_x_N, f_y_N, f_z_N)"
-NO_RATE = "the rate of the moment is not known"
+NO_CELL = NamedReason(
+    "no_force_recorded", "no force at the base was recorded (f_x_N, f_y_N, f_z_N)"
+)
+NO_RATE = NamedReason("no_moment_rate", "the rate of the moment is not known")
 
 
 def touch_alone(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

@@ -12,6 +12,7 @@ from estimator import noise
 from estimator.crossing import threshold_touch, touch_on_rate, zero_phase_lowpass
 from estimator.domain import require_positive
 from estimator.onset import Touch, columns, felt_touch, speed, usable
+from estimator.reasons import NamedReason
 
 __all__ = [
     "MomentAt",
@@ -26,7 +27,7 @@ __all__ = [
 HUM_PERIOD_S = 0.02
 HALF_WINDOW_RAD = np.radians(0.5)
 MIN_SAMPLES = 3
-NOT_REACHED = "the stroke does not reach the pushing angle"
+NOT_REACHED = NamedReason("angle_not_reached", "the stroke does not reach the pushing angle")
 
 
 @dataclass(frozen=True)

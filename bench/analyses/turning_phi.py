@@ -17,6 +17,7 @@ from bench.base.settings import TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow, FeltAt
 from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95
+from vision.geometry.reasons import Reason, joined
 from vision.truth.value import UNKNOWN, Value
 
 _FEWEST = 4  # angles, for three numbers and what is left
@@ -72,11 +73,12 @@ def with_turn(
     sure = abs(rate.value) > _quantile(np.inf) * spread
     if not (sure and off * row.d_x_est_mm.value > _MATTERS * row.d_x_est_mm.sigma):
         return widened
-    said = (
+    said = Reason(
+        "phi_turns",
         f"phi turns by {np.degrees(rate.value * theta_rad):+.1f} deg over the push: the object leans along the "
-        f"whisker or is curved to the side, and (10) may be {100 * off:.0f} % off"
+        f"whisker or is curved to the side, and (10) may be {100 * off:.0f} % off",
     )
-    return replace(widened, status="; ".join(filter(None, [row.status, said])))
+    return replace(widened, status=joined(row.status, said))
 
 
 def _widened(row: EstimateRow, share: float, length_mm: float) -> EstimateRow:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench.base.errors import BadInput
+from vision.geometry.reasons import Reason, joined
 
 
-def in_one_status(*said: str | None) -> str:
-    """Sentences as one status, each once; what is empty is left out."""
-    return "; ".join(dict.fromkeys(filter(None, said)))
+def in_one_status(*said: str | None) -> Reason:
+    """Return several statuses as one with the codes of all, each once, and none that is empty."""
+    return joined(*dict.fromkeys(filter(None, said)))
 
 
 @dataclass
@@ -42,5 +43,5 @@ class Doubts:
         return given
 
     def note(self, line: str) -> None:
-        """Keep a line that the user should read; the run goes on."""
+        """Keep a line that the user should read (with a code: a `Reason`); the run goes on."""
         self.notes.append(line)

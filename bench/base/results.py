@@ -28,7 +28,13 @@ SEEING = (
         "bench/trials/still_scene.py",
         "bench/trials/seeing.py",
     ),
-    *("bench/records", "bench/base/doubts.py", "bench/base/results.py", "bench/base/settings.py"),
+    *(
+        "bench/records",
+        "bench/base/doubts.py",
+        "bench/base/statuses.py",
+        "bench/base/results.py",
+        "bench/base/settings.py",
+    ),
     *(
         "bench/trials/one_camera.py",
         "estimator/seen_shape.py",

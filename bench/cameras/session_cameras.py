@@ -34,6 +34,7 @@ from vision.calibration.cameras_file import read_cameras
 from vision.calibration.place import Placement, by_board, placed
 from vision.geometry.camera import Cameras
 from vision.geometry.counted import counted
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation, skew
 
@@ -232,15 +233,16 @@ def moved_cameras(
     return moved
 
 
-def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -> str:
-    """Sentence on a camera that moved, or ''."""
+def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -> Reason:
+    """Return what to say of a camera that moved; nothing where it did not."""
     camera, T = calibration.cameras[name], calibration.T_rig_board
     points = session.board.corners_mm @ T[:, :3].T + T[:, 3]
     corners = refine_corners(grey, camera.project(points), np.arange(len(points)), session.board)
     try:
         shift_px, sigma_px = camera_moved(camera, corners, session.board, T)
     except Refused:
-        return ""
+        return NO_REASON
     if shift_px <= max(_MOVED_PX, _MOVED_SIGMAS * sigma_px):
-        return ""
-    return f"camera {name} moved and was left out: the rig board is {shift_px:.2f} ± {sigma_px:.2f} px off"
+        return NO_REASON
+    off = f"the rig board is {shift_px:.2f} ± {sigma_px:.2f} px off"
+    return Reason("camera_moved", f"camera {name} moved and was left out: {off}")

@@ -43,13 +43,14 @@ def evaluate(
     progress: bool = False,
     figure_formats: Sequence[str] = (),
     announce: Callable[[str], object] = print,
+    verdict_alone: bool = False,
     trials: Collection[str] | None = None,
 ) -> int:
     """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful; raises BadInput.
 
     dask: address of a Dask cluster's scheduler, in place of `workers`. figure_formats: of figures for a paper, beside
-    the others; announce: is given what is to be seen at a glance; trials: names of those that the session is taken to
-    have; None: all.
+    the others; announce: is given what is to be seen at a glance, or of that the verdict alone; trials: names of those
+    that the session is taken to have; None: all.
     """
     estimators(settings.estimators)
     if dask is not None:
@@ -66,7 +67,7 @@ def evaluate(
             summary = _evaluated(views[0], units, out, settings, pool, doubts, figure_formats)
         else:
             summary = _array(views, recorded, out, settings, pool, doubts, figure_formats)
-    announce(summary.on_screen(out))
+    announce("\n".join(summary.verdict) if verdict_alone else summary.on_screen(out))
     return DOUBTFUL if summary.doubtful else DONE
 
 

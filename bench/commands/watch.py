@@ -143,12 +143,13 @@ def watch(
         announce(f"{len(ready)} complete: {', '.join(ready)}")
         try:
             code = evaluate(
-                session_path, out, settings, trials=set(ready), announce=_verdict(announce), **told
+                session_path,
+                out,
+                settings,
+                trials=set(ready),
+                announce=announce,
+                verdict_alone=True,
+                **told,
             )
         except (BadInput, Refused) as problem:
             announce(f"not yet: {problem}")
-
-
-def _verdict(announce: Callable[[str], object]) -> Callable[[str], object]:
-    """Of a summary its first lines alone."""
-    return lambda text: announce(text.split("\n\n")[0])

@@ -21,9 +21,11 @@ from vision.fit.problem import BAR, REST, Problem, State
 from vision.fit.solve import weighted_jacobian
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import is_before
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.one_view import seen_from_one_side
+from vision.truth.observe import NOT_CONVERGED
 from vision.truth.records import WhiskTruth
 from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early
 from vision.truth.truth_rows import to_whisk
@@ -31,6 +33,7 @@ from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import require_both_rods
 
 _USUAL = VisionSettings()
+_ALL_BEHIND = Reason("all_cameras_behind", "all cameras have the whisker behind them")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,18 +58,16 @@ def expected(
         camera.name for camera in cameras if is_before(camera, staged.rods.wire, staged.motor_rad)
     ]
     if not facing:
-        return Expected(WhiskTruth(0, None, status="all cameras have the whisker behind them"), {})
+        return Expected(WhiskTruth(0, None, status=_ALL_BEHIND), {})
     cameras, curves = cameras.subset(facing), curves_of(staged, near_frames(staged))
     sights = {camera.name: sight_of(camera, staged, curves, settings, hides) for camera in cameras}
     try:
         fitted = _fitted(staged, cameras, lines, sights, curves)
     except Refused as reason:
-        return Expected(WhiskTruth(0, None, cameras=len(cameras), status=str(reason)), sights)
+        return Expected(WhiskTruth(0, None, cameras=len(cameras), status=reason.reason), sights)
     except np.linalg.LinAlgError:
         return Expected(
-            WhiskTruth(
-                0, None, cameras=len(cameras), status="the fit of wire and bar does not settle"
-            ),
+            WhiskTruth(0, None, cameras=len(cameras), status=NOT_CONVERGED),
             sights,
         )
     every = range(len(staged.motor_rad))
@@ -102,7 +103,7 @@ def _fitted(
     require_both_rods(seen)
     touches = staged.motor_rad[frames] > staged.touch.motor_rad
     if not np.any(touches):
-        raise Refused(NEVER_TOUCHES)
+        raise Refused(NEVER_TOUCHES, code="never_touches")
     alike = [lines[name].alike if name in lines else 0.0 for name in cameras.names]
     problem = Problem(
         cameras,

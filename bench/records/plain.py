@@ -1,4 +1,8 @@
-"""Records as JSON has them, and back: a `Value` is two keys there, its own and that of its sigma, and NaN is null."""
+"""Records as JSON has them, and back.
+
+A `Value` is two keys there, its own and that of its sigma. A `Reason` is two, too: its text, and the
+code and text of each of its sentences. NaN is null.
+"""
 
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -10,6 +14,7 @@ import numpy as np
 
 from bench.base.results import plain
 from bench.base.tables import sigma_name
+from vision.geometry.reasons import Reason, as_reason
 from vision.truth.value import NAN, Value
 
 Record = TypeVar("Record")
@@ -25,7 +30,17 @@ def to_plain(value: object) -> Any:
     return [to_plain(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
 
 
+def codes_name(name: str) -> str:
+    """Return the key of the codes of a status."""
+    return f"{name}_codes"
+
+
 def _keys(field: Field, value: object) -> list[tuple[str, Any]]:
+    if field.type is Reason:
+        return [
+            (field.name, str(value)),
+            (codes_name(field.name), [list(part) for part in as_reason(value).parts]),
+        ]
     if isinstance(value, Value):
         return [(field.name, plain(value.value)), (sigma_name(field.name), plain(value.sigma))]
     return (
@@ -75,7 +90,16 @@ def _field(kind: type, field: Field, hint: Any, table: Mapping) -> list:
         raise ValueError(f"{kind.__name__}: {field.name} is missing")
     if hint in (Value, Value | None):
         return [Value(_number(table[field.name]), _number(table.get(sigma_name(field.name))))]
+    if hint is Reason:
+        return [_reason(table[field.name], table.get(codes_name(field.name)))]
     return [_read(hint, table[field.name])]
+
+
+def _reason(text: str, parts: list | None) -> Reason:
+    """Return a status from its text and its codes. Raise ValueError where a text has none."""
+    if text and parts is None:
+        raise ValueError(f"the status {text!r} has no codes")
+    return Reason.of_parts(parts or [])
 
 
 def _number(value: Any) -> float | np.ndarray:

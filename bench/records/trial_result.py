@@ -12,6 +12,7 @@ from vision.fit.line_noise import LineNoise
 from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth, GaveWay, SeenObject, WireShape
 from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
@@ -102,7 +103,7 @@ class SeenWhisk:
     """
 
     whisk: int
-    status: str = ""
+    status: Reason = NO_REASON
     cameras: int = 0
     frames_used: int = 0
     touch_rad: Value = UNKNOWN
@@ -193,7 +194,7 @@ class EstimateRow:
     d_x_est_mm: Value
     alpha_est_rad: float = NAN
     beta_est_rad: float = NAN
-    status: str = ""
+    status: Reason = NO_REASON
     d_x_est_sigma_alpha_exact_mm: float = NAN
     d_x_est_low_mm: float = NAN
     d_x_est_high_mm: float = NAN
@@ -253,7 +254,7 @@ class FeltWhisk:
     covariance_at: np.ndarray | None = None
     theta_moment_covariance_at: np.ndarray | None = None
     shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    status: str = ""
+    status: Reason = NO_REASON
     saturated: int = 0
     agreement_chi2: float = NAN
     apart: bool = False

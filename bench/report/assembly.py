@@ -12,6 +12,7 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 from bench.report.whisk_tables import BEAM, BUDGET, ESTIMATES, PLACE, TRACK, WHISKS
 from estimator.distance import cartesian, contact_point
 from vision.fit.covariance import CAUSES
+from vision.geometry.reasons import Reason
 from vision.truth.value import NAN, UNKNOWN, Value
 
 # Column and field of the value; in the table each is followed by its sigma.
@@ -98,7 +99,7 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         yield row
 
 
-def status_of(seen: SeenWhisk, felt: FeltWhisk) -> str:
+def status_of(seen: SeenWhisk, felt: FeltWhisk) -> Reason:
     """What is doubtful of a whisk, seen and felt, each thing once."""
     return in_one_status(seen.status, felt.status)
 

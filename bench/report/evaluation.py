@@ -17,6 +17,7 @@ from bench.records.trial_result import FeltWhisk, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
+from vision.geometry.reasons import Reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class Finished:
 
     results: tuple[TrialResult, ...]
     friction: tuple[SurfaceFriction, ...]
-    doubt: str
+    doubt: Reason
 
 
 def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> Finished:
@@ -53,7 +54,7 @@ class Evaluation:
     friction: tuple[SurfaceFriction, ...]
     gauges: Gauges | None
     calibration: SessionCalibration
-    doubts: tuple[str, ...]
+    doubts: tuple[str, ...]  # each a Reason where it has a code
     recordings: Mapping[str, str]
     soft: tuple[Soft, ...] = ()
     shapes: tuple[tuple[TrialResult, FeltWhisk, Curved], ...] = ()

@@ -14,6 +14,7 @@ from bench.report.evaluation import Evaluation
 from bench.report.run_facts import BoardFacts, CameraFacts, GaugeFacts, GaugePoints, RunRecord
 from bench.report.summary.compose import Summary
 from bench.session.session import Session
+from vision.geometry.reasons import as_reason
 
 RECORD, SESSION = "run.json", ".session"
 ARRAY, RUNS = (
@@ -32,6 +33,7 @@ def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) 
         evaluation.settings,
         summary.verdict,
         summary.doubtful,
+        tuple(as_reason(line).codes for line in summary.doubtful),
         summary.sections,
         tuple(figures),
         any(trial.camera_sources for trial in session.trials),

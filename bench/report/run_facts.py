@@ -64,14 +64,19 @@ class GaugeFacts:
 
 @dataclass(frozen=True, eq=False)
 class RunRecord:
-    """verdict, doubts and sections: as the summary has them; figures: names of the pictures in the folder; recordings:
-    hash of each trial's files, by name; results: of each trial's result; versions: by distribution."""
+    """What a run found, and what it was found with.
+
+    verdict, doubts and sections: as the summary has them. doubt_codes: codes of the statuses in each
+    doubt. figures: names of the pictures in the folder. recordings: hash of each trial's files, by
+    name. results: of each trial's result. versions: by distribution.
+    """
 
     session: str
     whisker: Whisker
     settings: Settings
     verdict: tuple[str, ...]
     doubts: tuple[str, ...]
+    doubt_codes: tuple[tuple[str, ...], ...]
     sections: tuple[Section, ...]
     figures: tuple[str, ...]
     has_pictures: bool

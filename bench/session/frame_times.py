@@ -13,6 +13,7 @@ from bench.session.signals import Signals
 from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 from vision.geometry.counted import counted
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
 
@@ -130,7 +131,8 @@ def _common(trial: Trial) -> FrameTimes:
     _check_rate(table[TIME], trial, shown)
     doubts += tuple(_header_rates(table[TIME], trial, trial.camera_sources, shown))
     if repeats:
-        doubts = (*doubts, f"{shown}: {counted(repeats, 'repeated row')} dropped")
+        line = f"{shown}: {counted(repeats, 'repeated row')} dropped"
+        doubts = (*doubts, Reason("rows_repeated", line))
     pictures = {camera: np.arange(len(table)) for camera in trial.camera_sources}
     return FrameTimes(table[TIME], "frames.csv", pictures, doubts=doubts)
 
@@ -201,7 +203,11 @@ def _steady(trial: Trial) -> FrameTimes:
     doubts = (
         ()
         if trial.first_frame_s is not None
-        else (f"{_shown(trial)}: first_frame_s is not given; taken as 0",)
+        else (
+            Reason(
+                "first_frame_not_stated", f"{_shown(trial)}: first_frame_s is not given; taken as 0"
+            ),
+        )
     )
     picture = {camera: np.arange(count) for camera in counts}
     time_s = first_s + np.arange(count) / trial.frame_rate_Hz
@@ -225,7 +231,8 @@ def _from_container(trial: Trial) -> FrameTimes:
     camera = next(iter(times))
     doubt = f"{_shown(trial)}: frame times are those of {trial.camera_sources[camera].name}'s container; "
     picture = {name: np.arange(count) for name in times}
-    doubts = (doubt + "nothing ties them to the signals' clock",)
+    line = doubt + "nothing ties them to the signals' clock"
+    doubts = (Reason("clock_of_container", line),)
     sigma_s = _clock_sigma_s(trial, float(np.median(np.diff(times[camera]))) if count > 1 else 0.0)
     return FrameTimes(
         first_s + times[camera], "container", picture, doubts=doubts, clock_sigma_s=sigma_s
@@ -269,12 +276,12 @@ def _check_count(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str,
     if declared == rows:
         return ()
     if not source.is_dir() and declared == 0:
-        return (f"{trial.shown(source.name)}: the video cannot be opened: truncated or damaged",)
+        line = f"{trial.shown(source.name)}: the video cannot be opened: truncated or damaged"
+        return (Reason("frames_damaged", line),)
     found = decoded_count(source)
     if found == rows:
-        return (
-            f"{trial.shown(source.name)}: the header declares {counted(declared, 'frame')}, there are {found}",
-        )
+        counts = f"the header declares {counted(declared, 'frame')}, there are {found}"
+        return (Reason("frame_count_unlike_header", f"{trial.shown(source.name)}: {counts}"),)
     unlike = f"has {counted(rows, 'row')}, camera {camera} has {counted(found, 'frame')}"
     raise BadInput(f"{unlike}; there must be a row a frame", file=shown)
 
@@ -321,9 +328,10 @@ def _header_rates(
     for name, source in videos.items():
         stated_Hz = declared_rate_Hz(source)
         if stated_Hz and abs(stated_Hz / found_Hz - 1.0) > _HEADER_TOLERANCE:
-            yield (
+            yield Reason(
+                "rate_unlike_header",
                 f"{shown}: frames come at {found_Hz:.4g} Hz, the header of {name} says {stated_Hz:.4g} Hz; the times "
-                "are taken: where they are right, say so by frame_rate_Hz in trial.toml, or in [trial] of session.toml"
+                "are taken: where they are right, say so by frame_rate_Hz in trial.toml, or in [trial] of session.toml",
             )
 
 

@@ -18,6 +18,7 @@ from bench.session.strict_toml import as_keys, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
 from vision.geometry.board import Board
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import invert_transform, nearest_rotation
 from vision.pictures.files import natural_order
@@ -279,9 +280,10 @@ def _check_surfaces(trials: Iterable[Trial], order: Sequence[str], doubts: Doubt
     there = {t.surface for t in trials}
     for name in order:
         if there and name not in there:
-            doubts.note(
-                f"{MANIFEST}: surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}"
+            found = (
+                f"surfaces has {name!r}, which is no trial's; there are {_listed(sorted(there))}"
             )
+            doubts.note(Reason("surface_unused", f"{MANIFEST}: {found}"))
 
 
 def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:
@@ -292,7 +294,8 @@ def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tu
 def _check_cameras(session: Session, named: list[str], doubts: Doubts, lenses_known: bool) -> None:
     for name in named:
         if session.camera_names and name not in session.camera_names:
-            doubts.note(f"{MANIFEST}: [[cameras]] {name!r} has no pictures in boards/ or trials/")
+            line = f"{MANIFEST}: [[cameras]] {name!r} has no pictures in boards/ or trials/"
+            doubts.note(Reason("camera_unused", line))
     for trial in session.trials:
         with doubts.guard():
             _check_trial_cameras(trial, session.camera_names)

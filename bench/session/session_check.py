@@ -7,6 +7,7 @@ from pathlib import Path
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.results import hash_of_files
+from bench.base.statuses import reason
 from bench.session.array_view import load_views
 from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
@@ -14,6 +15,7 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.counted import counted
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.pictures.files import (
     STACK_SUFFIXES,
@@ -67,7 +69,7 @@ def _check(views: Sequence[Session], doubts: Doubts) -> None:
         doubts.note(line)
 
 
-def _copies(session: Session) -> Iterator[str]:
+def _copies(session: Session) -> Iterator[Reason]:
     """A line on trials whose signals are those of another: noise is never the same twice."""
     alike: dict[str, list[Trial]] = {}
     sizes = Counter(trial.signals_path.stat().st_size for trial in session.trials)
@@ -77,7 +79,7 @@ def _copies(session: Session) -> Iterator[str]:
     for trials in alike.values():
         if len(trials) > 1:
             names = ", ".join(trial.name for trial in trials)
-            yield f"trials {names} have one and the same {trials[0].signals_path.name}: all but one have another's"
+            yield reason("signals_copied", names=names, file=trials[0].signals_path.name)
 
 
 def check_recording(trial: Trial, doubts: Doubts) -> None:
@@ -100,9 +102,9 @@ def _note_signals(trial: Trial, signals, doubts: Doubts) -> None:
     for doubt in signals.doubts:
         doubts.note(doubt)
     for cause, count in signals.dropped.items():
-        doubts.note(f"{shown}: {count} {cause} mended")
+        doubts.note(reason("signals_mended", shown=shown, count=count, cause=cause))
     if trial.purpose != "weight" and not signals.doubts and not forward_strokes(signals):
-        doubts.note(f"{shown}: no forward stroke of the motor, so no whisk")
+        doubts.note(reason("no_forward_stroke", shown=shown))
 
 
 def _check_clock(trial: Trial, signals_s, frames_s, doubts: Doubts) -> None:
@@ -119,9 +121,8 @@ def _check_clock(trial: Trial, signals_s, frames_s, doubts: Doubts) -> None:
         )
         raise BadInput(f"{found}. {hint}", file=f"trials/{trial.name}")
     if outside:
-        doubts.note(
-            f"trials/{trial.name}: {counted(outside, 'frame')} taken while no signals were ({found})"
-        )
+        taken = f"{counted(outside, 'frame')} taken while no signals were ({found})"
+        doubts.note(Reason("frames_without_signals", f"trials/{trial.name}: {taken}"))
 
 
 def check_sizes(session: Session, doubts: Doubts) -> None:
@@ -209,10 +210,11 @@ def find_damage(
         try:
             damaged = [index for index, grey in Frames.open(source).read() if grey is None]
         except Refused as problem:
-            doubts.note(f"{shown}: {problem}")
+            doubts.note(Reason("frames_damaged", f"{shown}: {problem}"))
             continue
         if damaged:
-            doubts.note(f"{shown}: frame {_few(damaged)} cannot be read (damaged or cut short)")
+            line = f"{shown}: frame {_few(damaged)} cannot be read (damaged or cut short)"
+            doubts.note(Reason("frames_damaged", line))
 
 
 def _few(indices: list[int], most: int = 5) -> str:

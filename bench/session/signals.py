@@ -17,6 +17,7 @@ from bench.session.plausible import (
 )
 from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
+from vision.geometry.reasons import Reason
 
 TIME, MOTOR = "time_s", "motor_deg"
 VOLTS, MOMENTS = ("y_V", "z_V"), ("m_y_Nmm", "m_z_Nmm")
@@ -188,9 +189,8 @@ def _speed_doubts(speed_deg_s: float, trial: Trial, shown: str) -> tuple[str, ..
         )
     if _is(speed_deg_s, trial.speed_deg_s):
         return ()
-    return (
-        f"{shown}: the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {trial.speed_deg_s:g}",
-    )
+    found = f"the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {trial.speed_deg_s:g}"
+    return (Reason("speed_unlike_stated", f"{shown}: {found}"),)
 
 
 def _measured_speed(time_s: np.ndarray, motor_deg: np.ndarray) -> float:

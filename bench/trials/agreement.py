@@ -13,6 +13,7 @@ from scipy.special import chdtrc
 
 from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix
+from vision.geometry.reasons import NO_REASON, Reason
 
 # Once in ten thousand whisks by chance: a session of 640 is then told of one that is sound in one of fifteen.
 LEAST_CHANCE = 1e-4
@@ -32,11 +33,13 @@ class Agreement:
     cause: str = ""
 
     @property
-    def status(self) -> str:
-        """What to say of the whisk; '' where both agree."""
+    def status(self) -> Reason:
+        """Return what to say of the whisk; nothing where both agree."""
         if self.chance >= LEAST_CHANCE:
-            return ""
-        return f"felt moments are not those of the seen shape (χ² {self.chi2:.0f}, 2 degrees of freedom): {self.cause}"
+            return NO_REASON
+        sentence = f"felt moments are not those of the seen shape (χ² {self.chi2:.0f}, 2 degrees of freedom): {self.cause}"
+        is_explained = self.cause != _OTHERWISE
+        return Reason("gauge_fault" if is_explained else "shape_not_felt", sentence)
 
 
 @dataclass(frozen=True)

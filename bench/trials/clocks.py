@@ -17,6 +17,7 @@ from scipy.special import chdtrc
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import SeenWhisk, TrialResult, whisks
 from vision.geometry.counted import counted
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.value import Value
 
 # Chance by which sound sigmas would show as much: one session in a thousand.
@@ -151,10 +152,13 @@ def _wider(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
     return replace(seen, touch_rad=Value(seen.touch_rad.value, wider), touch_shared_rad=error)
 
 
-def shared_doubt(results: Sequence[TrialResult], shared: SharedTouch | None) -> str:
-    """A sentence on an error that all whisks share, with its likeliest causes; '' where there is none."""
+def shared_doubt(results: Sequence[TrialResult], shared: SharedTouch | None) -> Reason:
+    """Return what to say of an error that all whisks share, with its most probable causes.
+
+    Nothing is said where there is no such error.
+    """
     if shared is None or not shared.is_error:
-        return ""
+        return NO_REASON
     forward = [shared.at(row[3]) for row in _rows(results) if row[3] > 0]
     late, sigma = np.degrees(max(forward, key=lambda one: abs(one[0])))
     clock_ms = 1e3 * shared.values[1]
@@ -173,9 +177,10 @@ def shared_doubt(results: Sequence[TrialResult], shared: SharedTouch | None) -> 
             "likeliest the clock of frames or signals, else diameters or the gauges' onset: strokes of one speed and "
             "direction do not tell which; record back strokes with frames, or another speed"
         )
-    return (
+    return Reason(
+        "touch_apart",
         f"touch felt less seen is {late:+.3f} ± {sigma:.3f}° by {_strokes(shared.whisks, shared.back)} together (sound "
-        f"sigmas show as much in {shared.chance:.0e} of sessions); {cause}. It is in the sigma of touch seen"
+        f"sigmas show as much in {shared.chance:.0e} of sessions); {cause}. It is in the sigma of touch seen",
     )
 
 

@@ -14,6 +14,7 @@ from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.touched.width import in_all
 from vision.truth.value import UNKNOWN, Value
 
@@ -84,17 +85,19 @@ class Difference:
         return causes[best].said(left[best][1]) if np.isfinite(costs[best]) else otherwise
 
 
-def turns_doubt(turns: Turns | None, speed_rad_s: float) -> str:
+def turns_doubt(turns: Turns | None, speed_rad_s: float) -> Reason:
     """The encoder against the pictures: a sentence where the whisker does not turn from frame to frame as the motor
     does, '' where it does. speed_rad_s: of the motor."""
     if turns is None or len(turns.index) < 3:
-        return ""
+        return NO_REASON
     difference = Difference(turns.turn_rad, _without_mean(turns.covariance), len(turns.index) - 1)
     if difference.is_chance:
-        return ""
+        return NO_REASON
     found = f"(χ² {difference.chi2:.0f}, {difference.freedom} degrees of freedom)"
     cause = difference.likeliest(list(_turn_causes(turns, speed_rad_s)))
-    return f"the whisker is not seen to turn as the motor does {found}: {cause}"
+    return Reason(
+        "turns_unlike_motor", f"the whisker is not seen to turn as the motor does {found}: {cause}"
+    )
 
 
 def _without_mean(covariance: np.ndarray) -> np.ndarray:
@@ -172,23 +175,24 @@ def _another_time(frame: int, speed_rad_s: float) -> Callable[[float], str]:
     )
 
 
-def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> str:
+def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> Reason:
     """The bar against its diameter: a sentence where it looks thicker or thinner than said, '' where it does not, or
     where no camera tells. bar_looks: how thick over how thick it is said to be, by camera."""
     if not bar_looks:
-        return ""
+        return NO_REASON
     looks, looks_sigma = in_all({name: (one.value, one.sigma) for name, one in bar_looks.items()})
     logs, variances = _logs(bar_looks)
     if not _agree(logs, variances):
         low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))
         found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
-        return f"{found}: check its diameter_mm, or something else is taken for it"
+        sentence = f"{found}: check its diameter_mm, or something else is taken for it"
+        return Reason("bar_width_unlike_stated", sentence)
     sigma = float(
         np.hypot(looks_sigma / looks, trial.bar_diameter_sigma_mm / trial.bar_diameter_mm)
     )
     difference = Difference(np.array([np.log(looks)]), np.array([[sigma**-2.0]]), 1)
     if difference.is_chance:
-        return ""
+        return NO_REASON
     factor = float(np.exp(difference.values[0]))
     scale = (
         f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
@@ -197,63 +201,67 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
     )
     bar = f"some {trial.bar_diameter_mm * factor:.3g} for {trial.bar_diameter_mm:g}"
     found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
-    return f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
+    sentence = f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
+    return Reason("bar_width_unlike_board" if board else "bar_width_unlike_stated", sentence)
 
 
-def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> str:
+def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> Reason:
     """The whisker's diameter as seen against its own: a sentence where cameras that agree with each other see a thinner
     one, or the only one that tells; '' where they do not, or none tells. Shadows beside a wire, bloom and movement make
     it look thicker, in all cameras alike, and nothing thinner. looks: how thick over how thick it is said to be, by
     camera."""
     if not looks:
-        return ""
+        return NO_REASON
     logs, variances = _logs(looks)
     stated = (whisker.diameter_sigma_mm / whisker.diameter_mm) ** 2
     of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
     if of_all.is_chance or not _agree(logs, variances):
-        return ""
+        return NO_REASON
     factor, sigma = (
         float(np.exp(np.average(logs, weights=1.0 / variances))),
         float(np.sum(1.0 / variances) ** -0.5),
     )
     if factor > 1.0:
-        return ""
+        return NO_REASON
     found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
     cure = f"its diameter_mm would have to be some {whisker.diameter_mm * factor:.2g} for {whisker.diameter_mm:g}"
-    return f"the whisker looks {found}: {cure}"
+    return Reason("wire_width_unlike_stated", f"the whisker looks {found}: {cure}")
 
 
-def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> str:
+def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> Reason:
     """The whisker's end as seen against its length: a sentence where they are apart, '' where they are not, or where
     no two cameras see it end in one place: before something dark a dark wire seems to end. ends: by camera, mm from
     the base."""
     if len(ends) < 2:
-        return ""
+        return NO_REASON
     places, sigmas = (
         np.array([getattr(end, name) for end in ends.values()]) for name in ("value", "sigma")
     )
     if not _agree(places, sigmas**2):
-        return ""
+        return NO_REASON
     sigma = float(np.hypot(np.max(sigmas), whisker.length_sigma_mm))
     seen_mm = float(np.average(places, weights=sigmas**-2.0))
     if Difference(np.array([seen_mm - whisker.length_mm]), np.array([[sigma**-2.0]]), 1).is_chance:
-        return ""
+        return NO_REASON
     found = f"{seen_mm:.0f} ± {sigma:.0f} mm from its base"
-    return f"the whisker is seen to end {found}, length_mm says {whisker.length_mm:g}"
+    return Reason(
+        "length_unlike_stated",
+        f"the whisker is seen to end {found}, length_mm says {whisker.length_mm:g}",
+    )
 
 
-def slope_doubt(beta: Value, trial: Trial) -> str:
+def slope_doubt(beta: Value, trial: Trial) -> Reason:
     """The bar's slope as seen against trial.toml's: a sentence where they are apart, '' where they are not, or where
     one of them is not known."""
     nominal = nominal_slope(trial)
     apart = beta.value - nominal.value
     if not np.isfinite(apart):
-        return ""
+        return NO_REASON
     difference = Difference(
         np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal.sigma**2)]]), 1
     )
     if difference.is_chance:
-        return ""
+        return NO_REASON
     seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
     mirrored = replace(difference, values=np.array([beta.value + nominal.value]))
     cause = (
@@ -261,19 +269,22 @@ def slope_doubt(beta: Value, trial: Trial) -> str:
         if mirrored.is_chance
         else "check it, or something else is taken for the bar"
     )
-    return f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}"
+    return Reason(
+        "slope_unlike_stated",
+        f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}",
+    )
 
 
-def cone_doubt(phi: Value, beta: Value, what: str) -> str:
+def cone_doubt(phi: Value, beta: Value, what: str) -> Reason:
     """Direction of deflection or force against the cone of friction about the bar's normal: a sentence where it leaves
     even the widest cone, with what would bring it back; '' where it does not, or where one of them is not known."""
     sigma = float(np.hypot(phi.sigma, beta.sigma))
     off = _from_normal(phi.value, beta)
     if not np.isfinite(off) or off <= _STEEPEST_FRICTION_RAD:
-        return ""
+        return NO_REASON
     beyond = Difference(np.array([off - _STEEPEST_FRICTION_RAD]), np.array([[sigma**-2.0]]), 1)
     if beyond.is_chance:
-        return ""
+        return NO_REASON
     angles = f"φ {what} is {np.degrees(phi.value):.0f}°, {np.degrees(off):.0f}° from the normal of a bar at β = "
     others = {"y": -phi.value, "z": np.pi - phi.value, "y and z": np.pi + phi.value}
     within = [
@@ -282,7 +293,8 @@ def cone_doubt(phi: Value, beta: Value, what: str) -> str:
         if _from_normal(other, beta) <= _STEEPEST_FRICTION_RAD
     ]
     cause = f"; {' or '.join(within)} reversed would be within" if within else ""
-    return f"{angles}{np.degrees(beta.value):.0f}°, where no friction holds a whisker (up to μ = 1){cause}"
+    sentence = f"{angles}{np.degrees(beta.value):.0f}°, where no friction holds a whisker (up to μ = 1){cause}"
+    return Reason("force_reversed" if within else "friction_too_large", sentence)
 
 
 def _from_normal(phi_rad: float, beta: Value) -> float:

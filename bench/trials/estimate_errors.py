@@ -5,10 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.base.statuses import has_only_notes
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
-from bench.trials.seen import NO_PICTURES
-
-NO_DOUBTS = ("", NO_PICTURES)  # what the status of a whisk may say that makes nothing doubtful
 
 
 @dataclass(frozen=True)
@@ -51,12 +49,12 @@ class Judged:
 
 
 def is_sound(seen: SeenWhisk, felt: FeltWhisk) -> bool:
-    """Is nothing doubtful of distance and moments, seen and felt? No verdict takes doubtful ones.
+    """Return whether nothing is doubtful of distance and moments, seen and felt.
 
-    A slip that is seen to jump, or not up to the wanted angle, leaves the distance what it is.
+    No verdict takes doubtful ones. Notes make nothing doubtful: a slip that is seen to jump, or not
+    up to the wanted angle, leaves the distance what it is.
     """
-    of_slip = seen.at.status if seen.at is not None else ""
-    return not ({*seen.status.split("; "), felt.status} - {of_slip, *NO_DOUBTS})
+    return has_only_notes(seen.status) and has_only_notes(felt.status)
 
 
 def sound_whisks(results: Iterable[TrialResult]) -> set[tuple[str, int]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
+from bench.base.statuses import reason
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import Stroke, late_by
 from bench.gauges.matrix import GaugeMatrix, to_follicle
@@ -21,6 +22,7 @@ from estimator.distance import felt_slip_angle
 from estimator.signal import Touch
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
+from vision.geometry.reasons import Reason, as_reason, joined
 from vision.truth.value import Value
 
 UNTOLD = (math.nan, 0.0)  # radii of bar and whisker where nobody says
@@ -129,19 +131,19 @@ class Readout:
 
 def felt_whisk(
     stroke: Stroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
-) -> tuple[Touch, Whisk | str]:
+) -> tuple[Touch, Whisk | Reason]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
-    return touch, touch.status or whisk_at(stroke, readout, touch, beam, theta_rad)
+    return touch, as_reason(touch.status) or whisk_at(stroke, readout, touch, beam, theta_rad)
 
 
 def whisk_at(
     stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_rad: float
-) -> Whisk | str:
+) -> Whisk | Reason:
     """`felt_whisk` of a touch that is known."""
     at = stroke.at(theta_rad, touch)
     if at.status:
-        return at.status
+        return as_reason(at.status)
     moments = (stroke.filtered - touch.offset) @ readout.matrix.T
     m_y, m_z = readout.matrix @ at.values
     return Whisk(
@@ -289,7 +291,8 @@ def _asked(name: str, estimator: Estimator, whisk: Whisk, told: EstimatorSetting
     except (
         Exception
     ) as fault:  # someone's own code: a whisk on which it fails has no estimate, the others do
-        return Estimate(math.nan, math.nan, f"{name} raised {type(fault).__name__}: {fault}")
+        raised = f"{type(fault).__name__}: {fault}"
+        return Estimate(math.nan, math.nan, reason("estimator_raised", name=name, fault=raised))
     if not isinstance(estimate, Estimate):
         raise BadInput(
             f"--estimator {name} returned {type(estimate).__name__}; it must return an Estimate"
@@ -298,31 +301,28 @@ def _asked(name: str, estimator: Estimator, whisk: Whisk, told: EstimatorSetting
 
 
 def held_to_its_word(estimate: Estimate, length_mm: float) -> Estimate:
-    """The estimate, its status telling what no distance or no sigma can be. What is none becomes NaN."""
+    """Return the estimate with NaN for a distance or a sigma that is none, and a status on each."""
     d_x, sigma = _float(estimate.d_x_mm), _float(estimate.sigma_mm)
-    estimate = replace(estimate, d_x_mm=d_x, sigma_mm=sigma, status=str(estimate.status))
+    status = as_reason(estimate.status)
     if not (np.isfinite(d_x) and d_x > 0):
-        said = (
-            "gave no distance and no reason"
-            if math.isnan(d_x)
-            else f"gave {d_x:g} mm, which is no distance"
-        )
-        return replace(estimate, d_x_mm=math.nan, sigma_mm=math.nan, status=estimate.status or said)
-    doubts = (
-        [] if np.isfinite(sigma) and sigma > 0 else [f"gave a sigma of {sigma:g} mm, which is none"]
-    )
-    if d_x > length_mm and not estimate.status:
-        doubts.append(f"gave {d_x:.1f} mm, past the whisker's length of {length_mm:g} mm")
-    sigma = math.nan if doubts and "sigma" in doubts[0] else sigma
+        if math.isnan(d_x):
+            why_none = reason("no_distance_given")
+        else:
+            why_none = reason("distance_impossible", d_x_mm=d_x)
+        return replace(estimate, d_x_mm=math.nan, sigma_mm=math.nan, status=status or why_none)
+    warnings = []
+    if not (np.isfinite(sigma) and sigma > 0):
+        warnings.append(reason("sigma_impossible", sigma_mm=sigma))
+        sigma = math.nan
+    if d_x > length_mm and not status:
+        warnings.append(reason("past_whisker", d_x_mm=d_x, length_mm=length_mm))
     if estimate.deflection_mm is not None and not _is_measured(
         estimate.deflection_mm, estimate.deflection_sigma_mm
     ):
         given = f"{estimate.deflection_mm} ± {estimate.deflection_sigma_mm} mm"
-        doubts.append(f"gave a deflection of {given}, which is none")
+        warnings.append(reason("deflection_impossible", given=given))
         estimate = replace(estimate, deflection_mm=None, deflection_sigma_mm=None)
-    return replace(
-        estimate, sigma_mm=sigma, status="; ".join(filter(None, [estimate.status, *doubts]))
-    )
+    return replace(estimate, d_x_mm=d_x, sigma_mm=sigma, status=joined(status, *warnings))
 
 
 def _is_measured(pair, sigmas) -> bool:

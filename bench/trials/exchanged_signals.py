@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from bench.base.statuses import reason
 from bench.gauges.felt import strokes_of
 from bench.gauges.gauge_readings import pairs_of
 from bench.records.trial_result import TrialResult
@@ -28,7 +29,7 @@ def exchanged_signals(units: Sequence[Unit], results: Sequence[TrialResult]) -> 
     for one, other in combinations(apart, 2):
         if _fits(*one, other[0]) and _fits(*other, one[0]):
             names = f"{one[0].trial.name} and {other[0].trial.name}"
-            yield f"the signals of trials {names} look exchanged: each has the moments of the shape seen in the other"
+            yield reason("signals_exchanged", names=names)
 
 
 def _is_apart(result: TrialResult) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from bench.base.doubts import Doubts
 from bench.base.results import read_result, write_result
+from bench.base.statuses import reason
 from bench.base.workers import MOST_DEATHS, Workers
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import FeltTrial, FeltWhisk, SeenTrial, TrialResult
@@ -14,17 +15,14 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.trials.seen import unseen
 from bench.trials.unit import Unit, described, evaluate_unit, see_unit
 
-LOST = (
-    f"no result: the process that looked at the trial died {MOST_DEATHS} times, as it does where memory runs out; the "
-    "same command tries again"
-)
+LOST = reason("trial_lost", deaths=MOST_DEATHS)
 
 
 def seen_units(units: Sequence[Unit], pool: Workers, name: str, doubts: Doubts) -> list[SeenTrial]:
     """The seen half of every unit; a doubt for each whose process died. name: of the step."""
     seen = pool.run(see_unit, units, name, lost=_seen_lost)
     for unit, one in zip(units, seen):
-        line = f"{unit.trial.name}, among the {name}: {LOST}"
+        line = LOST.about(f"{unit.trial.name}, among the {name}")
         if one.notes == (LOST,) and line not in doubts.notes:
             doubts.note(line)
     return seen

@@ -31,6 +31,7 @@ from bench.trials.free_strokes import free_strokes
 from bench.trials.lost import seen_units
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit, kept_seen
+from vision.geometry.reasons import Reason
 
 _MORE = "or let the other trials serve: --gauges-from-all"
 _MOST_NAMED = 8  # trials in one line
@@ -143,7 +144,8 @@ def session_gauges(
         made = certified(trials, rate, pool, doubts)
     except Undetermined as reason:
         more = any(_has_volts(unit) for unit, one in zip(units, serves) if not one)
-        doubts.note("; ".join([str(reason), *_lacking(trials), *[_MORE] * more]))
+        line = "; ".join([str(reason), *_lacking(trials), *[_MORE] * more])
+        doubts.note(Reason("gauges_undetermined", line))
         return None, None
     return (replace(made.gauges, source=FROM_ALL) if from_all else made.gauges), made
 

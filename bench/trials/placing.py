@@ -17,6 +17,7 @@ from bench.trials.lost import seen_units
 from bench.trials.unit import Unit
 from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
 from vision.calibration.swing import by_strokes
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform
 
@@ -73,7 +74,7 @@ def place_rig(
     if alone or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
         _check_suffices(both, doubts)
     if both.alarm and not alone:
-        doubts.note(both.alarm)
+        doubts.note(Reason("board_misplaced", both.alarm))
     return placed_here.with_notes(
         *(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays
     )
@@ -97,7 +98,7 @@ def _by_scale(session: Session, board: Placement, strokes: Placement) -> str:
     return apart.likeliest([Cause(said, np.zeros(6), trace, 1)], otherwise="")
 
 
-def _elsewhere(session: Session, calibration: SessionCalibration) -> list[str]:
+def _elsewhere(session: Session, calibration: SessionCalibration) -> list[Reason]:
     """A doubt where no stroke can be read and what turns with the motor is not where the board has the whisker."""
     try:
         first = first_look(session, calibration.cameras)
@@ -106,10 +107,11 @@ def _elsewhere(session: Session, calibration: SessionCalibration) -> list[str]:
     across_mm = float(np.linalg.norm(invert_transform(first.T_rig_world)[1:, 3]))
     if across_mm < _ELSEWHERE_MM:
         return []
-    return [
+    line = (
         f"no free stroke can be read, and what turns with the motor turns about a centre some {across_mm:.0f} mm from "
         "where T_rig_board has it: measure a square of the board and check square_mm, then check T_rig_board"
-    ]
+    )
+    return [Reason("board_misplaced", line)]
 
 
 def _check_suffices(both: Placement, doubts: Doubts) -> None:
@@ -118,7 +120,7 @@ def _check_suffices(both: Placement, doubts: Doubts) -> None:
     except Refused as reason:
         raise BadInput(str(reason), file="trials") from None
     if doubt:
-        doubts.note(doubt)
+        doubts.note(Reason("board_misplaced", doubt))
 
 
 def _settled(

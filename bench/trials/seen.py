@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.base.doubts import in_one_status
 from bench.base.settings import Settings
+from bench.base.statuses import reason
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import (
@@ -34,12 +35,13 @@ from bench.trials.consistency import (
 from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import rungs
 from bench.trials.trial_frames import Shown
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.pictures.others import RodLines
 from vision.truth.observe import observe_trial
 from vision.truth.records import TrialTruth, WhiskTruth
 
-NO_PICTURES = "no pictures"
+NO_PICTURES = reason("no_pictures")
 _MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
 _MOST_NAMED = 5  # frames in a line
 _SAME = tuple(
@@ -66,11 +68,11 @@ def see_trial(
     try:
         shown = Shown.of(session, trial, signals, calibration, settings, wires or {})
         return _see(session, trial, shown, calibration, settings)
-    except Refused as reason:
-        return unseen(count, str(reason))
+    except Refused as refusal:
+        return unseen(count, refusal.reason)
 
 
-def unseen(count: int, status: str) -> SeenTrial:
+def unseen(count: int, status: Reason) -> SeenTrial:
     """So many whisks without a truth, and why."""
     return SeenTrial(tuple(SeenWhisk(number, status) for number in range(count)))
 
@@ -131,7 +133,7 @@ def _see(
     )
 
 
-def _leaning(truth: WhiskTruth, settings: Settings) -> str:
+def _leaning(truth: WhiskTruth, settings: Settings) -> Reason:
     return cone_doubt(truth.at(settings.theta_rad).phi_rad, truth.beta_rad, "seen")
 
 
@@ -181,14 +183,14 @@ def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
 def whisk_record(
     truth: WhiskTruth,
     settings: Settings,
-    doubts: Iterable[str] = (),
-    contradictions: Iterable[str] = (),
+    doubts: Iterable[Reason] = (),
+    contradictions: Iterable[Reason] = (),
 ) -> SeenWhisk:
     """One whisk: at first touch, at the wanted angle, a row a frame, and lines to draw."""
     at = truth.at(settings.theta_rad)
     contradictions = [
         *contradictions,
-        turns_doubt(truth.turns, motor_speed(truth.frames)) if truth.frames else "",
+        turns_doubt(truth.turns, motor_speed(truth.frames)) if truth.frames else NO_REASON,
     ]
     status = in_one_status(truth.status, at.status, *contradictions, *doubts)
     drawn = _overlay(truth, at.theta_rad)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.session.session import Session
+from vision.geometry.reasons import Reason
 from vision.pictures.scene_match import Likeness, exposures, is_blank, likeness, texture
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class StillScene:
     camera that shows another scene than the rig picture; notes: what was made good."""
 
     frames: dict[str, Pictures]
-    left_out: dict[str, str]
+    left_out: dict[str, Reason]
     notes: tuple[str, ...]
 
 
@@ -58,7 +59,8 @@ def still_scene(
             else "none of its frames can be read"
         )
         if doubt:
-            left_out[name] = f"camera {name} was left out: {doubt}"
+            sentence = f"camera {name} was left out: {doubt}"
+            left_out[name] = Reason("camera_left_out", sentence)
         else:
             kept[name], said = evenly_exposed(name, pictures)
             notes += said

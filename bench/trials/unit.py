@@ -14,6 +14,7 @@ import numpy as np
 
 from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_result, write_result
 from bench.base.settings import Settings
+from bench.base.statuses import reason
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.felt import Stroke, gauge_delay, strokes_of, touch_on_the_way_back
 from bench.gauges.gauge_readings import Pairs, pairs_of
@@ -49,12 +50,13 @@ from estimator.builtin import ESTIMATORS
 from estimator.sensors import SENSORS
 from estimator.signal import NOT_REACHED
 from estimator.whisk import Whisk
+from vision.geometry.reasons import NO_REASON, Reason, joined
 from vision.truth.value import NAN, UNKNOWN
 
-NO_GAUGES = "no gauges: there is no gauges.toml, [gauges] or usable gauge trial"
-SATURATED = "the gauges are at their rail at the pushing angle: raise their range, or ask for a smaller --theta-deg"
+NO_GAUGES = reason("no_gauges")
+SATURATED = reason("gauges_at_rail")
 _TEN = "with_friction"  # equation (10)
-OWN_GAUGES = "not judged: without this trial the gauges are not known"
+OWN_GAUGES = reason("own_gauges")
 
 
 @dataclass(frozen=True)
@@ -206,12 +208,13 @@ def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -
     readout, missing = readout_of(unit, kind)
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
-    status = whisk if isinstance(whisk, str) else missing
-    if status == NOT_REACHED and stroke.motor_rad.max() >= touch.motor_rad + theta_rad:
+    status = whisk if isinstance(whisk, Reason) else missing
+    if NOT_REACHED.code in status.codes and stroke.motor_rad.max() >= touch.motor_rad + theta_rad:
         status = SATURATED
     usable = None if status else whisk
     if usable is not None and readout.is_gauged:
-        status = unit.gauges.beyond(readout.in_follicle(usable))
+        beyond = unit.gauges.beyond(readout.in_follicle(usable))
+        status = Reason("beyond_calibration", beyond)
     felt = as_felt(
         number, touch, usable, stroke.speed_rad_s, gauge_delay(unit.trial.gauge_filter_Hz)
     )
@@ -277,7 +280,7 @@ def _against_pictures(
             if seen.deflection is None
             else ""
         )
-        return replace(felt, apart=seen.contradicted or bool(odd), status=_joined(felt.status, odd))
+        return replace(felt, apart=seen.contradicted or bool(odd), status=joined(felt.status, odd))
     whisker, rate = (
         unit.session.whisker,
         np.zeros(2) if unit.drift_rate is None else unit.drift_rate,
@@ -286,7 +289,7 @@ def _against_pictures(
     if pairs is None:
         return felt
     found = against_shape(unit, readout, pairs)
-    status = _joined(felt.status, found.status)
+    status = joined(felt.status, found.status)
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
 
 
@@ -295,18 +298,14 @@ def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> Agreement:
     return agreement(pairs, readout.gauges, _C_share(unit, readout, of_wire=False))
 
 
-def _joined(*statuses: str) -> str:
-    return "; ".join(filter(None, statuses))
-
-
-def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, str]:
+def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, Reason]:
     """How channels become moments, or why they cannot."""
     if kind == "Nmm":
-        return Readout.bare(), ""
+        return Readout.bare(), NO_REASON
     if unit.gauges is None:
         return None, NO_GAUGES
     fitted = unit.gauges.for_trial(unit.trial.name)
-    return (Readout.of(unit.trial, fitted), "") if fitted is not None else (None, OWN_GAUGES)
+    return (Readout.of(unit.trial, fitted), NO_REASON) if fitted is not None else (None, OWN_GAUGES)
 
 
 def _with_drift(unit: Unit, stroke: Stroke, readout: Readout) -> WithDrift | None:
@@ -316,7 +315,7 @@ def _with_drift(unit: Unit, stroke: Stroke, readout: Readout) -> WithDrift | Non
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke.with_drift, readout, unit.drift_rate, beam, theta_rad)
     felt = as_felt(0, touch, None, stroke.speed_rad_s, gauge_delay(unit.trial.gauge_filter_Hz))
-    if isinstance(whisk, str):
+    if isinstance(whisk, Reason):
         return WithDrift(felt.touch_felt_rad.value, NAN)
     (row,) = answers(whisk, {_TEN: ESTIMATORS[_TEN]}, unit.settings)
     return WithDrift(felt.touch_felt_rad.value, row.d_x_est_mm.value)

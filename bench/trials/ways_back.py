@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
+from bench.base.statuses import reason
 from bench.gauges.felt import Stroke, gauge_delay, ways_back_of
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk
 from bench.session.signals import Signals
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from bench.trials.unit import Unit
 
 BOTH_WAYS = "both_ways"
-NO_WAY_BACK = "no way back was recorded"
+NO_WAY_BACK = reason("no_way_back")
 
 
 def feel_back(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.base.doubts import in_one_status
+from bench.base.statuses import reason
 from bench.records.trial_result import SeenTrial, SeenWhisk
 from vision.fit.problem import REST_PRIOR_MM
 from vision.pictures.others import Others, RodLines
@@ -44,10 +45,10 @@ def _checked(whisk: SeenWhisk, straight, looked, own: str, radius_mm: float) -> 
     taken = [name for name in others if _lies_on(wires, looked, drawing.frame, name)]
     said = []
     if beside_mm > _MOST_BESIDE_MM:
-        said.append(f"its wire starts {beside_mm:.1f} mm beside its base, check base_mm")
+        said.append(reason("wire_off_its_base", beside_mm=beside_mm))
         taken += [nearest] * (nearest != own and nearest not in taken)
     if taken:
-        said.append(f"its wire may be that of {' or '.join(taken)}")
+        said.append(reason("wire_of_another", names=" or ".join(taken)))
     status = in_one_status(whisk.status, *said)
     return replace(whisk, status=status, contradicted=whisk.contradicted or bool(said))
 

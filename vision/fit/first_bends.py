@@ -101,7 +101,9 @@ def find_rest(
         points, source = _resting_points(sight, curves)
         seen += [Observed(k, number, points.select(source == f)) for k, f in enumerate(motor_rad)]
     if not any(len(one.points) for one in seen):
-        raise Refused("no whisker is seen where the motor angle says it should be")
+        raise Refused(
+            "no whisker is seen where the motor angle says it should be", code="no_whisker_seen"
+        )
     nothing = np.zeros(len(motor), dtype=bool)
     problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
     state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=_REST_SCALES)

@@ -26,19 +26,22 @@ def touch_by_onset(problem: Problem, state: State, covariance: np.ndarray) -> tu
     begins = onset(problem.motor_rad, values, whole)
     if begins is None:
         raise Refused(
-            "no bend of the whisker is seen: it never touches, or bends along the sight of all cameras"
+            "no bend of the whisker is seen: it never touches, or bends along the sight of all cameras",
+            code="no_bend_seen",
         )
     if begins.sigma_rad > _MOST_ONSET_RAD:
         raise Refused(
             f"when the whisker begins to bend is known to {np.degrees(begins.sigma_rad):.1f} deg only, "
-            f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known"
+            f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known",
+            code="bend_onset_vague",
         )
     touching, free = frames_by_touch(problem.motor_rad, begins.motor_rad, 0.5 * begins.sigma_rad)
     if np.sum(free) < FEWEST_FREE:
         at_deg, sigma_deg = np.degrees([begins.motor_rad, begins.sigma_rad])
         raise Refused(
             f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: fewer than "
-            "two frames of free stroke"
+            "two frames of free stroke",
+            code="bends_from_start",
         )
     vector = np.concatenate([state.vector[: problem.first_bend], bend[~free].ravel()])
     return replace(problem, onset=begins, touching=touching, bent=~free), replace(

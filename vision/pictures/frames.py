@@ -93,7 +93,8 @@ class Frames(ABC):
         if size != self.size_px:
             raise Refused(
                 f"frame {index} of {self.path.name} is {_size(size)}, the others are {_size(self.size_px)}: "
-                "one camera gives one size; pictures are never rescaled"
+                "one camera gives one size; pictures are never rescaled",
+                code="picture_size_differs",
             )
 
 

@@ -75,7 +75,8 @@ def see_bar_alone(
             coarse and edges is None
         ):
             raise Refused(
-                f"camera {camera.name} alone does not tell how far away the bar is: its edges are not seen"
+                f"camera {camera.name} alone does not tell how far away the bar is: its edges are not seen",
+                code="bar_distance_unseen",
             )
         axis = found
     return axis

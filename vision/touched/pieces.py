@@ -60,7 +60,10 @@ def bar_pieces(
         view.camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm
     )
     if not np.any(np.isfinite(radius)):
-        raise Refused(f"camera {view.camera.name} would have the bar behind it: check T_camera_rig")
+        raise Refused(
+            f"camera {view.camera.name} would have the bar behind it: check T_camera_rig",
+            code="bar_behind_camera",
+        )
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
     band = _from_whole(
         read_band(view.mean, view.background, middle, place, radius, half), settings.bar_piece_px

@@ -123,7 +123,8 @@ def see_rounded(
     )
     if clearness < _LEAST_CLEAR:
         raise Refused(
-            f"no {_name(rods)} is seen near the whisker; record with it in view of every camera"
+            f"no {_name(rods)} is seen near the whisker; record with it in view of every camera",
+            code="no_object_seen",
         )
     return axis
 
@@ -154,12 +155,14 @@ def _see_ring(
     best = found[int(np.argmax(shares))]
     if np.max(shares) < _LEAST_FILLED:
         raise Refused(
-            f"no {_name(rods)} is seen near the whisker; record with it in view of every camera"
+            f"no {_name(rods)} is seen near the whisker; record with it in view of every camera",
+            code="no_object_seen",
         )
     apart = np.array([np.linalg.norm(one.point_mm - best.point_mm) for one in found]) > _APART_MM
     if np.max(shares[apart], initial=0.0) > _AS_FILLED * np.max(shares):
         raise Refused(
-            f"a {_name(rods)} may be in either of two places; record with all of it in view of every camera"
+            f"a {_name(rods)} may be in either of two places; record with all of it in view of every camera",
+            code="object_in_two_places",
         )
     return best
 

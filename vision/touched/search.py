@@ -128,7 +128,7 @@ def see_bar(
             seen = settled(_alone(view, one, rods, motor_rad, settings))
             found += [seen] if view.camera.name in seen.seen_by else []
     if not found:
-        raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm))
+        raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm), code="no_bar_seen")
     if len(found) > 1 and seen_from_one_side(cameras, found[1].axis):
         found = found[1:]
     clearer = max(found, key=lambda one: one.clearness)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.value import FIELDS, Value, WhileTouching
 
 # [rad] To either side of the wanted angle, of the local fit. Set by eye. Study: thresholds.py
@@ -39,6 +40,7 @@ _FEWEST_FOR_PARABOLA = 5
 _FEWEST_FOR_SCATTER = 12
 
 
+_NO_TOUCHING_FRAME = Reason("no_touching_frame", "the whisker does not touch")
 _ANGLES = ("phi", "alpha")  # of FIELDS; the others are lengths
 
 
@@ -47,7 +49,7 @@ class TruthAtAngle(WhileTouching):
     """Truth at one pushing angle; NaN with a status where the whisk does not hold it."""
 
     theta_rad: float
-    status: str = ""
+    status: Reason = NO_REASON
 
 
 @dataclass(frozen=True)
@@ -61,16 +63,17 @@ class Smooth:
     covariance: np.ndarray
 
 
-def at_angle(smooth: Smooth | None, theta_rad: float, without: str) -> TruthAtAngle:
+def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthAtAngle:
     """Slip, deflection, force angle at pushing angle theta, each with sigma; status where it cannot be had.
 
     without: the status where there is nothing smooth.
     """
     if smooth is None or len(smooth.theta_rad) == 0:
-        return TruthAtAngle(theta_rad=theta_rad, status=without or "the whisker does not touch")
+        return TruthAtAngle(theta_rad=theta_rad, status=without or _NO_TOUCHING_FRAME)
     if theta_rad > np.max(smooth.theta_rad) + _BEYOND_RAD or theta_rad <= 0:
         reached = np.degrees(np.max(smooth.theta_rad))
-        return TruthAtAngle(theta_rad=theta_rad, status=f"pushed to {reached:.2f} deg only")
+        short = Reason("pushed_short", f"pushed to {reached:.2f} deg only")
+        return TruthAtAngle(theta_rad=theta_rad, status=short)
     between = _about(smooth, theta_rad)
     jumps = _jumps(smooth, theta_rad)
     values = {
@@ -80,7 +83,8 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: str) -> TruthAtAn
         for name, field in FIELDS.items()
     }
     first, last = np.degrees(smooth.theta_rad[between][[0, -1]])
-    status = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg" if jumps else ""
+    between_frames = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg"
+    status = Reason("slips_in_jumps", between_frames if jumps else "")
     return TruthAtAngle(theta_rad=theta_rad, **values, status=status)
 
 

@@ -23,6 +23,7 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
 from vision.geometry.contact import drawn_as_bar
 from vision.geometry.counted import counted
+from vision.geometry.reasons import Reason, joined
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
@@ -46,6 +47,9 @@ from vision.wire.trace import lines_of
 # [frames] Of a whisk that every camera sees: two of free stroke, two that touch. Derived.
 _FEWEST_FRAMES = 4
 
+# Why a whisk has no truth whose fit diverges.
+NOT_CONVERGED = Reason("fit_not_converged", "the fit of wire and bar does not settle")
+
 _USUAL = VisionSettings()
 
 
@@ -64,7 +68,7 @@ def observe_trial(
     try:
         seen, bar_seen, _ = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
-        return _nothing(whisks, str(reason))
+        return _nothing(whisks, reason.reason)
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = drawn_as_bar(bar_seen.axis), [whisk.light for whisk in seen]
     looks = seen_over_given(bar_seen)
@@ -154,7 +158,8 @@ def _told(
     stands: of that frame alone. Raises Refused for what is not told of it."""
     if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):
         raise Refused(
-            "an object that moves or gives way is seen where it is a straight bar; this one is none"
+            "an object that moves or gives way is seen where it is a straight bar; this one is none",
+            code="moving_object_not_straight",
         )
     if pictures.object_gives_way:
         return None, _at_first(views, strokes)
@@ -162,11 +167,12 @@ def _told(
         return None, views
     if len(strokes) != 1:
         raise Refused(
-            "an object that moves is seen in recordings of one whisk; record each by itself"
+            "an object that moves is seen in recordings of one whisk; record each by itself",
+            code="moving_object_many_whisks",
         )
     both = [frame for frame in strokes[0] if all(frame in view.frames for view in views)]
     if not both:
-        raise Refused("no frame is seen by every camera")
+        raise Refused("no frame is seen by every camera", code="no_shared_frame")
     middle = both[len(both) // 2]
     velocity, sigma = np.asarray(pictures.object_velocity_mm_s), pictures.object_velocity_sigma_mm_s
     return Told(velocity, sigma, float(pictures.time_s[middle])), in_one_frame(views, middle)
@@ -177,24 +183,27 @@ def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[V
     for frame in (frame for stroke in strokes for frame in stroke[:1]):
         if all(frame in view.frames for view in views):
             return in_one_frame(views, frame)
-    raise Refused("no stroke's first frame is seen by every camera")
+    raise Refused("no stroke's first frame is seen by every camera", code="no_shared_first_frame")
 
 
-def _nothing(whisks, reason: str) -> TrialTruth:
+def _nothing(whisks, reason: Reason) -> TrialTruth:
     rows = tuple(WhiskTruth(number, None, status=reason) for number in range(len(whisks)))
     return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), rows)
 
 
-def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, list[str]]:
+def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, list[Reason]]:
     """The cameras that have the whisker before them, and lines on the others. Raises Refused where none has."""
     faces = {camera.name: is_before(camera, wire, motor_rad) for camera in cameras}
     lines = [
-        f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig"
+        Reason(
+            "whisker_behind_camera",
+            f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig",
+        )
         for name, faced in faces.items()
         if not faced
     ]
     if not any(faces.values()):
-        raise Refused("; ".join(lines))
+        raise Refused("; ".join(lines), code="whisker_behind_camera")
     return cameras.subset([name for name, faced in faces.items() if faced]), lines
 
 
@@ -205,7 +214,8 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
         whisk = whisk.without_gaps()
         if len(whisk.frames) < _FEWEST_FRAMES:
             few = f"{counted(len(whisk.frames), 'frame')} seen by every camera, {_FEWEST_FRAMES} are needed"
-            return WhiskTruth(whisk.number, None, status="; ".join([few, *whisk.left_out]))
+            status = joined(Reason("too_few_frames", few), *whisk.left_out)
+            return WhiskTruth(whisk.number, None, status=status)
         try:
             fitted = fit_whisk(whisk)
             break
@@ -213,22 +223,22 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
             whisk = whisk.with_all_frames()
         except Misled as reason:
             if len(whisk.views) == 1:
-                return _refused(whisk, str(reason))
-            whisk = whisk.without(reason.camera, str(reason))
+                return _refused(whisk, reason.reason)
+            whisk = whisk.without(reason.camera, reason.reason)
         except Refused as reason:
-            return _refused(whisk, str(reason))
+            return _refused(whisk, reason.reason)
         except np.linalg.LinAlgError:
-            return _refused(whisk, "the fit of wire and bar does not settle")
+            return _refused(whisk, NOT_CONVERGED)
     return _truth(whisk, fitted)
 
 
-def _refused(whisk: WhiskPictures, status: str) -> WhiskTruth:
+def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
     return WhiskTruth(
         whisk.number,
         None,
         cameras=len(whisk.views),
         frames_used=len(whisk.frames),
-        status="; ".join([status, *whisk.left_out]),
+        status=joined(status, *whisk.left_out),
     )
 
 
@@ -237,15 +247,20 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     whisk = whisk.yielding_as(fitted.problem, fitted.state)
     truth, unexplained = (
         to_whisk(whisk, fitted),
-        [looks.doubt(name) for name, looks in whisk.light.items()],
+        [Reason("light_unexplained", looks.doubt(name)) for name, looks in whisk.light.items()],
     )
     beam = _beam(fitted) if whisk.settings.check_beam else None
     without = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
     stroke = fitted.problem, fitted.state
     if len(fitted.frames) < len(whisk.frames):
         stroke = free_stroke(whisk, fitted)
-    doubts = [contradiction(fitted.one_less), beam and beam.alarm, *unexplained, *whisk.left_out]
-    status = "; ".join(filter(None, [truth.status, *doubts]))
+    status = joined(
+        truth.status,
+        Reason("cameras_contradict", contradiction(fitted.one_less)),
+        Reason("no_beam", beam.alarm if beam else ""),
+        *unexplained,
+        *whisk.left_out,
+    )
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
     looks = wire_looks(whisk, fitted) if whisk.settings.check_beam and whisk.number == 0 else {}

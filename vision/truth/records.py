@@ -10,6 +10,7 @@ from vision.fit.problem import Problem
 from vision.fit.refinements import LeftOut
 from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
 from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
 
@@ -93,7 +94,7 @@ class WhiskTruth:
     psi_rad: Value = UNKNOWN
     cameras: int = 0
     frames_used: int = 0
-    status: str = ""
+    status: Reason = NO_REASON
     overlay: dict[int, dict[str, dict[str, np.ndarray]]] = field(default_factory=dict)
     smooth: Smooth | None = None
     budget: dict[str, float] = field(default_factory=dict)

@@ -127,11 +127,13 @@ class Outline:
         for name, limb in self.limbs.items():
             if limb.asked >= _ASKED and not len(limb.points):
                 raise Refused(
-                    f"camera {name} shows no edge of the object where the other cameras have it"
+                    f"camera {name} shows no edge of the object where the other cameras have it",
+                    code="no_object_edge",
                 )
         if sum(limb.said for limb in self.limbs.values()) < _LEAST_SAID:
             raise Refused(
-                "no clear outline of the object is seen: too little of its edges stands out"
+                "no clear outline of the object is seen: too little of its edges stands out",
+                code="no_object_outline",
             )
         return {
             name: [(0, 1, limb.points)] for name, limb in self.limbs.items() if len(limb.points)
@@ -176,7 +178,7 @@ class TouchByClearance:
         """Which frames touch, and which are free, (f,) bool each, by coarse bends (f, 2). Raises Refused."""
         touching, free = frames_that_touch(motor_rad, bend_rad)
         if not np.any(touching):
-            raise Refused(NEVER_TOUCHES)
+            raise Refused(NEVER_TOUCHES, code="never_touches")
         return touching, free
 
     def settled(
@@ -194,9 +196,9 @@ class TouchByClearance:
         if bends_tell_more(problem.motor_rad, sigma_rad):
             touching, free = touching | problem.touching & ~free, free | ~problem.bent & ~touching
         if np.sum(free) < FEWEST_FREE:
-            raise Refused(STARTS_TOUCHING)
+            raise Refused(STARTS_TOUCHING, code="starts_touching")
         if not np.any(touching):
-            raise Refused(NEVER_TOUCHES)
+            raise Refused(NEVER_TOUCHES, code="never_touches")
         return touching, free
 
 
@@ -243,7 +245,8 @@ def ways_to_see(whisk: WhiskPictures) -> list[tuple[BarMiddles, Touch]]:
     if isinstance(whisk.bar.axis, Rounded):
         if widest_sights_rad(cameras, whisk.bar.axis.spot_mm) < _LEAST_SIGHTS_RAD:
             raise Refused(
-                "an object that is no straight bar is seen by two cameras or more, from different sides"
+                "an object that is no straight bar is seen by two cameras or more, from different sides",
+                code="object_from_one_side",
             )
         return [
             (Outline(whisk.views, radius_mm, whisk.settings), TouchByClearance(fewest_cameras=2))

@@ -56,7 +56,7 @@ class TrialPictures:
             if len(self.frames.get(camera.name, ())) >= _FEWEST_PICTURES
         )
         if not views:
-            raise Refused("no camera has three frames or more")
+            raise Refused("no camera has three frames or more", code="no_camera_with_frames")
         return views
 
     def _view(self, camera) -> View:

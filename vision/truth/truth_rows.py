@@ -8,6 +8,7 @@ from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape,
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
+from vision.geometry.reasons import Reason, joined
 from vision.geometry.silhouette import normals, outline
 from vision.pictures.pyramid import full_px
 from vision.truth.at_angle import Smooth
@@ -37,10 +38,10 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     touch, beta = _touch(whisk, fitted), fitted.of_whisk("beta")
     frames = _frames(whisk, fitted, touch)
     reasons = [
-        _lost_at_touch(whisk, touch.value),
-        _outside(fitted, touch.value),
-        _slope_unresolved(beta.sigma),
-        _slip_unresolved(frames),
+        Reason("frame_lost_at_touch", _lost_at_touch(whisk, touch.value)),
+        Reason("touch_outside_frames", _outside(fitted, touch.value)),
+        Reason("slope_vague", _slope_unresolved(beta.sigma)),
+        Reason("slip_vague", _slip_unresolved(frames)),
     ]
     lost, outside, _, slip = reasons
     is_known = not (lost or outside or slip) and not beta.sigma > _MOST_SLOPE_SIGMA_RAD
@@ -50,7 +51,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         frames,
         cameras=len(whisk.views),
         frames_used=len(fitted.frames),
-        status="; ".join(filter(None, reasons)),
+        status=joined(*reasons),
         overlay=_overlay(whisk, fitted),
         budget=_budget(fitted),
         lines=line_noise(fitted.problem),

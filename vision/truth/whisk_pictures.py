@@ -15,6 +15,7 @@ from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
+from vision.geometry.reasons import Reason
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
@@ -52,7 +53,7 @@ class WhiskPictures:
     bar: SeenBar
     settings: VisionSettings
     light: dict[str, WireAppearance] = field(default_factory=dict)
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[Reason, ...] = ()
     told: Told | None = None
     gives: Gives | None = None
 
@@ -134,7 +135,10 @@ class WhiskPictures:
             name for name, count in counts.items() if count <= _FEWEST_SHARE * max(counts.values())
         ]
         lines = (
-            f"camera {name} was left out: {counts[name]} frames of {len(self.indices)}"
+            Reason(
+                "camera_with_few_frames",
+                f"camera {name} was left out: {counts[name]} frames of {len(self.indices)}",
+            )
             for name in few
         )
         return replace(
@@ -142,7 +146,7 @@ class WhiskPictures:
             left_out=(*lines, *self.left_out),
         )
 
-    def without(self, camera: str, line: str) -> "WhiskPictures":
+    def without(self, camera: str, line: Reason) -> "WhiskPictures":
         """The whisk by the other cameras, and a line on why."""
         others = [view.camera.name for view in self.views if view.camera.name != camera]
         return replace(self._by(others), left_out=(*self.left_out, line))

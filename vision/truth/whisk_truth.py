@@ -92,7 +92,8 @@ def _moving(whisk: WhiskPictures) -> tuple[BarInFrames, Touch]:
     """How a bar that moves is seen. Raises Refused where the cameras do not know it in space."""
     if seen_from_one_side(whisk.cameras, whisk.bar.axis) or len(whisk.views) < 2:
         raise Refused(
-            "an object that moves or gives way is seen by two cameras or more, from different sides"
+            "an object that moves or gives way is seen by two cameras or more, from different sides",
+            code="moving_object_from_one_side",
         )
     return BarInFrames(whisk.views, whisk.rods.bar.radius_mm, whisk.settings), TouchByClearance()
 
@@ -104,7 +105,7 @@ def _fitted_by(
     for _ in range(whisk.settings.rounds):
         seen = _trace_all(whisk, bar, look, last=False)
         if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
-            raise Refused("a single camera sees wire and bar")
+            raise Refused("a single camera sees wire and bar", code="single_camera")
         problem, state, answer = _fit(whisk, look, seen, touch)
         whisk = whisk.yielding_as(problem, state)
         _check_scatter(problem, state)
@@ -273,7 +274,7 @@ def require_both_rods(seen: Sequence[Observed]) -> None:
         ("bar clear of the wire", any(one.frame < 0 for one in seen)),
     ):
         if not there:
-            raise Refused(f"no camera shows enough of the {rod}")
+            raise Refused(f"no camera shows enough of the {rod}", code="rod_hidden")
 
 
 def trace_wire(

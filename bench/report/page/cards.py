@@ -8,10 +8,10 @@ from markupsafe import Markup
 
 from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
+from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
-from bench.report.page.cures import cure_of
 from bench.report.page.plane import (
     force_angle_over_stroke,
     moments_over_stroke,
@@ -20,7 +20,7 @@ from bench.report.page.plane import (
 )
 from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
-from bench.report.summary.warning_lines import SILENT
+from bench.report.summary.warning_lines import SILENT, is_silent
 from bench.session.whisker import Whisker
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
@@ -84,7 +84,7 @@ def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
         tuple(_estimate(row, answer) for answer in row.felt.estimates),
         (alt, source) if source else None,
         tuple(filter(None, plots)),
-        tuple((part, cure_of(part)) for part in status.split("; ") if part not in SILENT),
+        tuple((said, cure_of([code])) for code, said in status.parts if code not in SILENT),
     )
 
 
@@ -195,6 +195,11 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
         *(_error(row, name) for name in estimators),
         Cell(status_of(seen, row.felt) or SOUND),
     ]
+
+
+def is_flagged(row: Row) -> bool:
+    """Return whether the user should look at a whisk."""
+    return not is_silent(status_of(row.seen, row.felt))
 
 
 def _error(row: Row, estimator: str) -> Cell:

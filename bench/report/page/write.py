@@ -13,12 +13,12 @@ from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
 from bench.base.settings import Seeing
+from bench.base.statuses import cure_of
 from bench.records.trial_result import TrialResult
 from bench.report.estimator_accuracy import accuracies, truth_uncertainty
 from bench.report.evaluation import finished
-from bench.report.page.cards import SOUND, card, cells, columns
+from bench.report.page.cards import card, cells, columns, is_flagged
 from bench.report.page.combined_whisks import together
-from bench.report.page.cures import cure_of
 from bench.report.page.gauge_card import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
@@ -27,7 +27,6 @@ from bench.report.page.words import number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import CameraFacts, RunRecord
-from bench.report.summary.warning_lines import SILENT
 from vision.fit.covariance import CAUSES
 
 REPORT, METHODS, BIBLIOGRAPHY = "report.html", "methods.md", "results.bib"
@@ -101,12 +100,14 @@ def page(
         .get_template("report.html.j2")
         .render(
             record=record,
-            rows=[(row, cells(row, estimators)) for row in rows],
+            rows=[(row, cells(row, estimators), is_flagged(row)) for row in rows],
             columns=columns(estimators),
             cards=[card(row, record.whisker, out, len(rows)) for row in rows],
             accuracies=[(one, at.get(one.worst_at)) for one in accuracy],
             truth=truth_uncertainty(results),
-            doubts=[(line, cure_of(line)) for line in record.doubts],
+            doubts=[
+                (line, cure_of(codes)) for line, codes in zip(record.doubts, record.doubt_codes)
+            ],
             figures=list(figures(record, rows, friction)),
             explained=_stack(explained_bars(record, rows), SHARES, _PARTS),
             budget=_stack(budget_bars(rows), CAUSES, {cause: cause for cause in CAUSES}),
@@ -123,7 +124,6 @@ def page(
             others=[s for s in record.sections if not s.title.startswith(_IN_FIGURES)],
             citation=bibliography(record),
             number=number,
-            silent=(SOUND, *SILENT),
         )
         + "\n"
     )

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from bench.records.trial_result import TrialResult, whisks
+from vision.geometry.reasons import Reason
 
 # Causes of `budget` that are the same wire, bar, lamp, lenses and board in every whisk.
 SHARED = ("diameters", "light", "cameras", "placement")
@@ -79,11 +80,12 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         )
 
 
-def shared_doubts(results: Sequence[TrialResult]) -> Iterator[str]:
+def shared_doubts(results: Sequence[TrialResult]) -> Iterator[Reason]:
     """A line where whisks of one recording, which share bar and light, differ by more than they may."""
     shared = shared_distance(results)
     if shared is not None and shared.is_too_narrow:
-        yield (
+        yield Reason(
+            "whisks_scatter",
             f"whisks of one recording scatter by {shared.scatter_mm:.4f} mm in d_x, {shared.own_mm:.4f} mm is stated "
-            "as each whisk's own: bar or wire moves from whisk to whisk, or that part of the sigma is too narrow"
+            "as each whisk's own: bar or wire moves from whisk to whisk, or that part of the sigma is too narrow",
         )

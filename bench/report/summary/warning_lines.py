@@ -3,29 +3,41 @@
 from collections.abc import Iterable, Iterator
 
 from bench.analyses.runs import RUNS
+from bench.base.doubts import in_one_status
+from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.session import Session
-from bench.trials.seen import NO_PICTURES
-from bench.trials.unit import OWN_GAUGES
 from vision.geometry.counted import counted
+from vision.geometry.reasons import Reason, as_reason
 
-SILENT = ("", NO_PICTURES, OWN_GAUGES)
+# Codes of statuses that are as they should be: of a session without pictures, of a gauge trial.
+SILENT = {"no_pictures", "own_gauges"}
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
 _EXPECTED = ("no_slip", "frictionless", *RUNS)
 
 
-def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[str]:
-    """A line for each whisk that something is doubtful of. A gauge trial that cannot be judged is as it should be."""
+def is_silent(status: Reason) -> bool:
+    """Return whether a status says nothing that the user should look at."""
+    return SILENT.issuperset(status.codes)
+
+
+def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[Reason]:
+    """Yield a line for each whisk that something is doubtful of.
+
+    A gauge trial that cannot be judged is as it should be.
+    """
     for result, seen, felt in whisks(results):
         name = f"{result.trial.name}, whisk {seen.whisk}"
-        parts = [part for part in dict.fromkeys((seen.status, felt.status)) if part not in SILENT]
-        if parts:
-            yield f"{name}: {'; '.join(parts)}"
+        statuses = [as_reason(status) for status in (seen.status, felt.status)]
+        status = in_one_status(*(one for one in statuses if not is_silent(one)))
+        if status:
+            yield status.about(name)
         if felt.saturated:
-            yield f"{name}: {counted(felt.saturated, 'saturated sample')} left out"
+            samples = counted(felt.saturated, "saturated sample")
+            yield reason("samples_saturated", samples=samples).about(name)
         for answer in felt.estimates:
             if answer.status and answer.estimator not in _EXPECTED:
-                yield f"{name}, {answer.estimator}: {answer.status}"
+                yield as_reason(answer.status).about(f"{name}, {answer.estimator}")
 
 
 def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:

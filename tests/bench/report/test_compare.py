@@ -38,6 +38,7 @@ def moved(sigmas: float):
 
 def no_truth(seen: dict) -> None:
     seen |= {"d_x_mm": None, "d_x_sigma_mm": None, "status": "the whisker never touches"}
+    seen["status_codes"] = [["never_touches", "the whisker never touches"]]
 
 
 def test_a_run_and_its_copy_are_alike(exact_run, tmp_path):

@@ -17,7 +17,6 @@ from PIL import Image
 from bench.commands.cli import main
 from bench.report.estimator_accuracy import accuracies, truth_uncertainty
 from bench.report.page import words
-from bench.report.page.cures import _OTHERWISE, cure_of
 from bench.report.page.svg import Panel, ticks
 from bench.report.page.thumbnails import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script
@@ -239,23 +238,6 @@ def test_pictures_are_small_and_many_stay_beside(tmp_path, rng):
     assert inside.startswith("data:image/webp;base64,") and len(inside) < 1.4 * MOST_BYTES
     assert picture_source(tmp_path, "a b.png", MOST_INSIDE + 1) == "a%20b.png"
     assert picture_source(tmp_path, "none.png", 1) == ""
-
-
-@pytest.mark.parametrize(
-    "doubt",
-    [
-        "b30_3, whisk 0: the whisker never touches",
-        "touches from the start: fewer than two frames of free stroke",
-        "the bar's slope is known to 12 deg only: no two cameras see it from different sides",
-        "camera low moved and was left out: the rig board is 2.00 ± 0.10 px off",
-        "felt moments are not those of the seen shape (χ² 80, 2 degrees of freedom): y_V looks reversed",
-        "no gauges: there is no gauges.toml, [gauges] or usable gauge trial",
-        "camera high dropped 3 of 40 frames",
-    ],
-)
-def test_what_is_known_to_go_wrong_has_its_cure(doubt):
-    assert cure_of(doubt) != _OTHERWISE
-    assert cure_of("quite another thing") == _OTHERWISE
 
 
 @pytest.mark.parametrize(("low", "high"), [(-3.0, 85.0), (-210.0, 7.0), (0.0, 1e-3), (4.0, 4.5)])

@@ -46,7 +46,9 @@ def run(tmp_path):
                 "speed_deg_s": 10.0,
             }
             trial |= {"d_x_nominal_mm": d_x_mm, "beta_nominal_deg": float(beta)}
-            seen = {"status": "no pictures", "d_x_mm": None, "cameras": 0, "frames_used": 0}
+            codes = [["no_pictures", "no pictures"]]
+            seen = {"status": "no pictures", "status_codes": codes}
+            seen |= {"d_x_mm": None, "cameras": 0, "frames_used": 0}
             result = {
                 "hash": f"{name}{beta}",
                 "trial": trial,

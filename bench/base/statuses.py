@@ -1,0 +1,423 @@
+"""Every kind of status that a run can give: one table of codes.
+
+A status is a sentence with numbers for people, made where the numbers are known, and a code for
+programs (`vision.geometry.reasons.Reason`, `estimator.reasons.NamedReason`). What follows from it
+stands here: how severe it is, and what to do about it. Nothing else asks what a sentence says.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from vision.geometry.reasons import UNNAMED, Reason, as_reason
+
+# Severities. A note leaves distance and moments what they are; a warning makes them doubtful; a
+# refusal says why there are none.
+NOTE = "note"
+WARNING = "warning"
+REFUSAL = "refusal"
+
+_USUAL_CURE = "look at the whisk's card and overlays; docs/truth.md says what the truth needs"
+
+_PUSH_FARTHER = "let the motor turn farther, or take the trial out"
+_BEGIN_EARLIER = "begin the recording some 2° of motor angle before touch"
+_FRAMES_AT_TOUCH = "record frames all through touch; look for dropped ones"
+_SECOND_CAMERA = "place a second camera that sees the bar from another side"
+_FASTEN_CAMERA = "fasten the camera, record boards/rig again, and evaluate again"
+_CHECK_POSE = "check T_camera_rig in cameras.toml: it takes rig coordinates to the camera's"
+_LOOK_AT_CAMERA = "look at the overlays of that camera; if wire or bar is hidden there, move it"
+_GIVE_PICTURES = "give frames of the trial and board views, if a truth is wanted"
+_RECORD_GAUGES = "record gauge trials in two positions of the follicle, or try --gauges-from-all"
+_CHECK_CHANNELS = "check that, and evaluate again"
+_CLEARER_TOUCH = "sample faster, push farther after touch, or damp vibration"
+_LOOK_AT_ESTIMATOR = "look at the estimator: its answer is none"
+_FRAMES_LOST = "record again with a slower frame rate or a faster disk, if it is near touch"
+_LOOK_AT_FILE = "look at the file that is named; where it is meant so, nothing is to be done"
+_MEASURE_BOARD = "measure a square of the board with a caliper, then T_rig_board"
+
+
+@dataclass(frozen=True)
+class Status:
+    """A kind of status.
+
+    code: its name in snake_case, which stays when words change. severity: NOTE, WARNING or REFUSAL.
+    sentence: with places for numbers where bench makes it by `reason`; else what it says in general,
+    and the sentence itself is made where its numbers are known. cure: what to do.
+    """
+
+    code: str
+    severity: str
+    sentence: str
+    cure: str = _USUAL_CURE
+
+
+# Of several statuses in one line the cure of the first in this table is shown.
+_TABLE = (
+    Status("never_touches", REFUSAL, "the whisker never touches", _PUSH_FARTHER),
+    Status("no_bend_seen", REFUSAL, "no bend of the whisker is seen", _PUSH_FARTHER),
+    Status(
+        "no_rise",
+        REFUSAL,
+        "never touches: the moments do not rise above their noise",
+        _PUSH_FARTHER,
+    ),
+    Status(
+        "threshold_not_crossed",
+        REFUSAL,
+        "never touches: the filtered moment does not cross the threshold",
+        _PUSH_FARTHER,
+    ),
+    Status(
+        "starts_touching",
+        REFUSAL,
+        "touches from the start: fewer than two frames of free stroke",
+        _BEGIN_EARLIER,
+    ),
+    Status(
+        "no_free_stroke",
+        REFUSAL,
+        "touching from the start: no free stroke to measure the rise from",
+        _BEGIN_EARLIER,
+    ),
+    Status("touch_outside_frames", REFUSAL, "touch lies outside the frames", _FRAMES_AT_TOUCH),
+    Status("frame_lost_at_touch", REFUSAL, "a frame at touch was lost", _FRAMES_AT_TOUCH),
+    Status(
+        "pushed_short",
+        NOTE,
+        "not pushed as far as the wanted angle",
+        "push farther, or evaluate at a smaller --theta-deg",
+    ),
+    Status(
+        "slips_in_jumps",
+        NOTE,
+        "slips in jumps at the wanted angle",
+        "expected of stick–slip: slip lies between those frames; more frames a second narrow it",
+    ),
+    Status(
+        "rod_hidden",
+        REFUSAL,
+        "no camera shows enough of wire or bar",
+        "free the sight: nothing else may stand before or behind wire and bar",
+    ),
+    Status(
+        "camera_lines_scatter",
+        WARNING,
+        "a camera's lines of the wire scatter, and it was left out",
+        "look at the overlays: a shadow, a reflection, or another thing is taken for the wire",
+    ),
+    Status("slope_vague", WARNING, "the bar's slope is hardly known", _SECOND_CAMERA),
+    Status("single_camera", REFUSAL, "a single camera sees wire and bar", _SECOND_CAMERA),
+    Status(
+        "slip_vague",
+        REFUSAL,
+        "slip is hardly known",
+        "bring a camera nearer, or place one that does not look along the bar",
+    ),
+    Status("camera_moved", WARNING, "a camera moved and was left out", _FASTEN_CAMERA),
+    Status("cameras_contradict", WARNING, "the cameras see different whisks", _FASTEN_CAMERA),
+    Status(
+        "whisker_behind_camera", WARNING, "by a camera's pose the whisker is behind it", _CHECK_POSE
+    ),
+    Status("bar_behind_camera", REFUSAL, "by a camera's pose the bar is behind it", _CHECK_POSE),
+    Status("all_cameras_behind", REFUSAL, "all cameras have the whisker behind them", _CHECK_POSE),
+    Status(
+        "camera_left_out",
+        WARNING,
+        "a camera shows another scene, or nothing, and was left out",
+        _LOOK_AT_CAMERA,
+    ),
+    Status(
+        "camera_with_few_frames",
+        WARNING,
+        "a camera has few of the frames, and was left out",
+        _LOOK_AT_CAMERA,
+    ),
+    Status(
+        "no_beam",
+        WARNING,
+        "the wire does not bend as a beam with a point load",
+        "check that one thing alone touches the whisker, and that it is not kinked; see beam.csv",
+    ),
+    Status(
+        "bend_onset_vague",
+        REFUSAL,
+        "it is hardly known when the whisker begins to bend",
+        "let two cameras see the whisker, one of them along the motor's axis",
+    ),
+    Status(
+        "no_whisker_seen",
+        REFUSAL,
+        "no whisker is seen where the motor angle says it should be",
+        "check the motor's zero, T_rig_board and [whisker] diameter_mm; see the overlays",
+    ),
+    Status(
+        "fit_not_converged",
+        REFUSAL,
+        "the fit of wire and bar does not converge",
+        "look at the frames of this trial; if they are sound, please report it with them",
+    ),
+    Status("no_pictures", NOTE, "no pictures", _GIVE_PICTURES),
+    Status("camera_unused", WARNING, "a camera of the manifest has no pictures", _GIVE_PICTURES),
+    Status(
+        "no_gauges",
+        REFUSAL,
+        "no gauges: there is no gauges.toml, [gauges] or usable gauge trial",
+        _RECORD_GAUGES,
+    ),
+    Status(
+        "own_gauges",
+        REFUSAL,
+        "not judged: without this trial the gauges are not known",
+        _RECORD_GAUGES,
+    ),
+    Status(
+        "gauges_undetermined",
+        WARNING,
+        "the gauge trials do not fix the gauges' coefficients",
+        _RECORD_GAUGES,
+    ),
+    Status(
+        "gauge_fault",
+        WARNING,
+        "felt moments are not those of the seen shape, by a fault of the gauges",
+        _CHECK_CHANNELS,
+    ),
+    Status(
+        "force_reversed",
+        WARNING,
+        "no friction holds the whisker at this angle, unless a channel is reversed",
+        _CHECK_CHANNELS,
+    ),
+    Status(
+        "signals_exchanged",
+        WARNING,
+        "the signals of trials {names} look exchanged: "
+        "each has the moments of the shape seen in the other",
+        _CHECK_CHANNELS,
+    ),
+    Status(
+        "shape_not_felt",
+        WARNING,
+        "felt moments are not those of the seen shape, without a known cause",
+        "compare the card's moments; check that the bar touches nothing but the whisker",
+    ),
+    Status(
+        "beyond_calibration",
+        WARNING,
+        "a moment is beyond what the gauges were calibrated to",
+        "calibrate the gauges with larger deflections, or push less",
+    ),
+    Status("samples_saturated", WARNING, "{samples} left out", "lower the amplifier's gain"),
+    Status("onset_vague", REFUSAL, "no clear onset of the moments", _CLEARER_TOUCH),
+    Status(
+        "rise_too_short",
+        REFUSAL,
+        "touches too near the end of the stroke to fit the rise",
+        _CLEARER_TOUCH,
+    ),
+    Status("too_few_samples", REFUSAL, "too few samples to find a touch", _CLEARER_TOUCH),
+    Status(
+        "past_whisker",
+        WARNING,
+        "gave {d_x_mm:.1f} mm, past the whisker's length of {length_mm:g} mm",
+        _LOOK_AT_ESTIMATOR,
+    ),
+    Status(
+        "longer_than_whisker",
+        WARNING,
+        "the distance by (2) is longer than the whisker",
+        _LOOK_AT_ESTIMATOR,
+    ),
+    Status(
+        "tip_contact",
+        WARNING,
+        "the distance came out longer than the whisker, and was set to its length",
+        _LOOK_AT_ESTIMATOR,
+    ),
+    Status("no_distance_given", REFUSAL, "gave no distance and no reason", _LOOK_AT_ESTIMATOR),
+    Status(
+        "distance_impossible",
+        REFUSAL,
+        "gave {d_x_mm:g} mm, which is no distance",
+        _LOOK_AT_ESTIMATOR,
+    ),
+    Status("estimator_raised", REFUSAL, "{name} raised {fault}", _LOOK_AT_ESTIMATOR),
+    Status(
+        "sigma_impossible",
+        WARNING,
+        "gave a sigma of {sigma_mm:g} mm, which is none",
+        _LOOK_AT_ESTIMATOR,
+    ),
+    Status(
+        "touch_apart",
+        WARNING,
+        "touch felt and touch seen differ in all whisks alike",
+        "check how frames are stamped, and record strokes at two speeds or with their way back",
+    ),
+    Status(
+        "whisks_scatter",
+        WARNING,
+        "whisks of one recording scatter by more than their sigmas",
+        "fasten bar and hub: whisks of one recording should give one d_x",
+    ),
+    Status("frames_damaged", WARNING, "pictures cannot be read", _FRAMES_LOST),
+    Status(
+        "rows_repeated", WARNING, "rows of frame times were repeated, and dropped", _FRAMES_LOST
+    ),
+    Status(
+        "rate_unlike_header",
+        WARNING,
+        "frames come at another rate than a video's header says",
+        "look which is right; frame_rate_Hz in trial.toml settles it",
+    ),
+    Status(
+        "signals_copied",
+        WARNING,
+        "trials {names} have one and the same {file}: all but one have another's",
+        "find the recordings that belong to these trials, and copy them anew",
+    ),
+    Status("signals_mended", WARNING, "{shown}: {count} {cause} mended", _LOOK_AT_FILE),
+    Status(
+        "speed_unlike_stated",
+        WARNING,
+        "the motor goes at another speed than is stated",
+        _LOOK_AT_FILE,
+    ),
+    Status(
+        "frames_without_signals",
+        WARNING,
+        "frames were taken while no signals were",
+        "start the DAQ before the cameras and stop it after them",
+    ),
+    Status(
+        "no_forward_stroke",
+        WARNING,
+        "{shown}: no forward stroke of the motor, so no whisk",
+        "take the trial out, or let the motor turn forward in it",
+    ),
+    Status(
+        "board_misplaced",
+        WARNING,
+        "the board and the free strokes place the rig differently",
+        _MEASURE_BOARD,
+    ),
+    Status(
+        "bar_width_unlike_board",
+        WARNING,
+        "the bar looks thicker or thinner than said, or the board's squares are",
+        _MEASURE_BOARD,
+    ),
+    Status(
+        "bends_from_start", REFUSAL, "the whisker is seen to bend from the start", _BEGIN_EARLIER
+    ),
+    Status(
+        "moving_object_not_straight",
+        REFUSAL,
+        "an object that moves or gives way is no straight bar",
+        "record a straight bar where the object moves or gives way",
+    ),
+    Status(
+        "moving_object_many_whisks",
+        REFUSAL,
+        "an object that moves is in a recording of several whisks",
+        "record each whisk by itself",
+    ),
+    Status(
+        "moving_object_from_one_side",
+        REFUSAL,
+        "an object that moves or gives way is seen from one side",
+        _SECOND_CAMERA,
+    ),
+    Status(
+        "object_from_one_side",
+        REFUSAL,
+        "an object that is no straight bar is seen from one side",
+        _SECOND_CAMERA,
+    ),
+    Status("no_shared_frame", REFUSAL, "no frame is seen by every camera"),
+    Status("no_shared_first_frame", REFUSAL, "no stroke's first frame is seen by every camera"),
+    Status("too_few_frames", REFUSAL, "too few frames are seen by every camera"),
+    Status("no_camera_with_frames", REFUSAL, "no camera has three frames or more"),
+    Status("no_bar_seen", REFUSAL, "no bar is seen near the whisker"),
+    Status(
+        "bar_distance_unseen", REFUSAL, "one camera alone does not tell how far away the bar is"
+    ),
+    Status("no_object_seen", REFUSAL, "no object of the stated form is seen near the whisker"),
+    Status("object_in_two_places", REFUSAL, "the object may be in either of two places"),
+    Status("no_object_edge", REFUSAL, "a camera shows no edge of the object"),
+    Status("no_object_outline", REFUSAL, "no clear outline of the object is seen"),
+    Status("picture_size_differs", REFUSAL, "frames of a camera differ in size"),
+    Status("refused", REFUSAL, "nothing is seen, for a reason that the sentence tells"),
+    Status(
+        "trial_lost",
+        REFUSAL,
+        "no result: the process that looked at the trial died {deaths} times, as it does "
+        "where memory runs out; the same command tries again",
+    ),
+    Status("light_unexplained", WARNING, "the wire's light differs from that of any lit wire"),
+    Status("no_touching_frame", NOTE, "the whisker does not touch"),
+    Status("bar_width_unlike_stated", WARNING, "the bar looks thicker or thinner than said"),
+    Status("wire_width_unlike_stated", WARNING, "the whisker looks thinner than said"),
+    Status(
+        "length_unlike_stated", WARNING, "the whisker is seen to end elsewhere than length_mm says"
+    ),
+    Status("slope_unlike_stated", WARNING, "the bar's slope is seen other than stated"),
+    Status("turns_unlike_motor", WARNING, "the whisker is not seen to turn as the motor does"),
+    Status("friction_too_large", WARNING, "no friction holds the whisker at this angle"),
+    Status(
+        "wire_off_its_base",
+        WARNING,
+        "its wire starts {beside_mm:.1f} mm beside its base, check base_mm",
+    ),
+    Status("wire_of_another", WARNING, "its wire may be that of {names}"),
+    Status("no_free_force", REFUSAL, "no free stroke to read the force's zero from"),
+    Status("angle_not_reached", REFUSAL, "the stroke does not reach the pushing angle"),
+    Status(
+        "gauges_at_rail",
+        REFUSAL,
+        "the gauges are at their rail at the pushing angle: "
+        "raise their range, or ask for a smaller --theta-deg",
+    ),
+    Status("no_way_back", REFUSAL, "no way back was recorded"),
+    Status("deflection_impossible", WARNING, "gave a deflection of {given}, which is none"),
+    Status("only_nearer_known", WARNING, "the distance is known only to be nearer than a bound"),
+    Status("two_distances", WARNING, "an object that runs away is felt alike at two distances"),
+    Status("motion_not_stated", REFUSAL, "nobody says how the object moves"),
+    Status("object_runs_away", REFUSAL, "an object that moves as told would be touched nowhere"),
+    Status("no_force_recorded", REFUSAL, "no force at the base was recorded"),
+    Status("no_moment_rate", REFUSAL, "the rate of the moment is not known"),
+    Status("phi_turns", WARNING, "the force's angle turns over the push"),
+    Status(
+        "frame_count_unlike_header", WARNING, "a video's header declares another number of frames"
+    ),
+    Status("first_frame_not_stated", WARNING, "first_frame_s is not given"),
+    Status("clock_of_container", WARNING, "frame times are those of a video's container"),
+    Status("surface_unused", WARNING, "a surface of the manifest is no trial's"),
+    Status(
+        "unnamed", WARNING, "a sentence without a code, such as that of an estimator of one's own"
+    ),
+)
+
+STATUSES = {status.code: status for status in _TABLE}
+_RANK = {status.code: rank for rank, status in enumerate(_TABLE)}
+
+
+def status_of_code(code: str) -> Status:
+    """Return the kind of status of a code; that without a name where the code is not known."""
+    return STATUSES.get(code, STATUSES[UNNAMED])
+
+
+def reason(code: str, **numbers: object) -> Reason:
+    """Return the status of a code, its sentence from the table with numbers filled in."""
+    return Reason(code, STATUSES[code].sentence.format(**numbers))
+
+
+def has_only_notes(text: str) -> bool:
+    """Return whether all that a status says leaves distance and moments what they are."""
+    return all(status_of_code(code).severity == NOTE for code in as_reason(text).codes)
+
+
+def cure_of(codes: Iterable[str]) -> str:
+    """Return what to do about these codes: the cure of the one that stands first in the table."""
+    known = [code if code in STATUSES else UNNAMED for code in codes]
+    first = min(known, key=_RANK.__getitem__, default=UNNAMED)
+    return STATUSES[first].cure
