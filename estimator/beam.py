@@ -1,4 +1,7 @@
-"""The whisker as a beam: section, flexural rigidity, and C = 3EI. Lengths in mm, rigidity in N·mm²."""
+"""The whisker as a beam: section, flexural rigidity, and C = 3EI.
+
+Lengths in mm, rigidity in N·mm².
+"""
 
 from dataclasses import dataclass
 from math import inf, nan
@@ -37,7 +40,8 @@ def diameter_at(
 ) -> Numbers:
     """Return the diameter in mm at the arc length `arc_mm` from the base.
 
-    `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a cone.
+    `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a
+    cone.
     """
     return base_diameter_mm * (1 - taper * arc_mm / length_mm)
 
@@ -59,7 +63,7 @@ def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike) -> N
 
 
 def taper_of(shape: str, tip_share: float | None = None) -> float:
-    """Return the share of the base's diameter that is lost up to the tip: 0 of a cylinder, 1 of a cone.
+    """Return the share of the base's diameter that is lost: 0 of a cylinder, 1 of a cone.
 
     tip_share: the tip's diameter over the base's, given for "tapered" alone. Raises ValueError for
     another shape, and where a tip_share is missing, superfluous, or outside (0, 1).
@@ -81,12 +85,14 @@ def taper_of(shape: str, tip_share: float | None = None) -> float:
 class Beam:
     """A straight whisker, clamped at its base: cylinder, cone, or a cone cut off ("tapered").
 
-    C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's diameter
-    over the base's. Raises ValueError for anything but a positive C and length, and as `taper_of` does.
+    C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's
+    diameter over the base's. Raises ValueError for anything but a positive C and length, and as
+    `taper_of` does.
 
-    All of them have one compliance: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the diameter
-    that is lost up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every equation for a
-    cylinder holds for the base's cylinder touched at d (`as_cylinder_mm`), and `distance_mm` is the inverse.
+    All of them have one compliance: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the
+    diameter that is lost up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every
+    equation for a cylinder holds for the base's cylinder touched at d (`as_cylinder_mm`), and
+    `distance_mm` is the inverse.
     """
 
     C_Nmm2: float
@@ -141,7 +147,7 @@ class Beam:
         return self.C_Nmm2 * theta_rad / self.as_cylinder_mm(d_x_mm)
 
     def distance_mm(self, as_cylinder_mm: ArrayLike) -> Numbers:
-        """Return d_x from the distance that the base's cylinder would give; NaN unless that is positive."""
+        """Return d_x from the distance of the base's cylinder; NaN unless that is positive."""
         return _inverse_sum(as_cylinder_mm, self.taper / self.length_mm)
 
     def error_share(self, d_x_mm: ArrayLike, of_cylinder: ArrayLike) -> Numbers:
@@ -155,7 +161,7 @@ class Beam:
 
 
 def _inverse_sum(d, per_mm):
-    """Return 1 / (1/d + per_mm) for d > 0, infinite where the sum is zero or below, NaN elsewhere."""
+    """Return 1 / (1/d + per_mm) for d > 0: inf where the sum is ≤ 0, NaN unless d > 0."""
     if not isinstance(d, float):
         return _inverse_sums(d, per_mm)
     # A single number goes without arrays: a whisk's estimates need it a thousand times.

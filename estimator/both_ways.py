@@ -1,13 +1,15 @@
 """Slope and distance from a push and its way back, without any friction angle.
 
-Friction turns round as the motor does, and the object does not: at one pushing angle the moments there and back differ
-by friction alone, which acts along the object. So m_there − m_back points along the surface, in the plane of
-(m_z, m_y), and its normal is that of the object, β. With it (6) has the distance,
+Friction turns round as the motor does, and the object does not: at one pushing angle the moments
+there and back differ by friction alone, which acts along the object. So m_there − m_back points
+along the surface, in the plane of (m_z, m_y), and its normal is that of the object, β. With it (6)
+has the distance,
 
     d_x = Cθ cos β / (m_z cos β + m_y sin β),
 
-the same on both ways, and friction on the way there is α = |β − φ|. That the contact has not yet slid back does no
-harm: whatever friction acts, it acts along the object. Angles in rad, moments in N·mm, lengths in mm.
+the same on both ways, and friction on the way there is α = |β − φ|. That the contact has not yet
+slid back does no harm: whatever friction acts, it acts along the object. Angles in rad, moments in
+N·mm, lengths in mm.
 """
 
 from dataclasses import dataclass
@@ -34,7 +36,8 @@ _STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ThereAndBack:
-    """Distance and slope with their sigmas, and the angle between force and normal on the way there.
+    """Distance and slope with their sigmas, and the angle between force and normal on the way
+    there.
 
     NaN where status gives the reason. low_mm, high_mm: the distance's 95 % interval.
     """
@@ -71,8 +74,8 @@ def there_and_back(
 ) -> ThereAndBack:
     """Estimate distance and slope from both ways at one pushing angle.
 
-    shared: for each way the change (k, 2) of its moments by one sigma of each cause of error that both
-    have in common. Thickness and lean of the object enter the sigma as in (10).
+    shared: for each way the change (k, 2) of its moments by one sigma of each cause of error that
+    both have in common. Thickness and lean of the object enter the sigma as in (10).
     """
     felt = np.array([*_felt(there), *_felt(back)])
     if not np.isfinite(felt).all() or not min(felt[2], felt[5]) > 0:
@@ -110,8 +113,8 @@ def _felt(whisk: Whisk) -> tuple[float, float, float]:
 def _solution(felt: np.ndarray, beam: Beam) -> np.ndarray:
     """Solve for (d_x, β, α) from (θ, m_y, m_z) there and (θ, m_y, m_z) back.
 
-    The distance is the mean over both ways. The slope takes the moments' difference at one and the same
-    angle, so that an error of θ on one way alone turns β as well.
+    The distance is the mean over both ways. The slope takes the moments' difference at one and the
+    same angle, so that an error of θ on one way alone turns β as well.
     """
     there = felt[1:3] / felt[0]
     back = felt[4:6] / felt[3]
@@ -147,10 +150,10 @@ def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:
 def _covariance_of_dragging(felt: np.ndarray, alpha: float, left: float) -> np.ndarray:
     """Return the covariance (6, 6) that friction along the whisker adds to the moments back.
 
-    It is not in the difference of which the slope is made. On the way there the contact slips sideways,
-    and friction along with it; on the way back the contact is held until friction has turned round, and
-    no moment determines the share of it that then acts along the whisker. left: share of the base's
-    diameter that is left at the contact.
+    It is not in the difference of which the slope is made. On the way there the contact slips
+    sideways, and friction along with it; on the way back the contact is held until friction has
+    turned round, and no moment determines the share of it that then acts along the whisker. left:
+    share of the base's diameter that is left at the contact.
     """
     change = np.zeros(6)
     relative = first_order.dragging(felt[3], min(alpha, _STEEPEST_FRICTION_RAD)) / left
@@ -173,7 +176,9 @@ def _differs(felt: np.ndarray, covariance: np.ndarray) -> bool:
 def _model_share(
     whisk: Whisk, settings: EstimatorSettings, d_x: float, beta: float, alpha: float
 ) -> float:
-    """Return the model's own relative sigma of d_x: thickness and lean of the object, large angles."""
+    """Return the model's own relative sigma of d_x: thickness and lean of the object, large
+    angles.
+    """
     theta = whisk.theta_at_rad
     left = whisk.beam.left(d_x)
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)

@@ -1,9 +1,10 @@
-"""The paper's estimators, written as anyone would write one: a function of a whisk and the settings.
+"""The paper's estimators, written as anyone would write one: a function of a whisk and the
+settings.
 
-For a tapered whisker they run on the base's cylinder, and 1/d_x gains the taper (`Beam.distance_mm`). An
-estimate of (10) or (12) beyond the whisker's length is set to the length and reported as a tip contact
-(section VII). (2) overestimates because it ignores slip, so that a distance beyond the length means slip,
-not the tip: it is flagged and left.
+For a tapered whisker they run on the base's cylinder, and 1/d_x gains the taper
+(`Beam.distance_mm`). An estimate of (10) or (12) beyond the whisker's length is set to the length
+and reported as a tip contact (section VII). (2) overestimates because it ignores slip, so that a
+distance beyond the length means slip, not the tip: it is flagged and left.
 """
 
 from dataclasses import replace
@@ -33,7 +34,8 @@ def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equation (10): slip accounted for, with the assumed friction cone angle.
 
-    Its interval includes α_est's sigma and exists even where (10) loses its root: then with one side only.
+    Its interval includes α_est's sigma and exists even where (10) loses its root: then with one
+    side only.
     """
     return _with_friction(whisk, settings, _model_share)
 
@@ -41,9 +43,9 @@ def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equation (10) less the first order of its own error.
 
-    That is rolling over a round object, and friction along the whisker. The object's radius is the one of
-    the settings, else the thickness that they allow for; its lean is not known. Where (10) has no
-    distance, or the tip's, this is the estimate of (10).
+    That is rolling over a round object, and friction along the whisker. The object's radius is the
+    one of the settings, else the thickness that they allow for; its lean is not known. Where (10)
+    has no distance, or the tip's, this is the estimate of (10).
     """
     length = whisk.beam.length_mm
     estimate = _with_friction(whisk, settings, _share_left)
@@ -69,8 +71,8 @@ def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equations (16), (17) as printed: ν(θ, |m|) cos φ with the whisker's own ν.
 
-    It is far from the truth where a tapered whisker slips, since slip takes its share of the angle and
-    not of the distance. It is not among ESTIMATORS: use it by its name.
+    It is far from the truth where a tapered whisker slips, since slip takes its share of the angle
+    and not of the distance. It is not among ESTIMATORS: use it by its name.
     """
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     beam = whisk.beam
@@ -146,7 +148,9 @@ def _without_friction(settings: EstimatorSettings) -> EstimatorSettings:
 
 
 def _assuming(whisk, settings, d_x, gradient, model):
-    """Assemble an estimate from both moments, with its friction angle and the slope (9) that follows."""
+    """Assemble an estimate from both moments, with its friction angle and the slope (9) that
+    follows.
+    """
     slope = distance.estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
     estimate = _estimate(whisk, settings, d_x, gradient, model, m_y=whisk.m_y_at_Nmm)
     return replace(estimate, alpha_est_rad=settings.alpha_est_rad, beta_rad=slope)
@@ -155,10 +159,11 @@ def _assuming(whisk, settings, d_x, gradient, model):
 def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
     """Assemble an estimate from a cylinder's distance and gradient.
 
-    It adds sigma and interval, the taper, the clamp at the tip, and the reason for a NaN. m_y: the moment
-    along the surface that the equation takes; (2) takes none. model_share: function of the equation's own
-    relative sigma (`_model_share`). A tapering whisker's distance is not linear over the sigma of α_est:
-    its sigma is no less than the two sides of the interval, in the mean of their squares.
+    It adds sigma and interval, the taper, the clamp at the tip, and the reason for a NaN. m_y: the
+    moment along the surface that the equation takes; (2) takes none. model_share: function of the
+    equation's own relative sigma (`_model_share`). A tapering whisker's distance is not linear over
+    the sigma of α_est: its sigma is no less than the two sides of the interval, in the mean of
+    their squares.
     """
     beam = whisk.beam
     errors = {
@@ -198,12 +203,16 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
 
 
 def _on_whisker(end, beam):
-    """Convert an end of the cylinder's interval to this whisker, no longer than it; keep 0 and NaN."""
+    """Convert an end of the cylinder's interval to this whisker, no longer than it; keep 0 and
+    NaN.
+    """
     return min(beam.distance_mm(end), beam.length_mm) if end > 0 else end
 
 
 def _model_share(whisk, settings, d_x, left):
-    """Return the relative sigma of (10) itself; 0 without a distance or without a thickness to allow for."""
+    """Return the relative sigma of (10) itself; 0 without a distance or without a thickness to
+    allow for.
+    """
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
     return uncertainty.model_share(

@@ -1,7 +1,7 @@
 """The whisker on a circle: slip angle and deflection in the sensing plane, the core of Appendix B.
 
-Lengths over the contact distance d_x, angles in rad; arrays in, arrays out. The public side, with checks
-of settings and the equations' names, is `estimator.curvature`.
+Lengths over the contact distance d_x, angles in rad; arrays in, arrays out. The public side, with
+checks of settings and the equations' names, is `estimator.curvature`.
 """
 
 import numpy as np
@@ -13,7 +13,9 @@ from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, where_all
 def conditions(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike
 ) -> tuple[tuple[str, np.ndarray], ...]:
-    """Return the conditions on a push against the circle: pairs (what is wrong, mask of what must hold)."""
+    """Return the conditions on a push against the circle: pairs (what is wrong, mask of what must
+    hold).
+    """
     known = ~np.isnan(r_n) & np.isfinite(theta) & np.isfinite(beta_0)
     passed = "the whisker has passed the object: theta is 2 y_c or more"
     return (
@@ -50,10 +52,10 @@ def exact(
 ) -> tuple[Numbers, Numbers]:
     """Return (φ, d) with the friction cone at the contact point.
 
-    Where the contact slides, the surface there is steeper than at first touch by δ, φ = β_0 − α + δ, and
-    the law of sines reads sin α = sin(α − δ) + q sin φ. It is a quadratic in tan(δ/2), whose root is
-    taken without cancellation; its discriminant is the s² = (p/r_n)² − sin² α of d = θ (2 cos β_0 − q) /
-    (cos α + s).
+    Where the contact slides, the surface there is steeper than at first touch by δ, φ = β_0 − α +
+    δ, and the law of sines reads sin α = sin(α − δ) + q sin φ. It is a quadratic in tan(δ/2), whose
+    root is taken without cancellation; its discriminant is the s² = (p/r_n)² − sin² α of d = θ (2
+    cos β_0 − q) / (cos α + s).
     """
     slope = np.abs(beta_0)
     q = theta / r_n

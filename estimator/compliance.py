@@ -1,11 +1,15 @@
-"""Distance and stiffness of a yielding object, from two whisks at two distances (section VII, Kaneko 1998).
+"""Distance and stiffness of a yielding object, from two whisks at two distances.
 
-An object of stiffness k gives way by F/k under the contact force F = m/d_x, so that without lateral slip
+Section VII; Kaneko 1998.
+
+An object of stiffness k gives way by F/k under the contact force F = m/d_x, so that without lateral
+slip
 
     k_θ = θ/m = d/C + 1/(k d_x²),   1/d = 1/d_x − τ.
 
-Two whisks from bases a known shift apart give two such equations. Lengths in mm, k in N/mm, C = 3EI in N·mm² at the
-base; taper_per_mm, τ: share of its diameter that the whisker loses per mm (`Beam.taper` over its length).
+Two whisks from bases a known shift apart give two such equations. Lengths in mm, k in N/mm, C = 3EI
+in N·mm² at the base; taper_per_mm, τ: share of its diameter that the whisker loses per mm
+(`Beam.taper` over its length).
 """
 
 import numpy as np
@@ -39,12 +43,14 @@ def two_distances(
     """Solve for (d_x, k): distance of the nearer whisk in mm, stiffness of the object in N/mm.
 
     compliance_near and compliance_far are k_θ of (1) in rad/(N·mm), as of
-    `distance.rotational_compliance`; the second whisk is made `shift` mm farther away. The stiffness is
-    infinite where the object yields no more than a rigid one, as it may within the noise; both are NaN
-    where no distance explains the two compliances. shift ≤ 0 or C ≤ 0 raises ValueError.
+    `distance.rotational_compliance`; the second whisk is made `shift` mm farther away. The
+    stiffness is infinite where the object yields no more than a rigid one, as it may within the
+    noise; both are NaN where no distance explains the two compliances. shift ≤ 0 or C ≤ 0 raises
+    ValueError.
 
-    With K = C k_θ the cubic terms of a cylinder's (K_1 − d) d² = (K_2 − d − s)(d + s)² cancel, and the
-    larger root of a quadratic remains; of a whisker that tapers it is the largest root of a quartic.
+    With K = C k_θ the cubic terms of a cylinder's (K_1 − d) d² = (K_2 − d − s)(d + s)² cancel, and
+    the larger root of a quadratic remains; of a whisker that tapers it is the largest root of a
+    quartic.
     """
     require_positive("C", C, "N·mm²")
     require_positive("shift", shift, "mm")
@@ -68,10 +74,12 @@ def _rigid(d_x, C, taper_per_mm):
 
 @np.vectorize
 def _tapered_root(near, far, shift, taper):
-    """Find the largest root of (K_1 a − d) d² b = (K_2 b − d − s)(d + s)² a on the whisker; NaN without.
+    """Find the largest root of (K_1 a − d) d² b = (K_2 b − d − s)(d + s)² a on the whisker; NaN
+    without.
 
     a and b are the shares of the base's diameter that are left at d and d + s. At a root without
-    negative give the difference of both sides rises, and beyond the largest root it rises to infinity.
+    negative give the difference of both sides rises, and beyond the largest root it rises to
+    infinity.
     """
     if not (taper > 0 and np.isfinite([near, far]).all()):
         return np.nan
@@ -86,7 +94,9 @@ def _tapered_root(near, far, shift, taper):
 
 
 def _positive_root(square, linear, constant):
-    """Return the larger root of square · d² = linear · d + constant, by the form that does not cancel."""
+    """Return the larger root of square · d² = linear · d + constant, by the form that does not
+    cancel.
+    """
     root = np.sqrt(linear * linear + 4 * square * constant)
     return np.where(linear >= 0, (linear + root) / (2 * square), 2 * constant / (root - linear))
 
@@ -117,10 +127,11 @@ def two_distances_moved(
     far_change: ArrayLike,
     taper_per_mm: ArrayLike = 0.0,
 ) -> tuple[Numbers, Numbers]:
-    """Return the changes of d_x (mm) and 1/k (mm/N) of `two_distances` where both compliances change.
+    """Return the changes of d_x (mm) and 1/k (mm/N) of `two_distances` where both compliances
+    change.
 
-    To first order, with g = 1/k: δk_θ = (∂/∂d_x) k_θ δd_x + δg / d_x² at both places; the two equations
-    are solved for δd_x and δg.
+    To first order, with g = 1/k: δk_θ = (∂/∂d_x) k_θ δd_x + δg / d_x² at both places; the two
+    equations are solved for δd_x and δg.
     """
     require_positive("C", C, "N·mm²")
     far = d_x + shift
@@ -152,8 +163,8 @@ def two_distances_spread(
 ) -> tuple[Numbers, Numbers]:
     """Return the sigmas of d_x (mm) and 1/k (mm/N) of `two_distances`.
 
-    They come from the independent errors of both compliances and of the shift, which moves the farther
-    place alone.
+    They come from the independent errors of both compliances and of the shift, which moves the
+    farther place alone.
     """
     require_sigma("near_sigma", near_sigma)
     require_sigma("far_sigma", far_sigma)
@@ -173,7 +184,9 @@ def two_distances_sigma(
     near_sigma: ArrayLike,
     far_sigma: ArrayLike,
 ) -> tuple[Numbers, Numbers]:
-    """Return the sigmas of d_x (mm) and k (N/mm) of `two_distances`, as in `two_distances_spread`."""
+    """Return the sigmas of d_x (mm) and k (N/mm) of `two_distances`, as in
+    `two_distances_spread`.
+    """
     stiffness = np.asarray(stiffness, dtype=float)
     d_sigma, give_sigma = two_distances_spread(d_x, 1 / stiffness, shift, C, near_sigma, far_sigma)
     return d_sigma, (give_sigma * stiffness**2)[()]

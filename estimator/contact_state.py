@@ -20,8 +20,8 @@ _STEP = 1e-6
 class Contact:
     """Deflections d_y, d_z and slip at the pushing angle with their sigmas, mm.
 
-    touch_covariance_mm_rad: covariance of the distance with the angle of touch. NaN where the estimate
-    determines no contact.
+    touch_covariance_mm_rad: covariance of the distance with the angle of touch. NaN where the
+    estimate determines no contact.
     """
 
     d_y_mm: float
@@ -37,9 +37,11 @@ NO_CONTACT = Contact(nan, nan, nan, nan, nan, nan, nan)
 
 
 def deflection(d_x: float, theta: float, m_y: float, m_z: float, beam: Beam) -> tuple[float, float]:
-    """Return (d_y, d_z) of (18), (19), mm, of any whisker: m d_x d / C, d the distance as a cylinder.
+    """Return (d_y, d_z) of (18), (19), mm, of any whisker: m d_x d / C, d the distance as a
+    cylinder.
 
-    The whisker bends across itself, but the sensing plane is where it first touched: d_y gains 1/cos θ.
+    The whisker bends across itself, but the sensing plane is where it first touched: d_y gains
+    1/cos θ.
 
     >>> deflection(50.0, 0.0, 1.8, 9.0, Beam(9000.0, 100.0))
     (2.5, 0.5)
@@ -54,10 +56,11 @@ def slip(d_x: float, theta: float, m_y: float, m_z: float, alpha: float) -> floa
 
 
 def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
-    """Return the contact of an estimate, its sigmas by first order from the whisk's angle and moments.
+    """Return the contact of an estimate, its sigmas by first order from the whisk's angle and
+    moments.
 
-    The error of an estimate without a gradient is taken as independent; a variance beyond that of the
-    gradient is the model's. A deflection that the estimate gives itself is kept.
+    The error of an estimate without a gradient is taken as independent; a variance beyond that of
+    the gradient is the model's. A deflection that the estimate gives itself is kept.
     """
     d_x = estimate.d_x_mm
     beam = whisk.beam

@@ -1,8 +1,10 @@
-"""Touch on a filtered signal: half height of the moment's rate, and the paper's threshold, each with its bias.
+"""Touch on a filtered signal: half height of the moment's rate, and the paper's threshold, each
+with its bias.
 
-A filter smears the touch over a time of about one over its cut-off. A threshold on the smeared moment is crossed early
-or late by a share of that; half height of the smeared rate is not, by symmetry. Both biases are found by sending the
-ideal broken line (level, then rise) through the same filter.
+A filter smears the touch over a time of about one over its cut-off. A threshold on the smeared
+moment is crossed early or late by a share of that; half height of the smeared rate is not, by
+symmetry. Both biases are found by sending the ideal broken line (level, then rise) through the same
+filter.
 """
 
 import numpy as np
@@ -21,8 +23,9 @@ NOT_CROSSED = "never touches: the filtered moment does not cross the threshold"
 def zero_phase_lowpass(x: ArrayLike, rate_Hz: float, cutoff_Hz: float) -> np.ndarray:
     """Filter samples along the first axis by a low-pass, forwards and backwards: without delay.
 
-    Second-order Butterworth each way, −3 dB at cutoff_Hz over both. Missing samples (NaN) are bridged by
-    lines for the filter, and stay NaN. Raises ValueError for a cut-off outside (0, rate/2).
+    Second-order Butterworth each way, −3 dB at cutoff_Hz over both. Missing samples (NaN) are
+    bridged by lines for the filter, and stay NaN. Raises ValueError for a cut-off outside (0,
+    rate/2).
     """
     x = np.asarray(x, dtype=float)
     if not 0 < cutoff_Hz < rate_Hz / 2:
@@ -53,8 +56,8 @@ def _forwards_and_backwards(x, cutoff, padding: int):
 def _butterworth(x, cutoff):
     """Filter x (n, …) once by a second-order Butterworth low-pass, at rest at its first sample.
 
-    By the bilinear transform y_k + a1 y_{k-1} + a2 y_{k-2} = b (x_k + 2 x_{k-1} + x_{k-2}): one banded
-    system for all k.
+    By the bilinear transform y_k + a1 y_{k-1} + a2 y_{k-2} = b (x_k + 2 x_{k-1} + x_{k-2}): one
+    banded system for all k.
     """
     k = np.tan(np.pi * cutoff)
     a0 = 1.0 + np.sqrt(2.0) * k + k * k
@@ -88,9 +91,9 @@ def threshold_touch(
 ) -> Touch:
     """Find the touch as the paper does: where the filtered moment crosses a threshold for good.
 
-    The moment is taken above its level. threshold is in the unit of the moments, for their magnitude;
-    left out, it is ten times the filtered noise. The touch's bias_rad is how much too late the crossing
-    comes (early: negative) for the fitted rise.
+    The moment is taken above its level. threshold is in the unit of the moments, for their
+    magnitude; left out, it is ten times the filtered noise. The touch's bias_rad is how much too
+    late the crossing comes (early: negative) for the fitted rise.
     """
     felt = felt_touch(motor_rad, moments, time_s)
     if felt.status:
@@ -135,7 +138,8 @@ def touch_on_rate(
 class _Stroke:
     """A stroke's moments above their level, and the broken line fitted to them, both filtered.
 
-    filtered, ideal (n, k): moments, measured and of the broken line, N·mm; motor (n,): filtered angle, rad.
+    filtered, ideal (n, k): moments, measured and of the broken line, N·mm; motor (n,): filtered
+    angle, rad.
     """
 
     def __init__(self, motor_rad, moments, time_s, cutoff_Hz, felt):
@@ -159,21 +163,29 @@ class _Stroke:
         return zero_phase_lowpass(x, self._rate_Hz, self._cutoff_Hz)
 
     def rate(self, moments):
-        """Return the slope (n,) of the moments over the motor angle, in units of the fitted rise's."""
+        """Return the slope (n,) of the moments over the motor angle, in units of the fitted
+        rise's.
+        """
         with np.errstate(all="ignore"):
             return np.gradient(moments @ self._felt.rise.gain) / np.gradient(self.motor)
 
     def noise(self, index):
-        """Return the covariance (k, k) of the filtered moments at a sample: the noise that is left."""
+        """Return the covariance (k, k) of the filtered moments at a sample: the noise that is
+        left.
+        """
         return self._felt.rise.memory.of_sum(self._weights(index))
 
     def noise_of_rate(self, index):
-        """Return the covariance (k, k) of the filtered moments' slope over the motor at a sample."""
+        """Return the covariance (k, k) of the filtered moments' slope over the motor at a
+        sample.
+        """
         change = (self._weights(index + 1) - self._weights(index - 1)) / 2
         return self._felt.rise.memory.of_sum(change / np.gradient(self.motor)[index])
 
     def _weights(self, index):
-        """Return the weights (n,) of all samples in a filtered one: the response to an impulse there."""
+        """Return the weights (n,) of all samples in a filtered one: the response to an impulse
+        there.
+        """
         impulse = np.zeros(len(self.motor))
         impulse[np.clip(index, 0, len(impulse) - 1)] = 1.0
         return self._filter(impulse)
@@ -197,7 +209,8 @@ def _last_crossing(x, motor, height):
 
 
 def _nearest_crossing(x, motor, height, near):
-    """Find where x rises through `height` nearest to the motor angle `near`: (sample, angle, slope).
+    """Find where x rises through `height` nearest to the motor angle `near`: (sample, angle,
+    slope).
 
     The sample is None, and the others NaN, where it never does.
     """
@@ -209,6 +222,8 @@ def _nearest_crossing(x, motor, height, near):
 
 
 def _interpolated(x, motor, height, before):
-    """Interpolate between a sample and the next: (motor angle at which x is `height`, slope there)."""
+    """Interpolate between a sample and the next: (motor angle at which x is `height`, slope
+    there).
+    """
     slope = (x[before + 1] - x[before]) / (motor[before + 1] - motor[before])
     return motor[before] + (height - x[before]) / slope, slope

@@ -1,19 +1,22 @@
-"""Appendix B: the whisker against a surface of constant lateral curvature. Equations (15), (22)–(32).
+"""Appendix B: the whisker against a surface of constant lateral curvature. Equations (15),
+(22)–(32).
 
-Lengths are over the contact distance d_x, moments over C/d_x: r_n = r_κ/d_x, and at r_n = ∞ the surface
-is flat. β_0 is the slope at first touch, θ the pushing angle, α the friction cone angle, all in rad.
+Lengths are over the contact distance d_x, moments over C/d_x: r_n = r_κ/d_x, and at r_n = ∞ the
+surface is flat. β_0 is the slope at first touch, θ the pushing angle, α the friction cone angle,
+all in rad.
 
-Each function exists twice where the paper's (24) matters: as printed, φ = max(0, ζ − α) with ζ taken at
-the virtual point, and exact, where the force leaves the normal at the contact point by α. The printed
-form is right for α = 0 only.
+Each function exists twice where the paper's (24) matters: as printed, φ = max(0, ζ − α) with ζ
+taken at the virtual point, and exact, where the force leaves the normal at the contact point by α.
+The printed form is right for α = 0 only.
 
-Both are written with q = θ/r_n so that nothing cancels for large r_n: from p² = r_n² − 2 y_c θ + θ²,
+Both are written with q = θ/r_n so that nothing cancels for large r_n: from p² = r_n² − 2 y_c θ +
+θ²,
 
     d = θ (2 cos β_0 − q) / (√(1 − (p/r_n)² sin² u) + (p/r_n) cos u),   u = ζ − φ.
 
-Domain: r_n > 0, 0 ≤ θ < 2 y_c and below 90°, |β_0| < 90°, |φ| < 90°; beyond it the whisker has passed the
-object and the result is NaN; `why_not` says why. β_0 < 0 mirrors β_0 > 0. α outside [0°, 90°) raises
-ValueError.
+Domain: r_n > 0, 0 ≤ θ < 2 y_c and below 90°, |β_0| < 90°, |φ| < 90°; beyond it the whisker has
+passed the object and the result is NaN; `why_not` says why. β_0 < 0 mirrors β_0 > 0. α outside [0°,
+90°) raises ValueError.
 """
 
 import numpy as np
@@ -50,7 +53,8 @@ __all__ = [
 
 
 def normalized_curvature(d_x: ArrayLike, r_kappa: ArrayLike) -> Numbers:
-    """Return κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both are positive.
+    """Return κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both
+    are positive.
 
     >>> normalized_curvature(50.0, 100.0)
     0.5
@@ -84,7 +88,9 @@ def virtual_radius(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Numbe
 
 
 def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """Return φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α / p)."""
+    """Return φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α
+    / p).
+    """
     require_friction_angle("alpha", alpha)
     return circle.exact(r_n, theta, beta_0, alpha)[0]
 
@@ -131,7 +137,8 @@ def moments_printed(
 def curvature_of_slip(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLike) -> Numbers:
     """Return κ_n from the rate dφ/dθ at θ = 0, where φ = φ_0: rate cos α / sin φ_0.
 
-    It is (23) with the exact φ. Below zero the surface curves towards the whisker. NaN where nothing slips (φ_0 = 0).
+    It is (23) with the exact φ. Below zero the surface curves towards the whisker. NaN where
+    nothing slips (φ_0 = 0).
     """
     require_friction_angle("alpha", alpha)
     slipping = (np.abs(phi_0) > 0) & (np.abs(phi_0) + alpha < RIGHT_ANGLE)
@@ -149,7 +156,7 @@ def curvature_of_slip_printed(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLik
 def why_not(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0
 ) -> str | np.ndarray:
-    """Explain in a sentence why this module gives NaN for these arguments; empty inside the domain."""
+    """Return a sentence why this module gives NaN for these arguments; empty inside the domain."""
     require_friction_angle("alpha", alpha)
     arguments = np.broadcast_arrays(r_n, theta, beta_0, alpha)
     r_n, theta, beta_0, alpha = (a.astype(float) for a in arguments)

@@ -1,9 +1,9 @@
 """Radial distance d_x from pushing angle and moments: equations (1), (2), (6)–(12), (16), (17).
 
-Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the arguments are no push against
-a surface the distance is NaN, never negative and never infinite, and `why_not` names the condition that
-failed. β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0 and α_est outside
-[0°, 90°) raise ValueError.
+Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the arguments are no push
+against a surface the distance is NaN, never negative and never infinite, and `why_not` names the
+condition that failed. β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0
+and α_est outside [0°, 90°) raise ValueError.
 """
 
 from collections.abc import Callable
@@ -30,11 +30,12 @@ NoSlip: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @elementwise
 def rotational_compliance(theta: ArrayLike, m_z: ArrayLike) -> Numbers:
-    """Compute k_θ of (1), in rad/(N·mm): how far the base turns per moment, over two angles or a stroke.
+    """Compute k_θ of (1), in rad/(N·mm): how far the base turns per moment, over two angles or a
+    stroke.
 
-    theta and m_z (..., n): n ≥ 2 samples along the last axis, else it raises ValueError. The compliance is
-    one over the slope of the least-squares line of the moment over the angle, so that the angle of touch
-    drops out. NaN where the moment does not rise with the angle.
+    theta and m_z (..., n): n ≥ 2 samples along the last axis, else it raises ValueError. The
+    compliance is one over the slope of the least-squares line of the moment over the angle, so that
+    the angle of touch drops out. NaN where the moment does not rise with the angle.
 
     >>> round(rotational_compliance([0.01, 0.03], [2.0, 6.0]), 9)
     0.005
@@ -86,7 +87,9 @@ def friction_angle(mu: ArrayLike) -> Numbers:
 
 @elementwise
 def felt_slip_angle(m_y: ArrayLike, m_z: ArrayLike) -> Numbers:
-    """Return φ of (8), in rad: atan2(m_y, m_z); NaN unless m_z > 0: the whisker pushes towards +y."""
+    """Return φ of (8), in rad: atan2(m_y, m_z); NaN unless m_z > 0: the whisker pushes towards
+    +y.
+    """
     return np.where((m_z > 0) & np.isfinite(m_y) & np.isfinite(m_z), np.arctan2(m_y, m_z), np.nan)
 
 
@@ -105,8 +108,8 @@ def with_friction(
 ) -> Numbers:
     """Return d_x of (10), in mm, for an assumed friction cone angle α_est.
 
-    d_x = Cθ (m_z − μ |m_y|) / (m_z² + m_y²) with μ = tan α_est. The printed form with β_est = φ + α_est
-    is the same number; this one is exact to the last digit.
+    d_x = Cθ (m_z − μ |m_y|) / (m_z² + m_y²) with μ = tan α_est. The printed form with β_est = φ +
+    α_est is the same number; this one is exact to the last digit.
     """
     _require_settings(alpha_est, C)
     d_x = by_friction(theta, m_y, m_z, alpha_est, C)
@@ -133,8 +136,8 @@ def frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike)
 def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: NoSlip) -> Numbers:
     """Return d_x of (16) as printed, in mm: ν(θ, |m|) cos φ, for a no-slip extraction ν.
 
-    `nu(theta, magnitude)` takes and returns arrays. Exact only where ν is proportional to θ/|m|, that is
-    for a cylinder; use `general`.
+    `nu(theta, magnitude)` takes and returns arrays. Exact only where ν is proportional to θ/|m|,
+    that is for a cylinder; use `general`.
     """
     magnitude = np.hypot(m_y, m_z)
     d_x = nu(theta, magnitude) * (m_z / magnitude)
@@ -145,7 +148,8 @@ def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: NoSlip
 def general(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: NoSlip
 ) -> Numbers:
-    """Return d_x of (16), in mm, for any no-slip extraction ν, the angle scaled in place of the distance.
+    """Return d_x of (16), in mm, for any no-slip extraction ν, the angle scaled in place of the
+    distance.
 
     d_x = ν(θ cos(φ + α_est) / cos α_est, |m|): slip reduces the deflection, hence the angle.
     `nu(theta, magnitude)` takes and returns arrays.
@@ -198,7 +202,8 @@ def cone(
 
 @elementwise
 def taper(d_x: ArrayLike, length: ArrayLike) -> Numbers:
-    """Convert a distance d_x for a cylinder to that along a cone of the same base: 1 / (1/d_x + 1/L).
+    """Convert a distance d_x for a cylinder to that along a cone of the same base: 1 / (1/d_x +
+    1/L).
 
     Both are in mm; NaN unless d_x is positive and finite.
     """
@@ -227,8 +232,8 @@ def contact_point(
 ) -> tuple[Numbers, Numbers, Numbers]:
     """Return (r_c, θ_c, z_c) of section II: the contact's cylindrical coordinates, in mm, rad, mm.
 
-    `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All
-    three are NaN where the distance is not positive and finite.
+    `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation.
+    All three are NaN where the distance is not positive and finite.
     """
     known = np.isfinite(d_x) & (d_x > 0) & np.isfinite(touch) & np.isfinite(z_c)
     return tuple(np.where(known, value, np.nan) for value in (d_x, touch, z_c))
@@ -251,10 +256,10 @@ def why_not(
     beta: ArrayLike | None = None,
     C: ArrayLike | None = None,
 ) -> str | np.ndarray:
-    """Explain in a sentence why these arguments give no distance; empty where they give one.
+    """Return a sentence why these arguments give no distance; empty where they give one.
 
-    Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C, a distance too large or too
-    small for a float is reported as well. Returns a str for scalars, else an array of str.
+    Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C, a distance too large or
+    too small for a float is reported as well. Returns a str for scalars, else an array of str.
     """
     slope = 0.0 if beta is None else beta
     stiffness = 1.0 if C is None else C
@@ -273,7 +278,9 @@ def why_not(
 
 
 def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
-    """Return pairs (reason for having no distance, mask of what must hold), the first reason first."""
+    """Return pairs (reason for having no distance, mask of what must hold), the first reason
+    first.
+    """
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
     downhill = across_slope(m_y, m_z, beta)[0] > 0
     return (
@@ -301,7 +308,9 @@ def _distance(value, conditions):
 
 
 def _centred(samples):
-    """Normalise samples (..., n) to mean 0 and largest magnitude 1; return them and the scale (...)."""
+    """Normalise samples (..., n) to mean 0 and largest magnitude 1; return them and the scale
+    (...).
+    """
     deviation = samples - samples.mean(axis=-1, keepdims=True)
     scale = np.abs(deviation).max(axis=-1, keepdims=True)
     return deviation / scale, scale[..., 0]

@@ -1,7 +1,7 @@
 """Arguments and results of every equation: their domain, their broadcasting, their types.
 
-Measured arguments outside an equation's domain give NaN; settings that no measurement can excuse raise
-ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
+Measured arguments outside an equation's domain give NaN; settings that no measurement can excuse
+raise ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,10 +18,11 @@ Numbers: TypeAlias = float | np.ndarray
 
 
 def elementwise(function: Callable) -> Callable:
-    """Wrap a formula on float64 arrays: it takes anything array-like, and returns floats for scalars.
+    """Wrap a formula on float64 arrays: it takes anything array-like, and returns floats for
+    scalars.
 
-    Functions among the arguments pass through. Overflow, division by zero and NaN stay silent inside: the
-    formula's own domain decides what they mean.
+    Functions among the arguments pass through. Overflow, division by zero and NaN stay silent
+    inside: the formula's own domain decides what they mean.
     """
 
     @wraps(function)
@@ -56,9 +57,11 @@ def quotient(
     denominator: Sequence[np.ndarray],
     exponent: int | np.ndarray = 0,
 ) -> np.ndarray:
-    """Return 2^exponent times the numerator's factors over the denominator's, by way of powers of two.
+    """Return 2^exponent times the numerator's factors over the denominator's, by way of powers of
+    two.
 
-    Significands and exponents go separate ways: only the result itself can leave the range of float64.
+    Significands and exponents go separate ways: only the result itself can leave the range of
+    float64.
     """
     value = 1.0
     for factor in numerator:
@@ -87,7 +90,9 @@ def require_friction_angle(name: str, value: ArrayLike) -> None:
 
 
 def require_sigma(name: str, value: ArrayLike) -> None:
-    """Raise ValueError unless every `value` is a standard deviation: zero or positive, and finite."""
+    """Raise ValueError unless every `value` is a standard deviation: zero or positive, and
+    finite.
+    """
     if not _all(value, lambda x: (x >= 0) & (x < np.inf)):
         raise ValueError(
             f"{name} = {value}: a standard deviation must be zero or positive, and finite"
@@ -103,10 +108,11 @@ def _all(value: ArrayLike, holds: Callable) -> bool:
 def first_failure(
     conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int, ...]
 ) -> str | np.ndarray:
-    """Return the text of the first condition that does not hold, element by element; else an empty one.
+    """Return the text of the first condition that does not hold, element by element; else an empty
+    one.
 
-    `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else an
-    array of str.
+    `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else
+    an array of str.
     """
     reasons = np.full(shape, "", dtype=object)
     for text, holds in conditions:

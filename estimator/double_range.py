@@ -1,9 +1,10 @@
-"""Products and quotients of the distance's equations, within the range of doubles wherever their result is.
+"""Products and quotients of the distance's equations, within the range of doubles wherever their
+result is.
 
-Numbers near one and powers of two go separate ways (frexp, ldexp): C, the moments and their squares may
-be doubles where an intermediate product of the equation is none. So no distance that a double holds is
-lost on the way. All take arrays of float64 that broadcast: angles in rad, moments in N·mm, C in N·mm²,
-lengths in mm.
+Numbers near one and powers of two go separate ways (frexp, ldexp): C, the moments and their squares
+may be doubles where an intermediate product of the equation is none. So no distance that a double
+holds is lost on the way. All take arrays of float64 that broadcast: angles in rad, moments in N·mm,
+C in N·mm², lengths in mm.
 """
 
 import numpy as np
@@ -19,7 +20,9 @@ def _exponent(x):
 def over_common_power(
     m_y: np.ndarray, m_z: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Divide m_y and m_z by the power of two that brings the larger near one; return its exponent, too."""
+    """Scale m_y and m_z by the power of two that brings the larger near one; return its exponent,
+    too.
+    """
     exponent = np.maximum(_exponent(m_y), _exponent(m_z))
     return np.ldexp(m_y, -exponent), np.ldexp(m_z, -exponent), exponent
 

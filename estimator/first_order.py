@@ -1,7 +1,8 @@
 """The error of (10) to first order in θ, term by term, as shares of d_x; derived in docs/maps.md.
 
-(10) takes small angles, and a contact that slips along a line across the whisker. Each function is one
-effect that this leaves out, with its sign in the error (estimate less truth). Angles in rad, lengths in mm.
+(10) takes small angles, and a contact that slips along a line across the whisker. Each function is
+one effect that this leaves out, with its sign in the error (estimate less truth). Angles in rad,
+lengths in mm.
 """
 
 import numpy as np
@@ -9,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from estimator.domain import RIGHT_ANGLE, Numbers, elementwise
 
-# A contact that does not slip sideways is held at some slope β from 0 to α, which no moment determines.
-# The share of friction that is left to act along the whisker is √(1 − (tan β/tan α)²).
+# A contact that does not slip sideways is held at some slope β from 0 to α, which no moment
+# determines. The share of friction that is left to act along the whisker is √(1 − (tan β/tan α)²).
 # [1] Its mean over such slopes.
 HELD_SHARE = np.pi / 4
 # [1] Its standard deviation over such slopes.
@@ -38,8 +39,8 @@ def rolling(
 ) -> Numbers:
     """Return −θ (R/d_x) cos β (½/w − ⅛), β = φ + α: rolling over a round object towards the base.
 
-    reach: R, radii of object and whisker together; left: w, share of the base's diameter that is left at
-    d_x. Where the contact is held (φ = 0), its slope is taken as 0.
+    reach: R, radii of object and whisker together; left: w, share of the base's diameter that is
+    left at d_x. Where the contact is held (φ = 0), its slope is taken as 0.
 
     >>> round(rolling(0.05, 3.0, 0.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
@@ -52,7 +53,8 @@ def rolling(
 def rolling_at(
     theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, left: ArrayLike
 ) -> Numbers:
-    """Return −θ (R/d_x) cos β (½/w − ⅛): rolling at a known slope β, whether the contact is held or not.
+    """Return −θ (R/d_x) cos β (½/w − ⅛): rolling at a known slope β, whether the contact is held or
+    not.
 
     >>> round(rolling_at(0.05, 3.0, 0.0, 60.0, 1.0), 8)
     -0.0009375

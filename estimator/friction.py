@@ -1,7 +1,8 @@
-"""The friction cone angle α from the moments: the fit of Fig. 8, and the paper's ways to do without it.
+"""The friction cone angle α from the moments: the fit of Fig. 8, and the paper's ways to do without
+it.
 
-Way 1, tilting the array, and way 3, confidence, are here; way 2, consistency, needs the objects that a
-session describes. Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm.
+Way 1, tilting the array, and way 3, confidence, are here; way 2, consistency, needs the objects
+that a session describes. Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,8 @@ _GRID = np.radians(np.arange(0.0, 89.95, 0.25))
 _GOLDEN = (np.sqrt(5) - 1) / 2
 # Golden-section steps: they take two steps of the grid below a float's resolution.
 _SECTIONS = 45
-# [1] Share of the data's sum of squares below which two sums of squares are the same but for rounding.
+# [1] Two sums of squares are the same but for rounding if they differ by less than this share of
+# the data's own.
 _ROUNDING = 1e-14
 NEVER_SLIPPED = (
     "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
@@ -41,9 +43,10 @@ ONE_SIDED = "the slip angle does not leave zero on both sides of the tilts: tilt
 class FrictionFit:
     """Least-squares friction cone angle: floats for one run, arrays for many.
 
-    alpha_rad with sigma_rad and the 95 % interval low_rad … high_rad; rms of the residuals in the unit of
-    the observations; status: empty, or why α is missing or on its bound; freedom: degrees of freedom of
-    Student's t in the interval. NaN where the data do not determine α, but for rms and freedom.
+    alpha_rad with sigma_rad and the 95 % interval low_rad … high_rad; rms of the residuals in the
+    unit of the observations; status: empty, or why α is missing or on its bound; freedom: degrees
+    of freedom of Student's t in the interval. NaN where the data do not determine α, but for rms
+    and freedom.
     """
 
     alpha_rad: float
@@ -59,11 +62,11 @@ class FrictionFit:
 class Pushes:
     """Moments over slopes, measured on one surface.
 
-    beta (n,): slopes, rad. m_y, m_z (..., n): moments, N·mm; each run of the leading axes is fitted by
-    itself. d_x (mm), theta (rad) and C (N·mm²): scalars or (n,). sigma_y, sigma_z (..., n): standard
-    deviations of the moments, both or none. recording (n,): name of the set-up of each point; the points
-    of one set-up share its errors of slope and distance. Raises ValueError where C, d_x or theta is not
-    positive.
+    beta (n,): slopes, rad. m_y, m_z (..., n): moments, N·mm; each run of the leading axes is fitted
+    by itself. d_x (mm), theta (rad) and C (N·mm²): scalars or (n,). sigma_y, sigma_z (..., n):
+    standard deviations of the moments, both or none. recording (n,): name of the set-up of each
+    point; the points of one set-up share its errors of slope and distance. Raises ValueError where
+    C, d_x or theta is not positive.
     """
 
     beta: np.ndarray
@@ -86,15 +89,15 @@ class Pushes:
 def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
     """Fit the friction cone angle to moments over slopes, as in Fig. 8.
 
-    reading: "moments" takes the residuals of (13) and (14); "magnitude" those of |m|² alone, the other
-    reading of the paper's "LMS fits on the sum of the squares of (13) and (14)". All points weigh alike,
-    as in the paper.
+    reading: "moments" takes the residuals of (13) and (14); "magnitude" those of |m|² alone, the
+    other reading of the paper's "LMS fits on the sum of the squares of (13) and (14)". All points
+    weigh alike, as in the paper.
 
-    With the moments' own sigmas the interval is that of the normal distribution. Without them the sigma
-    comes from each residual's square and leverage, so that it also holds for noise that grows with the
-    moment, and the interval takes Student's t; below about 30 residuals it is somewhat short. The points
-    of a recording count as one in it. Raises ValueError where a moment or slope is NaN, or their numbers
-    differ.
+    With the moments' own sigmas the interval is that of the normal distribution. Without them the
+    sigma comes from each residual's square and leverage, so that it also holds for noise that grows
+    with the moment, and the interval takes Student's t; below about 30 residuals it is somewhat
+    short. The points of a recording count as one in it. Raises ValueError where a moment or slope
+    is NaN, or their numbers differ.
     """
     if reading not in READINGS:
         raise ValueError(f"reading = {reading!r}: must be one of {', '.join(READINGS)}")
@@ -123,7 +126,8 @@ def curves(
 def _observations(pushes, reading):
     """Return slopes (n,), data (..., n) or (..., 2n), and Cθ/d_x (n,).
 
-    Raises ValueError for a number that is missing, and for slopes and moments that are not one to one.
+    Raises ValueError for a number that is missing, and for slopes and moments that are not one to
+    one.
     """
     m_y, m_z = np.broadcast_arrays(pushes.m_y, pushes.m_z)
     push = pushes.C * np.divide(pushes.theta, pushes.d_x)
@@ -175,7 +179,9 @@ def _cost(alpha, beta, data, scale, reading):
 
 
 def _least_squares(beta, data, scale, reading):
-    """Find the global minimum over α: the best of a grid, then golden sections between its neighbours."""
+    """Find the global minimum over α: the best of a grid, then golden sections between its
+    neighbours.
+    """
     model = _model(_GRID, beta, scale, reading)
     cost = (model**2).sum(axis=-1) - 2 * data @ model.T
     best = np.argmin(cost, axis=-1)
@@ -194,8 +200,8 @@ def _least_squares(beta, data, scale, reading):
 def _sigma_of_residuals(residuals, slopes, recording):
     """Return (sigma of α, degrees of freedom) from the residuals' own scatter.
 
-    σ² = Σ (Σ J e)² / (1 − h) over (Σ J²)², with the residuals e, the slopes J and the leverages
-    h = Σ J² / Σ J². The inner sums are over each recording, or over the single residual where none is
+    σ² = Σ (Σ J e)² / (1 − h) over (Σ J²)², with the residuals e, the slopes J and the leverages h =
+    Σ J² / Σ J². The inner sums are over each recording, or over the single residual where none is
     given: MacKinnon & White's HC2, and Bell & McCaffrey's form of it for what is recorded together.
     """
     count = residuals.shape[-1]
@@ -255,11 +261,11 @@ def _float_or_array(value):
 def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 0.0) -> FrictionFit:
     """Estimate the friction cone angle from tilts of the whole array about the whisker's x axis.
 
-    This is way 1 of section VII. tilt (n,) and the felt slip angles φ (n,), rad. φ follows the tilt less
-    α beyond the range of tilts in which it is zero, and that range is 2α wide: two lines of slope one are
-    fitted, and α is half their distance. phi_sigma: standard deviation of one slip angle; 0 takes the
-    scatter about the lines, with Student's t for the interval, which is NaN with two slip angles on the
-    lines. NaN with a status where φ does not leave zero on both sides.
+    This is way 1 of section VII. tilt (n,) and the felt slip angles φ (n,), rad. φ follows the tilt
+    less α beyond the range of tilts in which it is zero, and that range is 2α wide: two lines of
+    slope one are fitted, and α is half their distance. phi_sigma: standard deviation of one slip
+    angle; 0 takes the scatter about the lines, with Student's t for the interval, which is NaN with
+    two slip angles on the lines. NaN with a status where φ does not leave zero on both sides.
     """
     require_sigma("phi_sigma", phi_sigma)
     tilt = np.asarray(tilt, dtype=float)
@@ -294,10 +300,11 @@ def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 
 
 
 def _dead_band(tilt, phi, phi_sigma):
-    """Fit the lines φ = tilt − middle ∓ α to the slip angles on both sides of the range without slip.
+    """Fit the lines φ = tilt − middle ∓ α to the slip angles on both sides of the range without
+    slip.
 
-    Returns (middle, α, masks (n,) of the points below and above the range); middle and α are NaN where a
-    side has no point.
+    Returns (middle, α, masks (n,) of the points below and above the range); middle and α are NaN
+    where a side has no point.
     """
     threshold = max(3 * phi_sigma, 0.1 * np.abs(phi).max(initial=0.0))
     below = phi < -threshold
