@@ -1,4 +1,7 @@
-"""The whisker as a beam: section, flexural rigidity, and C = 3EI. Lengths in mm, rigidity in N·mm²."""
+"""The whisker as a beam: section, flexural rigidity, and C = 3EI.
+
+Lengths in mm, rigidity in N·mm².
+"""
 
 from dataclasses import dataclass
 from math import inf, nan
@@ -9,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from estimator.domain import Numbers, elementwise, require_positive
 
+# [N·mm² per GPa·mm⁴] Unit of a rigidity from a modulus in GPa and a section in mm.
 NMM2_PER_GPA_MM4 = 1000.0
 SHAPES = ("cylinder", "cone", "tapered")
 
 
 def second_moment_of_area(diameter_mm: ArrayLike) -> Numbers:
-    """I = pi d^4 / 64 of a round section, in mm^4.
+    """Return the second moment of area of a round section, I = pi d^4 / 64, in mm^4.
 
     >>> round(second_moment_of_area(1.0), 7)
     0.0490874
@@ -23,7 +27,7 @@ def second_moment_of_area(diameter_mm: ArrayLike) -> Numbers:
 
 
 def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike) -> Numbers:
-    """EI in N·mm² of a round section.
+    """Return the flexural rigidity EI of a round section, in N·mm².
 
     >>> round(flexural_rigidity(60.0, 1.0), 1)
     2945.2
@@ -34,9 +38,10 @@ def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike) -> 
 def diameter_at(
     arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike
 ) -> Numbers:
-    """Diameter in mm at the arc length `arc_mm` from the base.
+    """Return the diameter in mm at the arc length `arc_mm` from the base.
 
-    `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a cone.
+    `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a
+    cone.
     """
     return base_diameter_mm * (1 - taper * arc_mm / length_mm)
 
@@ -44,12 +49,12 @@ def diameter_at(
 def rigidity_at(
     arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike
 ) -> Numbers:
-    """EI in N·mm² at the arc length `arc_mm`; it goes with the fourth power of the diameter."""
+    """Return EI in N·mm² at the arc length `arc_mm`: it goes with the diameter's fourth power."""
     return base_rigidity_Nmm2 * (1 - taper * arc_mm / length_mm) ** 4
 
 
 def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike) -> Numbers:
-    """Moment in the paper's unit EI/metre, i.e. the curvature at the base in 1/m (Fig. 8).
+    """Convert a moment to the paper's unit EI/metre: the curvature at the base in 1/m (Fig. 8).
 
     >>> moment_in_EI_per_metre(2.0, 4000.0)
     0.5
@@ -58,10 +63,10 @@ def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike) -> N
 
 
 def taper_of(shape: str, tip_share: float | None = None) -> float:
-    """Share of the base's diameter that is lost up to the tip: 0 of a cylinder, 1 of a cone, between them if tapered.
+    """Return the share of the base's diameter that is lost: 0 of a cylinder, 1 of a cone.
 
-    tip_share: the tip's diameter over the base's, given for "tapered" alone. Raises ValueError for another shape, and
-    where a tip_share is missing, not asked for, or outside (0, 1).
+    tip_share: the tip's diameter over the base's, given for "tapered" alone. Raises ValueError for
+    another shape, and where a tip_share is missing, superfluous, or outside (0, 1).
     """
     if shape not in SHAPES:
         raise ValueError(f"shape = {shape!r}: must be one of {', '.join(SHAPES)}")
@@ -80,12 +85,14 @@ def taper_of(shape: str, tip_share: float | None = None) -> float:
 class Beam:
     """A straight whisker, clamped at its base: cylinder, cone, or a cone cut off ("tapered").
 
-    C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's diameter over the
-    base's. Raises ValueError for anything but a positive C and length, and as `taper_of` does.
+    C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's
+    diameter over the base's. Raises ValueError for anything but a positive C and length, and as
+    `taper_of` does.
 
-    The one compliance of all of them: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the diameter that is lost
-    up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every equation for a cylinder holds for the base's
-    cylinder touched at d (`as_cylinder_mm`), and the way back is `distance_mm`.
+    All of them have one compliance: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the
+    diameter that is lost up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every
+    equation for a cylinder holds for the base's cylinder touched at d (`as_cylinder_mm`), and
+    `distance_mm` is the inverse.
     """
 
     C_Nmm2: float
@@ -94,6 +101,7 @@ class Beam:
     tip_share: float | None = None
 
     def __post_init__(self):
+        """Raise ValueError unless C and length are positive and the shape is a known one."""
         require_positive("C_Nmm2", self.C_Nmm2, "N·mm²")
         require_positive("length_mm", self.length_mm, "mm")
         taper_of(self.shape, self.tip_share)
@@ -102,60 +110,71 @@ class Beam:
     def from_modulus(
         cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, *shape: str | float
     ) -> Self:
-        """Beam of a round wire from Young's modulus and the diameter at the base."""
+        """Make the beam of a round wire from Young's modulus and the diameter at the base."""
         require_positive("youngs_modulus_GPa", youngs_modulus_GPa, "GPa")
         require_positive("diameter_mm", diameter_mm, "mm")
-        return cls.from_rigidity(
-            flexural_rigidity(youngs_modulus_GPa, diameter_mm), length_mm, *shape
-        )
+        rigidity_Nmm2 = flexural_rigidity(youngs_modulus_GPa, diameter_mm)
+        return cls.from_rigidity(rigidity_Nmm2, length_mm, *shape)
 
     @classmethod
     def from_rigidity(cls, rigidity_Nmm2: float, length_mm: float, *shape: str | float) -> Self:
-        """Beam from its flexural rigidity EI at the base."""
+        """Make a beam from its flexural rigidity EI at the base."""
         return cls(3 * rigidity_Nmm2, length_mm, *shape)
 
     @property
     def rigidity_Nmm2(self) -> float:
-        """EI at the base."""
+        """Return EI at the base."""
         return self.C_Nmm2 / 3
 
     @property
     def taper(self) -> float:
-        """Share of the base's diameter that is lost up to the tip."""
+        """Return the share of the base's diameter that is lost up to the tip."""
         return taper_of(self.shape, self.tip_share)
 
     def as_cylinder_mm(self, d_x_mm: ArrayLike) -> Numbers:
-        """Distance at which the base's cylinder is as stiff as this whisker at d_x; infinite at a cone's point."""
+        """Return the distance at which the base's cylinder is as stiff as this whisker at d_x.
+
+        It is infinite at a cone's apex, and NaN unless d_x is positive.
+        """
         return _inverse_sum(d_x_mm, -self.taper / self.length_mm)
 
     def left(self, d_x_mm: ArrayLike) -> Numbers:
-        """Share of the base's diameter that is left at d_x."""
+        """Return the share of the base's diameter that is left at d_x."""
         return d_x_mm / self.as_cylinder_mm(d_x_mm)
 
     def moment_Nmm(self, theta_rad: ArrayLike, d_x_mm: ArrayLike) -> Numbers:
-        """m_z of (2): of a push by θ against a contact at d_x, without slip."""
+        """Return m_z of (2): the moment of a push by θ against a contact at d_x, without slip."""
         return self.C_Nmm2 * theta_rad / self.as_cylinder_mm(d_x_mm)
 
     def distance_mm(self, as_cylinder_mm: ArrayLike) -> Numbers:
-        """d_x from the distance that the base's cylinder would give; NaN unless that is positive."""
+        """Return d_x from the distance of the base's cylinder; NaN unless that is positive."""
         return _inverse_sum(as_cylinder_mm, self.taper / self.length_mm)
 
     def error_share(self, d_x_mm: ArrayLike, of_cylinder: ArrayLike) -> Numbers:
-        """Relative error of d_x from that of the distance that its base's cylinder would give; −1: there is none."""
-        wrong = self.distance_mm(self.as_cylinder_mm(d_x_mm) * (1.0 + np.asarray(of_cylinder)))
-        return np.where(np.asarray(of_cylinder) > -1, wrong / d_x_mm, 0.0)[()] - 1.0
+        """Return the relative error of d_x from that of the distance as the base's cylinder.
+
+        −1, that is no distance at all, where the cylinder's is off by −1 or less.
+        """
+        of_cylinder = np.asarray(of_cylinder)
+        wrong = self.distance_mm(self.as_cylinder_mm(d_x_mm) * (1.0 + of_cylinder))
+        return np.where(of_cylinder > -1, wrong / d_x_mm, 0.0)[()] - 1.0
 
 
 def _inverse_sum(d, per_mm):
-    """1 / (1/d + per_mm) for d > 0, infinite where the sum is zero or below, NaN elsewhere."""
+    """Return 1 / (1/d + per_mm) for d > 0: inf where the sum is ≤ 0, NaN unless d > 0."""
     if not isinstance(d, float):
         return _inverse_sums(d, per_mm)
+    # A single number goes without arrays: a whisk's estimates need it a thousand times.
     d = float(d)
-    below = 1 + d * per_mm  # of one number, which a whisk's estimates ask for a thousand times
-    return (d / below if below > 0 else inf) if d > 0 else nan
+    if not d > 0:
+        return nan
+    below = 1 + d * per_mm
+    return d / below if below > 0 else inf
 
 
 @elementwise
 def _inverse_sums(d, per_mm):
+    """Evaluate `_inverse_sum` for arrays."""
     below = 1 + d * per_mm
-    return np.where(d > 0, np.where(below > 0, d / np.maximum(below, 0.0), np.inf), np.nan)
+    inverse = np.where(below > 0, d / np.maximum(below, 0.0), np.inf)
+    return np.where(d > 0, inverse, np.nan)

@@ -1,9 +1,10 @@
-"""The paper's estimators, written as anyone would write one: a function of a whisk and the settings.
+"""The paper's estimators, written as anyone would write one: a function of a whisk and the
+settings.
 
-For a tapered whisker they run on the base's cylinder, and 1/d_x gains the taper (`Beam.distance_mm`). An estimate of
-(10) or (12) beyond the whisker's length is set to the length and said to be a tip contact (section VII). (2)
-overestimates by as much as slip it ignores, so that beyond the length it tells of slip, not of the tip: it is flagged
-and left.
+For a tapered whisker they run on the base's cylinder, and 1/d_x gains the taper
+(`Beam.distance_mm`). An estimate of (10) or (12) beyond the whisker's length is set to the length
+and reported as a tip contact (section VII). (2) overestimates because it ignores slip, so that a
+distance beyond the length means slip, not the tip: it is flagged and left.
 """
 
 from dataclasses import replace
@@ -23,58 +24,75 @@ NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} m
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Equation (2): as if the whisker did not slip sideways."""
-    felt = (whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
-    d_x, gradient = distance.no_slip(*felt), uncertainty.gradient_no_slip(*felt)
-    return _estimate(
-        whisk, _without_friction(settings), d_x, gradient, _model_share, m_y=0.0, clamp=False
-    )
+    """Estimate by equation (2): as if the whisker did not slip sideways."""
+    theta = whisk.theta_at_rad
+    m_z = whisk.m_z_at_Nmm
+    d_x = distance.no_slip(theta, m_z, whisk.beam.C_Nmm2)
+    gradient = uncertainty.gradient_no_slip(theta, m_z, whisk.beam.C_Nmm2)
+    settings = _without_friction(settings)
+    return _estimate(whisk, settings, d_x, gradient, _model_share, m_y=0.0, clamp=False)
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Equation (10): slip accounted for, with the assumed friction cone angle.
+    """Estimate by equation (10): slip accounted for, with the assumed friction cone angle.
 
-    Its interval holds α_est's sigma and stays where (10) loses its root: then only one side of it is known.
+    Its interval includes α_est's sigma and exists even where (10) loses its root: then with one
+    side only.
     """
     return _with_friction(whisk, settings, _model_share)
 
 
 def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Equation (10) less the first order of its own error: rolling over a round object, friction along the whisker.
+    """Estimate by equation (10) less the first order of its own error.
 
-    The object's radius is the one that it is told, else as thick as it has to allow for; its lean is not known. Where
-    (10) has no distance, or the tip's, this says the same.
+    That is rolling over a round object, and friction along the whisker. The object's radius is the
+    one of the settings, else the thickness that they allow for; its lean is not known. Where (10)
+    has no distance, or the tip's, this is the estimate of (10).
     """
-    estimate, length = _with_friction(whisk, settings, _share_left), whisk.beam.length_mm
+    length = whisk.beam.length_mm
+    estimate = _with_friction(whisk, settings, _share_left)
     if not 0 < estimate.d_x_mm < length:
         return _with_friction(whisk, settings, _model_share)
-    longer = 1 - _first_order(whisk, settings, estimate.d_x_mm)
-    d_x, low, high = (
-        min(end * longer, length) for end in (estimate.d_x_mm, estimate.low_mm, estimate.high_mm)
+    factor = 1 - _first_order(whisk, settings, estimate.d_x_mm)
+    return replace(
+        estimate,
+        d_x_mm=min(estimate.d_x_mm * factor, length),
+        low_mm=min(estimate.low_mm * factor, length),
+        high_mm=min(estimate.high_mm * factor, length),
     )
-    return replace(estimate, d_x_mm=d_x, low_mm=low, high_mm=high)
 
 
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Equation (12): slip accounted for, as if there were no friction."""
+    """Estimate by equation (12): slip accounted for, as if there were no friction."""
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
-    d_x, gradient = distance.frictionless(*felt), uncertainty.gradient_frictionless(*felt)
+    d_x = distance.frictionless(*felt)
+    gradient = uncertainty.gradient_frictionless(*felt)
     return _assuming(whisk, _without_friction(settings), d_x, gradient, _model_share)
 
 
 def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Equations (16), (17) as printed, ν(θ, |m|) cos φ with the whisker's own ν: far off where a tapered whisker slips,
-    for the slip takes its share of the angle and not of the distance. Not among ESTIMATORS; to be asked for by name."""
-    felt, beam = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm), whisk.beam
-    d_x = distance.general_printed(
-        *felt, lambda theta, m: beam.distance_mm(beam.C_Nmm2 * theta / m)
-    )
-    if d_x != d_x:
+    """Estimate by equations (16), (17) as printed: ν(θ, |m|) cos φ with the whisker's own ν.
+
+    It is far from the truth where a tapered whisker slips, since slip takes its share of the angle
+    and not of the distance. It is not among ESTIMATORS: use it by its name.
+    """
+    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    beam = whisk.beam
+
+    def nu(theta, m):
+        """Return the no-slip distance, mm, for an angle and a moment."""
+        return beam.distance_mm(beam.C_Nmm2 * theta / m)
+
+    d_x = distance.general_printed(*felt, nu)
+    if isnan(d_x):
         return Estimate(nan, nan, distance.why_not(*felt))
-    noise = {"theta_sigma": whisk.theta_sigma_rad, "covariance": whisk.covariance_at}
-    gradient = uncertainty.gradient_printed(*felt, beam.C_Nmm2, beam.taper / beam.length_mm)
-    mixed = whisk.theta_moment_covariance_at
-    return Estimate(d_x, uncertainty.sigma(gradient, **noise, theta_moment_covariance=mixed))
+    sigma = uncertainty.sigma(
+        uncertainty.gradient_printed(*felt, beam.C_Nmm2, beam.taper / beam.length_mm),
+        theta_sigma=whisk.theta_sigma_rad,
+        covariance=whisk.covariance_at,
+        theta_moment_covariance=whisk.theta_moment_covariance_at,
+    )
+    return Estimate(d_x, sigma)
 
 
 ESTIMATORS = {
@@ -83,35 +101,37 @@ ESTIMATORS = {
     "frictionless": frictionless,
     "corrected": corrected,
 }
-WITHOUT_ALPHA = (no_slip, frictionless)  # say the same whatever friction angle they are told
+# Estimators whose distance does not depend on the assumed friction angle.
+WITHOUT_ALPHA = (no_slip, frictionless)
 
 
 def _first_order(whisk, settings, d_x):
-    """The error of (10) at d_x as a share of it, by what is known of the object."""
-    beam, alpha = whisk.beam, settings.alpha_est_rad
-    phi = 0.0 if is_held(whisk) else distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    left = beam.left(d_x)
-    told = settings.object_radius_mm == settings.object_radius_mm
-    reach = (
-        settings.object_radius_mm + settings.whisker_radius_mm * left
-        if told
-        else settings.object_reach_mm
-    )
-    rolling = first_order.rolling(whisk.theta_at_rad, reach, phi, alpha, d_x, left)
-    return rolling + (
-        first_order.HELD_SHARE * first_order.dragging(whisk.theta_at_rad, alpha)
-        if phi == 0
-        else 0.0
-    )
+    """Return the relative error of (10) at d_x, by the settings' knowledge of the object."""
+    theta = whisk.theta_at_rad
+    alpha = settings.alpha_est_rad
+    phi = 0.0 if is_held(whisk) else _phi(whisk)
+    left = whisk.beam.left(d_x)
+    reach = settings.object_reach_mm
+    if not isnan(settings.object_radius_mm):
+        reach = settings.object_radius_mm + settings.whisker_radius_mm * left
+    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
+    if phi != 0:
+        return rolling
+    return rolling + first_order.HELD_SHARE * first_order.dragging(theta, alpha)
 
 
 def is_held(whisk: Whisk) -> bool:
-    """Is no slip to the side felt, within two sigma?"""
+    """Check that no lateral slip is felt, within two sigma of m_y."""
     return abs(whisk.m_y_at_Nmm) <= 2 * sqrt(whisk.covariance_at[0, 0])
 
 
+def _phi(whisk):
+    """Return the felt slip angle φ of (8), rad."""
+    return distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+
+
 def _with_friction(whisk, settings, model):
-    """(10); model: what it may be off by itself, see `_model_share`."""
+    """Estimate by (10); model: the function of its own relative sigma, such as `_model_share`."""
     felt = (
         whisk.theta_at_rad,
         whisk.m_y_at_Nmm,
@@ -119,56 +139,60 @@ def _with_friction(whisk, settings, model):
         settings.alpha_est_rad,
         whisk.beam.C_Nmm2,
     )
-    d_x, gradient = distance.with_friction(*felt), uncertainty.gradient_with_friction(*felt)
+    d_x = distance.with_friction(*felt)
+    gradient = uncertainty.gradient_with_friction(*felt)
     return _assuming(whisk, settings, d_x, gradient, model)
 
 
 def _without_friction(settings: EstimatorSettings) -> EstimatorSettings:
+    """Return the settings with a friction angle that is exactly 0."""
     return replace(settings, alpha_est_rad=0.0, alpha_est_sigma_rad=0.0)
 
 
 def _assuming(whisk, settings, d_x, gradient, model):
-    """An estimate that takes both moments, with the friction angle assumed and the slope (9) that follows."""
+    """Assemble an estimate from both moments, with its friction angle and the slope (9) that
+    follows.
+    """
     slope = distance.estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
     estimate = _estimate(whisk, settings, d_x, gradient, model, m_y=whisk.m_y_at_Nmm)
     return replace(estimate, alpha_est_rad=settings.alpha_est_rad, beta_rad=slope)
 
 
-def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
-    """Estimate from a cylinder's distance and gradient: sigma, interval, taper, clamp at the tip, reason for a NaN.
+def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
+    """Assemble an estimate from a cylinder's distance and gradient.
 
-    m_y: the moment along the surface that the equation takes; (2) takes none. share: what the equation itself may be
-    off by (`_model_share`). A tapering whisker's distance bends over what α_est may be off by: its sigma is no less
-    than the two sides of the interval, in the mean of their squares.
+    It adds sigma and interval, the taper, the clamp at the tip, and the reason for a NaN. m_y: the
+    moment along the surface that the equation takes; (2) takes none. model_share: function of the
+    equation's own relative sigma (`_model_share`). A tapering whisker's distance is not linear over
+    the sigma of α_est: its sigma is no less than the two sides of the interval, in the mean of
+    their squares.
     """
-    theta, m_z, beam = whisk.theta_at_rad, whisk.m_z_at_Nmm, whisk.beam
-    knows = {
+    beam = whisk.beam
+    errors = {
         "theta_sigma": whisk.theta_sigma_rad,
         "covariance": whisk.covariance_at,
         "alpha_est_sigma": settings.alpha_est_sigma_rad,
         "theta_moment_covariance": whisk.theta_moment_covariance_at,
     }
     tapered = beam.distance_mm(d_x)
-    left = (
-        tapered / d_x
-    )  # of the base's diameter at the contact; of a relative error on the base's cylinder, too
-    model = share(whisk, settings, tapered, left)
-    ends = uncertainty.interval_with_friction(
-        theta,
+    # Share of the base's diameter at the contact, and of a relative error on the base's cylinder.
+    left = tapered / d_x
+    model = model_share(whisk, settings, tapered, left)
+    low, high = uncertainty.interval_with_friction(
+        whisk.theta_at_rad,
         m_y,
-        m_z,
+        whisk.m_z_at_Nmm,
         settings.alpha_est_rad,
         beam.C_Nmm2,
         model_sigma=model / left if model else 0.0,
-        **knows,
+        **errors,
     )
-    low, high = (min(beam.distance_mm(end), beam.length_mm) if end > 0 else end for end in ends)
-    if d_x != d_x:
+    low = _on_whisker(low, beam)
+    high = _on_whisker(high, beam)
+    if isnan(d_x):
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
-    sigma, gradient = (
-        hypot(uncertainty.sigma(gradient, **knows) * left**2, model * tapered),
-        gradient * left**2,
-    )
+    sigma = hypot(uncertainty.sigma(gradient, **errors) * left**2, model * tapered)
+    gradient = gradient * left**2
     if beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
         sigma = max(sigma, hypot(tapered - low, high - tapered) / (sqrt(2) * uncertainty.Z_95))
     clamped, at_tip = distance.clamp_to_length(tapered, beam.length_mm)
@@ -176,34 +200,52 @@ def _estimate(whisk, settings, d_x, gradient, share, *, m_y, clamp=True):
         return Estimate(tapered, sigma, BEYOND, gradient=gradient)
     if at_tip:
         return Estimate(clamped, sigma, TIP.format(tapered, low), low, high)
-    return Estimate(
-        clamped, sigma, NEARER.format(high) if low == 0 else "", low, high, gradient=gradient
-    )
+    status = NEARER.format(high) if low == 0 else ""
+    return Estimate(clamped, sigma, status, low, high, gradient=gradient)
+
+
+def _on_whisker(end, beam):
+    """Convert an end of the cylinder's interval to this whisker, no longer than it; keep 0 and
+    NaN.
+    """
+    return min(beam.distance_mm(end), beam.length_mm) if end > 0 else end
 
 
 def _model_share(whisk, settings, d_x, left):
-    """What (10) may be off by itself, as a share of d_x; 0 where nothing is said of the object, or without distance."""
-    if d_x != d_x or settings.object_reach_mm == 0:
+    """Return the relative sigma of (10) itself; 0 without a distance or without a thickness to
+    allow for.
+    """
+    if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
-    phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    known = {"reach": settings.object_reach_mm, "tilt_sigma": settings.tilt_sigma_rad, "left": left}
-    return uncertainty.model_share(whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, **known)
+    return uncertainty.model_share(
+        whisk.theta_at_rad,
+        _phi(whisk),
+        settings.alpha_est_rad,
+        d_x,
+        reach=settings.object_reach_mm,
+        tilt_sigma=settings.tilt_sigma_rad,
+        left=left,
+    )
 
 
 def _share_left(whisk, settings, d_x, left):
-    """What (10) may still be off by where its first order has been taken out."""
-    if d_x != d_x or settings.object_reach_mm == 0:
+    """Return the relative sigma that is left of (10) when its first order has been subtracted."""
+    if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
-    phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    known = {"tilt_sigma": settings.tilt_sigma_rad, "left": left}
-    known["held_spread"] = first_order.HELD_SPREAD if is_held(whisk) else 1.0
-    reach = settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
     return uncertainty.model_share(
-        whisk.theta_at_rad, phi, settings.alpha_est_rad, d_x, reach=reach, **known
+        whisk.theta_at_rad,
+        _phi(whisk),
+        settings.alpha_est_rad,
+        d_x,
+        reach=settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0,
+        tilt_sigma=settings.tilt_sigma_rad,
+        left=left,
+        held_spread=first_order.HELD_SPREAD if is_held(whisk) else 1.0,
     )
 
 
 def _reason(whisk, alpha_est, high):
+    """Return the reason for having no distance, and the interval's open end where there is one."""
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     reason = distance.why_not(*felt, alpha_est=alpha_est)
     return f"{reason}; {NEARER.format(high)}" if high > 0 else reason

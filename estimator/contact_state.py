@@ -1,7 +1,7 @@
-"""The contact that an estimate amounts to: deflection and slip there, and how they and the distance err together.
+"""The contact of an estimate: deflection and slip there, and the covariance with the distance.
 
-Frame and signs are those of the sensing plane (y, z): d_y against the push, d_z along the surface's rise. Angles in
-rad, moments in N·mm, lengths in mm.
+Frame and signs are those of the sensing plane (y, z): d_y against the push, d_z along the surface's
+rise. Angles in rad, moments in N·mm, lengths in mm.
 """
 
 from dataclasses import dataclass, replace
@@ -12,13 +12,17 @@ import numpy as np
 from estimator.beam import Beam
 from estimator.whisk import Estimate, Whisk
 
-_STEP = 1e-6  # relative, of central differences
+# [1] Step of central differences, relative.
+_STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Deflections d_y, d_z and slip at the pushing angle with their sigmas, mm; the covariance of the distance with the
-    angle of touch, mm·rad. NaN where the estimate tells none."""
+    """Deflections d_y, d_z and slip at the pushing angle with their sigmas, mm.
+
+    touch_covariance_mm_rad: covariance of the distance with the angle of touch. NaN where the
+    estimate determines no contact.
+    """
 
     d_y_mm: float
     d_y_sigma_mm: float
@@ -29,13 +33,15 @@ class Contact:
     touch_covariance_mm_rad: float
 
 
-NO_CONTACT = Contact(*(nan,) * 7)
+NO_CONTACT = Contact(nan, nan, nan, nan, nan, nan, nan)
 
 
 def deflection(d_x: float, theta: float, m_y: float, m_z: float, beam: Beam) -> tuple[float, float]:
-    """(d_y, d_z) of (18), (19), mm, of any whisker: m d_x d / C, d the distance on its base's cylinder.
+    """Return (d_y, d_z) of (18), (19), mm, of any whisker: m d_x d / C, d the distance as a
+    cylinder.
 
-    The whisker bends across itself, the sensing plane stands where it first touched: d_y gains 1/cos θ.
+    The whisker bends across itself, but the sensing plane is where it first touched: d_y gains
+    1/cos θ.
 
     >>> deflection(50.0, 0.0, 1.8, 9.0, Beam(9000.0, 100.0))
     (2.5, 0.5)
@@ -45,66 +51,68 @@ def deflection(d_x: float, theta: float, m_y: float, m_z: float, beam: Beam) -> 
 
 
 def slip(d_x: float, theta: float, m_y: float, m_z: float, alpha: float) -> float:
-    """σ of (5), mm, at the slope β = φ + α of (9): d_x θ sin φ / cos α."""
+    """Return σ of (5), mm, at the slope β = φ + α of (9): d_x θ sin φ / cos α."""
     return d_x * theta * m_y / sqrt(m_y * m_y + m_z * m_z) / cos(alpha)
 
 
 def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
-    """The contact of an estimate, by first order from what the whisk says of its angle and moments.
+    """Return the contact of an estimate, its sigmas by first order from the whisk's angle and
+    moments.
 
-    An estimate without a gradient is taken to err on its own; what a sigma holds beyond the gradient is the model's. A
-    deflection that the estimate gives itself stands.
+    The error of an estimate without a gradient is taken as independent; a variance beyond that of
+    the gradient is the model's. A deflection that the estimate gives itself is kept.
     """
-    on_whisker = estimate.d_x_mm > 0 and np.isfinite(
-        whisk.beam.as_cylinder_mm(estimate.d_x_mm * (1 + _STEP))
-    )
+    d_x = estimate.d_x_mm
+    beam = whisk.beam
+    on_whisker = d_x > 0 and np.isfinite(beam.as_cylinder_mm(d_x * (1 + _STEP)))
     if not (on_whisker and estimate.sigma_mm > 0):
         return NO_CONTACT
-    inputs = np.array(
-        [whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, estimate.alpha_est_rad]
-    )
-    covariance = _covariance(whisk, alpha_sigma)
-    gradient = (
-        np.zeros(4) if estimate.gradient is None else np.array(estimate.gradient, dtype=float)
-    )
+    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    inputs = np.array([*felt, estimate.alpha_est_rad])
+    covariance = np.zeros((4, 4))
+    covariance[:3, :3] = felt_covariance(whisk)
+    covariance[3, 3] = alpha_sigma**2
+    gradient = np.zeros(4)
+    if estimate.gradient is not None:
+        gradient = np.array(estimate.gradient, dtype=float)
     of_model = max(estimate.sigma_mm**2 - gradient @ covariance @ gradient, 0.0)
-    values = _quantities(estimate.d_x_mm, inputs, whisk.beam)
-    by_d_x, by_input = _derivatives(estimate.d_x_mm, inputs, whisk.beam)
-    rows = by_input + np.outer(by_d_x, gradient)
+    by_d_x, by_input = _derivatives(d_x, inputs, beam)
+    rows = by_input + np.outer(by_d_x, gradient)  # (3, 4): with d_x as a function of the inputs
     variances = np.einsum("ij,jk,ik->i", rows, covariance, rows) + by_d_x**2 * of_model
-    sigmas = np.sqrt(np.maximum(variances, 0.0))
-    pairs = (float(number) for pair in zip(values, sigmas) for number in pair)
-    found = Contact(*pairs, -float(gradient @ covariance[:, 0]))
+    sigmas = np.sqrt(np.maximum(variances, 0.0)).tolist()
+    d_y, d_z, slip_mm = _quantities(d_x, inputs, beam).tolist()
+    touch_covariance = -float(gradient @ covariance[:, 0])
+    contact = Contact(d_y, sigmas[0], d_z, sigmas[1], slip_mm, sigmas[2], touch_covariance)
     if estimate.deflection_mm is None:
-        return found
-    (d_y, d_z), (d_y_sigma, d_z_sigma) = estimate.deflection_mm, estimate.deflection_sigma_mm
-    return replace(found, d_y_mm=d_y, d_z_mm=d_z, d_y_sigma_mm=d_y_sigma, d_z_sigma_mm=d_z_sigma)
+        return contact
+    d_y, d_z = estimate.deflection_mm
+    d_y_sigma, d_z_sigma = estimate.deflection_sigma_mm
+    return replace(contact, d_y_mm=d_y, d_z_mm=d_z, d_y_sigma_mm=d_y_sigma, d_z_sigma_mm=d_z_sigma)
 
 
-def _covariance(whisk: Whisk, alpha_sigma: float) -> np.ndarray:
-    """Covariance (4, 4) of θ, m_y, m_z and α_est."""
-    whole = np.zeros((4, 4))
-    whole[0, 0], whole[3, 3] = whisk.theta_sigma_rad**2, alpha_sigma**2
-    whole[1:3, 1:3] = whisk.covariance_at
-    whole[0, 1:3] = whole[1:3, 0] = whisk.theta_moment_covariance_at
-    return whole
+def felt_covariance(whisk: Whisk) -> np.ndarray:
+    """Assemble the covariance (3, 3) of θ, m_y and m_z at the pushing angle."""
+    covariance = np.zeros((3, 3))
+    covariance[0, 0] = whisk.theta_sigma_rad**2
+    covariance[1:, 1:] = whisk.covariance_at
+    covariance[0, 1:] = whisk.theta_moment_covariance_at
+    covariance[1:, 0] = whisk.theta_moment_covariance_at
+    return covariance
 
 
 def _quantities(d_x: float, inputs: np.ndarray, beam: Beam) -> np.ndarray:
-    """d_y, d_z and slip (3,)."""
+    """Compute d_y, d_z and slip (3,), mm, from the inputs θ, m_y, m_z and α_est."""
     theta, m_y, m_z, alpha = inputs.tolist()
     return np.array([*deflection(d_x, theta, m_y, m_z, beam), slip(d_x, theta, m_y, m_z, alpha)])
 
 
 def _derivatives(d_x: float, inputs: np.ndarray, beam: Beam) -> tuple[np.ndarray, np.ndarray]:
-    """Of `_quantities` by d_x (3,) and by θ, m_y, m_z and α_est (3, 4)."""
-    steps = _STEP * np.array([d_x, inputs[0], *[np.hypot(*inputs[1:3])] * 2, 1.0])
-    columns = [
-        (
-            _quantities(d_x + shift[0], inputs + shift[1:], beam)
-            - _quantities(d_x - shift[0], inputs - shift[1:], beam)
-        )
-        / (2 * shift.sum())
-        for shift in np.diag(steps)
-    ]
+    """Differentiate `_quantities` by d_x (3,) and by θ, m_y, m_z and α_est (3, 4)."""
+    moment = np.hypot(inputs[1], inputs[2])
+    steps = _STEP * np.array([d_x, inputs[0], moment, moment, 1.0])
+    columns = []
+    for step in np.diag(steps):
+        above = _quantities(d_x + step[0], inputs + step[1:], beam)
+        below = _quantities(d_x - step[0], inputs - step[1:], beam)
+        columns.append((above - below) / (2 * step.sum()))
     return columns[0], np.stack(columns[1:], axis=1)

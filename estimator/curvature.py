@@ -1,19 +1,22 @@
-"""Appendix B: the whisker against a surface of constant lateral curvature. Equations (15), (22)–(32).
+"""Appendix B: the whisker against a surface of constant lateral curvature. Equations (15),
+(22)–(32).
 
-Lengths are over the contact distance d_x, moments over C/d_x: r_n = r_κ/d_x, and at r_n = ∞ the surface
-is flat. β_0 is the slope at first touch, θ the pushing angle, α the friction cone angle, all in rad.
+Lengths are over the contact distance d_x, moments over C/d_x: r_n = r_κ/d_x, and at r_n = ∞ the
+surface is flat. β_0 is the slope at first touch, θ the pushing angle, α the friction cone angle,
+all in rad.
 
-Each function exists twice where the paper's (24) matters: as printed, φ = max(0, ζ − α) with ζ taken at
-the virtual point, and exact, where the force leaves the normal at the contact point by α. The printed
-form is right for α = 0 only.
+Each function exists twice where the paper's (24) matters: as printed, φ = max(0, ζ − α) with ζ
+taken at the virtual point, and exact, where the force leaves the normal at the contact point by α.
+The printed form is right for α = 0 only.
 
-Both are written with q = θ/r_n so that nothing cancels for large r_n: from p² = r_n² − 2 y_c θ + θ²,
+Both are written with q = θ/r_n so that nothing cancels for large r_n: from p² = r_n² − 2 y_c θ +
+θ²,
 
     d = θ (2 cos β_0 − q) / (√(1 − (p/r_n)² sin² u) + (p/r_n) cos u),   u = ζ − φ.
 
-Domain: r_n > 0, 0 ≤ θ < 2 y_c and below 90°, |β_0| < 90°, |φ| < 90°; beyond it the whisker has passed the
-object and the result is NaN; `why_not` says why. β_0 < 0 mirrors β_0 > 0. α outside [0°, 90°) raises
-ValueError.
+Domain: r_n > 0, 0 ≤ θ < 2 y_c and below 90°, |β_0| < 90°, |φ| < 90°; beyond it the whisker has
+passed the object and the result is NaN; `why_not` says why. β_0 < 0 mirrors β_0 > 0. α outside [0°,
+90°) raises ValueError.
 """
 
 import numpy as np
@@ -50,7 +53,8 @@ __all__ = [
 
 
 def normalized_curvature(d_x: ArrayLike, r_kappa: ArrayLike) -> Numbers:
-    """κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both are positive.
+    """Return κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both
+    are positive.
 
     >>> normalized_curvature(50.0, 100.0)
     0.5
@@ -59,32 +63,34 @@ def normalized_curvature(d_x: ArrayLike, r_kappa: ArrayLike) -> Numbers:
 
 
 def normalized_radius(d_x: ArrayLike, r_kappa: ArrayLike) -> Numbers:
-    """r_n = 1/κ_n, both arguments in mm; NaN unless both are positive."""
+    """Return r_n = 1/κ_n, both arguments in mm; NaN unless both are positive."""
     return _positive_ratio(r_kappa, d_x)
 
 
 @elementwise
 def initial_contact(r_n: ArrayLike, beta_0: ArrayLike) -> tuple[Numbers, Numbers]:
-    """(y_c, z_c) of (26)–(28): the first contact seen from the centre of curvature, r_n (cos β_0, sin β_0)."""
+    """Return (y_c, z_c) of (26)–(28): the first contact from the centre, r_n (cos β_0, sin β_0)."""
     return circle.inside(r_n, 0.0, beta_0, r_n * np.cos(beta_0), r_n * np.sin(beta_0))
 
 
 @elementwise
 def virtual_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Numbers:
-    """ζ of (25) and (29), in rad: direction of the virtual point from the centre, β_0 and what the push adds."""
-    return circle.inside(r_n, theta, beta_0, beta_0 + circle.turn(theta / r_n, beta_0))[0]
+    """Return ζ of (25) and (29), in rad: direction of the virtual point from the centre."""
+    zeta = beta_0 + circle.turn(theta / r_n, beta_0)
+    return circle.inside(r_n, theta, beta_0, zeta)[0]
 
 
 @elementwise
 def virtual_radius(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Numbers:
-    """p of (32): distance of the virtual point from the centre, over d_x."""
-    return circle.inside(
-        r_n, theta, beta_0, r_n * circle.relative_virtual_radius(theta / r_n, beta_0)
-    )[0]
+    """Return p of (32): distance of the virtual point from the centre, over d_x."""
+    p = r_n * circle.relative_virtual_radius(theta / r_n, beta_0)
+    return circle.inside(r_n, theta, beta_0, p)[0]
 
 
 def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α / p)."""
+    """Return φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α
+    / p).
+    """
     require_friction_angle("alpha", alpha)
     return circle.exact(r_n, theta, beta_0, alpha)[0]
 
@@ -92,13 +98,13 @@ def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: Array
 def slip_angle_printed(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
 ) -> Numbers:
-    """φ of (24) as printed, in rad: max(0, ζ − α) with ζ at the virtual point."""
+    """Return φ of (24) as printed, in rad: max(0, ζ − α) with ζ at the virtual point."""
     require_friction_angle("alpha", alpha)
     return circle.printed(r_n, theta, beta_0, alpha)[0]
 
 
 def deflection(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """d of (31) with the exact φ: how far the whisker is bent in the sensing plane, over d_x."""
+    """Return d of (31) with the exact φ: the deflection in the sensing plane, over d_x."""
     require_friction_angle("alpha", alpha)
     return circle.exact(r_n, theta, beta_0, alpha)[1]
 
@@ -106,7 +112,7 @@ def deflection(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: Array
 def deflection_printed(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
 ) -> Numbers:
-    """d of (31) with φ of (24) as printed, over d_x."""
+    """Return d of (31) with φ of (24) as printed, over d_x."""
     require_friction_angle("alpha", alpha)
     return circle.printed(r_n, theta, beta_0, alpha)[1]
 
@@ -114,7 +120,7 @@ def deflection_printed(
 def moments(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """(m_y, m_z) of (22) with the exact φ, over C/d_x: d sin φ, d cos φ."""
+    """Return (m_y, m_z) of (22) with the exact φ, over C/d_x: d sin φ, d cos φ."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.exact(r_n, theta, beta_0, alpha))
 
@@ -122,16 +128,17 @@ def moments(
 def moments_printed(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """(m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
+    """Return (m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
     require_friction_angle("alpha", alpha)
     return _components(*circle.printed(r_n, theta, beta_0, alpha))
 
 
 @elementwise
 def curvature_of_slip(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """κ_n from how φ grows with the push from φ_0 on, dφ/dθ at θ = 0: (23) with the exact φ, rate cos α / sin φ_0.
+    """Return κ_n from the rate dφ/dθ at θ = 0, where φ = φ_0: rate cos α / sin φ_0.
 
-    Below zero the surface curves towards the whisker. NaN where nothing slips (φ_0 = 0).
+    It is (23) with the exact φ. Below zero the surface curves towards the whisker. NaN where
+    nothing slips (φ_0 = 0).
     """
     require_friction_angle("alpha", alpha)
     slipping = (np.abs(phi_0) > 0) & (np.abs(phi_0) + alpha < RIGHT_ANGLE)
@@ -140,7 +147,7 @@ def curvature_of_slip(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLike) -> Nu
 
 @elementwise
 def curvature_of_slip_printed(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """κ_n by (24) and (25) as printed, φ = ζ − α: rate / sin β_0 with β_0 = φ_0 + α."""
+    """Return κ_n by (24) and (25) as printed, φ = ζ − α: rate / sin β_0 with β_0 = φ_0 + α."""
     require_friction_angle("alpha", alpha)
     slipping = (np.abs(phi_0) > 0) & (np.abs(phi_0) + alpha < RIGHT_ANGLE)
     return np.where(slipping, rate / np.sin(phi_0 + np.copysign(alpha, phi_0)), np.nan)
@@ -149,24 +156,24 @@ def curvature_of_slip_printed(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLik
 def why_not(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0
 ) -> str | np.ndarray:
-    """Why this module's functions give NaN for these arguments: a sentence, empty inside the domain."""
+    """Return a sentence why this module gives NaN for these arguments; empty inside the domain."""
     require_friction_angle("alpha", alpha)
-    arguments = (np.asarray(a, dtype=float) for a in (r_n, theta, beta_0, alpha))
-    r_n, theta, beta_0, alpha = np.broadcast_arrays(*arguments)
+    arguments = np.broadcast_arrays(r_n, theta, beta_0, alpha)
+    r_n, theta, beta_0, alpha = (a.astype(float) for a in arguments)
     with np.errstate(all="ignore"):
-        passed = (
-            "the slip angle reaches 90 degrees",
-            np.isfinite(circle.exact(r_n, theta, beta_0, alpha)[0]),
-        )
+        phi = circle.exact(r_n, theta, beta_0, alpha)[0]
+        passed = ("the slip angle reaches 90 degrees", np.isfinite(phi))
         return first_failure((*circle.conditions(r_n, theta, beta_0), passed), r_n.shape)
 
 
 @elementwise
 def _positive_ratio(above, below):
+    """Return above / below; NaN unless both are positive and the ratio is finite."""
     ratio = above / below
     return np.where((above > 0) & (below > 0) & np.isfinite(ratio), ratio, np.nan)
 
 
 @elementwise
 def _components(phi, d):
+    """Split a deflection into its components (d sin φ, d cos φ)."""
     return d * np.sin(phi), d * np.cos(phi)

@@ -1,9 +1,9 @@
 """Radial distance d_x from pushing angle and moments: equations (1), (2), (6)–(12), (16), (17).
 
-Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the arguments are no push against a
-surface the distance is NaN, never negative and never infinite, and `why_not` says which condition failed.
-β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0 and α_est outside [0°, 90°) raise
-ValueError.
+Angles in rad, moments in N·mm, C = 3EI in N·mm², lengths in mm. Where the arguments are no push
+against a surface the distance is NaN, never negative and never infinite, and `why_not` names the
+condition that failed. β < 0 mirrors β > 0: m_y changes sign, the distance does not. C ≤ 0, L ≤ 0
+and α_est outside [0°, 90°) raise ValueError.
 """
 
 from collections.abc import Callable
@@ -24,42 +24,42 @@ from estimator.domain import (
 )
 from estimator.double_range import across_slope, by_friction, by_slope, friction_share, harmonic
 
-NoSlip: TypeAlias = Callable[
-    [np.ndarray, np.ndarray], np.ndarray
-]  # d_x of θ and |m| where nothing slips, mm
+# ν(θ, |m|): the distance in mm for an angle and a moment, where nothing slips.
+NoSlip: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @elementwise
 def rotational_compliance(theta: ArrayLike, m_z: ArrayLike) -> Numbers:
-    """k_θ of (1), in rad/(N·mm): how far the base turns per moment, from two angles or a whole stroke.
+    """Compute k_θ of (1), in rad/(N·mm): how far the base turns per moment, over two angles or a
+    stroke.
 
-    theta and m_z have the samples along their last axis, two at least (raises ValueError otherwise). It is one over
-    the slope of the least-squares line of the moment over the angle, so the angle of touch drops out. NaN
-    where the moment does not rise with the angle.
+    theta and m_z (..., n): n ≥ 2 samples along the last axis, else it raises ValueError. The
+    compliance is one over the slope of the least-squares line of the moment over the angle, so that
+    the angle of touch drops out. NaN where the moment does not rise with the angle.
 
     >>> round(rotational_compliance([0.01, 0.03], [2.0, 6.0]), 9)
     0.005
     """
     if min(theta.ndim, m_z.ndim) < 1 or min(theta.shape[-1], m_z.shape[-1]) < 2:
         raise ValueError("rotational_compliance needs two samples or more along the last axis")
-    (angle, turned), (moment, bent) = _centred(theta), _centred(m_z)
-    per_moment = (angle**2).sum(axis=-1) / (angle * moment).sum(axis=-1)
-    compliance = quotient((per_moment, turned), (bent,))
+    angle, angle_scale = _centred(theta)
+    moment, moment_scale = _centred(m_z)
+    scaled = (angle**2).sum(axis=-1) / (angle * moment).sum(axis=-1)
+    compliance = quotient((scaled, angle_scale), (moment_scale,))
     return np.where((compliance > 0) & np.isfinite(compliance), compliance, np.nan)
 
 
 @elementwise
 def from_compliance(compliance: ArrayLike, C: ArrayLike) -> Numbers:
-    """d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
+    """Return d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
-    return _distance(
-        quotient((C, compliance), ()), (("the compliance is missing", np.isfinite(compliance)),)
-    )
+    known = (("the compliance is missing", np.isfinite(compliance)),)
+    return _distance(quotient((C, compliance), ()), known)
 
 
 @elementwise
 def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
-    """d_x of (2), in mm: Cθ / m_z, exact where the whisker does not slip sideways.
+    """Return d_x of (2), in mm: Cθ / m_z, exact where the whisker does not slip sideways.
 
     >>> no_slip(0.05, 9.0, 9000.0)
     50.0
@@ -72,14 +72,14 @@ def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
 def known_slope(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike
 ) -> Numbers:
-    """d_x of (6), in mm, for a surface of known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
+    """Return d_x of (6), in mm, at a known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
     require_positive("C", C, "N·mm²")
     return _distance(by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
 
 
 @elementwise
 def friction_angle(mu: ArrayLike) -> Numbers:
-    """α of (7), in rad: atan μ. A negative or infinite coefficient raises ValueError."""
+    """Return α of (7), in rad: atan μ. A negative or infinite coefficient raises ValueError."""
     if not np.all((mu >= 0) & np.isfinite(mu)):
         raise ValueError(f"mu = {mu}: a friction coefficient must be zero or positive, and finite")
     return np.arctan(mu)
@@ -87,13 +87,15 @@ def friction_angle(mu: ArrayLike) -> Numbers:
 
 @elementwise
 def felt_slip_angle(m_y: ArrayLike, m_z: ArrayLike) -> Numbers:
-    """φ of (8), in rad: atan2(m_y, m_z). NaN unless m_z > 0, since the whisker pushes towards +y."""
+    """Return φ of (8), in rad: atan2(m_y, m_z); NaN unless m_z > 0: the whisker pushes towards
+    +y.
+    """
     return np.where((m_z > 0) & np.isfinite(m_y) & np.isfinite(m_z), np.arctan2(m_y, m_z), np.nan)
 
 
 @elementwise
 def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike) -> Numbers:
-    """β_est of (9), in rad: φ ± α_est on the side of φ; NaN where it reaches 90°, and for m_z ≤ 0."""
+    """Return β_est of (9), in rad: φ ± α_est on the side of φ; NaN from 90° on, and for m_z ≤ 0."""
     require_friction_angle("alpha_est", alpha_est)
     steep = np.arctan2(np.abs(m_y), m_z) + alpha_est
     slope = np.copysign(np.minimum(steep, RIGHT_ANGLE), m_y)
@@ -104,47 +106,52 @@ def estimated_slope(m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike) -> Num
 def with_friction(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike
 ) -> Numbers:
-    """d_x of (10), in mm, for an assumed friction cone angle: Cθ (m_z − μ |m_y|) / (m_z² + m_y²), μ = tan
-    α_est.
+    """Return d_x of (10), in mm, for an assumed friction cone angle α_est.
 
-    The printed form with β_est = φ + α_est is the same number; this one is exact to the last digit.
+    d_x = Cθ (m_z − μ |m_y|) / (m_z² + m_y²) with μ = tan α_est. The printed form with β_est = φ +
+    α_est is the same number; this one is exact to the last digit.
     """
     _require_settings(alpha_est, C)
-    return _distance(
-        by_friction(theta, m_y, m_z, alpha_est, C), _conditions(theta, m_y, m_z, alpha_est)
-    )
+    d_x = by_friction(theta, m_y, m_z, alpha_est, C)
+    return _distance(d_x, _conditions(theta, m_y, m_z, alpha_est))
 
 
 @elementwise
 def frictionless_sum(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
-    """d_x of (11), in mm: Cθ / (m_z + m_y²/m_z), (10) without friction; computed as (12), which it equals."""
+    """Return d_x of (11), in mm: Cθ / (m_z + m_y²/m_z), (10) without friction.
+
+    It is computed as (12), which it equals.
+    """
     return frictionless(theta, m_y, m_z, C)
 
 
 @elementwise
 def frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
-    """d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²)."""
+    """Return d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²)."""
     require_positive("C", C, "N·mm²")
     return _distance(by_friction(theta, m_y, m_z, 0.0, C), _conditions(theta, m_y, m_z))
 
 
 @elementwise
 def general_printed(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, nu: NoSlip) -> Numbers:
-    """d_x of (16) as printed, in mm: ν(θ, |m|) cos φ, for a no-slip extraction `nu(theta, magnitude)`.
+    """Return d_x of (16) as printed, in mm: ν(θ, |m|) cos φ, for a no-slip extraction ν.
 
-    Exact only where ν is proportional to θ/|m|, that is for a cylinder; use `general`.
+    `nu(theta, magnitude)` takes and returns arrays. Exact only where ν is proportional to θ/|m|,
+    that is for a cylinder; use `general`.
     """
     magnitude = np.hypot(m_y, m_z)
-    return _distance(nu(theta, magnitude) * (m_z / magnitude), _conditions(theta, m_y, m_z))
+    d_x = nu(theta, magnitude) * (m_z / magnitude)
+    return _distance(d_x, _conditions(theta, m_y, m_z))
 
 
 @elementwise
 def general(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, nu: NoSlip
 ) -> Numbers:
-    """d_x of (16) with the angle scaled in place of the distance, in mm; for any no-slip extraction ν.
+    """Return d_x of (16), in mm, for any no-slip extraction ν, the angle scaled in place of the
+    distance.
 
-    ν(θ cos(φ + α_est) / cos α_est, |m|): slip takes its share from the deflection, hence from the angle.
+    d_x = ν(θ cos(φ + α_est) / cos α_est, |m|): slip reduces the deflection, hence the angle.
     `nu(theta, magnitude)` takes and returns arrays.
     """
     require_friction_angle("alpha_est", alpha_est)
@@ -156,7 +163,7 @@ def general(
 
 @elementwise
 def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike) -> Numbers:
-    """ν(θ, |m|) of a cone that comes to a point at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
+    """Return ν(θ, |m|) of a cone with its apex at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
     _require_settings(0.0, C, length)
     return _distance(harmonic(quotient((C, theta), (m,)), length), _conditions(theta, 0.0, m))
 
@@ -165,7 +172,10 @@ def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike
 def cone_printed(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike
 ) -> Numbers:
-    """d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ. Far off under slip; use `cone`."""
+    """Return d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ.
+
+    It is far from the truth under slip; use `cone`.
+    """
     _require_settings(0.0, C, length)
     magnitude = np.hypot(m_y, m_z)
     d_x = harmonic(quotient((C, theta), (magnitude,)), length) * (m_z / magnitude)
@@ -181,8 +191,9 @@ def cone(
     C: ArrayLike,
     length: ArrayLike,
 ) -> Numbers:
-    """d_x of a cone, in mm, by (17) at the scaled angle: 1 / (1/L + 1/d) with d from (10) for the base's
-    cylinder.
+    """Return d_x of a cone, in mm, by (17) at the scaled angle.
+
+    d_x = 1 / (1/L + 1/d) with d from (10) for a cylinder of the base's diameter.
     """
     _require_settings(alpha_est, C, length)
     d_x = harmonic(by_friction(theta, m_y, m_z, alpha_est, C), length)
@@ -191,41 +202,48 @@ def cone(
 
 @elementwise
 def taper(d_x: ArrayLike, length: ArrayLike) -> Numbers:
-    """Distance along a cone from that which its base's cylinder would give, in mm: 1 / (1/d_x + 1/L)."""
+    """Convert a distance d_x for a cylinder to that along a cone of the same base: 1 / (1/d_x +
+    1/L).
+
+    Both are in mm; NaN unless d_x is positive and finite.
+    """
     require_positive("length", length, "mm")
     return np.where((d_x > 0) & np.isfinite(d_x), harmonic(d_x, length), np.nan)
 
 
 @elementwise
 def clamp_to_length(d_x: ArrayLike, length: ArrayLike) -> tuple[Numbers, bool | np.ndarray]:
-    """(d_x no longer than the whisker, mask of those that were): past the tip means tip contact, section VII.
+    """Clip distances to the whisker's length: past the tip means tip contact (section VII).
+
+    Returns (d_x in mm, at most `length`; mask of the distances that were longer).
 
     >>> clamp_to_length(120.0, 100.0)
     (100.0, True)
     """
     require_positive("length", length, "mm")
     d_x = np.where(d_x > 0, d_x, np.nan)
-    return np.where(d_x > length, length, d_x), d_x > length
+    at_tip = d_x > length
+    return np.where(at_tip, length, d_x), at_tip
 
 
 @elementwise
 def contact_point(
     d_x: ArrayLike, touch: ArrayLike, z_c: ArrayLike = 0.0
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """(r_c, θ_c, z_c) of section II: cylindrical coordinates of the contact, in mm, rad, mm.
+    """Return (r_c, θ_c, z_c) of section II: the contact's cylindrical coordinates, in mm, rad, mm.
 
-    `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation. All
-    three are NaN where the distance is not positive and finite.
+    `touch` is the motor angle of first touch, `z_c` the height of the whisker's plane of rotation.
+    All three are NaN where the distance is not positive and finite.
     """
-    good = np.isfinite(d_x) & (d_x > 0) & np.isfinite(touch) & np.isfinite(z_c)
-    return tuple(np.where(good, value, np.nan) for value in (d_x, touch, z_c))
+    known = np.isfinite(d_x) & (d_x > 0) & np.isfinite(touch) & np.isfinite(z_c)
+    return tuple(np.where(known, value, np.nan) for value in (d_x, touch, z_c))
 
 
 @elementwise
 def cartesian(
     r_c: ArrayLike, theta_c: ArrayLike, z_c: ArrayLike
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """(x, y, z) in mm of a contact in cylindrical coordinates, as of `contact_point`."""
+    """Convert the cylindrical coordinates of `contact_point` to (x, y, z) in mm."""
     return r_c * np.cos(theta_c), r_c * np.sin(theta_c), z_c + 0 * r_c
 
 
@@ -238,26 +256,31 @@ def why_not(
     beta: ArrayLike | None = None,
     C: ArrayLike | None = None,
 ) -> str | np.ndarray:
-    """Why there is no distance for these arguments, a sentence; empty where there is one. str or array of str.
+    """Return a sentence why these arguments give no distance; empty where they give one.
 
-    Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C a distance too large or too
-    small for a float is told as well.
+    Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C, a distance too large or
+    too small for a float is reported as well. Returns a str for scalars, else an array of str.
     """
-    _require_settings(alpha_est, 1.0 if C is None else C)
-    by_slope = beta is not None
-    measured = (theta, m_y, m_z, alpha_est, beta if by_slope else 0.0, 1.0 if C is None else C)
-    arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in measured))
-    theta, m_y, m_z, alpha_est, beta, C_or_one = arrays
+    slope = 0.0 if beta is None else beta
+    stiffness = 1.0 if C is None else C
+    _require_settings(alpha_est, stiffness)
+    arguments = np.broadcast_arrays(theta, m_y, m_z, alpha_est, slope, stiffness)
+    theta, m_y, m_z, alpha_est, slope, stiffness = (a.astype(float) for a in arguments)
     with np.errstate(all="ignore"):
-        conditions = _conditions(theta, m_y, m_z, alpha_est, beta)
+        conditions = _conditions(theta, m_y, m_z, alpha_est, slope)
         if C is not None:
-            d_x = known_slope(theta, m_y, m_z, beta, C_or_one)
-            d_x = d_x if by_slope else with_friction(theta, m_y, m_z, alpha_est, C_or_one)
+            if beta is None:
+                d_x = with_friction(theta, m_y, m_z, alpha_est, stiffness)
+            else:
+                d_x = known_slope(theta, m_y, m_z, slope, stiffness)
             conditions += (("the distance is beyond the range of a float", np.isfinite(d_x)),)
         return first_failure(conditions, theta.shape)
 
 
 def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
+    """Return pairs (reason for having no distance, mask of what must hold), the first reason
+    first.
+    """
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
     downhill = across_slope(m_y, m_z, beta)[0] > 0
     return (
@@ -272,19 +295,22 @@ def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
 
 
 def _require_settings(alpha_est, C, length=1.0):
+    """Raise ValueError for an α_est outside [0°, 90°), or a C or length that is not positive."""
     require_friction_angle("alpha_est", alpha_est)
     require_positive("C", C, "N·mm²")
     require_positive("length", length, "mm")
 
 
 def _distance(value, conditions):
-    """`value` where it is a distance: conditions hold, positive, and inside the range of float64."""
+    """Return `value` where it is positive and finite and all conditions hold, NaN elsewhere."""
     value = np.where(np.greater(value, 0) & np.isfinite(value), value, np.nan)
     return where_all(conditions, value)
 
 
 def _centred(samples):
-    """Samples less their mean, over their largest distance from it, and that distance."""
+    """Normalise samples (..., n) to mean 0 and largest magnitude 1; return them and the scale
+    (...).
+    """
     deviation = samples - samples.mean(axis=-1, keepdims=True)
-    largest = np.abs(deviation).max(axis=-1, keepdims=True)
-    return deviation / largest, largest[..., 0]
+    scale = np.abs(deviation).max(axis=-1, keepdims=True)
+    return deviation / scale, scale[..., 0]

@@ -1,7 +1,7 @@
-"""What every equation asks of its arguments, and how a result leaves the house.
+"""Arguments and results of every equation: their domain, their broadcasting, their types.
 
-Measured arguments outside an equation's domain give NaN; settings that no measurement can excuse raise
-ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
+Measured arguments outside an equation's domain give NaN; settings that no measurement can excuse
+raise ValueError. Scalars give floats, arrays give arrays, and NumPy never warns.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,20 +13,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 RIGHT_ANGLE = np.pi / 2
-# What an equation gives: a float for scalars, an array of their common shape for arrays.
+# The result of an equation: a float for scalars, an array of their common shape for arrays.
 Numbers: TypeAlias = float | np.ndarray
 
 
 def elementwise(function: Callable) -> Callable:
-    """Let a formula on float64 arrays take anything array-like, broadcast, and return floats for scalars.
+    """Wrap a formula on float64 arrays: it takes anything array-like, and returns floats for
+    scalars.
 
-    Functions among the arguments pass through.
-
-    Overflow, division by zero and NaN stay silent inside: the formula's own domain decides what they mean.
+    Functions among the arguments pass through. Overflow, division by zero and NaN stay silent
+    inside: the formula's own domain decides what they mean.
     """
 
     @wraps(function)
     def wrapper(*args, **kwargs):
+        """Evaluate the formula on arrays of float64."""
         arrays = [_array(a) for a in args]
         named = {name: _array(a) for name, a in kwargs.items()}
         with np.errstate(all="ignore"):
@@ -36,12 +37,14 @@ def elementwise(function: Callable) -> Callable:
 
 
 def _array(argument):
+    """Convert an argument to an array of float64, unless it is a function."""
     if type(argument) is float or isinstance(argument, np.ndarray) or not callable(argument):
         return np.asarray(argument, dtype=float)
     return argument
 
 
 def _plain(result):
+    """Convert arrays without axes to Python numbers, in tuples as well."""
     if isinstance(result, tuple):
         return tuple(_plain(part) for part in result)
     if isinstance(result, np.generic):
@@ -54,17 +57,21 @@ def quotient(
     denominator: Sequence[np.ndarray],
     exponent: int | np.ndarray = 0,
 ) -> np.ndarray:
-    """2^exponent times `numerator`'s factors over `denominator`'s, without overflow or underflow on the way.
+    """Return 2^exponent times the numerator's factors over the denominator's, by way of powers of
+    two.
 
-    Significands and exponents go separate ways, so only the result itself can leave the range of float64.
+    Significands and exponents go separate ways: only the result itself can leave the range of
+    float64.
     """
     value = 1.0
     for factor in numerator:
         significand, power = np.frexp(factor)
-        value, exponent = value * significand, exponent + power
+        value = value * significand
+        exponent = exponent + power
     for factor in denominator:
         significand, power = np.frexp(factor)
-        value, exponent = value / significand, exponent - power
+        value = value / significand
+        exponent = exponent - power
     return np.ldexp(value, exponent)
 
 
@@ -83,7 +90,9 @@ def require_friction_angle(name: str, value: ArrayLike) -> None:
 
 
 def require_sigma(name: str, value: ArrayLike) -> None:
-    """Raise ValueError unless every `value` is a standard deviation: zero or positive, and finite."""
+    """Raise ValueError unless every `value` is a standard deviation: zero or positive, and
+    finite.
+    """
     if not _all(value, lambda x: (x >= 0) & (x < np.inf)):
         raise ValueError(
             f"{name} = {value}: a standard deviation must be zero or positive, and finite"
@@ -91,7 +100,7 @@ def require_sigma(name: str, value: ArrayLike) -> None:
 
 
 def _all(value: ArrayLike, holds: Callable) -> bool:
-    """Whether `holds` is true of every value; of a single one without the cost of arrays."""
+    """Check that `holds` is true of every value; of a single one without the cost of arrays."""
     array = np.asarray(value, dtype=float)
     return bool(holds(array.item())) if array.ndim == 0 else bool(np.all(holds(array)))
 
@@ -99,9 +108,11 @@ def _all(value: ArrayLike, holds: Callable) -> bool:
 def first_failure(
     conditions: Sequence[tuple[str, np.ndarray]], shape: tuple[int, ...]
 ) -> str | np.ndarray:
-    """Text of the first condition that does not hold, element by element; empty where all do.
+    """Return the text of the first condition that does not hold, element by element; else an empty
+    one.
 
-    `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else an array of str.
+    `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else
+    an array of str.
     """
     reasons = np.full(shape, "", dtype=object)
     for text, holds in conditions:
@@ -111,6 +122,6 @@ def first_failure(
 
 
 def where_all(conditions: Sequence[tuple[str, np.ndarray]], value: np.ndarray) -> np.ndarray:
-    """`value` where all conditions hold, NaN elsewhere."""
+    """Return `value` where all conditions hold, NaN elsewhere."""
     holds = reduce(and_, (mask for _, mask in conditions))
     return np.where(holds, value, np.nan)

@@ -1,8 +1,10 @@
-"""Products and quotients of the distance's equations, within the range of doubles wherever their result is.
+"""Products and quotients of the distance's equations, within the range of doubles wherever their
+result is.
 
-They take numbers near one and powers of two apart (frexp, ldexp): C, moments and their squares may be doubles where
-what stands between them in an equation is none. So no distance that a double holds is lost on the way. All take arrays
-of float64 that broadcast: angles in rad, moments in N·mm, C in N·mm², lengths in mm.
+Numbers near one and powers of two go separate ways (frexp, ldexp): C, the moments and their squares
+may be doubles where an intermediate product of the equation is none. So no distance that a double
+holds is lost on the way. All take arrays of float64 that broadcast: angles in rad, moments in N·mm,
+C in N·mm², lengths in mm.
 """
 
 import numpy as np
@@ -11,14 +13,16 @@ from estimator.domain import quotient
 
 
 def _exponent(x):
-    """Power of two that brings x near one; far below all others for zero."""
+    """Return the power of two that brings x near one; far below all others for zero."""
     return np.where(x == 0, -9999, np.frexp(x)[1])
 
 
 def over_common_power(
     m_y: np.ndarray, m_z: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """m_y, m_z over a common power of two that brings the larger near one, and its exponent."""
+    """Scale m_y and m_z by the power of two that brings the larger near one; return its exponent,
+    too.
+    """
     exponent = np.maximum(_exponent(m_y), _exponent(m_z))
     return np.ldexp(m_y, -exponent), np.ldexp(m_z, -exponent), exponent
 
@@ -26,19 +30,20 @@ def over_common_power(
 def friction_share(
     m_y: np.ndarray, m_z: np.ndarray, alpha_est: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(m_z − μ|m_y|) as a number near one and an exponent of two."""
-    (across, across_power), (along, along_power) = np.frexp(m_z), np.frexp(np.abs(m_y))
+    """Return m_z − μ|m_y| with μ = tan α_est as a number near one and an exponent of two."""
+    across, across_power = np.frexp(m_z)
+    along, along_power = np.frexp(np.abs(m_y))
     drag = np.tan(alpha_est) * along
     exponent = np.where(drag == 0, across_power, np.maximum(across_power, along_power))
-    return np.ldexp(across, across_power - exponent) - np.ldexp(
-        drag, along_power - exponent
-    ), exponent
+    across = np.ldexp(across, across_power - exponent)
+    drag = np.ldexp(drag, along_power - exponent)
+    return across - drag, exponent
 
 
 def across_slope(
     m_y: np.ndarray, m_z: np.ndarray, beta: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(m_z cos β + m_y sin β) as a number near one and an exponent of two."""
+    """Return m_z cos β + m_y sin β as a number near one and an exponent of two."""
     m_y, m_z, exponent = over_common_power(m_y, m_z)
     return m_z * np.cos(beta) + m_y * np.sin(beta), exponent
 
@@ -46,7 +51,7 @@ def across_slope(
 def by_slope(
     theta: np.ndarray, m_y: np.ndarray, m_z: np.ndarray, beta: np.ndarray, C: np.ndarray
 ) -> np.ndarray:
-    """Cθ cos β / (m_z cos β + m_y sin β), (6)."""
+    """Return Cθ cos β / (m_z cos β + m_y sin β), the d_x of (6)."""
     across, exponent = across_slope(m_y, m_z, beta)
     return quotient((C, theta, np.cos(beta)), (across,), -exponent)
 
@@ -54,7 +59,7 @@ def by_slope(
 def by_friction(
     theta: np.ndarray, m_y: np.ndarray, m_z: np.ndarray, alpha_est: np.ndarray, C: np.ndarray
 ) -> np.ndarray:
-    """Cθ (m_z − μ|m_y|) / (m_z² + m_y²) with μ = tan α_est, (10)."""
+    """Return Cθ (m_z − μ|m_y|) / (m_z² + m_y²) with μ = tan α_est, the d_x of (10)."""
     share, share_exponent = friction_share(m_y, m_z, alpha_est)
     m_y, m_z, exponent = over_common_power(m_y, m_z)
     square = m_z * m_z + m_y * m_y
@@ -62,6 +67,7 @@ def by_friction(
 
 
 def harmonic(d_x: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """1 / (1/d_x + 1/L) without leaving the range of float64, even where d_x does."""
-    short, long = np.minimum(d_x, length), np.maximum(d_x, length)
-    return short / (1 + short / long)
+    """Return 1 / (1/d_x + 1/L) without leaving the range of float64, even where d_x does."""
+    shorter = np.minimum(d_x, length)
+    longer = np.maximum(d_x, length)
+    return shorter / (1 + shorter / longer)

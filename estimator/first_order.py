@@ -1,7 +1,8 @@
 """The error of (10) to first order in θ, term by term, as shares of d_x; derived in docs/maps.md.
 
-(10) takes small angles, and a contact that slips along a line across the whisker. Each function is one thing that this
-leaves out, with the sign that it has in the error (estimate less truth). Angles in rad, lengths in mm.
+(10) takes small angles, and a contact that slips along a line across the whisker. Each function is
+one effect that this leaves out, with its sign in the error (estimate less truth). Angles in rad,
+lengths in mm.
 """
 
 import numpy as np
@@ -9,15 +10,17 @@ from numpy.typing import ArrayLike
 
 from estimator.domain import RIGHT_ANGLE, Numbers, elementwise
 
-# A contact that does not slip sideways is held at some slope from 0 to α, and no moment tells at which. The share of
-# friction that is left to act along the whisker, √(1 − (tan β/tan α)²): mean and standard deviation over such slopes.
+# A contact that does not slip sideways is held at some slope β from 0 to α, which no moment
+# determines. The share of friction that is left to act along the whisker is √(1 − (tan β/tan α)²).
+# [1] Its mean over such slopes.
 HELD_SHARE = np.pi / 4
+# [1] Its standard deviation over such slopes.
 HELD_SPREAD = np.sqrt(2 / 3 - HELD_SHARE**2)
 
 
 @elementwise
 def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """½ θ tan ψ sin φ / cos α: the contact moves along the whisker as it slips along an object that leans by ψ.
+    """Return ½ θ tan ψ sin φ / cos α: slip along an object that leans by ψ, thus along the whisker.
 
     >>> round(leaning(0.05, 0.1, 0.5, 0.2), 8)
     0.00122703
@@ -34,28 +37,24 @@ def rolling(
     d_x: ArrayLike,
     left: ArrayLike,
 ) -> Numbers:
-    """−θ (R/d_x) cos β (½/w − ⅛), β = φ + α: the contact rolls over a round object towards the base.
+    """Return −θ (R/d_x) cos β (½/w − ⅛), β = φ + α: rolling over a round object towards the base.
 
-    reach: R, radii of object and whisker together; left: w, share of the base's diameter that is left at d_x. Where the
-    contact is held, its slope is taken as 0.
+    reach: R, radii of object and whisker together; left: w, share of the base's diameter that is
+    left at d_x. Where the contact is held (φ = 0), its slope is taken as 0.
 
     >>> round(rolling(0.05, 3.0, 0.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
     """
-    return rolling_at(
-        theta,
-        reach,
-        np.where(phi == 0, 0.0, np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE)),
-        d_x,
-        left,
-    )
+    slope = np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE)
+    return rolling_at(theta, reach, np.where(phi == 0, 0.0, slope), d_x, left)
 
 
 @elementwise
 def rolling_at(
     theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, left: ArrayLike
 ) -> Numbers:
-    """The same where the slope β is known, held or not.
+    """Return −θ (R/d_x) cos β (½/w − ⅛): rolling at a known slope β, whether the contact is held or
+    not.
 
     >>> round(rolling_at(0.05, 3.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
@@ -65,7 +64,7 @@ def rolling_at(
 
 @elementwise
 def dragging(theta: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """−⅕ θ tan α: friction that acts along the whisker alone stretches it, and makes it stiffer.
+    """Return −⅕ θ tan α: friction along the whisker alone pulls at it, and makes it stiffer.
 
     >>> round(dragging(0.05, 0.4), 8)
     -0.00422793
