@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_banded
 
-from estimator.onset import Touch, columns, felt_touch, usable
+from estimator.onset import FeltTouch, columns, felt_touch, usable
 
 FILTER_ORDER = 2
 THRESHOLD_IN_SIGMAS = 10.0
@@ -73,7 +73,7 @@ def threshold_touch(
     cutoff_Hz: float,
     *,
     threshold: float | None = None,
-) -> Touch:
+) -> FeltTouch:
     """Touch as the paper finds it: where the filtered moment above its level crosses a threshold for good.
 
     threshold is in the unit of the moments, for their magnitude; left out, it is ten times the filtered noise.
@@ -88,7 +88,7 @@ def threshold_touch(
     height = THRESHOLD_IN_SIGMAS * np.sqrt(np.trace(middle)) if threshold is None else threshold
     index, found, steepness = _last_crossing(size, stroke.motor, height)
     if index is None:
-        return Touch.none(NOT_CROSSED)
+        return FeltTouch.none(NOT_CROSSED)
     along = felt.rise.slope / np.hypot.reduce(felt.rise.slope)
     scatter = along @ (stroke.noise(index) + felt.level.covariance_between(found, found)) @ along
     ideal = _last_crossing(ideal_size, stroke.motor, height)[1]
@@ -97,7 +97,7 @@ def threshold_touch(
 
 def touch_on_rate(
     motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float
-) -> Touch:
+) -> FeltTouch:
     """Touch where the filtered moment's rate over the motor angle reaches half of its rate in the fitted rise."""
     felt = felt_touch(motor_rad, moments, time_s)
     if felt.status:
@@ -106,7 +106,7 @@ def touch_on_rate(
     rate, ideal_rate = stroke.rate(stroke.filtered), stroke.rate(stroke.ideal)
     index, found, steepness = _nearest_crossing(rate, stroke.motor, 0.5, felt.motor_rad)
     if index is None:
-        return Touch.none(NOT_CROSSED)
+        return FeltTouch.none(NOT_CROSSED)
     scatter = felt.rise.gain @ stroke.noise_of_rate(index) @ felt.rise.gain
     ideal = _nearest_crossing(ideal_rate, stroke.motor, 0.5, felt.motor_rad)[1]
     return _touch(found, np.sqrt(scatter) / steepness, ideal, felt)
@@ -153,7 +153,7 @@ class _Stroke:
 
 def _touch(found, sigma, ideal, felt):
     bias = float(ideal - felt.motor_rad)
-    return Touch(float(found), float(sigma), "", bias, felt.level, felt.rise)
+    return FeltTouch(float(found), float(sigma), "", bias, felt.level, felt.rise)
 
 
 def _last_crossing(x, motor, height):
