@@ -1,9 +1,11 @@
-"""Radial distance from force and moment at the base (Table I: Tsujimura, Scholz & Rahn, Clements & Rahn; [21], [37]).
+"""Radial distance from force and moment at the base (Table I: Tsujimura, Scholz & Rahn, Clements &
+Rahn; [21], [37]).
 
-Axes are the hub's. f: force that the base exerts on the whisker, N; m = P × f: moment, N·mm; so the contact P lies on
-the line of action of f. No angle of touch, slope or friction is needed, and the beam only for how far the contact is
-bent back, which counts to second order in θ. Angles in rad, lengths in mm. The moment and force about the whisker's own
-axis: m_x follows from m · f = 0 and adds no information.
+Axes are the hub's. f: force that the base exerts on the whisker, N; m = P × f: moment, N·mm; so the
+contact P lies on the line of action of f. No angle of touch, slope or friction is needed, and the
+beam only for how far the contact is bent back, which counts to second order in θ. Angles in rad,
+lengths in mm. The moment and force about the whisker's own axis: m_x follows from m · f = 0 and
+adds no information.
 """
 
 import numpy as np
@@ -35,7 +37,7 @@ def lever(
 
 @elementwise
 def across(m_y: ArrayLike, m_z: ArrayLike, f_y: ArrayLike, f_z: ArrayLike) -> Numbers:
-    """Compute the force across the whisker, N, in the plane in which m bends it: (f_y m_z − f_z m_y) / |m|."""
+    """Compute the force across the whisker, N, in the plane of bending: (f_y m_z − f_z m_y) / |m|."""
     return (f_y * m_z - f_z * m_y) / np.hypot(m_y, m_z)
 
 
@@ -48,12 +50,14 @@ def distance(
     f_z: ArrayLike,
     beam: Beam,
 ) -> Numbers:
-    """Compute d_x, mm: where the line of action meets the bent whisker, turned from the hub's axes to those at touch.
+    """Compute d_x, mm: where the line of action meets the bent whisker, turned from the hub's axes
+    to those at touch.
 
-    In the plane of bending |m| = x f + w f_x, w = |m| x d/C the deflection there ((18), d the distance on the base's
-    cylinder); d_x = x cos θ + w cos φ sin θ, for the contact moves in the sensing plane, which is fixed where it first
-    touched. Within 0.01 % of an exact rod to θ = 3°, but for `rolling` and `leaning`. NaN where the force or the
-    moment does not push; `why_not` says which.
+    In the plane of bending |m| = x f + w f_x, w = |m| x d/C the deflection there ((18), d the
+    distance on the base's cylinder); d_x = x cos θ + w cos φ sin θ, for the contact moves in the
+    sensing plane, which is fixed where it first touched. Within 0.01 % of an exact rod to θ = 3°,
+    but for `rolling` and `leaning`. NaN where the force or the moment does not push; `why_not` says
+    which.
     """
     theta = np.asarray(theta, dtype=float)
     m_y, m_z, f_x, f_y, f_z = _broadcast(m_y, m_z, f_x, f_y, f_z)
@@ -91,9 +95,11 @@ def relative_gradient(m_y: float, m_z: float, f_y: float, f_z: float) -> np.ndar
 def rolling(
     theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, d_x: ArrayLike, left: ArrayLike
 ) -> Numbers:
-    """Return −½ θ (R/d_x) cos β / w, at most: the share of d_x by which the contact rolls towards the base.
+    """Return −½ θ (R/d_x) cos β / w, at most: the share of d_x by which the contact rolls towards
+    the base.
 
-    reach: R, radii of object and whisker together; left: w, share of the base's diameter at d_x. β is at least φ.
+    reach: R, radii of object and whisker together; left: w, share of the base's diameter at d_x. β
+    is at least φ.
 
     >>> round(rolling(0.05, 3.0, 0.0, 60.0, 1.0), 8)
     -0.00125
@@ -105,8 +111,8 @@ def rolling(
 def leaning(theta: ArrayLike, psi: ArrayLike, phi: ArrayLike, alpha: ArrayLike) -> Numbers:
     """Return θ tan ψ sin φ / cos α, the share of d_x by which the contact moves along the whisker.
 
-    It does so as it slips along an object that leans by ψ. The share is twice that of (10), which feels the whole way
-    there.
+    It does so as it slips along an object that leans by ψ. The share is twice that of (10), which
+    feels the whole way there.
     """
     return 2 * first_order.leaning(theta, psi, phi, alpha)
 

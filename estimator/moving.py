@@ -1,14 +1,17 @@
-"""Distance of an object that moves at known speed while it is touched: (2) and (10) with the way that it has come.
+"""Distance of an object that moves at known speed while it is touched: (2) and (10) with the way
+that it has come.
 
-The contact lies on the object's surface, which has moved by u θ since touch, u the object's motion per radian of the
-motor. With the deflection w = |m| x d/C at the contact's distance x (d: on the base's cylinder), towards the normal
+The contact lies on the object's surface, which has moved by u θ since touch, u the object's motion
+per radian of the motor. With the deflection w = |m| x d/C at the contact's distance x (d: on the
+base's cylinder), towards the normal
 
     w cos(β − φ) = θ (x cos β + u_n),   β = φ + α,   d_x = x − u_x θ,
 
-u_n towards the whisker. Where the contact sticks to the object, w cos φ = θ (x − u_y). Axes are those of the contact
-frame: x along the whisker at touch, y the way it pushes, z up. The friction acts against the motion over the surface,
-so an object that moves faster along itself than the whisker slips turns it round, and one that moves along the whisker
-takes its share of it. Angles in rad, lengths in mm.
+u_n towards the whisker. Where the contact sticks to the object, w cos φ = θ (x − u_y). Axes are
+those of the contact frame: x along the whisker at touch, y the way it pushes, z up. The friction
+acts against the motion over the surface, so an object that moves faster along itself than the
+whisker slips turns it round, and one that moves along the whisker takes its share of it. Angles in
+rad, lengths in mm.
 """
 
 from collections.abc import Callable
@@ -25,8 +28,8 @@ from estimator.whisk import Estimate, EstimatorSettings, Whisk
 MOTION_UNKNOWN = "nobody says how the object moves (object_velocity_mm_s)"
 RUNS_AWAY = "an object that moves as told would be touched nowhere on the whisker"
 AMBIGUOUS = "or {:.1f} mm: an object that runs away is felt alike at both"
-# Share of the distance above which another distance counts: at one as near as that the object would run at nine tenths
-# of the whisker's own speed.
+# Share of the distance above which another distance counts: at one as near as that the object would
+# run at nine tenths of the whisker's own speed.
 _LEAST_OTHER = 0.1
 # [sigma] of m_y, as in `estimator.builtin.is_held`.
 _HELD_SIGMAS = 2.0
@@ -42,8 +45,8 @@ _STEEPEST_RAD = 1.55
 class MovingContact:
     """Contact with a moving object; NaN where there is none.
 
-    d_x_mm: distance as at touch. beta_rad: slope that it follows from. other_mm: another distance that explains as
-    much, not above zero where there is none.
+    d_x_mm: distance as at touch. beta_rad: slope that it follows from. other_mm: another distance
+    that explains as much, not above zero where there is none.
     """
 
     d_x_mm: float
@@ -68,7 +71,8 @@ def held(theta: float, m_y: float, m_z: float, u: np.ndarray, beam: Beam) -> Mov
 def sliding(
     theta: float, m_y: float, m_z: float, alpha: float, u: np.ndarray, beam: Beam
 ) -> MovingContact:
-    """Compute the contact that slides over the object: up or down along it, whichever agrees with its displacement.
+    """Compute the contact that slides over the object: up or down along it, whichever agrees with
+    its displacement.
 
     >>> beam = Beam.from_rigidity(3000.0, 100.0)
     >>> away = sliding(0.05, 2.0, 6.0, 0.2, np.array([0.0, 10.0, 0.0]), beam)
@@ -85,7 +89,9 @@ def sliding(
 
 
 def _slide_one_way(way, theta, m_y, m_z, alpha, u, beam) -> tuple[MovingContact, float]:
-    """Compute the contact if the whisker slides to one side (1: up the z of the object), and its slip in mm."""
+    """Compute the contact if the whisker slides to one side (1: up the z of the object), and its
+    slip in mm.
+    """
     phi = atan2(m_y, m_z)
     moment = hypot(m_y, m_z)
     share = 1.0  # of friction that acts along the surface in the sensing plane
@@ -107,11 +113,12 @@ def _slide_one_way(way, theta, m_y, m_z, alpha, u, beam) -> tuple[MovingContact,
 
 
 def _distances(standing_mm: float, gains_mm: float, beam: Beam) -> tuple[float, float]:
-    """Solve d = standing (1 + gains/x) for the farther and the nearer x, where 1/d = 1/x − τ; NaN without a solution.
+    """Solve d = standing (1 + gains/x) for the farther and the nearer x, where 1/d = 1/x − τ; NaN
+    without a solution.
 
-    d is the distance on the base's cylinder. An object that runs away (gains < 0) is felt alike at both: at the farther
-    it does so at less than half the speed with which the whisker follows, at the nearer at more. The farther comes
-    first, unless the whisker is not as long.
+    d is the distance on the base's cylinder. An object that runs away (gains < 0) is felt alike at
+    both: at the farther it does so at less than half the speed with which the whisker follows, at
+    the nearer at more. The farther comes first, unless the whisker is not as long.
     """
     tau = beam.taper / beam.length_mm
     square = 1 + standing_mm * tau
@@ -128,9 +135,11 @@ def _distances(standing_mm: float, gains_mm: float, beam: Beam) -> tuple[float, 
 
 
 def known_motion(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Estimate the distance by (10) for an object that moves as `Whisk.object_motion` says, by (2) where it sticks.
+    """Estimate the distance by (10) for an object that moves as `Whisk.object_motion` says, by (2)
+    where it sticks.
 
-    Its interval is the sum in squares of the changes by either end of α_est's interval and of 1.96 sigma of the rest.
+    Its interval is the sum in squares of the changes by either end of α_est's interval and of 1.96
+    sigma of the rest.
     """
     beam = whisk.beam
     if whisk.object_motion is None:
@@ -183,7 +192,9 @@ def _sliding_at(inputs: np.ndarray, beam: Beam) -> MovingContact:
 
 
 def _is_held(whisk: Whisk, contact: MovingContact) -> bool:
-    """Check whether m_y is, within two sigma, that of an object which takes the whisker along with it."""
+    """Check whether m_y is, within two sigma, that of an object which takes the whisker along with
+    it.
+    """
     if not contact.d_x_mm > 0:
         return False
     u = whisk.object_motion.per_rad_mm
@@ -215,7 +226,9 @@ def _covariance(whisk: Whisk) -> np.ndarray:
 
 
 def _interval(solve, inputs, beam, d_x, half_alpha, rest) -> tuple[float, float]:
-    """Return the 95 % interval: changes by either end of α_est's and by the rest, in squares, as for (10)."""
+    """Return the 95 % interval: changes by either end of α_est's and by the rest, in squares, as
+    for (10).
+    """
     steep = _d_x_at(solve, inputs, beam, inputs[3] + half_alpha)
     flat = _d_x_at(solve, inputs, beam, inputs[3] - half_alpha)
     ends = (steep if steep > 0 else 0.0, flat if flat > 0 else beam.length_mm)

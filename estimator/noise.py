@@ -1,7 +1,9 @@
-"""Correlated noise: covariance of weighted sums of samples, from residuals and their autocorrelation.
+"""Correlated noise: covariance of weighted sums of samples, from residuals and their
+autocorrelation.
 
-Hum, vibration and stick–slip correlate neighbouring samples, so a mean over n of them is not √n better than one.
-Samples are rows, channels are columns; a sample that is left out of a sum has weight 0 in it.
+Hum, vibration and stick–slip correlate neighbouring samples, so a mean over n of them is not √n
+better than one. Samples are rows, channels are columns; a sample that is left out of a sum has
+weight 0 in it.
 """
 
 from dataclasses import dataclass
@@ -9,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len
 
-# [lags per sample] How far the autocorrelation is used: beyond a sixth of the samples it is mostly noise.
+# [lags per sample] How far the autocorrelation is used: beyond a sixth of the samples it is mostly
+# noise.
 LAGS_PER_SAMPLE = 1 / 6
 # [–] Stands instead of a scatter of nothing, so that it may be squared and divided by.
 TINY = 1e-150
@@ -20,8 +23,8 @@ class Memory:
     """Autocovariance of samples, estimated from residuals.
 
     covariance (lags, k, k): covariance of the samples with those some lags later, tapered to zero.
-    white (lags,): what the same residuals would show of white noise of unit variance. Fitted lines take part of the
-    slow noise with them; the covariances of sums are raised by what is missing.
+    white (lags,): what the same residuals would show of white noise of unit variance. Fitted lines
+    take part of the slow noise with them; the covariances of sums are raised by what is missing.
     """
 
     covariance: np.ndarray
@@ -84,7 +87,9 @@ class Memory:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Fourier transform of a series (n,), from which its products with others at several lags are made."""
+    """Fourier transform of a series (n,), from which its products with others at several lags are
+    made.
+    """
 
     values: np.ndarray
     size: int
@@ -92,18 +97,22 @@ class Spectrum:
 
     @classmethod
     def of(cls, series: np.ndarray, lags: int) -> "Spectrum":
-        """Transform a series (n,), padded so that its end does not meet its beginning at any of the lags."""
+        """Transform a series (n,), padded so that its end does not meet its beginning at any of the
+        lags.
+        """
         size = next_fast_len(len(series) + lags, real=True)
         return cls(np.fft.rfft(series, size), size, lags)
 
     def lagged(self, other: "Spectrum | None" = None) -> np.ndarray:
-        """Return Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1; without `other` b is the series itself."""
+        """Return Σ_i a_i b_{i+h} for the lags h = 0 … lags − 1; without `other` b is the series
+        itself.
+        """
         second = self if other is None else other
         return np.fft.irfft(np.conj(self.values) * second.values, self.size)[: self.lags]
 
 
 def _lagged_products(residuals, lags):
-    """Return the products (k, k, lags) of all pairs of columns of residuals (n, k), made symmetric."""
+    """Return the symmetric products (k, k, lags) of all pairs of columns of residuals (n, k)."""
     columns = [Spectrum.of(column, lags) for column in residuals.T]
     channels = len(columns)
     products = np.empty((channels, channels, lags))
@@ -123,7 +132,9 @@ def _overlap(one, other=None):
 
 
 def _hull(series: np.ndarray) -> slice:
-    """Return the slice from the first to the last element that is not zero; the first element if none is."""
+    """Return the slice from the first to the last element that is not zero; the first element if
+    none is.
+    """
     there = np.flatnonzero(series)
     return slice(there[0], there[-1] + 1) if len(there) else slice(0, 1)
 
@@ -155,7 +166,9 @@ def mean_weights(used: np.ndarray) -> np.ndarray:
 
 
 def line_weights(x: np.ndarray, used: np.ndarray, at: float) -> np.ndarray:
-    """Return the weights (n,) that make the least-squares line's value at x = `at` from the marked samples."""
+    """Return the weights (n,) that make the least-squares line's value at x = `at` from the marked
+    samples.
+    """
     middle = x[used].mean()
     spread = np.where(used, x - middle, 0.0)
     return mean_weights(used) + spread * (at - middle) / max(spread @ spread, TINY)

@@ -1,7 +1,8 @@
 """Felt touch: the motor angle at which the moments leave the level of the free stroke.
 
-Plain arrays over one forward stroke: motor angle (n,) in rad, moments (n,) or (n, 2) in N·mm or volts, time (n,) in s.
-The fit of the rise is here; half height of the rate and the paper's threshold are in `estimator.crossing`.
+Plain arrays over one forward stroke: motor angle (n,) in rad, moments (n,) or (n, 2) in N·mm or
+volts, time (n,) in s. The fit of the rise is here; half height of the rate and the paper's
+threshold are in `estimator.crossing`.
 """
 
 from dataclasses import dataclass, field
@@ -39,9 +40,9 @@ SPIKE_IN_SIGMAS = 8.0
 class Level:
     """Reading of the moments without contact.
 
-    offset (k,) with covariance (k, k), at the motor angle centre_rad. drift (k,) per rad: slope of the free stroke
-    beyond its noise. It is not subtracted: extrapolated past the free stroke it would bring more noise than it
-    removes. It widens the covariance instead.
+    offset (k,) with covariance (k, k), at the motor angle centre_rad. drift (k,) per rad: slope of
+    the free stroke beyond its noise. It is not subtracted: extrapolated past the free stroke it
+    would bring more noise than it removes. It widens the covariance instead.
     """
 
     offset: np.ndarray
@@ -58,9 +59,11 @@ class Level:
 
 @dataclass(frozen=True)
 class Rise:
-    """The fitted rise: slope (k,) per rad; gain (k,) turns moments above the level into rad past the touch.
+    """The fitted rise: slope (k,) per rad; gain (k,) turns moments above the level into rad past
+    the touch.
 
-    weights (n,) make the line's value at the touch from the samples; memory describes the noise of these.
+    weights (n,) make the line's value at the touch from the samples; memory describes the noise of
+    these.
     """
 
     slope: np.ndarray
@@ -71,9 +74,11 @@ class Rise:
 
 @dataclass(frozen=True)
 class FeltTouch:
-    """First touch as found in the moments, with its standard deviation; both NaN where status is not empty.
+    """First touch as found in the moments, with its standard deviation; both NaN where status is
+    not empty.
 
-    bias_rad: systematic error of the method, not subtracted. level, rise: what the touch was found from.
+    bias_rad: systematic error of the method, not subtracted. level, rise: what the touch was found
+    from.
     """
 
     motor_rad: float
@@ -102,13 +107,15 @@ def felt_touch(
     window_rad: float = WINDOW_RAD,
     guard_rad: float = GUARD_RAD,
 ) -> FeltTouch:
-    """Find the touch where a line fitted to the rise of the moments meets the level of the free stroke.
+    """Find the touch where a line fitted to the rise of the moments meets the level of the free
+    stroke.
 
-    The rise is fitted from guard_rad to window_rad past the touch, and over 60 ms at least where time_s is given, so
-    that fast strokes average over hum and vibration too. The channels share one touch angle, weighted by the inverse
-    of their scatter's covariance: where the whisker sticks and slips, the scatter lies along the surface, so that the
-    weight falls on the moment across it, which rises evenly whatever the slip. Isolated spikes and NaN are left out.
-    Raises ValueError where motor angles and moments do not have the same samples.
+    The rise is fitted from guard_rad to window_rad past the touch, and over 60 ms at least where
+    time_s is given, so that fast strokes average over hum and vibration too. The channels share one
+    touch angle, weighted by the inverse of their scatter's covariance: where the whisker sticks and
+    slips, the scatter lies along the surface, so that the weight falls on the moment across it,
+    which rises evenly whatever the slip. Isolated spikes and NaN are left out. Raises ValueError
+    where motor angles and moments do not have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
     used = usable(motor, samples) & _moving(motor)
@@ -144,7 +151,7 @@ def columns(motor_rad: ArrayLike, moments: ArrayLike) -> tuple[np.ndarray, np.nd
 
 
 def usable(motor: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """Return the mask (n,) of the samples that are known in all columns and are no isolated spikes."""
+    """Return the mask (n,) of the samples that are known in all columns and are no spikes."""
     known = np.isfinite(motor) & np.isfinite(samples).all(axis=1)
     if np.count_nonzero(known) < 5:
         return known
@@ -179,8 +186,8 @@ def _moving(motor):
 def _noise(samples):
     """Estimate the standard deviation (k,) of one sample by the median of second differences.
 
-    It is blind to rise, drift and spikes, and never less than a billionth of the range: a channel whose values are
-    mostly equal would show nothing.
+    It is blind to rise, drift and spikes, and never less than a billionth of the range: a channel
+    whose values are mostly equal would show nothing.
     """
     second = np.abs(np.diff(samples, n=2, axis=0))
     floor = np.maximum(1e-9 * np.ptp(samples, axis=0), noise.TINY)
@@ -188,7 +195,9 @@ def _noise(samples):
 
 
 def _coarse_touch(motor, samples, used):
-    """Find the motor angle of the break of the broken line (level, then rise) that explains most of both channels."""
+    """Find the motor angle of the break of the broken line (level, then rise) that explains most of
+    both channels.
+    """
     angle, binned = _binned(motor[used], samples[used])
     scaled = binned / _noise(samples[used])
     breaks = angle[:-2]
@@ -201,7 +210,9 @@ def _coarse_touch(motor, samples, used):
 
 
 def _binned(motor, samples):
-    """Return the means of motor angles (bins,) and samples (bins, k) in at most COARSE_BINS equal bins."""
+    """Return the means of motor angles (bins,) and samples (bins, k) in at most COARSE_BINS equal
+    bins.
+    """
     bins = min(COARSE_BINS, len(motor))
     edges = np.linspace(0, len(motor), bins + 1).astype(int)
     counts = np.diff(edges)
@@ -211,7 +222,9 @@ def _binned(motor, samples):
 
 
 def _coarse_status(motor, samples, used, touch):
-    """Return why there is no touch at the coarse one: no rise, or no free stroke; empty where there is."""
+    """Return why there is no touch at the coarse one: no rise, or no free stroke; empty where there
+    is.
+    """
     after = used & (motor > touch)
     before = used & (motor <= touch)
     if np.count_nonzero(after) < MIN_RISE_SAMPLES:
@@ -226,7 +239,9 @@ def _coarse_status(motor, samples, used, touch):
 
 
 def _rises_already(motor, samples, before, after):
-    """Check whether the supposed free stroke rises significantly, at more than a third of the later rate."""
+    """Check whether the supposed free stroke rises significantly, at more than a third of the later
+    rate.
+    """
     rate = noise.line_slope(motor, samples, after)
     size = np.hypot.reduce(rate)
     slope = noise.line_slope(motor, samples, before) @ rate / size
@@ -237,7 +252,7 @@ def _rises_already(motor, samples, before, after):
 
 
 def _extrapolate(motor, samples, used, touch, window, guard):
-    """Return the touch of one pass of `felt_touch`, which starts from a touch angle known before."""
+    """Return the touch of one pass of `felt_touch`, which starts from an earlier touch."""
     free = used & (motor < touch - guard)
     rising = used & (motor > touch + guard) & (motor <= touch + window)
     if np.count_nonzero(free) < MIN_FREE_SAMPLES:
@@ -253,7 +268,9 @@ def _extrapolate(motor, samples, used, touch, window, guard):
 
 
 def _fit_rise(motor, samples, free, rising, touch, level):
-    """Return the line through the rise, and the standard deviation (rad) of where it meets the level."""
+    """Return the line through the rise, and the standard deviation (rad) of where it meets the
+    level.
+    """
     weights = noise.line_weights(motor, rising, touch)
     memory = noise.Memory.of(motor, samples, free, rising)
     own = noise.Memory.of(motor, samples, rising)
@@ -267,7 +284,9 @@ def _fit_rise(motor, samples, free, rising, touch, level):
 
 
 def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Level:
-    """Measure the level of the samples (n, k) of a free stroke, a mask (n,), over motor angles (n,)."""
+    """Measure the level of the samples (n, k) of a free stroke, a mask (n,), over motor angles
+    (n,).
+    """
     weights = noise.mean_weights(free)
     memory = noise.Memory.of(motor, samples, free)
     centre = motor[free].mean()

@@ -1,4 +1,5 @@
-"""Readings of sensors other than angle and moment over a stroke: forces at an angle, the moment's rate (Table I).
+"""Readings of sensors other than angle and moment over a stroke: forces at an angle, the moment's
+rate (Table I).
 
 Plain arrays over one forward stroke, as in `estimator.signal`. Angles in rad, times in s.
 """
@@ -32,11 +33,13 @@ def force_at(
     time_s: ArrayLike | None = None,
     drift: np.ndarray | None = None,
 ) -> MomentAt:
-    """Return the forces (k,) above the free stroke's level at the pushing angle theta_rad past `touch`.
+    """Return the forces (k,) above the free stroke's level at the pushing angle theta_rad past
+    `touch`.
 
-    They are read as moments are (`estimator.signal.moment_at`); the touch was found in other channels. The covariance
-    holds the forces' own noise and the drift (k,) per rad of their zero; where `drift` is not given, the one that the
-    free stroke shows. Raises ValueError for theta_rad ≤ 0, and where angles and forces do not have the same samples.
+    They are read as moments are (`estimator.signal.moment_at`); the touch was found in other
+    channels. The covariance holds the forces' own noise and the drift (k,) per rad of their zero;
+    where `drift` is not given, the one that the free stroke shows. Raises ValueError for theta_rad
+    ≤ 0, and where angles and forces do not have the same samples.
     """
     motor, samples = columns(motor_rad, forces)
     if not touch.status:
@@ -46,7 +49,9 @@ def force_at(
 
 
 def _with_zero_of_forces(touch, motor, samples, free, drift):
-    """Return the touch with level and noise of the forces (n, k) over their free stroke, a mask (n,)."""
+    """Return the touch with level and noise of the forces (n, k) over their free stroke, a mask
+    (n,).
+    """
     if np.count_nonzero(free) < MIN_FREE_SAMPLES:
         return replace(touch, status=NO_ZERO)
     level = free_level(motor, samples, free)
@@ -62,10 +67,10 @@ def rate_at(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit the slope (k,) per rad of moments over the motor angle, from touch to theta_rad past it.
 
-    Returns it with its covariance (k, k). It is what a sensor of the moment's rate reads, divided by the motor's speed;
-    no zero enters, and the touch only as the angle from which samples count. The zero's drift is in the covariance.
-    NaN where there is no touch or fewer than three samples. Raises ValueError where angles and moments do not have
-    the same samples.
+    Returns it with its covariance (k, k). It is what a sensor of the moment's rate reads, divided
+    by the motor's speed; no zero enters, and the touch only as the angle from which samples count.
+    The zero's drift is in the covariance. NaN where there is no touch or fewer than three samples.
+    Raises ValueError where angles and moments do not have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
     begin = touch.motor_rad + GUARD_RAD

@@ -1,11 +1,14 @@
-"""Contact and force from the seen shape of a whisker of known rigidity, by one camera and no gauge ([38], Kaneko).
+"""Contact and force from the seen shape of a whisker of known rigidity, by one camera and no gauge
+([38], Kaneko).
 
-This estimator alone is allowed pictures of its own trial. It is given sights, not images: lines from one eye on which
-points of the centreline lie. Up to the contact the curvature falls to zero as the lever does, beyond it the whisker is
-straight: where the bend ends is the contact, how much it bends is the force. One camera does not see the bend towards
-it; the angle at which it leaves the whisking plane has a prior of 0 ± 45° and is fitted with the rest.
+This estimator alone is allowed pictures of its own trial. It is given sights, not images: lines
+from one eye on which points of the centreline lie. Up to the contact the curvature falls to zero as
+the lever does, beyond it the whisker is straight: where the bend ends is the contact, how much it
+bends is the force. One camera does not see the bend towards it; the angle at which it leaves the
+whisking plane has a prior of 0 ± 45° and is fitted with the rest.
 
-Rig frame: base at the origin, z the rotation axis, x along the whisker at motor angle 0. Lengths in mm, angles in rad.
+Rig frame: base at the origin, z the rotation axis, x along the whisker at motor angle 0. Lengths in
+mm, angles in rad.
 """
 
 from collections.abc import Callable
@@ -24,22 +27,27 @@ from estimator.uncertainty import Z_95
 
 FEW = "one camera shows too few points or frames of the whisker"
 NOT_PUSHED = "one camera does not see the whisker pushed as far as the pushing angle"
-PLANE_UNKNOWN = "force and give are not told: the camera looks aside, and how the bend leaves the whisking plane is not known"
+PLANE_UNKNOWN = (
+    "force and give are not told: the camera looks aside, "
+    "and how the bend leaves the whisking plane is not known"
+)
 NO_END = "the seen shape does not tell where the bend ends"
-# [mm] Prior sigma of the rest shape by powers of s/L: clamped off centre, clamp angle, set and sag, change of curvature.
+# [mm] Prior sigma of the rest shape by powers of s/L: clamped off centre, clamp angle, set and sag,
+# change of curvature.
 _REST_MM = np.array([1.0, 8.0, 5.0, 2.0])
 # Prior sigma of tan φ of the bend: 45°.
 _TAN_PHI = 1.0
-# [mm/rad] Prior sigma of how fast the contact moves along the whisker: a bar's radius in rolling, or 3 mm of slip in 3°
-# along an object that leans by 20°.
+# [mm/rad] Prior sigma of how fast the contact moves along the whisker: a bar's radius in rolling,
+# or 3 mm of slip in 3° along an object that leans by 20°.
 _ALONG_MM_RAD = 20.0
 # [rad] Frames that far past the pushing angle still count.
 _BEYOND_RAD = np.radians(1.0)
 # Fewest frames with points, and fewest points, from which a shape is fitted.
 _FEWEST_FRAMES = 4
 _FEWEST_POINTS = 30
-# [1/rad] Relative sigma of the force per rad pushed: friction along the whisker, which is not modelled, adds to the
-# moment tan α times w/d, that is θ at most, over that of the force across; α is taken as 0 ± 14°.
+# [1/rad] Relative sigma of the force per rad pushed: friction along the whisker, which is not
+# modelled, adds to the moment tan α times w/d, that is θ at most, over that of the force across; α
+# is taken as 0 ± 14°.
 _DRAG = 0.25
 # Largest share of the force by which tan φ may change it: its square, a hundredth, is left out.
 _MOST_BY_PLANE = 0.1
@@ -47,7 +55,8 @@ _MOST_BY_PLANE = 0.1
 _LEAST_LEFT = 1e-3
 # Nodes and weights of Gauss–Legendre quadrature on −1 … 1.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-# Places in the parameter vector: the rest shape in y (4) and z (4) stands before these, the shared causes after them.
+# Places in the parameter vector: the rest shape in y (4) and z (4) stands before these, the shared
+# causes after them.
 _TOUCH = 8  # rad
 _BEND = 9  # tangent angle at the contact, by the angle past touch
 _BEND_2 = 10  # 1/rad, by its square
@@ -85,7 +94,8 @@ class SeenShape:
         shapes = list(map(np.shape, arrays))
         if shapes != [(3,), (count, 3), (count, 3), (count,)] or len(self.shared_rad) != count:
             raise ValueError(
-                "frame (n,), eye_mm (3,), sight and across (n, 3), sigma_rad (n,), shared_rad (n, k)"
+                "frame (n,), eye_mm (3,), sight and across (n, 3), "
+                "sigma_rad (n,), shared_rad (n, k)"
             )
         if not (np.asarray(self.sigma_rad) > 0).all():
             raise ValueError("sigma_rad must be positive")
@@ -110,12 +120,14 @@ class SeenShape:
 
 @dataclass(frozen=True)
 class ShapeContact:
-    """Contact and force that follow from a seen shape, each with one sigma; NaN where `status` says why.
+    """Contact and force that follow from a seen shape, each with one sigma; NaN where `status` says
+    why.
 
-    touch_rad: motor angle at which the whisker begins to bend. force_N: across the whisker in the whisking plane.
-    moved_mm: how far the contact has gone the way it is pushed since touch: an object gives way, or the whisker slips
-    along a slope, and one camera cannot distinguish them. stiffness_N_mm: force over that way, NaN where it is within
-    its noise. stiffness_low_N_mm: bound below which the stiffness is not at 97.5 %, either way.
+    touch_rad: motor angle at which the whisker begins to bend. force_N: across the whisker in the
+    whisking plane. moved_mm: how far the contact has gone the way it is pushed since touch: an
+    object gives way, or the whisker slips along a slope, and one camera cannot distinguish them.
+    stiffness_N_mm: force over that way, NaN where it is within its noise. stiffness_low_N_mm: bound
+    below which the stiffness is not at 97.5 %, either way.
     """
 
     touch_rad: float = nan
@@ -141,10 +153,12 @@ def contact_of_shape(
     tilt_sigma_rad: float = 0.0,
     rigidity_share: float = 0.0,
 ) -> ShapeContact:
-    """Estimate touch, distance, force and give at a pushing angle, from all frames up to it and a little beyond.
+    """Estimate touch, distance, force and give at a pushing angle, from all frames up to it and a
+    little beyond.
 
-    reach_mm, tilt_sigma_rad: how thick the object may be and how far it may lean, as in `EstimatorSettings`: they enter
-    the sigma of d_x. rigidity_share: one sigma of EI as a share of it, which enters the force alone.
+    reach_mm, tilt_sigma_rad: how thick the object may be and how far it may lean, as in
+    `EstimatorSettings`: they enter the sigma of d_x. rigidity_share: one sigma of EI as a share of
+    it, which enters the force alone.
     """
     if seen.frames < _FEWEST_FRAMES or len(seen.frame) < _FEWEST_POINTS:
         return ShapeContact(status=FEW)
@@ -179,7 +193,9 @@ def _without_force(contact: ShapeContact) -> ShapeContact:
 
 
 def _with_sigmas(values, covariance, length_mm, model_share, force_share) -> ShapeContact:
-    """Return the contact of observables (4,) with covariance (4, 4), and relative sigmas of d_x and force by models."""
+    """Return the contact of observables (4,) with covariance (4, 4), and relative sigmas of d_x and
+    force by models.
+    """
     touch, d_x, force, moved = values.tolist()
     touch_sigma, d_x_sigma, force_sigma, moved_sigma = np.sqrt(np.diag(covariance)).tolist()
     if not (0 < d_x <= length_mm and d_x_sigma < 0.25 * length_mm and force > 0):
@@ -204,7 +220,9 @@ def _with_sigmas(values, covariance, length_mm, model_share, force_share) -> Sha
 
 
 def _stiffness(force, force_sigma, moved, moved_sigma, covariance) -> tuple[float, float, float]:
-    """Return (stiffness, its sigma, its low end), N/mm; the first two NaN where the way is within its noise."""
+    """Return (stiffness, its sigma, its low end), N/mm; the first two NaN where the way is within
+    its noise.
+    """
     low = force / max(moved + Z_95 * moved_sigma, 1e-9)
     if moved <= Z_95 * moved_sigma:
         return nan, nan, low
@@ -215,7 +233,8 @@ def _stiffness(force, force_sigma, moved, moved_sigma, covariance) -> tuple[floa
 
 
 def bend(arc_mm: np.ndarray, contact_mm: np.ndarray, taper_per_mm: float) -> np.ndarray:
-    """Compute ∫₀ˢ (c − t) / (1 − τt)⁴ dt, mm²: the tangent angle by a unit force at c over EI at the base.
+    """Compute ∫₀ˢ (c − t) / (1 − τt)⁴ dt, mm²: the tangent angle by a unit force at c over EI at
+    the base.
 
     It is constant beyond c. arc_mm: s, contact_mm: c, taper_per_mm: τ.
     """
@@ -225,7 +244,9 @@ def bend(arc_mm: np.ndarray, contact_mm: np.ndarray, taper_per_mm: float) -> np.
 
 
 def _deflection(arc, contact, taper):
-    """Compute ∫₀ˢ of `bend`, mm³: the deflection (n,) at arcs (n,) by a unit force over EI at the base."""
+    """Compute ∫₀ˢ of `bend`, mm³: the deflection (n,) at arcs (n,) by a unit force over EI at the
+    base.
+    """
     half = 0.5 * np.minimum(arc, contact)[:, None]
     inner = (half * _WEIGHTS * bend(half * (1.0 + _NODES), contact[:, None], taper)).sum(axis=1)
     return inner + np.maximum(arc - contact, 0.0) * bend(contact, contact, taper)
@@ -235,8 +256,9 @@ def _deflection(arc, contact, taper):
 class _ShapeFit:
     """Least squares of a stroke's shape.
 
-    Parameters: rest shape (2, 4), touch, bend in y by the angle past touch and by its square, tan φ, contact arc at the
-    pushing angle and its change by angle, then the shared causes of the points.
+    Parameters: rest shape (2, 4), touch, bend in y by the angle past touch and by its square, tan
+    φ, contact arc at the pushing angle and its change by angle, then the shared causes of the
+    points.
     """
 
     seen: SeenShape
@@ -269,7 +291,9 @@ class _ShapeFit:
     def points(
         self, vector: np.ndarray, arc: np.ndarray, pushed: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Compute centreline points and tangents (n, 3), hub frame, at arcs (n,) of shapes pushed (n,) past touch."""
+        """Compute centreline points and tangents (n, 3), hub frame, at arcs (n,) of shapes pushed
+        (n,) past touch.
+        """
         contact = vector[_ARC] + vector[_ALONG] * (pushed - self.theta_rad)
         contact = np.clip(contact, 1.0, self.beam.length_mm)
         size = (vector[_BEND] + vector[_BEND_2] * pushed) * pushed
@@ -301,7 +325,8 @@ class _ShapeFit:
         return np.stack([x, y, z], axis=-1)
 
     def residuals(self, vector: np.ndarray) -> np.ndarray:
-        """Compute, in sigmas, the points' residuals from their sights and the parameters' from their priors.
+        """Compute, in sigmas, the points' residuals from their sights and the parameters' from
+        their priors.
 
         Returns (n + parameters,).
         """
@@ -319,7 +344,9 @@ class _ShapeFit:
         return np.concatenate([lateral / seen.sigma_rad, vector / self.prior])
 
     def observables(self, vector: np.ndarray) -> np.ndarray:
-        """Compute (4,): touch in rad, d_x in mm, force in N, and how far the contact has moved in mm."""
+        """Compute (4,): touch in rad, d_x in mm, force in N, and how far the contact has moved in
+        mm.
+        """
         theta = self.theta_rad
         arc = vector[[_ARC]]
         points, _ = self.points(vector, arc, np.array([theta]))
@@ -349,7 +376,9 @@ class _ShapeFit:
         return found.x, np.linalg.pinv(jacobian.T @ jacobian)
 
     def _sigma_factor(self, residuals: np.ndarray) -> float:
-        """Return the factor on sigmas, at least 1, by the residuals' scatter and the correlation of neighbours."""
+        """Return the factor on sigmas, at least 1, by the residuals' scatter and the correlation of
+        neighbours.
+        """
         same = np.diff(self.seen.frame) == 0
         products = (residuals[1:] * residuals[:-1])[same]
         correlation = float(np.clip(products.mean() / np.mean(residuals**2), 0.0, 0.95))
@@ -366,7 +395,8 @@ def _turn_about_z(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def _initial_parameters(seen: SeenShape, theta: float, beam: Beam) -> tuple[float, np.ndarray]:
-    """Find (touch, parameters to begin with) by linear least squares over a grid of touch and contact.
+    """Find (touch, parameters to begin with) by linear least squares over a grid of touch and
+    contact.
 
     Two finer grids follow, each about the best of the grid before.
     """
@@ -387,10 +417,14 @@ def _initial_parameters(seen: SeenShape, theta: float, beam: Beam) -> tuple[floa
 
 
 class _PlanarShape:
-    """The seen shape to first order: rest shape and bend in the whisking plane, for given touch and contact."""
+    """The seen shape to first order: rest shape and bend in the whisking plane, for given touch and
+    contact.
+    """
 
     def __init__(self, fit: _ShapeFit):
-        """Compute the weighted aim (n + 4,) and the columns (n + 4, 4) of the rest shape, its priors last."""
+        """Compute the weighted aim (n + 4,) and the columns (n + 4, 4) of the rest shape, its
+        priors last.
+        """
         seen = fit.seen
         self.motor = fit.motor
         self.arc = fit.along_mm
@@ -430,7 +464,9 @@ class _PlanarShape:
 
 
 def _derivatives(function: Callable, vector: np.ndarray) -> np.ndarray:
-    """Compute the derivatives (values, parameters) of a function of the parameters by central differences."""
+    """Compute the derivatives (values, parameters) of a function of the parameters by central
+    differences.
+    """
     steps = 1e-5 * np.maximum(np.abs(vector), 1e-2)
     columns = []
     for step in np.diag(steps):

@@ -1,6 +1,8 @@
-"""The other sensors of the paper's Table I as estimators: each a function of a whisk and the settings.
+"""The other sensors of the paper's Table I as estimators: each a function of a whisk and the
+settings.
 
-Angle and moment are the paper's own (`estimator.builtin`); here are those that have more, or less, to go by.
+Angle and moment are the paper's own (`estimator.builtin`); here are those that have more, or less,
+to go by.
 """
 
 from dataclasses import replace
@@ -18,18 +20,22 @@ NO_RATE = "the rate of the moment is not known"
 
 
 def touch_alone(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Estimate from a binary sensor, which has the angle of touch, and of the distance only that the whisker reaches.
+    """Estimate from a binary sensor, which has the angle of touch, and of the distance only that
+    the whisker reaches.
 
-    Every place along the whisker is equally probable: the middle, with the standard deviation of a uniform distribution.
+    Every place along the whisker is equally probable: the middle, with the standard deviation of a
+    uniform distribution.
     """
     length = whisk.beam.length_mm
     return Estimate(length / 2, length / sqrt(12), "", 0.025 * length, 0.975 * length)
 
 
 def moment_rate(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Estimate from the moments' rate over the angle (piezoelectric sensors): (1) with the slip of (10), by rate times θ.
+    """Estimate from the moments' rate over the angle (piezoelectric sensors): (1) with the slip of
+    (10), by rate times θ.
 
-    The moment is taken to rise as a line, so no angle of touch and no zero enters, and no error of theirs.
+    The moment is taken to rise as a line, so no angle of touch and no zero enters, and no error of
+    theirs.
     """
     others = whisk.others
     theta = whisk.theta_at_rad
@@ -48,10 +54,12 @@ def moment_rate(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 
 
 def force_and_moment(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
-    """Estimate from six axes at the base: the force's line of action meets the whisker there (`estimator.load_cell`).
+    """Estimate from six axes at the base: the force's line of action meets the whisker there
+    (`estimator.load_cell`).
 
-    One over the distance is linear in the force, so the interval is that of one over it (Fieller: Journal of the Royal
-    Statistical Society B 16, 1954); where the force is within its noise, only "no nearer than" is left.
+    One over the distance is linear in the force, so the interval is that of one over it (Fieller:
+    Journal of the Royal Statistical Society B 16, 1954); where the force is within its noise, only
+    "no nearer than" is left.
     """
     others = whisk.others
     if others is None or not np.isfinite(others.force_N).all():
@@ -75,7 +83,9 @@ def force_and_moment(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 
 
 def _interval(d_x: float, half: float, length: float) -> tuple[float, float]:
-    """Return the ends, mm, where 1/d_x lies within ± half of itself; the high one at most the whisker's length."""
+    """Return the ends, mm, where 1/d_x lies within ± half of itself; the high one at most the
+    whisker's length.
+    """
     low = min(d_x / (1 + half), length)
     high = min(d_x / (1 - half), length) if half < 1 else length
     return low, high
@@ -89,7 +99,9 @@ SENSORS = {
 
 
 def _noise_share(whisk: Whisk, by_felt: np.ndarray) -> float:
-    """Return the relative sigma of the distance by noise of moments and forces, whose sensors are independent."""
+    """Return the relative sigma of the distance by noise of moments and forces, whose sensors are
+    independent.
+    """
     by_moments = by_felt[:2]
     by_forces = by_felt[2:]
     moments = by_moments @ whisk.covariance_at @ by_moments

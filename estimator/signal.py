@@ -1,4 +1,5 @@
-"""From the samples of one forward stroke to what an estimator needs: filter, felt touch, moments at an angle.
+"""From the samples of one forward stroke to what an estimator needs: filter, felt touch, moments at
+an angle.
 
 Everything takes plain arrays; moments may be in N·mm or in volts. Angles in rad, times in s.
 """
@@ -36,8 +37,9 @@ NOT_REACHED = "the stroke does not reach the pushing angle"
 class MomentAt:
     """Moments above the free stroke's level at a pushing angle.
 
-    values (k,) and covariance (k, k) in the unit of the samples; theta_covariance (k,) is the covariance
-    of the pushing angle (through the touch) with the moments. NaN where status is not empty.
+    values (k,) and covariance (k, k) in the unit of the samples; theta_covariance (k,) is the
+    covariance of the pushing angle (through the touch) with the moments. NaN where status is not
+    empty.
     """
 
     theta_rad: float
@@ -57,12 +59,14 @@ def moment_at(
     half_window_rad: ArrayLike = HALF_WINDOW_RAD,
     good: np.ndarray | None = None,
 ) -> MomentAt:
-    """Fit a line to the samples around the pushing angle theta_rad past `touch`, and return the moments there.
+    """Fit a line to the samples around the pushing angle theta_rad past `touch`, and return the
+    moments there.
 
-    The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum, and never reaches
-    back to the touch. The covariance holds the fit (with the noise's autocorrelation), the free stroke and drift.
-    good: mask (n,) of the `usable` samples, where that is known already. Raises ValueError for theta_rad ≤ 0, and
-    where motor angles and moments do not have the same samples.
+    The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum,
+    and never reaches back to the touch. The covariance holds the fit (with the noise's
+    autocorrelation), the free stroke and drift. good: mask (n,) of the `usable` samples, where that
+    is known already. Raises ValueError for theta_rad ≤ 0, and where motor angles and moments do not
+    have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
     channels = samples.shape[1]
@@ -87,7 +91,9 @@ def _nothing(theta_rad, channels, status):
 
 
 def _local_fit(theta_rad, motor, samples, near, at, touch):
-    """Return the moments at the motor angle `at` from a line fitted to the samples `near` it, a mask (n,)."""
+    """Return the moments at the motor angle `at` from a line fitted to the samples `near` it, a
+    mask (n,).
+    """
     level = touch.level
     rise = touch.rise
     weights = noise.line_weights(motor, near, at)

@@ -1,12 +1,12 @@
-"""Lateral slip in the sensing plane: what the base feels for a given contact. Equations (3)–(5), (13),
-(14), (18)–(21).
+"""Lateral slip in the sensing plane: what the base feels for a given contact. Equations (3)–(5),
+(13), (14), (18)–(21).
 
-Written with φ = max(0, |β| − α) in sines and cosines, which stay finite where the printed tan and cot do not.
-β < 0 mirrors β > 0: φ, m_y and σ change sign. Angles in rad, lengths in mm, C = 3EI in N·mm², moments in
-N·mm.
+Written with φ = max(0, |β| − α) in sines and cosines, which stay finite where the printed tan and
+cot do not. β < 0 mirrors β > 0: φ, m_y and σ change sign. Angles in rad, lengths in mm, C = 3EI in
+N·mm², moments in N·mm.
 
-Domain: |β| < 90°, θ ≥ 0 and below 90°, d_x > 0; outside it the result is NaN, and `why_not` says why.
-A friction cone angle α outside [0°, 90°) or C ≤ 0 raises ValueError.
+Domain: |β| < 90°, θ ≥ 0 and below 90°, d_x > 0; outside it the result is NaN, and `why_not` says
+why. A friction cone angle α outside [0°, 90°) or C ≤ 0 raises ValueError.
 """
 
 import numpy as np
@@ -44,7 +44,8 @@ def slip_angle(beta: ArrayLike, alpha: ArrayLike) -> Numbers:
 def moments(
     d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """Return (m_y, m_z) of (14) and (13), in N·mm, at the angle θ against a flat surface of slope β.
+    """Return (m_y, m_z) of (14) and (13), in N·mm, at the angle θ against a flat surface of slope
+    β.
 
     m_z = (Cθ/d_x) cos β cos φ / cos(β − φ),  m_y = (Cθ/d_x) cos β sin φ / cos(β − φ).
     Raises ValueError for α outside [0°, 90°) or C ≤ 0.
@@ -114,8 +115,8 @@ def slope_from_deflection(
 ) -> tuple[Numbers, Numbers]:
     """Return (β, φ) of (20) and (21), in rad, from the deflections d_y, d_z in mm.
 
-    tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no trace: β is
-    NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
+    tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no
+    trace: β is NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
     """
     obstructed = (
         d_x * theta - d_y
@@ -134,7 +135,9 @@ def slope_from_deflection(
 
 
 def why_not(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike) -> str | np.ndarray:
-    """Return why (4), (5), (13) and (14) give NaN for these arguments: a sentence, empty inside the domain."""
+    """Return why (4), (5), (13) and (14) give NaN for these arguments: a sentence, empty inside the
+    domain.
+    """
     d_x, theta, beta = np.broadcast_arrays(
         np.asarray(d_x, float), np.asarray(theta, float), np.asarray(beta, float)
     )

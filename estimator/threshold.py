@@ -1,6 +1,8 @@
-"""How steep a surface may be before a distance is wrong by a given share: the curves of Figs 5 and 6.
+"""How steep a surface may be before a distance is wrong by a given share: the curves of Figs 5 and
+6.
 
-Angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed forms, a curved one is searched.
+Angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed forms, a curved one is
+searched.
 """
 
 import numpy as np
@@ -32,11 +34,13 @@ def distance_error(
     equation: str = "with_friction",
     printed: bool = False,
 ) -> Numbers:
-    """Compute the relative error of (2) or (10), estimate over truth minus one, for a slope β_0 at first touch.
+    """Compute the relative error of (2) or (10), estimate over truth minus one, for a slope β_0 at
+    first touch.
 
-    α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature (15).
-    `printed` takes Appendix B as printed. −1 where (10) gives no distance because φ + α_est reaches 90°;
-    NaN outside the domain. Raises ValueError for a friction angle outside [0°, 90°) or an unknown equation.
+    α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature
+    (15). `printed` takes Appendix B as printed. −1 where (10) gives no distance because φ + α_est
+    reaches 90°; NaN outside the domain. Raises ValueError for a friction angle outside [0°, 90°) or
+    an unknown equation.
     """
     _require(alpha, alpha_est, equation)
     no_slip = equation == "no_slip"
@@ -55,10 +59,12 @@ def slope_threshold(
     equation: str = "with_friction",
     printed: bool = False,
 ) -> Numbers:
-    """Find β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by `error`; NaN if never.
+    """Find β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by
+    `error`; NaN if never.
 
-    Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0. Raises ValueError for a friction
-    angle outside [0°, 90°), an unknown equation, an error ≤ 0, or a curved surface with θ ≤ 0.
+    Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0. Raises ValueError
+    for a friction angle outside [0°, 90°), an unknown equation, an error ≤ 0, or a curved surface
+    with θ ≤ 0.
 
     >>> round(slope_threshold(0.05, 0.0, 0.0, r_n=1.0, theta=0.0524) * 180 / 3.14159, 1)
     62.9
@@ -125,7 +131,9 @@ def _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, form):
 
 @elementwise
 def _curved_threshold(error, alpha, alpha_est, r_n, theta, no_slip, form):
-    """Find the first slope on a grid at which the error is reached, then bisect back to the crossing."""
+    """Find the first slope on a grid at which the error is reached, then bisect back to the
+    crossing.
+    """
 
     def is_reached(slope):
         """Check whether the error is reached at slopes (..., k)."""

@@ -1,13 +1,16 @@
-"""Friction and distance together: whisks at two tilts of the base, or more, that share their contact.
+"""Friction and distance together: whisks at two tilts of the base, or more, that share their
+contact.
 
-The plane of whisking is turned about the whisker, so that each whisk meets another slope at the same distance on the
-same surface (section VII, way 1). (10) is linear in the distance on the base's cylinder and in μ,
+The plane of whisking is turned about the whisker, so that each whisk meets another slope at the
+same distance on the same surface (section VII, way 1). (10) is linear in the distance on the base's
+cylinder and in μ,
 
     (|m|² / Cθ) d (1 + e) + |m_y| μ = m_z,
 
-so that two whisks have one solution, and more a least-squares one. e is what (10) leaves out to first order, of which
-friction along the whisker counts most: all of friction where nothing slips sideways, and less the more does. Neither
-slopes nor tilts need be known; only must |m_y| of one whisk differ from another's. Angles in rad, lengths in mm.
+so that two whisks have one solution, and more a least-squares one. e is what (10) leaves out to
+first order, of which friction along the whisker counts most: all of friction where nothing slips
+sideways, and less the more does. Neither slopes nor tilts need be known; only must |m_y| of one
+whisk differ from another's. Angles in rad, lengths in mm.
 """
 
 from collections.abc import Sequence
@@ -24,10 +27,12 @@ from estimator.whisk import EstimatorSettings, Whisk
 
 # Iterations of weights and e by the solution; after four nothing changes that matters.
 _ITERATIONS = 8
-# How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its chord.
+# How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its
+# chord.
 _DRAWN = 0.6
-# Share left unknown of large bending's second order, and of the friction along a whisker that slips, when they are taken
-# out: as much as exact mechanics differ from them. Study: tests/studies/accuracy/two_tilts.py.
+# Share left unknown of large bending's second order, and of the friction along a whisker that
+# slips, when they are taken out: as much as exact mechanics differ from them. Study:
+# tests/studies/accuracy/two_tilts.py.
 _LARGE_LEFT = 1 / 3
 _DRAGGING_LEFT = 1 / 3
 ALIKE = "the whisks slip alike: no two of them tell friction from distance"
@@ -58,12 +63,14 @@ def shared_contact(
     places: Sequence[object] = (),
     shared_Nmm: Sequence[np.ndarray] = (),
 ) -> SharedContact:
-    """Solve for the contact of two whisks or more at different slopes of one surface; α_est is not used.
+    """Solve for the contact of two whisks or more at different slopes of one surface; α_est is not
+    used.
 
-    apart_sigma_mm: standard deviation of a whisk's distance from the common one. places: a name for each whisk; those
-    of one name were set up once, and have the same deviation (default: each whisk its own). shared_Nmm: for each whisk,
-    the change (k, 2) of its moments by one sigma of each cause that all whisks have in common. Thickness and lean of
-    the object are unknown as in (10), and the same for all whisks. Raises ValueError for fewer than two whisks.
+    apart_sigma_mm: standard deviation of a whisk's distance from the common one. places: a name for
+    each whisk; those of one name were set up once, and have the same deviation (default: each whisk
+    its own). shared_Nmm: for each whisk, the change (k, 2) of its moments by one sigma of each
+    cause that all whisks have in common. Thickness and lean of the object are unknown as in (10),
+    and the same for all whisks. Raises ValueError for fewer than two whisks.
     """
     if len(whisks) < 2:
         raise ValueError("two whisks at two tilts are the fewest that tell friction from distance")
@@ -94,7 +101,9 @@ def _per_distance(whisks: Sequence[Whisk]) -> np.ndarray:
 
 
 def _start(rows: np.ndarray, m_z: np.ndarray) -> np.ndarray:
-    """Solve for (d, μ) by plain least squares; without friction where the distance is not above zero."""
+    """Solve for (d, μ) by plain least squares; without friction where the distance is not above
+    zero.
+    """
     solution = np.linalg.lstsq(rows, m_z, rcond=None)[0]
     if solution[0] > 0:
         return solution
@@ -104,7 +113,9 @@ def _start(rows: np.ndarray, m_z: np.ndarray) -> np.ndarray:
 def _weighted(
     rows: np.ndarray, m_z: np.ndarray, spread: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve for (d, μ) with covariance by generalized least squares; NaN where the rows do not separate the two."""
+    """Solve for (d, μ) with covariance by generalized least squares; NaN where the rows do not
+    separate the two.
+    """
     nothing = np.full(2, np.nan), np.full((2, 2), np.nan)
     try:
         pull = np.linalg.solve(spread, rows)
@@ -128,8 +139,8 @@ def _by_place(places: Sequence[object]) -> np.ndarray:
 def _spread(whisks, models, solution, apart_mm, shared_Nmm) -> np.ndarray:
     """Compute the covariance (n, n) of the equations' errors, (N·mm)².
 
-    It holds each whisk's own errors, and those that all whisks or those of one place have in common. apart_mm (n, p):
-    one sigma of the distance by place.
+    It holds each whisk's own errors, and those that all whisks or those of one place have in
+    common. apart_mm (n, p): one sigma of the distance by place.
     """
     count = len(whisks)
     per_mm = _per_distance(whisks)
@@ -175,8 +186,9 @@ def _covariance(whisk: Whisk) -> np.ndarray:
 class _TiltModel:
     """Errors of (10) for one whisk, as shares of d.
 
-    held: nothing slips sideways, so that m_y is noise. error: the error that is corrected. shared (3,): sigmas by lean,
-    thickness and large bending, which whisks have in common. own: the whisk's own sigma.
+    held: nothing slips sideways, so that m_y is noise. error: the error that is corrected. shared
+    (3,): sigmas by lean, thickness and large bending, which whisks have in common. own: the whisk's
+    own sigma.
     """
 
     held: bool
@@ -188,8 +200,8 @@ class _TiltModel:
 def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _TiltModel:
     """Evaluate the errors of (10), docs/maps.md, at the friction and the distance found so far.
 
-    Where the object's radius is not known, everything from nothing to the allowed reach is equally probable. A share of
-    d_x is 1/w of that of d, w being the share of the diameter that is left.
+    Where the object's radius is not known, everything from nothing to the allowed reach is equally
+    probable. A share of d_x is 1/w of that of d, w being the share of the diameter that is left.
     """
     theta = whisk.theta_at_rad
     alpha = max(atan(solution[1]), 0.0)
@@ -215,7 +227,9 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
 
 
 def _rolling(theta, phi, alpha, d_x, left, settings) -> tuple[float, float]:
-    """Return the error by rolling over the object, and its sigma: that of a uniform distribution of unknown radii."""
+    """Return the error by rolling over the object, and its sigma: that of a uniform distribution of
+    unknown radii.
+    """
     radius = settings.object_radius_mm
     if isnan(radius):
         most = first_order.rolling(theta, settings.object_reach_mm, phi, alpha, d_x, left)

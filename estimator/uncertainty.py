@@ -1,9 +1,11 @@
-"""Standard deviation and interval of d_x from those of the pushing angle, the moments and α_est, and the model's own.
+"""Standard deviation and interval of d_x from those of the pushing angle, the moments and α_est,
+and the model's own.
 
-Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4. Angles in rad, moments in
-N·mm, C in N·mm², lengths in mm. Where the distance is NaN, so is its sigma.
+Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4. Angles in rad,
+moments in N·mm, C in N·mm², lengths in mm. Where the distance is NaN, so is its sigma.
 
-C = 3EI has no place in the sum: where the gauge factors were found with the same C, it drops out of d_x.
+C = 3EI has no place in the sum: where the gauge factors were found with the same C, it drops out of
+d_x.
 """
 
 import numpy as np
@@ -70,7 +72,9 @@ def gradient_cone(
     C: ArrayLike,
     length: ArrayLike,
 ) -> np.ndarray:
-    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's d_x)²."""
+    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's
+    d_x)².
+    """
     cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
     cone = distance.cone(theta, m_y, m_z, alpha_est, C, length)
     shrink = (cone / cylinder) ** 2
@@ -81,7 +85,9 @@ def gradient_cone(
 def gradient_printed(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, taper_per_mm: ArrayLike
 ) -> np.ndarray:
-    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of (16) as printed, cos φ / (|m|/(Cθ) + τ/L); the last one is 0."""
+    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of (16) as printed, cos φ / (|m|/(Cθ) + τ/L); the last one
+    is 0.
+    """
     m = np.hypot(m_y, m_z)
     d_x = (m_z / m) / (m / (C * theta) + taper_per_mm)
     shrink = 1 / (1 + taper_per_mm * C * theta / m)  # of a relative error of Cθ/|m|
@@ -100,9 +106,9 @@ def sigma(
 ) -> Numbers:
     """Compute the standard deviation of d_x, in mm, from its gradient (..., 4).
 
-    theta_sigma: of the motor angle, touch_sigma: of the touch, both in rad; covariance (..., 2, 2) of
-    (m_y, m_z) in (N·mm)²; alpha_est_sigma in rad; theta_moment_covariance (..., 2) of the pushing angle
-    with (m_y, m_z). A negative or infinite sigma raises ValueError.
+    theta_sigma: of the motor angle, touch_sigma: of the touch, both in rad; covariance (..., 2, 2)
+    of (m_y, m_z) in (N·mm)²; alpha_est_sigma in rad; theta_moment_covariance (..., 2) of the
+    pushing angle with (m_y, m_z). A negative or infinite sigma raises ValueError.
 
     >>> gradient = gradient_no_slip(0.05, 9.0, 9000.0)
     >>> sigma(gradient, theta_sigma=0.0005)
@@ -156,7 +162,7 @@ def sigma_with_friction(
 def sigma_frictionless(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
 ) -> Numbers:
-    """Compute the standard deviation of (11) and (12), in mm; `sigmas` are the keywords of `sigma`."""
+    """Compute the standard deviation of (11), (12), in mm; `sigmas` are the keywords of `sigma`."""
     return sigma(gradient_frictionless(theta, m_y, m_z, C), **sigmas)
 
 
@@ -169,7 +175,9 @@ def sigma_cone(
     length: ArrayLike,
     **sigmas: ArrayLike,
 ) -> Numbers:
-    """Compute the standard deviation of the cone's distance, in mm; `sigmas` are the keywords of `sigma`."""
+    """Compute the standard deviation of the cone's distance, in mm; `sigmas` are the keywords of
+    `sigma`.
+    """
     return sigma(gradient_cone(theta, m_y, m_z, alpha_est, C, length), **sigmas)
 
 
@@ -184,14 +192,16 @@ def interval_with_friction(
     model_sigma: ArrayLike = 0.0,
     **sigmas: ArrayLike,
 ) -> tuple[Numbers, Numbers]:
-    """Return (low, high), mm, of the 95 % interval of (10), also where φ + α_est passes 90°; NaN without a push.
+    """Return (low, high), mm, of the 95 % interval of (10), also where φ + α_est passes 90°; NaN
+    without a push.
 
-    (10) falls with α_est, and by more than a line where its sigma is large. So each side has its own width: the change
-    by that end of α_est's interval and 1.96 sigma of the rest (`sigmas` are the keywords of `sigma`), added in squares
-    (MOVER: Zou & Donner, Statistics in Medicine 27, 2008). No friction angle is below 0: where α_est's interval is cut
-    there, α may well be at the cut itself, and the rest keeps its share of the sum (`_upper_side`).
-    model_sigma: relative sigma of the equation itself. A low end at zero or below means that no distance is too short:
-    it is 0. Raises ValueError for α_est outside [0°, 90°), C ≤ 0 or a negative sigma.
+    (10) falls with α_est, and by more than a line where its sigma is large. So each side has its
+    own width: the change by that end of α_est's interval and 1.96 sigma of the rest (`sigmas` are
+    the keywords of `sigma`), added in squares (MOVER: Zou & Donner, Statistics in Medicine 27,
+    2008). No friction angle is below 0: where α_est's interval is cut there, α may well be at the
+    cut itself, and the rest keeps its share of the sum (`_upper_side`). model_sigma: relative sigma
+    of the equation itself. A low end at zero or below means that no distance is too short: it is 0.
+    Raises ValueError for α_est outside [0°, 90°), C ≤ 0 or a negative sigma.
     """
     require_sigma("alpha_est_sigma", alpha_est_sigma)
     require_friction_angle("alpha_est", alpha_est)
@@ -222,11 +232,13 @@ def model_share(
     left: ArrayLike = 1.0,
     held_spread: ArrayLike = 1.0,
 ) -> Numbers:
-    """Return the relative sigma of d_x by what (10) leaves out: leading terms in θ, derived in docs/maps.md.
+    """Return the relative sigma of d_x by what (10) leaves out: leading terms in θ, derived in
+    docs/maps.md.
 
-    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left: share of the base's
-    diameter that is left at d_x. A held contact drags along the whisker by up to tan α; where it slips, that is far
-    less than the effect of α_est. held_spread: the part of that which is not known.
+    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left:
+    share of the base's diameter that is left at d_x. A held contact drags along the whisker by up
+    to tan α; where it slips, that is far less than the effect of α_est. held_spread: the part of
+    that which is not known.
     """
     leaning = first_order.leaning(theta, tilt_sigma, phi, alpha)
     rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
@@ -239,9 +251,9 @@ def model_share(
 def _upper_side(change, rest, alpha_est, half):
     """Return the width of the interval's side of small α.
 
-    It is the most of u·whole + √(1 − u²)·rest over what α ≥ 0 leaves of u in 0 to 1, where whole is the change by all
-    of α_est's half interval (rad), of which `change` is the part down to α = 0. Where nothing is cut off, it is the
-    root of the sum of squares.
+    It is the most of u·whole + √(1 − u²)·rest over what α ≥ 0 leaves of u in 0 to 1, where whole is
+    the change by all of α_est's half interval (rad), of which `change` is the part down to α = 0.
+    Where nothing is cut off, it is the root of the sum of squares.
     """
     left = np.where(alpha_est < half, alpha_est / half, 1.0)
     whole = np.where(left > 0, change / left, 0.0)
@@ -252,7 +264,7 @@ def _upper_side(change, rest, alpha_est, half):
 
 @elementwise
 def _through_zero(theta, m_y, m_z, alpha_est, C):
-    """Compute (10) and its gradient (..., 4), which go on through zero where φ + α_est passes 90°."""
+    """Compute (10) and its gradient (..., 4), negative where φ + α_est passes 90°."""
     mu = np.copysign(np.tan(alpha_est), m_y)
     square = m_z * m_z + m_y * m_y
     scale = C * theta / square

@@ -20,7 +20,8 @@ _ARRAYS = (
 
 @dataclass(frozen=True, eq=False)
 class OtherSensors:
-    """Readings of the other sensors of Table I at the pushing angle; NaN where there is no such sensor.
+    """Readings of the other sensors of Table I at the pushing angle; NaN where there is no such
+    sensor.
 
     force_N (3,): force (f_x, f_y, f_z) of the base on the whisker, in the hub's axes.
     force_covariance (3, 3): its covariance, N².
@@ -52,8 +53,8 @@ class ObjectMotion:
 class Whisk:
     """One forward stroke against an object, as a robot feels it.
 
-    time_s, theta_rad, m_y_Nmm, m_z_Nmm (n,): samples, which begin before the felt touch. theta_rad is
-    the motor angle since the felt touch (negative before it), moments are above the level of the
+    time_s, theta_rad, m_y_Nmm, m_z_Nmm (n,): samples, which begin before the felt touch. theta_rad
+    is the motor angle since the felt touch (negative before it), moments are above the level of the
     free stroke.
     theta_at_rad: the pushing angle at which the distance is wanted.
     m_y_at_Nmm, m_z_at_Nmm: moments at that angle.
@@ -82,7 +83,7 @@ class Whisk:
     object_motion: ObjectMotion | None = None
 
     def __post_init__(self):
-        """Check shapes and sigma, and keep read-only copies; raise ValueError where one is wrong."""
+        """Raise ValueError for a wrong shape or sigma, and keep read-only copies."""
         samples = (self.time_s, self.theta_rad, self.m_y_Nmm, self.m_z_Nmm)
         shapes = set(map(np.shape, samples))
         if len(shapes) != 1 or len(shapes.pop()) != 1:
@@ -103,11 +104,12 @@ class Whisk:
 
 @dataclass(frozen=True)
 class EstimatorSettings:
-    """What an estimator assumes: the friction cone angle and its uncertainty, and limits of the object.
+    """What an estimator assumes: the friction cone angle and its uncertainty, and limits of the
+    object.
 
     object_reach_mm: radii of object and whisker together, at most; it enters the sigma alone.
-    tilt_sigma_rad: standard deviation of the object's lean along the whisker; it enters the sigma alone.
-    object_radius_mm: radius of the object where it is known, NaN elsewhere.
+    tilt_sigma_rad: standard deviation of the object's lean along the whisker; it enters the sigma
+    alone. object_radius_mm: radius of the object where it is known, NaN elsewhere.
     whisker_radius_mm: radius of the whisker at its base.
     """
 
@@ -127,16 +129,17 @@ class EstimatorSettings:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A distance with its standard deviation, both in mm; NaN where there is none, and status says why.
+    """A distance with its standard deviation, both in mm; NaN where there is none, and status says
+    why.
 
-    low_mm, high_mm: the 95 % interval; NaN where it is d_x ± 1.96 sigma. A low end of 0 and a high end
-    at the whisker's length are open ends.
-    alpha_est_rad, beta_rad: the assumed friction angle and the slope that follows from it; NaN where
-    the estimator uses none.
-    deflection_mm: where the contact is at the pushing angle, (d_y, d_z) from the unbent whisker, with
-    deflection_sigma_mm; None where it is to be computed from distance and moments.
-    gradient (4,): derivative of the distance by (θ, m_y, m_z, alpha_est), from which the covariance of
-    the contact point follows; None where the estimator has none.
+    low_mm, high_mm: the 95 % interval; NaN where it is d_x ± 1.96 sigma. A low end of 0 and a high
+    end at the whisker's length are open ends.
+    alpha_est_rad, beta_rad: the assumed friction angle and the slope that follows from it; NaN
+    where the estimator uses none.
+    deflection_mm: where the contact is at the pushing angle, (d_y, d_z) from the unbent whisker,
+    with deflection_sigma_mm; None where it is to be computed from distance and moments.
+    gradient (4,): derivative of the distance by (θ, m_y, m_z, alpha_est), from which the covariance
+    of the contact point follows; None where the estimator has none.
     """
 
     d_x_mm: float
