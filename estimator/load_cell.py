@@ -37,7 +37,7 @@ def lever(
 
 @elementwise
 def across(m_y: ArrayLike, m_z: ArrayLike, f_y: ArrayLike, f_z: ArrayLike) -> Numbers:
-    """Compute the force across the whisker, N, in the plane of bending: (f_y m_z − f_z m_y) / |m|."""
+    """Compute the force across the whisker, N, in the plane of m: (f_y m_z − f_z m_y) / |m|."""
     return (f_y * m_z - f_z * m_y) / np.hypot(m_y, m_z)
 
 

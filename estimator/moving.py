@@ -217,10 +217,7 @@ def _gradient(solve: Callable, inputs: np.ndarray, beam: Beam) -> np.ndarray:
 def _covariance(whisk: Whisk) -> np.ndarray:
     """Return the covariance (7, 7) of the inputs, that of α left at zero."""
     whole = np.zeros((7, 7))
-    whole[0, 0] = whisk.theta_sigma_rad**2
-    whole[1:3, 1:3] = whisk.covariance_at
-    whole[0, 1:3] = whisk.theta_moment_covariance_at
-    whole[1:3, 0] = whisk.theta_moment_covariance_at
+    whole[:3, :3] = whisk.felt_covariance
     whole[4:, 4:] = whisk.object_motion.covariance_mm2
     return whole
 

@@ -42,17 +42,14 @@ class Memory:
         samples = samples[inside]
         used = used[inside]
         lags = max(1, int(np.count_nonzero(used) * LAGS_PER_SAMPLE))
+        segments = [segment[inside] for segment in segments]
         residuals = np.zeros_like(samples)
-        lost = np.zeros(lags)  # autocorrelation of white noise that the lines take with them
         for segment in segments:
-            marked = segment[inside]
-            residuals[marked] = line_residuals(x, samples, marked)
-            for basis in _line_basis(x, marked):
-                lost += Spectrum.of(basis, lags).lagged()
+            residuals[segment] = line_residuals(x, samples, segment)
         pairs = np.maximum(1.0, np.round(Spectrum.of(used, lags).lagged()))  # samples per lag
         taper = _parzen(np.arange(lags) / lags)
         covariance = _lagged_products(residuals, lags) * (taper / pairs)
-        kept = -lost
+        kept = -_lost_to_lines(x, segments, lags)
         kept[0] += pairs[0]
         return cls(np.moveaxis(covariance, -1, 0), kept * taper / pairs)
 
@@ -109,6 +106,15 @@ class Spectrum:
         """
         second = self if other is None else other
         return np.fft.irfft(np.conj(self.values) * second.values, self.size)[: self.lags]
+
+
+def _lost_to_lines(x, segments, lags):
+    """Return the autocorrelation (lags,) of unit white noise that a line in each segment removes."""
+    lost = np.zeros(lags)
+    for segment in segments:
+        for basis in _line_basis(x, segment):
+            lost += Spectrum.of(basis, lags).lagged()
+    return lost
 
 
 def _lagged_products(residuals, lags):

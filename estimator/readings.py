@@ -77,8 +77,8 @@ def rate_at(
     end = touch.motor_rad + theta_rad
     used = usable(motor, samples) & (motor > begin) & (motor <= end)
     if touch.status or np.count_nonzero(used) < MIN_SAMPLES:
-        width = samples.shape[1]
-        return np.full(width, np.nan), np.full((width, width), np.nan)
+        unknown = np.full((samples.shape[1], samples.shape[1]), np.nan)
+        return unknown[0], unknown
     at = motor[used].mean() + 1.0
     weights = noise.line_weights(motor, used, at) - noise.mean_weights(used)
     own = noise.Memory.of(motor, samples, used).of_sum(weights)

@@ -162,7 +162,7 @@ def contact_of_shape(
     """
     if seen.frames < _FEWEST_FRAMES or len(seen.frame) < _FEWEST_POINTS:
         return ShapeContact(status=FEW)
-    touch, begin = _initial_parameters(seen, theta_rad, beam)
+    touch, begin = _initial_parameters(_ShapeFit(seen, theta_rad, beam))
     near = seen.until(touch + theta_rad + _BEYOND_RAD)
     last = seen.motor_rad[seen.frame].max()
     if near.frames < _FEWEST_FRAMES or touch + theta_rad > last + 1e-3:
@@ -394,22 +394,22 @@ def _turn_about_z(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return np.stack([c * x - s * y, s * x + c * y, z + 0 * angle], axis=-1)
 
 
-def _initial_parameters(seen: SeenShape, theta: float, beam: Beam) -> tuple[float, np.ndarray]:
+def _initial_parameters(fit: _ShapeFit) -> tuple[float, np.ndarray]:
     """Find (touch, parameters to begin with) by linear least squares over a grid of touch and
     contact.
 
     Two finer grids follow, each about the best of the grid before.
     """
-    fit = _ShapeFit(seen, theta, beam)
     plane = _PlanarShape(fit)
+    length = fit.beam.length_mm
     touches = np.linspace(fit.motor.min(), fit.motor.max(), 26)[2:-2]
-    contacts = np.linspace(0.1, 0.98, 19) * beam.length_mm
+    contacts = np.linspace(0.1, 0.98, 19) * length
     around = np.linspace(-1.0, 1.0, 7)
     for _ in range(3):
         values, touch, contact = plane.best_of_grid(touches, contacts)
         touches = touch + around * (touches[1] - touches[0])
         contacts = contact + around * (contacts[1] - contacts[0])
-        contacts = np.clip(contacts, 1.0, 0.999 * beam.length_mm)
+        contacts = np.clip(contacts, 1.0, 0.999 * length)
     vector = np.zeros(len(fit.prior))
     vector[:4] = values[:4]
     vector[[_TOUCH, _BEND, _ARC]] = [touch, values[4], contact]

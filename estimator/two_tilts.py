@@ -148,7 +148,7 @@ def _spread(whisks, models, solution, apart_mm, shared_Nmm) -> np.ndarray:
     common = []  # (k,) of each whisk
     for row, (whisk, model) in enumerate(zip(whisks, models)):
         gradient = _gradient(whisk, model.held, solution)
-        measured[row] = gradient @ _covariance(whisk) @ gradient
+        measured[row] = gradient @ whisk.felt_covariance @ gradient
         common.append(shared_Nmm[row] @ gradient[1:] if len(shared_Nmm) else np.zeros(0))
     common = np.array(common)
     # The moments' covariance holds their shared causes, too.
@@ -170,16 +170,6 @@ def _gradient(whisk: Whisk, held: bool, solution: np.ndarray) -> np.ndarray:
     friction = 0.0 if held else np.copysign(mu, m_y)
     by_theta = per_moment * (m_y**2 + m_z**2) / theta
     return np.array([by_theta, -2 * per_moment * m_y - friction, 1 - 2 * per_moment * m_z])
-
-
-def _covariance(whisk: Whisk) -> np.ndarray:
-    """Return the covariance (3, 3) of θ, m_y, m_z."""
-    whole = np.zeros((3, 3))
-    whole[0, 0] = whisk.theta_sigma_rad**2
-    whole[1:, 1:] = whisk.covariance_at
-    whole[0, 1:] = whisk.theta_moment_covariance_at
-    whole[1:, 0] = whisk.theta_moment_covariance_at
-    return whole
 
 
 @dataclass(frozen=True)

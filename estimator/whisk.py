@@ -101,6 +101,16 @@ class Whisk:
             kept.setflags(write=False)
             object.__setattr__(self, name, kept)
 
+    @property
+    def felt_covariance(self) -> np.ndarray:
+        """Return the covariance (3, 3) of the pushing angle, m_y and m_z."""
+        whole = np.zeros((3, 3))
+        whole[0, 0] = self.theta_sigma_rad**2
+        whole[0, 1:] = self.theta_moment_covariance_at
+        whole[1:, 0] = self.theta_moment_covariance_at
+        whole[1:, 1:] = self.covariance_at
+        return whole
+
 
 @dataclass(frozen=True)
 class EstimatorSettings:
