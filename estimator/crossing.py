@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_banded
 
-from estimator.onset import Touch, columns, felt_touch, usable
+from estimator.onset import FeltTouch, columns, felt_touch, usable
 from estimator.reasons import NamedReason
 
 # Order of the Butterworth filter of each way.
@@ -91,7 +91,7 @@ def threshold_touch(
     cutoff_Hz: float,
     *,
     threshold: float | None = None,
-) -> Touch:
+) -> FeltTouch:
     """Find the touch as the paper does: where the filtered moment crosses a threshold for good.
 
     The moment is taken above its level. threshold is in the unit of the moments, for their
@@ -108,7 +108,7 @@ def threshold_touch(
         threshold = _THRESHOLD_IN_SIGMAS * np.sqrt(np.trace(noise))
     index, found, steepness = _last_crossing(magnitude, stroke.motor, threshold)
     if index is None:
-        return Touch.none(NOT_CROSSED)
+        return FeltTouch.none(NOT_CROSSED)
     along = felt.rise.slope / np.hypot.reduce(felt.rise.slope)
     covariance = stroke.noise(index) + felt.level.covariance_between(found, found)
     sigma = np.sqrt(along @ covariance @ along) / steepness
@@ -119,7 +119,7 @@ def threshold_touch(
 
 def touch_on_rate(
     motor_rad: ArrayLike, moments: ArrayLike, time_s: ArrayLike, cutoff_Hz: float
-) -> Touch:
+) -> FeltTouch:
     """Find the touch where the filtered moment's slope reaches half of that in the fitted rise.
 
     The slope is that over the motor angle.
@@ -131,7 +131,7 @@ def touch_on_rate(
     rate = stroke.rate(stroke.filtered)
     index, found, steepness = _nearest_crossing(rate, stroke.motor, 0.5, felt.motor_rad)
     if index is None:
-        return Touch.none(NOT_CROSSED)
+        return FeltTouch.none(NOT_CROSSED)
     variance = felt.rise.gain @ stroke.noise_of_rate(index) @ felt.rise.gain
     ideal_rate = stroke.rate(stroke.ideal)
     ideal = _nearest_crossing(ideal_rate, stroke.motor, 0.5, felt.motor_rad)[1]
@@ -197,7 +197,7 @@ class _Stroke:
 def _touch(found, sigma, ideal, felt):
     """Return the touch at the crossing `found`, biased as the ideal line's crossing is."""
     bias = float(ideal - felt.motor_rad)
-    return Touch(float(found), float(sigma), "", bias, felt.level, felt.rise)
+    return FeltTouch(float(found), float(sigma), "", bias, felt.level, felt.rise)
 
 
 def _last_crossing(x, motor, height):

@@ -1,4 +1,5 @@
-"""What sensors other than an angle and a moment read of a stroke: forces at an angle, the moment's rate (Table I).
+"""Readings of sensors other than angle and moment over a stroke: forces at an angle, the moment's
+rate (Table I).
 
 Plain arrays over one forward stroke, as in `estimator.signal`. Angles in rad, times in s.
 """
@@ -9,59 +10,79 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import noise
-from estimator.onset import GUARD_RAD, MIN_FREE_SAMPLES, Rise, Touch, columns, free_level, usable
+from estimator.onset import (
+    GUARD_RAD,
+    MIN_FREE_SAMPLES,
+    FeltTouch,
+    Rise,
+    columns,
+    free_level,
+    usable,
+)
 from estimator.reasons import NamedReason
 from estimator.signal import MIN_SAMPLES, MomentAt, moment_at
 
-NO_FREE_FORCE = NamedReason("no_free_force", "no free stroke to read the force's zero from")
+NO_ZERO = NamedReason("no_free_force", "no free stroke to read the force's zero from")
 
 
 def force_at(
     theta_rad: float,
     motor_rad: ArrayLike,
     forces: ArrayLike,
-    touch: Touch,
+    touch: FeltTouch,
     *,
     time_s: ArrayLike | None = None,
     drift: np.ndarray | None = None,
 ) -> MomentAt:
-    """Forces (k,) above the free stroke's level at the pushing angle past `touch`, which other channels told: read
-    as moments are (`estimator.signal.moment_at`). Their own noise is in the covariance, and the drift (k,) of their
-    zero, per rad; where it is not given, as the one free stroke shows it."""
+    """Return the forces (k,) above the free stroke's level at the pushing angle theta_rad past
+    `touch`.
+
+    They are read as moments are (`estimator.signal.moment_at`); the touch was found in other
+    channels. The covariance holds the forces' own noise and the drift (k,) per rad of their zero;
+    where `drift` is not given, the one that the free stroke shows. Raises ValueError for theta_rad
+    ≤ 0, and where angles and forces do not have the same samples.
+    """
     motor, samples = columns(motor_rad, forces)
-    free = usable(motor, samples) & (motor < touch.motor_rad - GUARD_RAD)
-    if not touch.status and np.count_nonzero(free) < MIN_FREE_SAMPLES:
-        touch = replace(touch, status=NO_FREE_FORCE)
     if not touch.status:
-        nothing = np.zeros(samples.shape[1])
-        untold = Rise(nothing, nothing, np.zeros(len(motor)), noise.Memory.of(motor, samples, free))
-        level = free_level(motor, samples, free)
-        touch = replace(
-            touch, level=level if drift is None else replace(level, drift=drift), rise=untold
-        )
+        free = usable(motor, samples) & (motor < touch.motor_rad - GUARD_RAD)
+        touch = _with_zero_of_forces(touch, motor, samples, free, drift)
     return moment_at(theta_rad, motor, samples, touch, time_s=time_s)
 
 
-def rate_at(
-    theta_rad: float, motor_rad: ArrayLike, moments: ArrayLike, touch: Touch
-) -> tuple[np.ndarray, np.ndarray]:
-    """(slope (k,) per rad, covariance (k, k)) of moments over the motor angle, from touch to theta_rad past it.
+def _with_zero_of_forces(touch, motor, samples, free, drift):
+    """Return the touch with level and noise of the forces (n, k) over their free stroke, a mask
+    (n,).
+    """
+    if np.count_nonzero(free) < MIN_FREE_SAMPLES:
+        return replace(touch, status=NO_ZERO)
+    level = free_level(motor, samples, free)
+    if drift is not None:
+        level = replace(level, drift=drift)
+    no_gain = np.zeros(samples.shape[1])  # the forces have no part in the touch
+    memory = noise.Memory.of(motor, samples, free)
+    return replace(touch, level=level, rise=Rise(no_gain, no_gain, np.zeros(len(motor)), memory))
 
-    It is what a sensor of the moment's rate has, divided by the motor's speed; no zero enters, and the touch only as
-    the angle from which samples count. The zero's drift is in the covariance. NaN where fewer than three samples are.
+
+def rate_at(
+    theta_rad: float, motor_rad: ArrayLike, moments: ArrayLike, touch: FeltTouch
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fit the slope (k,) per rad of moments over the motor angle, from touch to theta_rad past it.
+
+    Returns it with its covariance (k, k). It is what a sensor of the moment's rate reads, divided
+    by the motor's speed; no zero enters, and the touch only as the angle from which samples count.
+    The zero's drift is in the covariance. NaN where there is no touch or fewer than three samples.
+    Raises ValueError where angles and moments do not have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
-    width = samples.shape[1]
-    if touch.status:
-        return np.full(width, np.nan), np.full((width, width), np.nan)
-    used = (
-        usable(motor, samples)
-        & (motor > touch.motor_rad + GUARD_RAD)
-        & (motor <= touch.motor_rad + theta_rad)
-    )
-    if np.count_nonzero(used) < MIN_SAMPLES:
-        return np.full(width, np.nan), np.full((width, width), np.nan)
-    weights = noise.line_weights(motor, used, motor[used].mean() + 1.0) - noise.mean_weights(used)
+    begin = touch.motor_rad + GUARD_RAD
+    end = touch.motor_rad + theta_rad
+    used = usable(motor, samples) & (motor > begin) & (motor <= end)
+    if touch.status or np.count_nonzero(used) < MIN_SAMPLES:
+        unknown = np.full((samples.shape[1], samples.shape[1]), np.nan)
+        return unknown[0], unknown
+    at = motor[used].mean() + 1.0
+    weights = noise.line_weights(motor, used, at) - noise.mean_weights(used)
     own = noise.Memory.of(motor, samples, used).of_sum(weights)
     scatter = noise.wider(touch.rise.memory.of_sum(weights), own)
-    return noise.weighted_sum(weights, samples, used), scatter + np.diag(touch.level.drift**2)
+    slope = noise.weighted_sum(weights, samples, used)
+    return slope, scatter + np.diag(touch.level.drift**2)

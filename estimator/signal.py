@@ -1,4 +1,5 @@
-"""From the samples of one forward stroke to what an estimator needs: filter, felt touch, moments at an angle.
+"""From the samples of one forward stroke to what an estimator needs: filter, felt touch, moments at
+an angle.
 
 Everything takes plain arrays; moments may be in N·mm or in volts. Angles in rad, times in s.
 """
@@ -11,12 +12,12 @@ from numpy.typing import ArrayLike
 from estimator import noise
 from estimator.crossing import threshold_touch, touch_on_rate, zero_phase_lowpass
 from estimator.domain import require_positive
-from estimator.onset import Touch, columns, felt_touch, speed, usable
+from estimator.onset import FeltTouch, columns, felt_touch, speed, usable
 from estimator.reasons import NamedReason
 
 __all__ = [
+    "FeltTouch",
     "MomentAt",
-    "Touch",
     "felt_touch",
     "moment_at",
     "threshold_touch",
@@ -24,8 +25,11 @@ __all__ = [
     "zero_phase_lowpass",
 ]
 
+# [s] Period of mains hum at 50 Hz, over which moments are averaged.
 HUM_PERIOD_S = 0.02
+# [rad] Half width of the window around the pushing angle, over which moments are a line.
 HALF_WINDOW_RAD = np.radians(0.5)
+# Fewest samples to which a line with a scatter is fitted.
 MIN_SAMPLES = 3
 NOT_REACHED = NamedReason("angle_not_reached", "the stroke does not reach the pushing angle")
 
@@ -34,8 +38,9 @@ NOT_REACHED = NamedReason("angle_not_reached", "the stroke does not reach the pu
 class MomentAt:
     """Moments above the free stroke's level at a pushing angle.
 
-    values (k,) and covariance (k, k) in the unit of the samples; theta_covariance (k,) is the covariance
-    of the pushing angle (through the touch) with the moments. NaN where status is not empty.
+    values (k,) and covariance (k, k) in the unit of the samples; theta_covariance (k,) is the
+    covariance of the pushing angle (through the touch) with the moments. NaN where status is not
+    empty.
     """
 
     theta_rad: float
@@ -49,41 +54,54 @@ def moment_at(
     theta_rad: ArrayLike,
     motor_rad: ArrayLike,
     moments: ArrayLike,
-    touch: Touch,
+    touch: FeltTouch,
     *,
     time_s: ArrayLike | None = None,
     half_window_rad: ArrayLike = HALF_WINDOW_RAD,
     good: np.ndarray | None = None,
 ) -> MomentAt:
-    """Moments at the pushing angle theta_rad past `touch`, from a line fitted to the samples around it.
+    """Fit a line to the samples around the pushing angle theta_rad past `touch`, and return the
+    moments there.
 
-    The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum, and never reaches
-    back to the touch. The covariance holds the fit (with the noise's autocorrelation), the free stroke and drift.
-    good: mask (n,) of the `usable` samples, where that is known already.
+    The window is ± half_window_rad, widened where time_s is given to hold a period of mains hum,
+    and never reaches back to the touch. The covariance holds the fit (with the noise's
+    autocorrelation), the free stroke and drift. good: mask (n,) of the `usable` samples, where that
+    is known already. Raises ValueError for theta_rad ≤ 0, and where motor angles and moments do not
+    have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
+    channels = samples.shape[1]
     if touch.status:
-        return _nothing(theta_rad, samples.shape[1], touch.status)
+        return _nothing(theta_rad, channels, touch.status)
     require_positive("theta_rad", theta_rad, "rad")
     at = touch.motor_rad + theta_rad
-    half = min(max(half_window_rad, speed(motor, time_s) * HUM_PERIOD_S / 2), 0.9 * theta_rad)
-    good = usable(motor, samples) if good is None else good
+    hum_rad = speed(motor, time_s) * HUM_PERIOD_S
+    half = min(max(half_window_rad, hum_rad / 2), 0.9 * theta_rad)
+    if good is None:
+        good = usable(motor, samples)
     near = good & (np.abs(motor - at) <= half)
     if not good.any() or motor[good].max() < at or np.count_nonzero(near) < MIN_SAMPLES:
-        return _nothing(theta_rad, samples.shape[1], NOT_REACHED)
+        return _nothing(theta_rad, channels, NOT_REACHED)
     return _local_fit(theta_rad, motor, samples, near, at, touch)
 
 
 def _nothing(theta_rad, channels, status):
+    """Return moments of NaN in so many channels, and why."""
     gap = np.full(channels, np.nan)
     return MomentAt(theta_rad, gap, np.full((channels, channels), np.nan), gap, status)
 
 
 def _local_fit(theta_rad, motor, samples, near, at, touch):
+    """Return the moments at the motor angle `at` from a line fitted to the samples `near` it, a
+    mask (n,).
+    """
+    level = touch.level
+    rise = touch.rise
     weights = noise.line_weights(motor, near, at)
     own = noise.Memory.of(motor, samples, near)
-    values = noise.weighted_sum(weights, samples, near) - touch.level.offset
-    scatter = noise.wider(touch.rise.memory.of_sum(weights), own.of_sum(weights))
-    shared = touch.rise.memory.between_sums(touch.rise.weights, weights)
-    with_touch = touch.rise.gain @ (shared + touch.level.covariance_between(touch.motor_rad, at))
-    return MomentAt(theta_rad, values, scatter + touch.level.covariance_between(at, at), with_touch)
+    values = noise.weighted_sum(weights, samples, near) - level.offset
+    scatter = noise.wider(rise.memory.of_sum(weights), own.of_sum(weights))
+    covariance = scatter + level.covariance_between(at, at)
+    shared = rise.memory.between_sums(rise.weights, weights)
+    with_touch = rise.gain @ (shared + level.covariance_between(touch.motor_rad, at))
+    return MomentAt(theta_rad, values, covariance, with_touch)

@@ -1,12 +1,12 @@
-"""Lateral slip in the sensing plane: what the base feels for a given contact. Equations (3)–(5), (13),
-(14), (18)–(21).
+"""Lateral slip in the sensing plane: what the base feels for a given contact. Equations (3)–(5),
+(13), (14), (18)–(21).
 
-Written with φ = max(0, |β| − α) in sines and cosines, which stay finite where the printed tan and cot do not.
-β < 0 mirrors β > 0: φ, m_y and σ change sign. Angles in rad, lengths in mm, C = 3EI in N·mm², moments in
-N·mm.
+Written with φ = max(0, |β| − α) in sines and cosines, which stay finite where the printed tan and
+cot do not. β < 0 mirrors β > 0: φ, m_y and σ change sign. Angles in rad, lengths in mm, C = 3EI in
+N·mm², moments in N·mm.
 
-Domain: |β| < 90°, θ ≥ 0 and below 90°, d_x > 0; outside it the result is NaN, and `why_not` says why.
-A friction cone angle α outside [0°, 90°) or C ≤ 0 raises ValueError.
+Domain: |β| < 90°, θ ≥ 0 and below 90°, d_x > 0; outside it the result is NaN, and `why_not` says
+why. A friction cone angle α outside [0°, 90°) or C ≤ 0 raises ValueError.
 """
 
 import numpy as np
@@ -26,7 +26,9 @@ from estimator.domain import (
 
 @elementwise
 def slip_angle(beta: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """φ of (4), in rad: zero while the friction cone holds the whisker, |β| − α beyond.
+    """Return φ of (4), in rad: zero while the friction cone holds the whisker, |β| − α beyond.
+
+    Raises ValueError for α outside [0°, 90°).
 
     >>> slip_angle(0.5, 0.2)
     0.3
@@ -42,18 +44,20 @@ def slip_angle(beta: ArrayLike, alpha: ArrayLike) -> Numbers:
 def moments(
     d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """(m_y, m_z) of (14) and (13), in N·mm, at the pushing angle θ against a flat surface of slope β.
+    """Return (m_y, m_z) of (14) and (13), in N·mm, at the angle θ against a flat surface of slope
+    β.
 
     m_z = (Cθ/d_x) cos β cos φ / cos(β − φ),  m_y = (Cθ/d_x) cos β sin φ / cos(β − φ).
+    Raises ValueError for α outside [0°, 90°) or C ≤ 0.
 
     >>> moments(50.0, 0.05, 0.0, 0.2, 9000.0)
     (0.0, 9.0)
     """
     _require_settings(alpha, C)
     phi = slip_angle(beta, alpha)
-    below = (d_x, np.cos(_held_angle(beta, alpha)))
-    m_y = quotient((C, theta, np.cos(beta), np.sin(phi)), below)
-    m_z = quotient((C, theta, np.cos(beta), np.cos(phi)), below)
+    denominator = (d_x, np.cos(_held_angle(beta, alpha)))
+    m_y = quotient((C, theta, np.cos(beta), np.sin(phi)), denominator)
+    m_z = quotient((C, theta, np.cos(beta), np.cos(phi)), denominator)
     return _inside(d_x, theta, beta, m_y), _inside(d_x, theta, beta, m_z)
 
 
@@ -61,19 +65,25 @@ def moments(
 def moment_magnitude(
     d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike, C: ArrayLike
 ) -> Numbers:
-    """|m| of (13) and (14), in N·mm: (Cθ/d_x) cos β / cos(β − φ)."""
+    """Return |m| of (13) and (14), in N·mm: (Cθ/d_x) cos β / cos(β − φ).
+
+    Raises ValueError for α outside [0°, 90°) or C ≤ 0.
+    """
     _require_settings(alpha, C)
-    magnitude = quotient((C, theta, np.cos(beta)), (d_x, np.cos(_held_angle(beta, alpha))))
+    denominator = (d_x, np.cos(_held_angle(beta, alpha)))
+    magnitude = quotient((C, theta, np.cos(beta)), denominator)
     return _inside(d_x, theta, beta, magnitude)
 
 
 @elementwise
 def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """σ of (5), in mm: how far the contact has slid along the surface. σ = d_x θ sin φ / cos(β − φ)."""
+    """Return σ of (5), in mm: how far the contact has slid along the surface.
+
+    σ = d_x θ sin φ / cos(β − φ). Raises ValueError for α outside [0°, 90°).
+    """
     require_friction_angle("alpha", alpha)
-    slip = quotient(
-        (d_x, theta, np.sin(slip_angle(beta, alpha))), (np.cos(_held_angle(beta, alpha)),)
-    )
+    phi = slip_angle(beta, alpha)
+    slip = quotient((d_x, theta, np.sin(phi)), (np.cos(_held_angle(beta, alpha)),))
     return _inside(d_x, theta, beta, slip)
 
 
@@ -81,29 +91,36 @@ def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: Arra
 def moment_from_deflection(
     d_x: ArrayLike, d_y: ArrayLike, d_z: ArrayLike, C: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """(m_y, m_z) of (19) and (18), in N·mm, from the deflections d_y, d_z in mm.
+    """Return (m_y, m_z) of (19) and (18), in N·mm, from the deflections d_y, d_z in mm.
 
     m_z = C d_y / d_x², m_y = C d_z / d_x²; the paper prints d_z² under (19), a slip of the pen.
-    NaN unless d_x > 0.
+    NaN unless d_x > 0. Raises ValueError for C ≤ 0.
 
     >>> moment_from_deflection(50.0, 2.5, 0.5, 9000.0)
     (1.8, 9.0)
     """
     require_positive("C", C, "N·mm²")
-    pair = (quotient((C, deflection), (d_x, d_x)) for deflection in (d_z, d_y))
-    return tuple(np.where((d_x > 0) & np.isfinite(d_x) & np.isfinite(m), m, np.nan) for m in pair)
+    inside = (d_x > 0) & np.isfinite(d_x)
+    m_y = quotient((C, d_z), (d_x, d_x))
+    m_z = quotient((C, d_y), (d_x, d_x))
+    return (
+        np.where(inside & np.isfinite(m_y), m_y, np.nan),
+        np.where(inside & np.isfinite(m_z), m_z, np.nan),
+    )
 
 
 @elementwise
 def slope_from_deflection(
     d_x: ArrayLike, theta: ArrayLike, d_y: ArrayLike, d_z: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """(β, φ) of (20) and (21), in rad, from the deflections d_y, d_z in mm.
+    """Return (β, φ) of (20) and (21), in rad, from the deflections d_y, d_z in mm.
 
-    tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no trace: β is
-    NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
+    tan β = (d_x θ − d_y) / d_z, tan φ = d_z / d_y. Without slip (d_z = 0) the slope leaves no
+    trace: β is NaN. NaN also for d_y ≤ 0 and d_y > d_x θ, which no push against a surface gives.
     """
-    obstructed = d_x * theta - d_y
+    obstructed = (
+        d_x * theta - d_y
+    )  # mm that the surface keeps the contact behind the unbent whisker
     possible = (
         (d_x > 0)
         & (theta >= 0)
@@ -118,12 +135,17 @@ def slope_from_deflection(
 
 
 def why_not(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike) -> str | np.ndarray:
-    """Why (4), (5), (13) and (14) give NaN for these arguments: a sentence, empty inside the domain."""
-    arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (d_x, theta, beta)))
-    return first_failure(_conditions(*arrays), arrays[0].shape)
+    """Return why (4), (5), (13) and (14) give NaN for these arguments: a sentence, empty inside the
+    domain.
+    """
+    d_x, theta, beta = np.broadcast_arrays(
+        np.asarray(d_x, float), np.asarray(theta, float), np.asarray(beta, float)
+    )
+    return first_failure(_conditions(d_x, theta, beta), d_x.shape)
 
 
 def _conditions(d_x, theta, beta):
+    """Return pairs (what is wrong, mask of what must hold) of the domain."""
     finite = np.isfinite(d_x) & np.isfinite(theta) & np.isfinite(beta)
     return (
         ("a measured value is missing or infinite", finite),
@@ -135,16 +157,17 @@ def _conditions(d_x, theta, beta):
 
 
 def _require_settings(alpha, C):
+    """Raise ValueError for α outside [0°, 90°) or C ≤ 0."""
     require_friction_angle("alpha", alpha)
     require_positive("C", C, "N·mm²")
 
 
 def _inside(d_x, theta, beta, value):
-    return where_all(
-        (*_conditions(d_x, theta, beta), ("beyond the range of a float", np.isfinite(value))), value
-    )
+    """Return the value inside the domain and the range of a float, NaN elsewhere."""
+    in_range = ("beyond the range of a float", np.isfinite(value))
+    return where_all((*_conditions(d_x, theta, beta), in_range), value)
 
 
 def _held_angle(beta, alpha):
-    """|β| − φ, which is min(|β|, α) to the last bit."""
+    """Return |β| − φ, which is min(|β|, α) to the last bit."""
     return np.minimum(np.abs(beta), alpha)

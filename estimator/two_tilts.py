@@ -1,13 +1,16 @@
-"""Friction and distance together: whisks at two tilts of the base, or more, that share their contact.
+"""Friction and distance together: whisks at two tilts of the base, or more, that share their
+contact.
 
-The plane of whisking is turned about the whisker, so that each whisk meets another slope at the same distance on the
-same surface (section VII, way 1). (10) is linear in the distance on the base's cylinder and in μ,
+The plane of whisking is turned about the whisker, so that each whisk meets another slope at the
+same distance on the same surface (section VII, way 1). (10) is linear in the distance on the base's
+cylinder and in μ,
 
     (|m|² / Cθ) d (1 + e) + |m_y| μ = m_z,
 
-so that two whisks have one solution, and more a least-squares one. e is what (10) leaves out to first order, of which
-friction along the whisker counts most: all of friction where nothing slips sideways, and less the more does. Neither
-slopes nor tilts need be known; only must |m_y| of one whisk differ from another's. Angles in rad, lengths in mm.
+so that two whisks have one solution, and more a least-squares one. e is what (10) leaves out to
+first order, of which friction along the whisker counts most: all of friction where nothing slips
+sideways, and less the more does. Neither slopes nor tilts need be known; only must |m_y| of one
+whisk differ from another's. Angles in rad, lengths in mm.
 """
 
 from collections.abc import Sequence
@@ -22,11 +25,16 @@ from estimator.distance import felt_slip_angle
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
 
-_ROUNDS = 8  # of weights and e by the solution; after four nothing changes that matters
-_DRAWN = 0.6  # of θ d: how far a cantilever's end is drawn along itself as it bends, its arc's excess over its chord
-# Of large bending's second order and of friction along the whisker that slips, what is left unknown when they are taken
-# out: as much as exact mechanics differ from them (tests/studies/accuracy/two_tilts.py).
-_LARGE_LEFT, _DRAGGING_LEFT = 1 / 3, 1 / 3
+# Iterations of weights and e by the solution; after four nothing changes that matters.
+_ITERATIONS = 8
+# How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its
+# chord.
+_DRAWN = 0.6
+# Share left unknown of large bending's second order, and of the friction along a whisker that
+# slips, when they are taken out: as much as exact mechanics differ from them. Study:
+# tests/studies/accuracy/two_tilts.py.
+_LARGE_LEFT = 1 / 3
+_DRAGGING_LEFT = 1 / 3
 ALIKE = "the whisks slip alike: no two of them tell friction from distance"
 NO_PUSH = "a whisk does not push: its m_z is not positive"
 BELOW_ZERO = "the friction angle came out below 0"
@@ -34,8 +42,10 @@ BELOW_ZERO = "the friction angle came out below 0"
 
 @dataclass(frozen=True, eq=False)
 class SharedContact:
-    """Distance and friction angle that whisks share, with their covariance (2, 2) in mm, rad; NaN where status says
-    why. low_mm, high_mm: the distance's 95 % interval."""
+    """Distance and friction angle that whisks share, with their covariance (2, 2) in mm, rad.
+
+    NaN where status says why. low_mm, high_mm: the distance's 95 % interval.
+    """
 
     d_x_mm: float
     alpha_rad: float
@@ -53,113 +63,123 @@ def shared_contact(
     places: Sequence[object] = (),
     shared_Nmm: Sequence[np.ndarray] = (),
 ) -> SharedContact:
-    """The contact of two whisks or more at different slopes of one surface. α_est is not asked for.
+    """Solve for the contact of two whisks or more at different slopes of one surface; α_est is not
+    used.
 
-    apart_sigma_mm: how far a whisk's distance may be off the common one; places: what was set up once has one name, and
-    is off by the same (default: each whisk by its own). shared_Nmm: of each whisk, what its moments
-    change by at one sigma of each cause that all whisks have in common, (k, 2). What nothing is known of in the object
-    enters as in (10): thickness and lean, of which all whisks meet the same. Raises ValueError for fewer than two.
+    apart_sigma_mm: standard deviation of a whisk's distance from the common one. places: a name for
+    each whisk; those of one name were set up once, and have the same deviation (default: each whisk
+    its own). shared_Nmm: for each whisk, the change (k, 2) of its moments by one sigma of each
+    cause that all whisks have in common. Thickness and lean of the object are unknown as in (10),
+    and the same for all whisks. Raises ValueError for fewer than two whisks.
     """
     if len(whisks) < 2:
         raise ValueError("two whisks at two tilts are the fewest that tell friction from distance")
     felt = np.array([(w.theta_at_rad, w.m_y_at_Nmm, w.m_z_at_Nmm) for w in whisks])
-    if not (felt[:, 2] > 0).all() or not np.isfinite(felt).all():
-        return _none(NO_PUSH)
-    scale, m_z = _per_distance(whisks), felt[:, 2]
-    solution, covariance = (
-        _start(np.column_stack([scale, np.abs(felt[:, 1])]), m_z),
-        np.full((2, 2), np.nan),
-    )
-    for _ in range(_ROUNDS):
+    m_y = np.abs(felt[:, 1])
+    m_z = felt[:, 2]
+    if not (m_z > 0).all() or not np.isfinite(felt).all():
+        return _without_contact(NO_PUSH)
+    per_mm = _per_distance(whisks)
+    apart = apart_sigma_mm * _by_place(places or range(len(whisks)))
+    solution = _start(np.column_stack([per_mm, m_y]), m_z)
+    for _ in range(_ITERATIONS):
         models = [_model(whisk, solution, settings) for whisk in whisks]
-        across = [0.0 if model.held else abs(w.m_y_at_Nmm) for w, model in zip(whisks, models)]
-        rows = np.column_stack([scale * [1 + model.error for model in models], across])
-        apart = apart_sigma_mm * _by_place(places or range(len(whisks)))
+        held = np.array([model.held for model in models])
+        error = np.array([model.error for model in models])
+        rows = np.column_stack([per_mm * (1 + error), np.where(held, 0.0, m_y)])
         spread = _spread(whisks, models, solution, apart, shared_Nmm)
         solution, covariance = _weighted(rows, m_z, spread)
         if not np.isfinite(covariance).all() or not solution[0] > 0:
-            return _none(ALIKE)
-    return _told(whisks[0], solution, covariance)
+            return _without_contact(ALIKE)
+    return _contact(whisks[0], solution, covariance)
 
 
 def _per_distance(whisks: Sequence[Whisk]) -> np.ndarray:
-    """|m|² / Cθ (n,)."""
+    """Compute |m|² / Cθ (n,), N·mm per mm."""
     squares = np.array([w.m_y_at_Nmm**2 + w.m_z_at_Nmm**2 for w in whisks])
     return squares / [w.beam.C_Nmm2 * w.theta_at_rad for w in whisks]
 
 
 def _start(rows: np.ndarray, m_z: np.ndarray) -> np.ndarray:
-    """(d, μ) by plain least squares: friction may come out as anything, the distance is above zero."""
-    d, mu = np.linalg.lstsq(rows, m_z, rcond=None)[0]
-    return np.array([d, mu]) if d > 0 else np.array([(m_z / rows[:, 0]).mean(), 0.0])
+    """Solve for (d, μ) by plain least squares; without friction where the distance is not above
+    zero.
+    """
+    solution = np.linalg.lstsq(rows, m_z, rcond=None)[0]
+    if solution[0] > 0:
+        return solution
+    return np.array([(m_z / rows[:, 0]).mean(), 0.0])
 
 
 def _weighted(
     rows: np.ndarray, m_z: np.ndarray, spread: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(d, μ) with covariance, by generalized least squares; NaN where the rows do not tell the two apart."""
+    """Solve for (d, μ) with covariance by generalized least squares; NaN where the rows do not
+    separate the two.
+    """
+    nothing = np.full(2, np.nan), np.full((2, 2), np.nan)
     try:
         pull = np.linalg.solve(spread, rows)
         covariance = np.linalg.inv(rows.T @ pull)
     except np.linalg.LinAlgError:
-        return np.full(2, np.nan), np.full((2, 2), np.nan)
+        return nothing
     if not (np.diag(covariance) > 0).all():
-        return np.full(2, np.nan), np.full((2, 2), np.nan)
+        return nothing
     return covariance @ pull.T @ m_z, covariance
 
 
 def _by_place(places: Sequence[object]) -> np.ndarray:
-    """Which whisks (n, p) were made at each place, 1 or 0."""
+    """Return which whisks (n, p) were made at each place, 1 or 0."""
     names = list(dict.fromkeys(places))
-    return np.array([[float(name == place) for name in names] for place in places])
+    made_at = np.zeros((len(places), len(names)))
+    for row, place in enumerate(places):
+        made_at[row, names.index(place)] = 1.0
+    return made_at
 
 
 def _spread(whisks, models, solution, apart_mm, shared_Nmm) -> np.ndarray:
-    """Covariance (n, n) of the equations' errors, N·mm: each whisk's own, and what all, or those of one place, have in
-    common. apart_mm (n, p): one sigma of the distance by place."""
-    by = np.array([_by_felt(whisk, model.held, solution) for whisk, model in zip(whisks, models)])
+    """Compute the covariance (n, n) of the equations' errors, (N·mm)².
+
+    It holds each whisk's own errors, and those that all whisks or those of one place have in
+    common. apart_mm (n, p): one sigma of the distance by place.
+    """
+    count = len(whisks)
     per_mm = _per_distance(whisks)
-    common = np.zeros((len(whisks), 0))
-    if len(shared_Nmm):
-        common = np.array([shared @ gradient[1:] for shared, gradient in zip(shared_Nmm, by)])
-    causes = [
-        common,
-        per_mm[:, None] * apart_mm,
-        solution[0] * per_mm[:, None] * [model.shared for model in models],
-    ]
-    causes = np.concatenate(causes, axis=1)
-    own = np.array(
-        [gradient @ _covariance(whisk) @ gradient for whisk, gradient in zip(whisks, by)]
-    )
-    own = np.maximum(
-        own - (common**2).sum(axis=1), 0.0
-    )  # the moments' covariance holds their shared causes, too
+    measured = np.zeros(count)  # variance by angle and moments
+    common = []  # (k,) of each whisk
+    for row, (whisk, model) in enumerate(zip(whisks, models)):
+        gradient = _gradient(whisk, model.held, solution)
+        measured[row] = gradient @ whisk.felt_covariance @ gradient
+        common.append(shared_Nmm[row] @ gradient[1:] if len(shared_Nmm) else np.zeros(0))
+    common = np.array(common)
+    # The moments' covariance holds their shared causes, too.
+    own = np.maximum(measured - (common**2).sum(axis=1), 0.0)
     left = solution[0] * per_mm * [model.own for model in models]
+    by_place = per_mm[:, None] * apart_mm
+    by_model = solution[0] * per_mm[:, None] * [model.shared for model in models]
+    causes = np.concatenate([common, by_place, by_model], axis=1)
     return np.diag(own + left**2) + causes @ causes.T
 
 
-def _by_felt(whisk: Whisk, held: bool, solution: np.ndarray) -> np.ndarray:
-    """Change (3,) of m_z − a d − |m_y| μ with θ, m_y, m_z."""
-    (d, mu), theta, m_y, m_z = solution, whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
-    stiff = d / (whisk.beam.C_Nmm2 * theta)
-    of_friction = 0.0 if held else np.copysign(mu, m_y)
-    return np.array(
-        [stiff * (m_y**2 + m_z**2) / theta, -2 * stiff * m_y - of_friction, 1 - 2 * stiff * m_z]
-    )
-
-
-def _covariance(whisk: Whisk) -> np.ndarray:
-    """Of θ, m_y, m_z (3, 3)."""
-    whole = np.zeros((3, 3))
-    whole[0, 0], whole[1:, 1:] = whisk.theta_sigma_rad**2, whisk.covariance_at
-    whole[0, 1:] = whole[1:, 0] = whisk.theta_moment_covariance_at
-    return whole
+def _gradient(whisk: Whisk, held: bool, solution: np.ndarray) -> np.ndarray:
+    """Compute the derivative (3,) of m_z − a d − |m_y| μ by θ, m_y, m_z, where a = |m|² / Cθ."""
+    d, mu = solution
+    theta = whisk.theta_at_rad
+    m_y = whisk.m_y_at_Nmm
+    m_z = whisk.m_z_at_Nmm
+    per_moment = d / (whisk.beam.C_Nmm2 * theta)
+    friction = 0.0 if held else np.copysign(mu, m_y)
+    by_theta = per_moment * (m_y**2 + m_z**2) / theta
+    return np.array([by_theta, -2 * per_moment * m_y - friction, 1 - 2 * per_moment * m_z])
 
 
 @dataclass(frozen=True)
-class _Model:
-    """Of one whisk: error of (10) as a share of d, and one sigma of what is not known of it: by lean, thickness and
-    large bending, which whisks share (3,), and of its own. held: nothing slips sideways, so that m_y is noise."""
+class _TiltModel:
+    """Errors of (10) for one whisk, as shares of d.
+
+    held: nothing slips sideways, so that m_y is noise. error: the error that is corrected. shared
+    (3,): sigmas by lean, thickness and large bending, which whisks have in common. own: the whisk's
+    own sigma.
+    """
 
     held: bool
     error: float
@@ -167,44 +187,61 @@ class _Model:
     own: float
 
 
-def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _Model:
-    """By docs/maps.md, at the friction and the distance found so far. Of an object whose radius nobody tells all from
-    nothing to what is allowed for is as likely. A share of d_x is 1/w of that of d, w of the diameter being left."""
-    theta, alpha, d_x = (
-        whisk.theta_at_rad,
-        max(atan(solution[1]), 0.0),
-        whisk.beam.distance_mm(solution[0]),
-    )
-    left, held = d_x / solution[0], is_held(whisk)
+def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _TiltModel:
+    """Evaluate the errors of (10), docs/maps.md, at the friction and the distance found so far.
+
+    Where the object's radius is not known, everything from nothing to the allowed reach is equally
+    probable. A share of d_x is 1/w of that of d, w being the share of the diameter that is left.
+    """
+    theta = whisk.theta_at_rad
+    alpha = max(atan(solution[1]), 0.0)
+    d_x = whisk.beam.distance_mm(solution[0])
+    left = d_x / solution[0]
+    held = is_held(whisk)
     phi = 0.0 if held else abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
     bent = theta if held else theta * max(cos(phi + alpha), 0.0) / cos(alpha)
-    drawn, slipped = _DRAWN * bent, sin(phi) / cos(alpha)
-    along = first_order.HELD_SHARE if held else drawn / hypot(drawn, slipped)
-    dragging, large = first_order.dragging(theta, alpha), bent**2 / (6 * left)
-    told = not isnan(settings.object_radius_mm)
-    reach = (
-        settings.object_radius_mm + settings.whisker_radius_mm * left
-        if told
-        else settings.object_reach_mm
-    )
-    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
+    dragging = first_order.dragging(theta, alpha)
+    large = bent**2 / (6 * left)
+    if held:
+        along = first_order.HELD_SHARE
+        own = first_order.HELD_SPREAD * dragging
+    else:
+        drawn = _DRAWN * bent
+        along = drawn / hypot(drawn, sin(phi) / cos(alpha))
+        own = _DRAGGING_LEFT * along * dragging
+    rolling, rolling_sigma = _rolling(theta, phi, alpha, d_x, left, settings)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
-    error = along * dragging + large + (rolling if told else 0.5 * rolling)
-    shared = np.array([leaning, 0.0 if told else rolling / sqrt(12.0), _LARGE_LEFT * large])
-    own = (first_order.HELD_SPREAD if held else _DRAGGING_LEFT * along) * dragging
-    return _Model(held, error / left, shared / left, own / left)
+    error = along * dragging + large + rolling
+    shared = np.array([leaning, rolling_sigma, _LARGE_LEFT * large])
+    return _TiltModel(held, error / left, shared / left, own / left)
 
 
-def _told(whisk: Whisk, solution: np.ndarray, covariance: np.ndarray) -> SharedContact:
-    """From (d, μ) to d_x and α."""
-    d_x, mu = whisk.beam.distance_mm(solution[0]), max(solution[1], 0.0)
-    by = np.diag([(d_x / solution[0]) ** 2, cos(atan(mu)) ** 2])
-    covariance = by @ covariance @ by
+def _rolling(theta, phi, alpha, d_x, left, settings) -> tuple[float, float]:
+    """Return the error by rolling over the object, and its sigma: that of a uniform distribution of
+    unknown radii.
+    """
+    radius = settings.object_radius_mm
+    if isnan(radius):
+        most = first_order.rolling(theta, settings.object_reach_mm, phi, alpha, d_x, left)
+        return 0.5 * most, most / sqrt(12.0)
+    reach = radius + settings.whisker_radius_mm * left
+    return first_order.rolling(theta, reach, phi, alpha, d_x, left), 0.0
+
+
+def _contact(whisk: Whisk, solution: np.ndarray, covariance: np.ndarray) -> SharedContact:
+    """Convert (d, μ) with its covariance to d_x and α."""
+    length = whisk.beam.length_mm
+    d_x = whisk.beam.distance_mm(solution[0])
+    alpha = atan(max(solution[1], 0.0))
+    jacobian = np.diag([(d_x / solution[0]) ** 2, cos(alpha) ** 2])
+    covariance = jacobian @ covariance @ jacobian
     half = Z_95 * covariance[0, 0] ** 0.5
-    low, high = max(d_x - half, 0.0), min(d_x + half, whisk.beam.length_mm)
+    low = float(max(d_x - half, 0.0))
+    high = float(min(d_x + half, length))
     status = BELOW_ZERO if solution[1] < -Z_95 * covariance[1, 1] ** 0.5 else ""
-    return SharedContact(float(d_x), atan(mu), covariance, float(low), float(high), status)
+    return SharedContact(float(d_x), alpha, covariance, low, high, status)
 
 
-def _none(status: str) -> SharedContact:
+def _without_contact(status: str) -> SharedContact:
+    """Return that there is no contact, and why."""
     return SharedContact(nan, nan, np.full((2, 2), nan), status=status)

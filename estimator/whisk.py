@@ -1,4 +1,4 @@
-"""All that an estimator may know of one whisk, what it is told, and what it answers."""
+"""What an estimator receives of one whisk, its settings, and the estimate that it returns."""
 
 from dataclasses import dataclass, field
 from math import nan
@@ -20,11 +20,14 @@ _ARRAYS = (
 
 @dataclass(frozen=True, eq=False)
 class OtherSensors:
-    """What other sensors of Table I tell of a whisk at its pushing angle; NaN where there is no such sensor.
+    """Readings of the other sensors of Table I at the pushing angle; NaN where there is no such
+    sensor.
 
-    force_N (3,): f_x, f_y, f_z of the base on the whisker, hub's axes, with covariance (3, 3); scale_sigma: share by
-    which the force's newtons and the moments' may disagree. rate_Nmm (2,): rate of m_y and m_z over the motor angle,
-    per rad, with covariance (2, 2).
+    force_N (3,): force (f_x, f_y, f_z) of the base on the whisker, in the hub's axes.
+    force_covariance (3, 3): its covariance, N².
+    scale_sigma: relative standard deviation of the force's scale against that of the moments.
+    rate_Nmm (2,): derivative of (m_y, m_z) by the motor angle, N·mm per rad.
+    rate_covariance (2, 2): its covariance.
     """
 
     force_N: np.ndarray
@@ -36,25 +39,33 @@ class OtherSensors:
 
 @dataclass(frozen=True, eq=False)
 class ObjectMotion:
-    """How an object moves while it is touched: (3,) mm per radian of the motor, with covariance (3, 3); x along the
-    whisker at touch, y the way it pushes, z up."""
+    """Motion of an object while it is touched, per radian of the motor.
+
+    per_rad_mm (3,): mm/rad; x along the whisker at touch, y the way it pushes, z up.
+    covariance_mm2 (3, 3): its covariance.
+    """
 
     per_rad_mm: np.ndarray
     covariance_mm2: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Whisk:
     """One forward stroke against an object, as a robot feels it.
 
-    time_s, theta_rad, m_y_Nmm, m_z_Nmm: (n,) samples from before felt touch on; theta_rad is the motor
-    angle since felt touch (negative before it), moments are above the free stroke's level. theta_at_rad:
-    the pushing angle wanted; m_y_at_Nmm, m_z_at_Nmm: moments there; covariance_at (2, 2): theirs, in the
-    order y, z, in (N·mm)²; theta_sigma_rad: of the pushing angle, felt touch included;
-    theta_moment_covariance_at (2,): of the pushing angle with m_y and m_z, in rad·N·mm. others: what other sensors
-    tell, None where nobody asked. object_motion: None where the object stands. Raises ValueError where shapes disagree
-    or a sigma is negative. The arrays are copies that cannot be written to: what one estimator does with them is no
-    other's concern.
+    time_s, theta_rad, m_y_Nmm, m_z_Nmm (n,): samples, which begin before the felt touch. theta_rad
+    is the motor angle since the felt touch (negative before it), moments are above the level of the
+    free stroke.
+    theta_at_rad: the pushing angle at which the distance is wanted.
+    m_y_at_Nmm, m_z_at_Nmm: moments at that angle.
+    covariance_at (2, 2): covariance of (m_y, m_z) there, (N·mm)².
+    theta_sigma_rad: standard deviation of the pushing angle, that of the felt touch included.
+    theta_moment_covariance_at (2,): covariance of the pushing angle with (m_y, m_z), rad·N·mm.
+    others: readings of other sensors; None where there are none.
+    object_motion: None where the object stands still.
+
+    Raises ValueError where shapes disagree or a sigma is negative. The arrays are read-only copies:
+    no estimator can change what another one receives.
     """
 
     time_s: np.ndarray
@@ -72,15 +83,16 @@ class Whisk:
     object_motion: ObjectMotion | None = None
 
     def __post_init__(self):
-        shapes = {np.shape(a) for a in (self.time_s, self.theta_rad, self.m_y_Nmm, self.m_z_Nmm)}
+        """Raise ValueError for a wrong shape or sigma, and keep read-only copies."""
+        samples = (self.time_s, self.theta_rad, self.m_y_Nmm, self.m_z_Nmm)
+        shapes = set(map(np.shape, samples))
         if len(shapes) != 1 or len(shapes.pop()) != 1:
             raise ValueError(
                 "time_s, theta_rad, m_y_Nmm and m_z_Nmm must be arrays (n,) of one length"
             )
-        if np.shape(self.covariance_at) != (2, 2):
-            raise ValueError(
-                f"covariance_at has shape {np.shape(self.covariance_at)}: must be (2, 2)"
-            )
+        shape = np.shape(self.covariance_at)
+        if shape != (2, 2):
+            raise ValueError(f"covariance_at has shape {shape}: must be (2, 2)")
         if np.shape(self.theta_moment_covariance_at) != (2,):
             raise ValueError("theta_moment_covariance_at must have shape (2,)")
         require_sigma("theta_sigma_rad", self.theta_sigma_rad)
@@ -89,14 +101,26 @@ class Whisk:
             kept.setflags(write=False)
             object.__setattr__(self, name, kept)
 
+    @property
+    def felt_covariance(self) -> np.ndarray:
+        """Return the covariance (3, 3) of the pushing angle, m_y and m_z."""
+        whole = np.zeros((3, 3))
+        whole[0, 0] = self.theta_sigma_rad**2
+        whole[0, 1:] = self.theta_moment_covariance_at
+        whole[1:, 0] = self.theta_moment_covariance_at
+        whole[1:, 1:] = self.covariance_at
+        return whole
+
 
 @dataclass(frozen=True)
 class EstimatorSettings:
-    """What an estimator is told beforehand: the assumed friction cone angle, and how far it is trusted.
+    """What an estimator assumes: the friction cone angle and its uncertainty, and limits of the
+    object.
 
-    object_reach_mm is how thick the object may be (radii of object and whisker together), and
-    tilt_sigma_rad how far it may lean along the whisker. Both enter the sigma alone. Who is told its radius has it in
-    object_radius_mm, NaN else; whisker_radius_mm is the whisker's own at its base.
+    object_reach_mm: radii of object and whisker together, at most; it enters the sigma alone.
+    tilt_sigma_rad: standard deviation of the object's lean along the whisker; it enters the sigma
+    alone. object_radius_mm: radius of the object where it is known, NaN elsewhere.
+    whisker_radius_mm: radius of the whisker at its base.
     """
 
     alpha_est_rad: float
@@ -107,6 +131,7 @@ class EstimatorSettings:
     whisker_radius_mm: float = 0.0
 
     def __post_init__(self):
+        """Raise ValueError unless the friction angle lies in [0°, 90°) and no sigma is negative."""
         require_friction_angle("alpha_est_rad", self.alpha_est_rad)
         for name in ("alpha_est_sigma_rad", "object_reach_mm", "tilt_sigma_rad"):
             require_sigma(name, getattr(self, name))
@@ -114,14 +139,17 @@ class EstimatorSettings:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A distance with its standard deviation, both in mm; NaN where there is none, and status says why.
+    """A distance with its standard deviation, both in mm; NaN where there is none, and status says
+    why.
 
-    low_mm, high_mm: its 95 % interval, NaN where that is 1.96 sigma to either side; a low end of 0 and a high one at
-    the whisker's length are open. alpha_est_rad, beta_rad: the friction angle that was assumed and the slope that came
-    of it, NaN where the estimator knows of none. deflection_mm, deflection_sigma_mm: where it says itself where the
-    contact is at the pushing angle, (d_y, d_z) from the unbent whisker; None: worked out from distance and moments.
-    gradient (4,): of the distance by θ, m_y, m_z and alpha_est, where the estimator knows it: so the contact point's
-    errors hang together.
+    low_mm, high_mm: the 95 % interval; NaN where it is d_x ± 1.96 sigma. A low end of 0 and a high
+    end at the whisker's length are open ends.
+    alpha_est_rad, beta_rad: the assumed friction angle and the slope that follows from it; NaN
+    where the estimator uses none.
+    deflection_mm: where the contact is at the pushing angle, (d_y, d_z) from the unbent whisker,
+    with deflection_sigma_mm; None where it is to be computed from distance and moments.
+    gradient (4,): derivative of the distance by (θ, m_y, m_z, alpha_est), from which the covariance
+    of the contact point follows; None where the estimator has none.
     """
 
     d_x_mm: float

@@ -12,7 +12,7 @@ import numpy as np
 
 from bench.gauges.felt import Stroke
 from estimator import noise
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 
 _GUARD_RAD = np.radians(0.1)  # rad before felt touch, beyond what that is uncertain by. Set by eye
 _ROUNDS = 10  # of weights and excess; after five nothing changes that matters
@@ -72,7 +72,7 @@ def drift_rate(slopes: Sequence[FreeSlope]) -> np.ndarray:
     return np.sqrt(excess + information.sum(axis=0) ** -0.5)
 
 
-def allow_drift(touch: Touch, rate: np.ndarray, speed_rad_s: float) -> Touch:
+def allow_drift(touch: FeltTouch, rate: np.ndarray, speed_rad_s: float) -> FeltTouch:
     """The same touch, with a zero that may drift at `rate` (k,) per second: the session's, and not the stroke's own,
     which is mostly noise. The touch's sigma takes the one for the other too, so that it agrees with its covariances."""
     if touch.status or speed_rad_s <= 0:

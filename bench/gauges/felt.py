@@ -14,7 +14,7 @@ from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, back_stroke, forward_strokes, ways_back
 from bench.session.trial import Trial
 from estimator.onset import usable
-from estimator.signal import MomentAt, Touch, felt_touch, moment_at, zero_phase_lowpass
+from estimator.signal import FeltTouch, MomentAt, felt_touch, moment_at, zero_phase_lowpass
 from vision.truth.records import FrameTruth
 from vision.truth.value import UNKNOWN, Value
 
@@ -103,19 +103,19 @@ class Stroke:
             drift=None,
         )
 
-    def touch(self) -> Touch:
+    def touch(self) -> FeltTouch:
         """Felt touch. The rise is fitted as recorded: a filter would smear the onset."""
         return self._touch
 
     @cached_property
-    def _touch(self) -> Touch:
+    def _touch(self) -> FeltTouch:
         return felt_touch(self.motor_rad, self.channels, self.time_s)
 
     @cached_property
     def _usable(self) -> np.ndarray:
         return usable(self.motor_rad, self.channels)
 
-    def at(self, theta_rad: float, touch: Touch, **window: float) -> MomentAt:
+    def at(self, theta_rad: float, touch: FeltTouch, **window: float) -> MomentAt:
         """Channels above the free stroke's level, at a pushing angle past `touch`: a line through the samples as
         recorded, which averages as section V's low-pass does. That smears the onset, by 5 % of it at 0.5°."""
         known = {"time_s": self.time_s, "good": self._usable}

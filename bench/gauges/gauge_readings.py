@@ -16,7 +16,7 @@ from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.beam import rigidity_at
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 from vision.truth.value import Value
 
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
@@ -172,7 +172,9 @@ def _shared(effect) -> np.ndarray:
     return np.outer(effect.ravel(), effect.ravel())
 
 
-def reference_from_nominal(trial: Trial, touch: Touch, whisker: Whisker) -> ReferenceMoments | None:
+def reference_from_nominal(
+    trial: Trial, touch: FeltTouch, whisker: Whisker
+) -> ReferenceMoments | None:
     """Moments of a bar at right angles to the push, at the distance that a ruler gave; None where there is none.
 
     The bent whisker leans by half the pushing angle where it touches, and rolls that far over the bar towards its base.
@@ -199,7 +201,7 @@ def _paired(
     whisk: int,
     reference: ReferenceMoments,
     stroke: Stroke,
-    touch: Touch,
+    touch: FeltTouch,
     rigid_Nmm: float,
     theta_rad: float,
 ) -> Pairs | None:
@@ -245,7 +247,7 @@ def _seen_from_follicle(trial: Trial, moments, covariance) -> tuple[np.ndarray, 
     return moments @ to_follicle(roll).T, turn @ covariance @ turn.T + _shared(by_roll)
 
 
-def _volts_covariance(read: Sequence, theta, touch: Touch) -> np.ndarray:
+def _volts_covariance(read: Sequence, theta, touch: FeltTouch) -> np.ndarray:
     """(2n, 2n): each reading's own, and the zero that all share."""
     n = len(read)
     covariance = np.zeros((2 * n, 2 * n))

@@ -19,7 +19,7 @@ from estimator.beam import Beam
 from estimator.builtin import ESTIMATORS, WITHOUT_ALPHA
 from estimator.contact_state import Contact, contact_of
 from estimator.distance import felt_slip_angle
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 from vision.geometry.reasons import Reason, as_reason, joined
@@ -105,7 +105,7 @@ class Readout:
         """The whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
         return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
-    def moments_Nmm(self, stroke: Stroke, touch: Touch) -> np.ndarray:
+    def moments_Nmm(self, stroke: Stroke, touch: FeltTouch) -> np.ndarray:
         """(n, 2): of the stroke's samples as recorded, unfiltered."""
         return (stroke.channels - touch.offset) @ self.matrix.T
 
@@ -131,14 +131,14 @@ class Readout:
 
 def felt_whisk(
     stroke: Stroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
-) -> tuple[Touch, Whisk | Reason]:
+) -> tuple[FeltTouch, Whisk | Reason]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     return touch, as_reason(touch.status) or whisk_at(stroke, readout, touch, beam, theta_rad)
 
 
 def whisk_at(
-    stroke: Stroke, readout: Readout, touch: Touch, beam: Beam, theta_rad: float
+    stroke: Stroke, readout: Readout, touch: FeltTouch, beam: Beam, theta_rad: float
 ) -> Whisk | Reason:
     """`felt_whisk` of a touch that is known."""
     at = stroke.at(theta_rad, touch)
@@ -162,7 +162,7 @@ def whisk_at(
 
 
 def as_felt(
-    number: int, touch: Touch, whisk: Whisk | None, speed_rad_s: float, delay_s: Value
+    number: int, touch: FeltTouch, whisk: Whisk | None, speed_rad_s: float, delay_s: Value
 ) -> FeltWhisk:
     """Felt touch, moments and slip angle of a whisk, rad and N·mm; without moments where there is no `whisk`.
 
@@ -194,7 +194,7 @@ def _moments(whisk: Whisk) -> tuple[Value, Value]:
 def felt_by_theta(
     stroke: Stroke,
     readout: Readout,
-    touch: Touch,
+    touch: FeltTouch,
     beam: Beam,
     answered: Callable[[Whisk], tuple[EstimateRow, ...]],
 ) -> tuple[FeltAt, ...]:

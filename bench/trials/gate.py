@@ -13,7 +13,7 @@ from bench.gauges.felt import Stroke
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.trials.estimates import Readout, felt_at
 from bench.trials.stick_slip_phases import Rest, rests_of
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
 
 _FEWEST = 2  # teeth: one jump may be a knock
@@ -22,7 +22,7 @@ _FROM_SHARE, _TO_SHARE = 0.5, 1.5
 
 
 def kinetic_of(
-    stroke: Stroke, touch: Touch, readout: Readout, whisk: Whisk, given: EstimateRow
+    stroke: Stroke, touch: FeltTouch, readout: Readout, whisk: Whisk, given: EstimateRow
 ) -> FeltAt | None:
     """What a stroke shows of `kinetic_end`."""
     theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)

@@ -7,7 +7,7 @@ import numpy as np
 from bench.gauges.felt import Stroke
 from bench.trials.estimates import Readout
 from estimator.readings import force_at, rate_at
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 from estimator.whisk import OtherSensors, Whisk
 
 
@@ -15,7 +15,7 @@ def with_others(
     whisk: Whisk,
     stroke: Stroke,
     readout: Readout,
-    touch: Touch,
+    touch: FeltTouch,
     *,
     force_drift_rate: np.ndarray | None,
     scale_sigma: float,

@@ -18,7 +18,7 @@ from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
 from bench.trials.estimates import Readout
 from estimator.beam import Beam
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 from vision.truth.records import FrameTruth
 
 _LEAST_SLIP_MM, _LEAST_FRAMES = (
@@ -96,7 +96,7 @@ def _runs(mask) -> list[tuple[int, int]]:
 
 
 def phases_of(
-    trial: Trial, stroke: Stroke, touch: Touch, readout: Readout, seen: SeenWhisk, beam: Beam
+    trial: Trial, stroke: Stroke, touch: FeltTouch, readout: Readout, seen: SeenWhisk, beam: Beam
 ) -> Phases:
     """Phases felt, with the slope and distance as seen, or the nominal ones where no picture tells of them."""
     if seen.deflection is not None:

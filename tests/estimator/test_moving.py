@@ -7,7 +7,7 @@ import pytest
 
 from estimator.beam import Beam
 from estimator.builtin import with_friction
-from estimator.moving import NOT_TOLD, RUNS_AWAY, held, known_motion
+from estimator.moving import MOTION_UNKNOWN, RUNS_AWAY, held, known_motion
 from estimator.whisk import EstimatorSettings, ObjectMotion, Whisk
 from tests.studies.accuracy.moving import errors_percent
 
@@ -62,6 +62,6 @@ def test_how_well_the_speed_is_known_is_in_the_sigma():
 
 
 def test_what_has_no_distance_says_why():
-    assert known_motion(replace(whisk(), object_motion=None), TOLD).status == NOT_TOLD
+    assert known_motion(replace(whisk(), object_motion=None), TOLD).status == MOTION_UNKNOWN
     assert known_motion(whisk((0.0, 40.0, 0.0)), TOLD).status == RUNS_AWAY
     assert "m_z is not positive" in known_motion(whisk(m_z=-1.0), TOLD).status

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.seen_shape import FEW, NOT_PUSHED, UNTOLD, SeenShape, bend, contact_of_shape
+from estimator.seen_shape import FEW, NO_END, NOT_PUSHED, SeenShape, bend, contact_of_shape
 from tests.scenes.seen_shapes import shown
 
 TOLD = {"reach_mm": 3.5, "tilt_sigma_rad": np.radians(5.0)}
@@ -74,7 +74,7 @@ def test_what_is_not_seen_is_not_told():
         == NOT_PUSHED
     )
     free = contact_of_shape(seen.until(one.touch_rad - 0.005), 0.01, one.beam)
-    assert free.status in (UNTOLD, NOT_PUSHED)
+    assert free.status in (NO_END, NOT_PUSHED)
     assert np.isnan(free.d_x_mm)
 
 

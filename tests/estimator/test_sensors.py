@@ -9,7 +9,7 @@ from estimator import slip
 from estimator.beam import Beam
 from estimator.readings import force_at, rate_at
 from estimator.sensors import NO_CELL, NO_RATE, force_and_moment, moment_rate, touch_alone
-from estimator.signal import Touch, felt_touch
+from estimator.signal import FeltTouch, felt_touch
 from estimator.whisk import EstimatorSettings, OtherSensors, Whisk
 
 BEAM = Beam(8835.7, 100.0)
@@ -122,6 +122,10 @@ def _first(values, covariance) -> tuple[float, float]:
 
 
 def test_without_a_touch_nothing_is_read():
-    none, angles, samples = Touch.none("never touches"), np.linspace(0, 0.1, 50), np.zeros((50, 3))
+    none, angles, samples = (
+        FeltTouch.none("never touches"),
+        np.linspace(0, 0.1, 50),
+        np.zeros((50, 3)),
+    )
     assert force_at(THETA, angles, samples, none).status == "never touches"
     assert np.isnan(rate_at(THETA, angles, samples, none)[0]).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimator import uncertainty
-from estimator.onset import Touch
+from estimator.onset import FeltTouch
 from estimator.signal import NOT_REACHED, felt_touch, moment_at
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -108,7 +108,7 @@ def test_beyond_the_stroke_there_is_no_moment(stroke):
 
 def test_without_touch_there_is_no_moment(stroke):
     s = stroke(np.random.default_rng(13))
-    at = moment_at(THETA, *s.arrays, Touch.none("never touches"))
+    at = moment_at(THETA, *s.arrays, FeltTouch.none("never touches"))
     assert at.status == "never touches"
     assert np.isnan(at.values).all()
 

@@ -19,7 +19,7 @@ from bench.rig.stick_slip import Friction, March
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.whisker import Whisker
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 
 WHISKER = Whisker("cylinder", 100.0, 1.0, 60.0)
 
@@ -67,7 +67,7 @@ def test_coefficients_of_the_sample_session(session, exactly_seen):
 def test_a_nominal_bar_gives_the_moments_of_2(session):
     """Without pictures: (2) at small angles, a distance known to 1 %, and the touch's sigma in all of it."""
     trial = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=6.0)
-    reference = reference_from_nominal(trial, Touch(0.04, 1e-4), WHISKER)
+    reference = reference_from_nominal(trial, FeltTouch(0.04, 1e-4), WHISKER)
     assert reference.moments[:, 1] == pytest.approx(
         WHISKER.C_Nmm2 * reference.theta_rad / 50.0, rel=5e-3
     )
@@ -91,7 +91,7 @@ def test_a_nominal_bar_gives_the_moments_of_the_exact_contact(bar_radius_mm):
     trial = SimpleNamespace(
         d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=2 * bar_radius_mm
     )
-    reference = reference_from_nominal(trial, Touch(0.0, 1e-4), WHISKER)
+    reference = reference_from_nominal(trial, FeltTouch(0.0, 1e-4), WHISKER)
     march = March(rod, bar, Friction(0.2, 0.2), first_touch(rod, bar, 0.0, 50.0))
     exact = [moments_Nmm(state)[1] for state in march.along(reference.theta_rad)[1]]
     assert reference.moments[:, 1] == pytest.approx(exact, rel=6e-4)
@@ -99,7 +99,7 @@ def test_a_nominal_bar_gives_the_moments_of_the_exact_contact(bar_radius_mm):
 
 def test_a_steep_nominal_bar_gives_none():
     steep = SimpleNamespace(d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=30.0)
-    assert reference_from_nominal(steep, Touch(0.04, 1e-4), WHISKER) is None
+    assert reference_from_nominal(steep, FeltTouch(0.04, 1e-4), WHISKER) is None
 
 
 def test_no_touch_no_pairs(session, exactly_seen):

@@ -22,7 +22,7 @@ from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
 from bench.report.summary.verdict import verdict
 from bench.trials.estimates import as_felt
-from estimator.signal import Touch
+from estimator.signal import FeltTouch
 from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.covariance import CAUSES
 from vision.geometry.counted import counted
@@ -50,7 +50,7 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
 def test_the_filters_delay_is_taken_out_of_felt_touch(filter_Hz, late_deg, doubt_deg):
     """At 90 deg/s 0.52 ms are 0.047 deg; whose filter is not named may have any delay up to twice the paper's."""
     own = np.radians(0.001)
-    felt = as_felt(0, Touch(0.0508, own), None, np.radians(90.0), gauge_delay(filter_Hz))
+    felt = as_felt(0, FeltTouch(0.0508, own), None, np.radians(90.0), gauge_delay(filter_Hz))
     late = lateness(SeenWhisk(0, touch_rad=Value(0.05, own)), felt)
     assert np.degrees(late.value) == pytest.approx(np.degrees(8e-4) - late_deg, abs=1e-4)
     assert np.degrees(late.sigma) == pytest.approx(np.hypot(0.001 * 2**0.5, doubt_deg), abs=1e-4)

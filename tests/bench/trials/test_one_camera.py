@@ -11,7 +11,7 @@ from bench.base.settings import Settings
 from bench.records.trial_result import ByOneCamera, SeenWhisk
 from bench.trials.one_camera import NOT_SHOWN, by_one_camera, require_camera
 from estimator.beam import Beam
-from estimator.seen_shape import ASIDE
+from estimator.seen_shape import PLANE_UNKNOWN
 from tests.scenes.model_scenes import scene, with_points
 from vision.geometry.centreline import rotation_z
 from vision.truth.records import WhiskTruth
@@ -49,7 +49,7 @@ def test_sights_pass_through_the_points_that_are_seen(problem):
 
 def test_one_camera_tells_the_distance_and_no_force_where_it_looks_aside(problem):
     said = by_one_camera(WhiskTruth(0, None, problem=problem), WHISKER, Settings(one_camera="one"))
-    assert said.status == ASIDE
+    assert said.status == PLANE_UNKNOWN
     assert abs(said.d_x_mm.value - 60.0) < 2.0 * said.d_x_mm.sigma < 3.0
     rest = np.array([[0.05, 0.1, -0.2], [-0.05, 0.1, -0.3]]) @ 0.6 ** np.arange(
         3
