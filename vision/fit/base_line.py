@@ -10,10 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.blocks import REST_PRIOR_MM
 from vision.fit.problem import (
-    BAR,
-    REST,
-    REST_PRIOR_MM,
     WANDER_PX,
     Problem,
     State,
@@ -63,7 +61,7 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     if len(frames) < 2:
         return None
     shape, covariance = _shape_at_rest(rows)
-    covariance = covariance + lens[BAR : BAR + REST, BAR : BAR + REST]
+    covariance = covariance + lens[problem.blocks.rest_shape.slice, problem.blocks.rest_shape.slice]
     motor, length = problem.motor_rad[frames], problem.wire.length_mm
     lines = [
         _in_space(shape[_LINE], *_own_line([r for r in rows if r.frame == f], shape), m, length)
@@ -90,12 +88,12 @@ def _free_rows(problem: Problem, state: State) -> list[_Rows]:
 def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian) -> _Rows:
     """Without the offsets that the whole fit gave the line, and counted from a straight whisker in its place."""
     clear = seen.points.place > _CLEAR_OF_HUB_MM
-    offsets = problem.wire_off(seen.camera)
-    by_rest = jacobian[:, BAR : BAR + REST]
+    offsets = problem.blocks.wire_offsets[seen.camera].slice
+    by_rest = jacobian[:, problem.blocks.rest_shape.slice]
     away = (
         residual
         - jacobian[:, offsets] @ state.vector[offsets]
-        - by_rest @ state.vector[BAR : BAR + REST]
+        - by_rest @ state.vector[problem.blocks.rest_shape.slice]
     )
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
     return _Rows(seen.frame, away[clear], by_rest[clear], nuisance[clear])
@@ -111,10 +109,10 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
     """Rest shape (8,) and its covariance."""
     J = np.concatenate([np.hstack([r.by_rest, r.by_nuisance]) for r in rows])
     bent = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
-    prior = np.concatenate([bent, bent, np.full(J.shape[1] - REST, WANDER_PX)])
+    prior = np.concatenate([bent, bent, np.full(J.shape[1] - 8, WANDER_PX)])
     covariance = np.linalg.inv(J.T @ J + np.diag(prior**-2.0))
     solution = -covariance @ (J.T @ np.concatenate([r.residual for r in rows]))
-    return solution[:REST], covariance[:REST, :REST]
+    return solution[:8], covariance[:8, :8]
 
 
 def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

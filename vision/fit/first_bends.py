@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import BAR, REST, REST_PRIOR_MM, Problem, start
+from vision.fit.blocks import REST_PRIOR_MM
+from vision.fit.problem import Problem, rest_shape, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines, one_curve
@@ -105,7 +106,7 @@ def find_rest(
     nothing = np.zeros(len(motor), dtype=bool)
     problem = Problem(cameras, rods, axis, motor, nothing, nothing, seen)
     state, _ = solve(problem, start(problem, rods.wire.length_mm / 2), scales=_REST_SCALES)
-    return state.vector[BAR : BAR + REST].reshape(2, REST_POWERS)
+    return rest_shape(problem, state.vector)
 
 
 def _resting_points(sight: Sight, curves: Mapping[int, Curves]) -> tuple[LinePoints, np.ndarray]:

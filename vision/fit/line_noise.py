@@ -24,7 +24,10 @@ class LineNoise:
 
 def line_noise(problem: Problem) -> dict[str, LineNoise]:
     """By camera, from the line points of a fit; of many sigmas that which has the same information."""
-    alike = [*problem.alike, *[0.0] * (len(problem.cameras) - len(problem.alike))]
+    alike = [
+        *problem.neighbour_correlation,
+        *[0.0] * (len(problem.cameras) - len(problem.neighbour_correlation)),
+    ]
     return {
         name: LineNoise(_of_wire(problem, camera), alike[camera], _of_bar(problem, camera))
         for camera, name in enumerate(problem.cameras.names)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from vision.fit.covariance import Uncertainty, alike, camera_rows
+from vision.fit.covariance import Uncertainty, camera_rows, times_residual_covariance
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.quantities import Jacobians
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
@@ -102,7 +102,7 @@ class _Observations:
         """Covariance (k, k) of what these rows (k, n) make of all that observations and cameras err by."""
         of_cameras = rows @ self.by_camera
         return (
-            alike(self.problem, rows) @ rows.T
+            times_residual_covariance(self.problem, rows) @ rows.T
             + of_cameras @ self.problem.cameras.covariance @ of_cameras.T
         )
 
@@ -120,17 +120,17 @@ def leave_out_each(
     for number, name in enumerate(problem.cameras.names):
         kept = seen.without(number)
         answer = np.linalg.inv(kept.T @ kept)
-        rows = asked @ (answer @ kept.T - fitted.answer @ seen.jacobian.T)
+        rows = asked @ (answer @ kept.T - fitted.inverse_normal @ seen.jacobian.T)
         step = -answer @ (kept.T @ seen.residual)
         moved, spread = asked @ step, seen.spread(rows)
-        beside, beside_sigma, by_lines = _lines_beside(seen, state, fitted.answer, number)
+        beside, beside_sigma, by_lines = _lines_beside(seen, state, fitted.inverse_normal, number)
         chance = min(1.0, 2 * len(problem.cameras) * min(_chance(moved, spread), by_lines))
         one = OneLess(
             name, step, moved, np.sqrt(np.diag(spread)), sigma, beside, beside_sigma, chance
         )
         if one.contradicts:
             one = replace(
-                one, spread=seen.spread(answer @ kept.T - fitted.answer @ seen.jacobian.T)
+                one, spread=seen.spread(answer @ kept.T - fitted.inverse_normal @ seen.jacobian.T)
             )
         found.append(one)
     return found
@@ -147,7 +147,10 @@ def _lines_beside(
     procedure for use in geodetic networks, 1968). So it does where the others alone do not know the bar.
     """
     problem = seen.problem
-    off = np.r_[problem.wire_off(camera)][:2].tolist() + np.r_[problem.bar_off(camera)].tolist()
+    off = (
+        np.r_[problem.blocks.wire_offsets[camera].slice][:2].tolist()
+        + np.r_[problem.blocks.bar_offsets[camera].slice].tolist()
+    )
     belief = (
         len(seen.residual) - problem.size - (problem.onset is not None) + np.array(off)
     )  # rows of what is believed

@@ -70,7 +70,7 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
 def _deflection(problem: Problem, vector, touch: FirstTouch, point):
     """d_y = V_y - P_y and d_z = P_z - V_z (…, f) in the contact frame."""
     shape = point.shape[:-1]
-    rest = np.broadcast_to(rest_shape(vector)[..., None, :, :], (*shape, 2, REST_POWERS))
+    rest = np.broadcast_to(rest_shape(problem, vector)[..., None, :, :], (*shape, 2, REST_POWERS))
     motor = np.broadcast_to(problem.motor_rad, shape)
     unbent = centrelines(
         rest, np.zeros((*shape, 2)), np.full(shape, problem.wire.length_mm / 2), motor, problem.wire
@@ -123,8 +123,8 @@ def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
     all_rows = measure(problem, moved, state.arcs_mm)
     whisk = {name: np.zeros(problem.size) for name in all_rows.whisk}
     frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in all_rows.frame}
-    for number, (step, columns) in enumerate(moves, start=1):
-        shared = 0 <= columns[0] < problem.first_bend
+    for number, move in enumerate(moves, start=1):
+        shared, step, columns = move.is_shared, move.step, move.column
         for name, values in all_rows.whisk.items():
             if shared:
                 whisk[name][columns[0]] = (values[number] - values[0]) / step

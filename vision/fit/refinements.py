@@ -1,11 +1,11 @@
 """What the truth of a whisk would be without one refinement of the model: one linear step from the fit that has all.
 
-A refinement is left out in one of three ways, each of which the fit answers by its own normal equations, JᵀWJ:
+A refinement is left out in one of three ways, each of which the fit follows by its own normal equations, JᵀWJ:
 
 - a parameter, or a function of them, is held at what the plainer model has there (a least-squares fit with an equality
   constraint; Björck, Numerical Methods for Least Squares Problems, SIAM 1996, 5.1);
 - lines or centrelines are predicted elsewhere, which changes residuals, and slip or touch directly, too;
-- the cameras are those of a calibration without a lens term, which answers by its own covariance.
+- the cameras are those of a calibration without a lens term, to which the others respond by its own covariance.
 
 Where a plainer model is far off, the step is no more than the size of its error.
 """
@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.covariance import by_lens
-from vision.fit.problem import BAR, REACH, Problem, State, bar_axes, bends, curves_of
+from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import Jacobians, Measured, measure
 from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
@@ -38,7 +38,7 @@ LENS_TERMS = {"lens k1 k2": ("k1", "k2"), "lens k3": ("k3",), "lens p1 p2": ("p1
 ALONG = "friction along the whisker"
 # [columns] A layout, no threshold: curvature of the rest shape and its change, across and along
 # the axis.
-_CURVED = [BAR + across + power for across in (0, REST_POWERS) for power in (2, 3)]
+_CURVED = [4 + across + power for across in (0, REST_POWERS) for power in (2, 3)]
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,11 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit that is done. answer (size, size): how its parameters answer observations (see `Uncertainty`)."""
+    """A fit that is done. inverse_normal (size, size): see `Uncertainty`."""
 
     problem: Problem
     state: State
-    answer: np.ndarray
+    inverse_normal: np.ndarray
     measured: Measured
     by: Jacobians
 
@@ -76,14 +76,14 @@ class Fit:
 
     def held(self, rows: np.ndarray, values: np.ndarray) -> LeftOut:
         """With functions of the parameters, whose derivatives are rows (k, size), changed by values (k,)."""
-        told = self.answer @ rows.T
+        told = self.inverse_normal @ rows.T
         return self.after(told @ np.linalg.lstsq(rows @ told, values, rcond=None)[0])
 
     def step(self, residual: np.ndarray) -> np.ndarray:
-        """The step (size,) by which the parameters answer a change (n,) of the first n residuals."""
+        """The step (size,) by which the parameters follow a change (n,) of the first n residuals."""
         linear = linear_at(self.problem, self.state)
         weights = robust_weights(linear, LAST_SCALE)[: len(residual)]
-        return -self.answer @ (linear.jacobian[: len(residual)].T @ (weights * residual))
+        return -self.inverse_normal @ (linear.jacobian[: len(residual)].T @ (weights * residual))
 
 
 def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
@@ -92,10 +92,13 @@ def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut
     return {
         "large bending": _large_bending(fit),
         "bar radius": fit.held(
-            eye[[REACH]], np.array([-fit.problem.rods.bar.radius_mm - vector[REACH]])
+            eye[[fit.problem.blocks.reach.start]],
+            np.array([-fit.problem.rods.bar.radius_mm - vector[fit.problem.blocks.reach.start]]),
         ),
         "psi": fit.held(fit.by.whisk["psi"][None], -np.atleast_1d(fit.measured.whisk["psi"])),
-        ALONG: fit.held(eye[[fit.problem.pull]], -vector[[fit.problem.pull]]),
+        ALONG: fit.held(
+            eye[[fit.problem.blocks.friction.start]], -vector[[fit.problem.blocks.friction.start]]
+        ),
         "taper": _taper(fit),
         "sag and set": fit.held(eye[_CURVED], -vector[_CURVED]),
         **{name: _lens(fit, terms) for name, terms in LENS_TERMS.items()},
@@ -131,7 +134,11 @@ def _small_angles(
     along = curves.tangents @ rotation_z(problem.motor_rad)
     turn = np.linalg.norm(bends(problem, state.vector), axis=-1)[:, None]
     here = bend_growth(
-        turn, state.vector[problem.pull], curves.arc_mm, state.arcs_mm[:, None], problem.wire
+        turn,
+        state.vector[problem.blocks.friction.start],
+        curves.arc_mm,
+        state.arcs_mm[:, None],
+        problem.wire,
     )
     there = tangent_growth(curves.arc_mm, arcs_mm[:, None], problem.wire)
     slope = there - np.sinc(turn * here / np.pi) * here
@@ -186,12 +193,15 @@ def _lens(fit: Fit, terms: Sequence[str]) -> LeftOut:
     free = np.diag(cameras.covariance)[all_of_them] > 0
     if np.any(values[~free]):
         return LeftOut(
-            NAN, NAN, NAN, "the cameras are taken as exact, and do not tell what else would answer"
+            NAN,
+            NAN,
+            NAN,
+            "the cameras are taken as exact, and do not tell what else would answer",
         )
     rows = all_of_them[free]
     told = cameras.covariance[:, rows]
     moved = -told @ np.linalg.lstsq(told[rows], values[free], rcond=None)[0]
-    return fit.after(by_lens(fit.problem, fit.state, fit.answer) @ moved)
+    return fit.after(by_lens(fit.problem, fit.state, fit.inverse_normal) @ moved)
 
 
 def _one_sided(fit: Fit, light: Mapping[str, WireAppearance]) -> LeftOut:

@@ -57,7 +57,9 @@ def inflated_by_residuals(problem: Problem, state: State, least_shared: float = 
         for one in problem.seen
     ]
     return replace(
-        problem, seen=seen, alike=[(one.along - 1.0) / (one.along + 1.0) for one in scatter]
+        problem,
+        seen=seen,
+        neighbour_correlation=[(one.along - 1.0) / (one.along + 1.0) for one in scatter],
     )
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import REACH, Problem, bar_axis, rest_shape, shift_at_mm
+from vision.fit.problem import Problem, bar_axis, rest_shape, shift_at_mm
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import Axis, clearance
 from vision.geometry.rods import Rods
@@ -48,9 +48,9 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
 
     def gap(motor_rad):
         there = replace(axis, point_mm=axis.point_mm + shift_at_mm(problem, vector, motor_rad))
-        return _gap(rest, motor_rad, there, vector[..., REACH], problem.rods)
+        return _gap(rest, motor_rad, there, vector[..., problem.blocks.reach.start], problem.rods)
 
-    rest = rest_shape(vector)
+    rest = rest_shape(problem, vector)
     ends = np.min(problem.motor_rad), np.max(problem.motor_rad)
     if problem.is_rounded:
         ends = _about_touch(problem, vector)
@@ -72,7 +72,11 @@ def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:
     low, high = float(np.min(problem.motor_rad)), float(np.max(problem.motor_rad))
     angles = np.linspace(low, high, 2 + int((high - low) / _SCAN_RAD))
     gaps, _, _ = _gap(
-        rest_shape(first), angles, bar_axis(problem, first), first[REACH], problem.rods
+        rest_shape(problem, first),
+        angles,
+        bar_axis(problem, first),
+        first[problem.blocks.reach.start],
+        problem.rods,
     )
     touches = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
     return (angles[touches[0]], angles[touches[0] + 1]) if len(touches) else (low, high)
@@ -85,7 +89,7 @@ def touch_and_sigma(
 
     answer (size, size): covariance that the fit gives.
     """
-    geometry = np.r_[: REACH + 1, problem.bar_moves]
+    geometry = np.append(np.arange(problem.blocks.reach.start + 1), problem.blocks.placement)
     here = float(first_touch(problem, vector).motor_rad)
     moved = first_touch(problem, vector + _STEP * np.eye(len(vector))[geometry]).motor_rad
     slope = (moved - here) / _STEP

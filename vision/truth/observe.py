@@ -265,7 +265,7 @@ def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut
     fit = Fit(
         fitted.problem,
         fitted.state,
-        fitted.uncertainty.answer,
+        fitted.uncertainty.inverse_normal,
         fitted.measured,
         fitted.by_parameter,
     )

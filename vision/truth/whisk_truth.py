@@ -7,8 +7,6 @@ import numpy as np
 
 from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
 from vision.fit.problem import (
-    BAR,
-    REST,
     Problem,
     State,
     bar_axis,
@@ -111,7 +109,7 @@ def _fitted_by(
         look = _Look(
             upward(bar_axis(problem, state.vector)),
             shifts_mm(problem, state.vector),
-            rest_shape(state.vector),
+            rest_shape(problem, state.vector),
             bends(problem, state.vector),
             state.arcs_mm,
             _fitted_curves(problem, state, whisk.frames),
@@ -203,7 +201,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     problem, state, wire = fitted.problem, fitted.state, whisk.rods.wire
     touched = {f for f, bent in zip(fitted.frames, problem.bent) if bent}
     whisk = whisk.during([f for f in whisk.frames if f not in touched])
-    rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
+    rest, axis = rest_shape(problem, state.vector), bar_axis(problem, state.vector)
     curves = {
         f: one_curve(rest, np.zeros(2), wire.length_mm, angle, wire)
         for f, angle in whisk.motor.items()
@@ -239,9 +237,9 @@ def _blurs_px(whisk: WhiskPictures) -> dict[str, float]:
 
 def _begin(problem: Problem, look: _Look) -> State:
     vector = np.zeros(problem.size)
-    vector[BAR : BAR + REST] = np.ravel(look.rest_mm)
+    vector[problem.blocks.rest_shape.slice] = np.ravel(look.rest_mm)
     if problem.motion is not None and problem.motion.from_touch:
-        vector[problem.bar_moves] = problem.motion.values(look.came_mm)
+        vector[problem.blocks.motion.slice] = problem.motion.values(look.came_mm)
     vector[problem.first_bend :] = look.bend_rad[problem.bent].ravel()
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 
