@@ -134,7 +134,7 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
     curves = {
         f: one_curve(rest, b, a, m, wire) for (f, m), b, a in zip(whisk.motor.items(), bend, arcs)
     }
-    came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.told_mm
+    came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
     if whisk.gives is not None:
         came = _given_way(whisk, list(curves.values()), touching)
         first = int(np.argmax(touching))

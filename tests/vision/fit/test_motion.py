@@ -9,7 +9,7 @@ import pytest
 
 from tests.scenes.model_scenes import begun, scene, with_points
 from vision.fit.bend_onset import Onset
-from vision.fit.motion import Gives, Motion, Told, Yielding, between
+from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding, between
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import measure
 from vision.fit.solve import linearise, solve
@@ -20,7 +20,7 @@ VELOCITY = np.array([1.0, 2.0, -1.5])
 
 def moving(frames=6):
     """A bar at constant velocity, frames 0.09 s apart, counted from the fourth."""
-    return Motion.steady(Told(VELOCITY, 0.5, 0.27), 0.09 * np.arange(frames))
+    return Motion.steady(StatedVelocity(VELOCITY, 0.5, 0.27), 0.09 * np.arange(frames))
 
 
 @cache
