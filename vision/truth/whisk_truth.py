@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
+from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
 from vision.fit.problem import (
     Problem,
     State,
@@ -149,7 +149,8 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
     is seen to swing."""
     axis = whisk.bar.axis
     sights = [
-        Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views
+        SwingPictures.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm)
+        for view in whisk.views
     ]
     free = np.array(whisk.frames)[early(whisk.angles_rad)]
     rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
