@@ -134,7 +134,9 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit what one frame adds to the shape's offsets and slopes (4,), with its covariance (4, 4)."""
+    """Fit what one frame adds to the shape's offsets and slopes (4,), with its
+    covariance (4, 4).
+    """
     J = np.concatenate([r.by_rest[:, _LINE] for r in rows])
     residual = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
     covariance = np.linalg.inv(J.T @ J)

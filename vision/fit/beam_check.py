@@ -95,8 +95,9 @@ class BeamCheck:
         change = scale * (moved.spline - moved.beam)
         by = f"{change:+.4f} ± {scale * moved.difference_sigma:.4f} {unit}"
         return (
-            f"the wire does not bend as a beam with a point load (chance {self.chance:.1g}): by a spline {what} is "
-            f"{by} from the beam's, {abs(moved.shift):.1f} of its stated sigma; check the whisker's shape, its clamp, "
+            "the wire does not bend as a beam with a point load "
+            f"(chance {self.chance:.1g}): by a spline {what} is {by} from the beam's, "
+            f"{abs(moved.shift):.1f} of its stated sigma; check the whisker's shape, its clamp, "
             "and its shaft for joints"
         )
 

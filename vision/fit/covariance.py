@@ -138,7 +138,9 @@ def _placement_variance(
 
 @lru_cache(maxsize=1)
 def camera_rows(problem: Problem, state: State) -> np.ndarray:
-    """Return derivatives (n, 15 cameras) of the line points' residuals by the cameras' parameters."""
+    """Return derivatives (n, 15 cameras) of the line points' residuals by the cameras'
+    parameters.
+    """
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     return np.concatenate([_by_cameras(problem, seen, state, curves) for seen in problem.seen])
 

@@ -27,8 +27,8 @@ from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 # [px] Length of a piece of the wire in this first pass. Set by eye. Study: thresholds.py
 # fit.first_bends _PIECE_PX ….
 _PIECE_PX = 16
-# [px] How far to either side of the place predicted by the last two frames a wire is searched for. Set by
-# eye. Study: thresholds.py fit.first_bends _REACH_PX ….
+# [px] How far to either side of the place predicted by the last two frames a wire is searched for.
+# Set by eye. Study: thresholds.py fit.first_bends _REACH_PX ….
 _REACH_PX = 26
 # [px] From curve to curve that is tried: half of a wire's width. Derived.
 _STEP_PX = 2
@@ -37,7 +37,8 @@ _STEP_PX = 2
 _REST_SIGMAS = 2.0
 # [px] RMS along the wire, from bend to bend that is tried: 2 px at the tip. Derived.
 _BEND_PX = 1.0
-# [frames] More would not make what stands still less noisy: its noise is 0.38 of a frame's. Derived.
+# [frames] More would not make what stands still less noisy: its noise is 0.38 of a frame's.
+# Derived.
 _MEDIAN_OF = 11
 # [rad] A round that moves bends by less is the last: a hundredth of a millimetre at the tip.
 # Derived.
@@ -199,7 +200,9 @@ class _BendModel:
     def linearise(
         self, bend: np.ndarray, seen: Sequence[LinePoints]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return distances (n,) in px of one bend (2,), and their derivatives (n, 2) by the bend."""
+        """Return distances (n,) in px of one bend (2,), and their derivatives (n, 2) by the
+        bend.
+        """
         px = self.px(bend + _STEP_RAD * np.eye(3, 2, -1), seen)  # (3, n)
         moved = np.stack([px[1], px[2]], axis=1)
         return px[0], (moved - px[0][:, None]) / _STEP_RAD

@@ -74,7 +74,9 @@ class Motion:
         return len(self.sigma)
 
     def shift_mm(self, values: np.ndarray) -> np.ndarray:
-        """Return how far (…, f, 3) the bar is from where its axis is counted, by parameters (…, k)."""
+        """Return how far (…, f, 3) the bar is from where its axis is counted, by parameters
+        (…, k).
+        """
         return self.expected_mm + np.einsum("...k,kfi->...fi", values, self.per_unit)
 
 

@@ -115,7 +115,9 @@ class _Observations:
         return self.jacobian * others[:, None]
 
     def spread(self, rows: np.ndarray) -> np.ndarray:
-        """Return the covariance (k, k) of rows (k, n) times the errors of observations and cameras."""
+        """Return the covariance (k, k) of rows (k, n) times the errors of observations and
+        cameras.
+        """
         by_camera = rows @ self.by_camera
         by_noise = times_residual_covariance(self.problem, rows) @ rows.T
         return by_noise + by_camera @ self.problem.cameras.covariance @ by_camera.T

@@ -131,7 +131,9 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Parameters in one vector, with the contact arcs (f,) from which the next evaluation starts."""
+    """Parameters in one vector, with the contact arcs (f,) from which the next evaluation
+    starts.
+    """
 
     vector: np.ndarray
     arcs_mm: np.ndarray
@@ -169,7 +171,9 @@ def bar_axes(problem: Problem, vector: np.ndarray) -> Axis:
 
 
 def shift_at_mm(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
-    """Return how far (…, 3) the bar is from `bar_axis` as the motor passes angles (…) up to touch."""
+    """Return how far (…, 3) the bar is from `bar_axis` as the motor passes angles (…) up to
+    touch.
+    """
     if problem.motion is None or problem.motion.from_touch:
         return np.zeros(3)
     return between(problem.motor_rad, shifts_mm(problem, vector), motor_rad)

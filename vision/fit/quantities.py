@@ -24,7 +24,8 @@ from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, bar_at, clearance, contact_frame_angles
 
-# [rounds] Of Newton's method for the virtual point; the resting whisker is nearly straight. Derived.
+# [rounds] Of Newton's method for the virtual point: the resting whisker is nearly straight.
+# Derived.
 _ROUNDS = 3
 
 
@@ -145,7 +146,9 @@ class Jacobians:
 
 
 def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
-    """Return all quantities and their derivatives by finite differences, all frames' bends at once."""
+    """Return all quantities and their derivatives by finite differences, all frames' bends at
+    once.
+    """
     vectors, moves = perturbed(problem, state.vector, reach=True)
     values = measure(problem, vectors, state.arcs_mm)
     here = values.one(0)

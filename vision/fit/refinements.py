@@ -4,9 +4,10 @@ all.
 A refinement is left out in one of three ways, each of which the fit follows by its own normal
 equations, JᵀWJ:
 
-- a parameter, or a function of them, is held at what the plainer model has there (a least-squares fit
-  with an equality constraint; Björck, Numerical Methods for Least Squares Problems, SIAM 1996, 5.1);
-- lines or centrelines are predicted elsewhere, which changes residuals, and slip or touch directly, too;
+- a parameter, or a function of them, is held at what the plainer model has there (a least-squares
+  fit with an equality constraint; Björck, Numerical Methods for Least Squares Problems, SIAM 1996,
+  5.1);
+- lines or centrelines are predicted elsewhere, which changes residuals, and slip or touch directly;
 - the cameras are those of a calibration without a lens term, by its own covariance.
 
 Where a plainer model is far off, the step is no more than the size of its error.

@@ -92,7 +92,9 @@ def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
 
 
 def _of_wire(problem: Problem, values: Sequence, camera: int) -> list:
-    """Select of values, one for each observation, those of the wire in one camera, frame by frame."""
+    """Select of values, one for each observation, those of the wire in one camera, frame by
+    frame.
+    """
     is_own = [seen.camera == camera and seen.frame >= 0 for seen in problem.seen]
     return [value for value, own in zip(values, is_own) if own]
 
@@ -103,7 +105,9 @@ def _sigma_px(residuals: Sequence[np.ndarray]) -> float:
 
 
 def _scatter(problem: Problem, residuals: Sequence[np.ndarray], camera: int) -> PointScatter:
-    """Return the scatter of one camera's wire points, by the residuals (n,) px of all observations."""
+    """Return the scatter of one camera's wire points, by the residuals (n,) px of all
+    observations.
+    """
     own = _of_wire(problem, residuals, camera)
     sigma = _sigma_px(own)
     if sigma == 0.0:

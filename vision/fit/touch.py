@@ -1,4 +1,6 @@
-"""First touch as the pictures show it: the motor angle at which the unbent whisker reaches the bar."""
+"""First touch as the pictures show it: the motor angle at which the unbent whisker reaches the
+bar.
+"""
 
 from dataclasses import dataclass, replace
 

@@ -11,8 +11,8 @@ from vision.fit.problem import Problem, State, bends
 from vision.fit.touch import FEWEST_FREE, frames_by_touch
 from vision.geometry.refusals import Refused
 
-# [rad] An onset with a larger sigma leaves no truth: one known to 2.4° had free frames touch, and the
-# bar 10 mm off. Study: coverage.py alone.
+# [rad] An onset with a larger sigma leaves no truth: one known to 2.4° had free frames touch, and
+# the bar 10 mm off. Study: coverage.py alone.
 _MOST_ONSET_RAD = np.radians(0.5)
 
 
@@ -34,12 +34,14 @@ def touch_by_onset(problem: Problem, state: State, covariance: np.ndarray) -> tu
     begins = onset(problem.motor_rad, values, variances)
     if begins is None:
         raise Refused(
-            "no bend of the whisker is seen: it never touches, or bends along the sight of all cameras"
+            "no bend of the whisker is seen: it never touches, or bends along the sight of all "
+            "cameras"
         )
     if begins.sigma_rad > _MOST_ONSET_RAD:
         raise Refused(
-            f"when the whisker begins to bend is known to {np.degrees(begins.sigma_rad):.1f} deg only, "
-            f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known"
+            "when the whisker begins to bend is known to "
+            f"{np.degrees(begins.sigma_rad):.1f} deg only, {np.degrees(_MOST_ONSET_RAD):g} is "
+            "allowed: which frames touch is not known"
         )
     touching, free = frames_by_touch(problem.motor_rad, begins.motor_rad, 0.5 * begins.sigma_rad)
     if np.sum(free) < FEWEST_FREE:
