@@ -17,7 +17,7 @@ from bench.plan.sight import (
 )
 from bench.plan.staged import Staged
 from vision.fit.line_noise import LineNoise
-from vision.fit.problem import BAR, REST, Problem, State
+from vision.fit.problem import Problem, State
 from vision.fit.solve import weighted_jacobian
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import is_before
@@ -113,7 +113,7 @@ def _fitted(
         touches,
         touches,
         seen,
-        alike=alike,
+        neighbour_correlation=alike,
     )
     by_edges = any(one.side for one in seen)
     few = by_edges and len({one.camera for one in seen if one.frame >= 0}) < 2
@@ -131,7 +131,7 @@ def _answer(problem: Problem, state: State) -> np.ndarray:
 def state_of(problem: Problem, staged: Staged, frames: Sequence[int]) -> State:
     """The parameters as staged."""
     vector = np.zeros(problem.size)
-    vector[BAR : BAR + REST] = np.ravel(staged.rest_mm)
+    vector[problem.blocks.rest_shape.slice] = np.ravel(staged.rest_mm)
     vector[problem.first_bend :] = staged.bend_rad[frames][problem.bent].ravel()
     return State(vector, staged.arc_mm[frames])
 

@@ -9,11 +9,11 @@ import numpy as np
 from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import SeenTrial, SeenWhisk
-from vision.fit.problem import REST_PRIOR_MM
+from vision.fit.blocks import REST_PRIOR_MM
 from vision.pictures.others import Others, RodLines
 
 _MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
-# mm: as far as a wire is looked for, two sigma of what is believed of a clamp (`vision.fit.problem`).
+# mm: as far as a wire is looked for, two sigma of what is believed of a clamp (`vision.fit.blocks`).
 _MOST_BESIDE_MM = 2.0 * float(REST_PRIOR_MM[0])
 
 

@@ -48,7 +48,7 @@ def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7, motion=None):
     problem = Problem(CAMERAS, RODS, axis, motor, touching, touching, [], motion=motion)
     vector = np.zeros(problem.size)
     vector[4:12] = [0.05, 0.1, -0.2, 0.0, -0.05, 0.1, -0.3, 0.0]
-    vector[problem.bar_moves] = 0.1
+    vector[problem.blocks.motion.slice] = 0.1
     state = State(vector, np.full(frames, d_x))
     return problem, _bent_until_touching(problem, state)
 

@@ -1,19 +1,19 @@
-"""The whisker's base on each frame of a free stroke, as a line in space: `calibration.place` learns the rig from it.
+"""The whisker's base on each frame of a free stroke, as a line in space: `calibration.place` learns
+the rig from it.
 
-Two fits to the line points of the frames before touch, away from the hub. One gives the shape at rest, of which only
-what is straight counts here; how far a whole traced line may be off, and wander along the wire, enters as nuisances,
-because it is the same in all frames and no average makes it smaller. The other gives how far each frame by itself lies
-from that: offset and slope, y and z. In the hub's frame, lengths in mm, slopes in mm at the tip.
+Two fits to the line points of the frames before touch, away from the hub. One gives the shape at
+rest, of which only what is straight counts here; how far a whole traced line may be off, and wander
+along the wire, enters as nuisances, because it is the same in all frames and no average makes it
+smaller. The other gives how far each frame by itself lies from that: offset and slope, y and z. In
+the hub's frame, lengths in mm, slopes in mm at the tip.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.blocks import REST_PRIOR_MM
 from vision.fit.problem import (
-    BAR,
-    REST,
-    REST_PRIOR_MM,
     WANDER_PX,
     Problem,
     State,
@@ -42,10 +42,17 @@ _DRIFT_PER_RAD = 0.5
 _FEWEST_POINTS = 8
 
 
+# [parameters] Of the rest shape. A layout, no threshold.
+_REST = 2 * REST_POWERS
+
+
 @dataclass(frozen=True)
 class _Rows:
-    """Line points of one camera in one frame: residual (n,) about a straight whisker, by rest shape (n, 8) and by
-    nuisances (n, m), all over their sigma."""
+    """Line points of one camera in one frame, over their sigma.
+
+    residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m): its derivatives by
+    rest shape and nuisances.
+    """
 
     frame: int
     residual: np.ndarray
@@ -54,89 +61,100 @@ class _Rows:
 
 
 def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | None:
-    """Lines of the frames before touch. lens (size, size): what the cameras' uncertainty adds to the fit's parameters.
+    """Return the whisker's base as a line in each frame before touch.
 
+    lens (size, size): what the cameras' uncertainty adds to the covariance of the fit's parameters.
     None where fewer than two frames are free and well seen.
     """
     rows = _free_rows(problem, state)
-    frames = [f for f in sorted({r.frame for r in rows}) if _count(rows, f) >= _FEWEST_POINTS]
+    frames = []
+    for frame in sorted({r.frame for r in rows}):
+        if sum(len(r.residual) for r in rows if r.frame == frame) >= _FEWEST_POINTS:
+            frames.append(frame)
     if len(frames) < 2:
         return None
     shape, covariance = _shape_at_rest(rows)
-    covariance = covariance + lens[BAR : BAR + REST, BAR : BAR + REST]
-    motor, length = problem.motor_rad[frames], problem.wire.length_mm
-    lines = [
-        _in_space(shape[_LINE], *_own_line([r for r in rows if r.frame == f], shape), m, length)
-        for f, m in zip(frames, motor)
-    ]
-    return BaseLines(
-        motor, *map(np.array, zip(*lines)), _shared(covariance, float(motor.mean()), length)
-    )
-
-
-def _count(rows: list[_Rows], frame: int) -> int:
-    return sum(len(r.residual) for r in rows if r.frame == frame)
+    own = problem.blocks.rest_shape.slice
+    covariance = covariance + lens[own, own]
+    motor_rad = problem.motor_rad[frames]
+    length_mm = problem.wire.length_mm
+    lines = []
+    for frame, angle in zip(frames, motor_rad):
+        step, spread = _own_line([r for r in rows if r.frame == frame], shape)
+        lines.append(_in_space(shape[_LINE] + step, spread, angle, length_mm))
+    point, point_spread, direction, direction_spread = map(np.array, zip(*lines))
+    shared = _shared(covariance, float(motor_rad.mean()), length_mm)
+    return BaseLines(motor_rad, point, point_spread, direction, direction_spread, shared)
 
 
 def _free_rows(problem: Problem, state: State) -> list[_Rows]:
+    """Return the rows of the wire in all frames that do not bend."""
     linear = linear_at(problem, state)
-    return [
-        _rows_of(problem, seen, state, linear.residual[rows], linear.jacobian[rows])
-        for seen, rows in point_rows(problem)
-        if seen.frame >= 0 and not problem.bent[seen.frame]
-    ]
+    found = []
+    for seen, rows in point_rows(problem):
+        if seen.frame >= 0 and not problem.bent[seen.frame]:
+            found.append(
+                _rows_of(problem, seen, state, linear.residual[rows], linear.jacobian[rows])
+            )
+    return found
 
 
-def _rows_of(problem: Problem, seen: Observed, state: State, residual, jacobian) -> _Rows:
-    """Without the offsets that the whole fit gave the line, and counted from a straight whisker in its place."""
+def _rows_of(
+    problem: Problem, seen: Observed, state: State, residual: np.ndarray, jacobian: np.ndarray
+) -> _Rows:
+    """Return the rows of one observation, without the offsets that the whole fit gave the line, and
+    counted from a straight whisker in its place."""
     clear = seen.points.place > _CLEAR_OF_HUB_MM
-    offsets = problem.wire_off(seen.camera)
-    by_rest = jacobian[:, BAR : BAR + REST]
-    away = (
-        residual
-        - jacobian[:, offsets] @ state.vector[offsets]
-        - by_rest @ state.vector[BAR : BAR + REST]
-    )
+    offsets = problem.blocks.wire_offsets[seen.camera].slice
+    rest = problem.blocks.rest_shape.slice
+    by_rest = jacobian[:, rest]
+    by_offsets = jacobian[:, offsets] @ state.vector[offsets]
+    straight = residual - by_offsets - by_rest @ state.vector[rest]
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
-    return _Rows(seen.frame, away[clear], by_rest[clear], nuisance[clear])
+    return _Rows(seen.frame, straight[clear], by_rest[clear], nuisance[clear])
 
 
 def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
-    """Of each camera a shift of the whole line and hats along the wire, px: (n, cameras · (1 + knots))."""
+    """Return of each camera a shift of the whole line and interpolation weights along the wire, px:
+    (n, cameras · (1 + knots))."""
     own = np.column_stack([np.ones(len(seen.points)), wandering(problem, seen)])
     return np.kron(np.arange(len(problem.cameras)) == seen.camera, own)
 
 
 def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
-    """Rest shape (8,) and its covariance."""
+    """Fit the rest shape (8,) with its covariance."""
     J = np.concatenate([np.hstack([r.by_rest, r.by_nuisance]) for r in rows])
-    bent = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
-    prior = np.concatenate([bent, bent, np.full(J.shape[1] - REST, WANDER_PX)])
+    residual = np.concatenate([r.residual for r in rows])
+    rest_sigma = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
+    nuisance_sigma = np.full(J.shape[1] - _REST, WANDER_PX)
+    prior = np.concatenate([rest_sigma, rest_sigma, nuisance_sigma])
     covariance = np.linalg.inv(J.T @ J + np.diag(prior**-2.0))
-    solution = -covariance @ (J.T @ np.concatenate([r.residual for r in rows]))
-    return solution[:REST], covariance[:REST, :REST]
+    solution = -covariance @ (J.T @ residual)
+    return solution[:_REST], covariance[:_REST, :_REST]
 
 
 def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What one frame adds to the shape's offsets and slopes (4,), with its covariance (4, 4)."""
+    """Fit what one frame adds to the shape's offsets and slopes (4,), with its
+    covariance (4, 4).
+    """
     J = np.concatenate([r.by_rest[:, _LINE] for r in rows])
-    left = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
+    residual = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
     covariance = np.linalg.inv(J.T @ J)
-    return -covariance @ (J.T @ left), covariance
+    return -covariance @ (J.T @ residual), covariance
 
 
 def _in_space(
-    shape: np.ndarray, step: np.ndarray, covariance: np.ndarray, motor_rad: float, length_mm: float
-):
-    """Point, its covariance, direction and its covariance, of offsets and slopes shape + step.
+    line: np.ndarray, covariance: np.ndarray, motor_rad: float, length_mm: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return point, its covariance, direction and its covariance of offsets and slopes (4,).
 
     The point is taken where offset and slope err independently of each other.
     """
     place = -np.trace(covariance[:2, 2:]) / np.trace(covariance[2:, 2:])  # in lengths
     R = rotation_z(motor_rad)
     to_place = np.hstack([np.eye(2), place * np.eye(2)])
-    point = np.append(place * length_mm, to_place @ (shape + step))
-    direction = np.append(1.0, (shape + step)[2:] / length_mm)
+    point = np.append(place * length_mm, to_place @ line)
+    direction = np.append(1.0, line[2:] / length_mm)
     spread = np.zeros((2, 3, 3))
     spread[0, 1:, 1:] = to_place @ covariance @ to_place.T
     spread[1, 1:, 1:] = covariance[2:, 2:] / length_mm**2
@@ -145,19 +163,24 @@ def _in_space(
 
 
 def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.ndarray:
-    """What the rest shape's covariance lets all lines turn and shift alike, (6, 6): w rad, v mm at the base.
+    """Return the covariance (6, 6) with which all lines turn and shift in common: w rad, v mm at
+    the base.
 
-    An offset shifts the base; a slope in y turns it about z, one in z about −y. An offset in y that changes as the
-    whisker turns shifts the base along it; one in z passes for an axis that leans about the whisker.
+    covariance (8, 8): of the rest shape. An offset shifts the base; a slope in y turns it about z,
+    one in z about −y. An offset in y that changes as the whisker turns shifts the base along it;
+    one in z passes for an axis that leans about the whisker.
     """
     hub = np.zeros((6, 4))
-    hub[4, 0] = hub[5, 1] = 1.0
-    hub[2, 2], hub[1, 3] = 1.0 / length_mm, -1.0 / length_mm
-    to_rig = np.kron(np.eye(2), rotation_z(motor_rad)) @ hub
-    along = np.append(np.zeros(3), rotation_z(motor_rad)[:, 0])
+    hub[4, 0] = 1.0
+    hub[5, 1] = 1.0
+    hub[2, 2] = 1.0 / length_mm
+    hub[1, 3] = -1.0 / length_mm
+    R = rotation_z(motor_rad)
+    to_rig = np.kron(np.eye(2), R) @ hub
+    along = np.append(np.zeros(3), R[:, 0])
     lean = np.append(along[3:], np.zeros(3)) / (0.5 * length_mm)
-    drift = [
-        _DRIFT_PER_RAD**2 * covariance[k, k] * np.outer(way, way)
-        for k, way in zip(_LINE[:2], (along, lean))
-    ]
-    return to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T + sum(drift)
+    shared = to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T
+    drift = np.zeros((6, 6))
+    for k, motion in zip(_LINE[:2], (along, lean)):
+        drift += _DRIFT_PER_RAD**2 * covariance[k, k] * np.outer(motion, motion)
+    return shared + drift

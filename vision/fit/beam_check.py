@@ -1,15 +1,17 @@
-"""Is the wire bent as a beam with a point load? Its curve once more, the shape of the bend left free.
+"""Is the wire bent as a beam with a point load? Its curve once more, the shape of the bend left
+free.
 
-The fit believes that all deflection is that of a clamped rod of the stated profile under one force. Here, on the same
-line points with the same sigmas, the deflection of each frame may depart from the beam's by a spline along the wire, in
-mm for each rad of the frame's bend. What gives way with the load (a softer or tapering shaft, a joint, the clamp)
-departs so, the same in all frames and, in a round rod, in both directions across: so one spline serves, and all frames
-tell it. At the base it is zero and has any slope, which is the clamp's giving way. What lines of free and of touching
+The fit believes that all deflection is that of a clamped rod of the stated profile under one force.
+Here, on the same line points with the same sigmas, the deflection of each frame may depart from the
+beam's by a spline along the wire, in mm for each rad of the frame's bend. What gives way with the
+load (a softer or tapering shaft, a joint, the clamp) departs so, the same in all frames and, in a
+round rod, in both directions across: so one spline serves, and all frames determine it. At the base
+it is zero and has any slope, which is the clamp's giving way. What lines of free and of touching
 frames show alike is no bend: each camera's lines may wander along the wire.
 
-The departure is small, so one linear step from the fit's solution does. Where the beam is right, what the step moves
-has mean 0 and a covariance that follows from those of line points and cameras, and its square over that covariance is
-a chi² (the test of Hausman, Econometrica 46, 1251, 1978).
+The departure is small, so one linear step from the fit's solution does. Where the beam is right,
+what the step moves has mean 0 and a covariance that follows from those of line points and cameras,
+and its square over that covariance is a chi² (the test of Hausman, Econometrica 46, 1251, 1978).
 """
 
 from dataclasses import dataclass
@@ -42,7 +44,9 @@ _NAMES = ("d_x", "touch", "slip")
 
 @dataclass(frozen=True)
 class Compared:
-    """A quantity by the beam and by the spline, the sigma of their difference, and that stated for the beam's."""
+    """A quantity by the beam and by the spline, the sigma of their difference, and that stated for
+    the beam's.
+    """
 
     beam: float
     spline: float
@@ -51,15 +55,17 @@ class Compared:
 
     @property
     def shift(self) -> float:
-        """The difference in stated sigmas."""
+        """Return the difference in stated sigmas."""
         return (self.spline - self.beam) / self.sigma
 
 
 @dataclass(frozen=True)
 class BeamCheck:
-    """Beam against spline in one whisk: d_x (mm), touch (rad), slip (mm) at the largest pushing angle theta_rad.
+    """Beam against spline in one whisk: d_x (mm), touch (rad), and slip (mm) at the largest pushing
+    angle theta_rad.
 
-    chance: by which a wire that bends as a beam departs from it so far; NaN where the fit is nowhere.
+    chance: by which a wire that bends as a beam departs from it so far; NaN where the fit is
+    nowhere.
     """
 
     d_x: Compared
@@ -70,17 +76,28 @@ class BeamCheck:
 
     @property
     def alarm(self) -> str:
-        """What is wrong, or '': the curves differ by more than chance, and the truth with them by what matters."""
-        worst = max(_NAMES, key=lambda name: abs(getattr(self, name).shift))
-        if not (self.chance <= FALSE_ALARM and abs(getattr(self, worst).shift) >= _MATTERS):
+        """Return what is wrong, or '' where the curves differ by no more than chance, or the truth
+        by less than what matters.
+        """
+        compared = {"d_x": self.d_x, "touch": self.touch, "slip": self.slip}
+        worst = max(_NAMES, key=lambda name: abs(compared[name].shift))
+        moved = compared[worst]
+        if not (self.chance <= FALSE_ALARM and abs(moved.shift) >= _MATTERS):
             return ""
-        moved: Compared = getattr(self, worst)
-        scale, unit = (np.degrees(1.0), "deg") if worst == "touch" else (1.0, "mm")
-        what = f"slip at {np.degrees(self.theta_rad):.1f} deg" if worst == "slip" else worst
-        by = f"{scale * (moved.spline - moved.beam):+.4f} ± {scale * moved.difference_sigma:.4f} {unit}"
+        what = worst
+        scale = 1.0
+        unit = "mm"
+        if worst == "touch":
+            scale = np.degrees(1.0)
+            unit = "deg"
+        if worst == "slip":
+            what = f"slip at {np.degrees(self.theta_rad):.1f} deg"
+        change = scale * (moved.spline - moved.beam)
+        by = f"{change:+.4f} ± {scale * moved.difference_sigma:.4f} {unit}"
         return (
-            f"the wire does not bend as a beam with a point load (chance {self.chance:.1g}): by a spline {what} is "
-            f"{by} from the beam's, {abs(moved.shift):.1f} of its stated sigma; check the whisker's shape, its clamp, "
+            "the wire does not bend as a beam with a point load "
+            f"(chance {self.chance:.1g}): by a spline {what} is {by} from the beam's, "
+            f"{abs(moved.shift):.1f} of its stated sigma; check the whisker's shape, its clamp, "
             "and its shaft for joints"
         )
 
@@ -88,103 +105,125 @@ class BeamCheck:
 def check_beam(
     problem: Problem, state: State, covariance: np.ndarray, measured: Measured, by: Jacobians
 ) -> BeamCheck:
-    """The check of a whisk that touches. covariance (size, size): of the parameters, by the fit and by the cameras."""
+    """Check the beam in a whisk that touches.
+
+    covariance (size, size): of the parameters, by the fit and by the cameras. measured, by: its
+    quantities and their derivatives.
+    """
     last = np.flatnonzero(problem.touching)[-1]
     departure, spread, follows, slip_by = _departure(problem, state, last)
-    gradients = {"d_x": by.whisk["d_x"], "touch": by.whisk["touch"], "slip": by.frame["slip"][last]}
-    values = {
-        "d_x": measured.whisk["d_x"],
-        "touch": measured.whisk["touch"],
-        "slip": measured.frame["slip"][last],
-    }
-    found = {}
-    for name, gradient in gradients.items():
-        row = gradient @ follows + (slip_by if name == "slip" else 0.0)
-        sigma, beam = np.sqrt(gradient @ covariance @ gradient), float(values[name])
-        found[name] = Compared(
-            beam, beam + float(row @ departure), float(np.sqrt(row @ spread @ row)), float(sigma)
-        )
-    theta = float(problem.motor_rad[last] - measured.whisk["touch"])
-    return BeamCheck(**found, theta_rad=theta, chance=_chance(departure, spread))
+
+    def compare(value: float, gradient: np.ndarray, directly: np.ndarray | float) -> Compared:
+        """Return a quantity with gradient (size,) that also changes `directly` (k,) with the
+        departure.
+        """
+        row = gradient @ follows + directly
+        difference_sigma = float(np.sqrt(row @ spread @ row))
+        sigma = float(np.sqrt(gradient @ covariance @ gradient))
+        beam = float(value)
+        return Compared(beam, beam + float(row @ departure), difference_sigma, sigma)
+
+    return BeamCheck(
+        d_x=compare(measured.whisk["d_x"], by.whisk["d_x"], 0.0),
+        touch=compare(measured.whisk["touch"], by.whisk["touch"], 0.0),
+        slip=compare(measured.frame["slip"][last], by.frame["slip"][last], slip_by),
+        theta_rad=float(problem.motor_rad[last] - measured.whisk["touch"]),
+        chance=_chance(departure, spread),
+    )
 
 
-def _chance(departure, spread) -> float:
-    """Of a departure so far from none; 1 where the lines do not tell it, NaN where the fit is nowhere."""
+def _chance(departure: np.ndarray, spread: np.ndarray) -> float:
+    """Return the chance that a beam departs so far; 1 where the lines do not determine it, NaN
+    where the fit is nowhere.
+    """
     if not np.all(np.isfinite(spread)):
         return float("nan")
     square = departure @ np.linalg.pinv(spread, hermitian=True) @ departure
     return float(chdtrc(len(departure), square))
 
 
-def _departure(problem: Problem, state: State, frame: int):
-    """Departure (k,), its covariance (k, k) where the beam is right, what the parameters follow it by (size, k), and
-    the slip in a frame (k,), the parameters standing still."""
+def _departure(
+    problem: Problem, state: State, frame: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Estimate the departure (k,), mm/rad, by one linear step from the fit.
+
+    Returns it, its covariance (k, k) where the beam is right, what the parameters follow it by
+    (size, k), and the slip in a frame (k,), the parameters standing still.
+    """
     linear = linear_at(problem, state)
     root = np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     moves = _moves(problem, state, curves)
-    on_bar, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
-
-    def fill(*parts: np.ndarray) -> np.ndarray:
-        return _filled(len(root), *parts) * root
-
-    own = np.hstack([linear.jacobian * root, fill(_wander_rows(problem))])
+    on_contacts, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
+    of_lines = by_lines(problem, curves, moves)
+    count = len(root)
+    wander = _padded_rows(count, _wander_rows(problem)) * root
+    own = np.hstack([linear.jacobian * root, wander])
     prior = np.eye(own.shape[1])[problem.size :] / WANDER_PX
-    rows, cameras = (
-        fill(by_lines(problem, curves, moves), on_bar),
-        fill(camera_rows(problem, state)),
-    )
-    residual, of_cameras = linear.residual * root[:, 0], problem.cameras.covariance
-    departure, spread, follows = _beside(own, prior, rows, residual, cameras, of_cameras)
+    rows = _padded_rows(count, np.concatenate([of_lines, on_contacts])) * root
+    cameras = _padded_rows(count, camera_rows(problem, state)) * root
+    residual = linear.residual * root[:, 0]
+    covariance = problem.cameras.covariance
+    departure, spread, follows = _beside(own, prior, rows, residual, cameras, covariance)
     return departure, spread, follows[: problem.size], slip_by
 
 
-def _filled(count: int, *parts: np.ndarray) -> np.ndarray:
-    """The parts' rows, and zeros below to so many."""
-    made = np.zeros((count, parts[0].shape[1]))
-    made[: sum(map(len, parts))] = np.concatenate(parts)
-    return made
+def _padded_rows(count: int, rows: np.ndarray) -> np.ndarray:
+    """Return the rows, and zeros below them up to `count` rows."""
+    padded = np.zeros((count, rows.shape[1]))
+    padded[: len(rows)] = rows
+    return padded
 
 
-def _beside(own, prior, rows, residual, cameras, covariance):
-    """What parameters (k,) with Jacobian `rows` (n, k) add to a least-squares problem, solved with Jacobian `own`
-    (n, p) and the rows of `prior` (m, p), whose residuals are 0: their values, their covariance where they are none, by
-    noise and by cameras, and what the p follow them by (p, k)."""
+def _beside(
+    own: np.ndarray,
+    prior: np.ndarray,
+    rows: np.ndarray,
+    residual: np.ndarray,
+    cameras: np.ndarray,
+    covariance: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit parameters (k,) with Jacobian `rows` (n, k) that are added to a least-squares problem.
+
+    It is solved, with residuals 0, by Jacobian `own` (n, p) and the rows of `prior` (m, p). cameras
+    (n, c): derivatives by the cameras' parameters, with their covariance (c, c). Returns the
+    values, their covariance where they are none, by noise and by cameras, and what the p follow
+    them by (p, k).
+    """
     basis, triangle = np.linalg.qr(np.vstack([own, prior]))
-    taken = basis[: len(own)].T @ rows
-    free = rows - basis[: len(own)] @ taken
+    basis = basis[: len(own)]
+    explained = basis.T @ rows
+    free = rows - basis @ explained
     information = rows.T @ free
-    within = np.linalg.inv(information + np.eye(rows.shape[1]) / _DEPARTURE_MM_PER_RAD**2)
+    prior_information = np.eye(rows.shape[1]) / _DEPARTURE_MM_PER_RAD**2
+    within = np.linalg.inv(information + prior_information)
     by_cameras = within @ free.T @ cameras
     spread = within @ information @ within + by_cameras @ covariance @ by_cameras.T
-    return -within @ (free.T @ residual), spread, -np.linalg.solve(triangle, taken)
+    return -within @ (free.T @ residual), spread, -np.linalg.solve(triangle, explained)
 
 
 def _moves(problem: Problem, state: State, curves: Curves) -> Curves:
-    """What a unit of each departure moves the centrelines by: points and tangents (k, f, m, 3) per mm/rad."""
-    from scipy.interpolate import (
-        CubicSpline,
-    )  # with all of scipy.optimize: a look at a session does without
+    """Return how a unit of each departure moves the centrelines: points and tangents (k, f, m, 3)
+    per mm/rad.
+    """
+    # Brings in all of scipy.optimize, which the reading of a session does without.
+    from scipy.interpolate import CubicSpline
 
     knots = np.linspace(0.0, problem.wire.length_mm, KNOTS + 1)
     spline = CubicSpline(knots, np.eye(KNOTS + 1)[:, 1:], bc_type="natural")
-    bent = np.concatenate(
-        [np.zeros((len(problem.motor_rad), 1)), bends(problem, state.vector)], axis=1
-    )
-    way = np.einsum("fij,fj->fi", rotation_z(problem.motor_rad), bent)
-    points, tangents = (
-        np.einsum("mk,fi->kfmi", spline(curves.arc_mm, order), way) for order in (0, 1)
-    )
+    bend = np.zeros((len(problem.motor_rad), 3))
+    bend[:, 1:] = bends(problem, state.vector)
+    direction = np.einsum("fij,fj->fi", rotation_z(problem.motor_rad), bend)
+    points = np.einsum("mk,fi->kfmi", spline(curves.arc_mm, 0), direction)
+    tangents = np.einsum("mk,fi->kfmi", spline(curves.arc_mm, 1), direction)
     return Curves(curves.arc_mm, points, tangents)
 
 
 def _wander_rows(problem: Problem) -> np.ndarray:
-    """Derivatives (n, w) of the line points' residuals by each camera's wandering."""
-    return np.concatenate(
-        [
-            np.kron(np.arange(len(problem.cameras)) == seen.camera, wandering(problem, seen))
-            * (seen.frame >= 0)
-            / seen.points.sigma_px[:, None]
-            for seen in problem.seen
-        ]
-    )
+    """Return derivatives (n, w) of the line points' residuals by each camera's wandering."""
+    rows = []
+    for seen in problem.seen:
+        is_own = np.arange(len(problem.cameras)) == seen.camera
+        by_knot = np.kron(is_own, wandering(problem, seen)) * (seen.frame >= 0)
+        rows.append(by_knot / seen.points.sigma_px[:, None])
+    return np.concatenate(rows)

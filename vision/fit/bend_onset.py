@@ -1,7 +1,8 @@
 """When the whisker begins to bend, as the pictures show it.
 
-Two cameras know bar and whisker in space, and so when they touch. To one camera both may be millimetres off along its
-sight; but that they touch while the whisker bends, and not before, shows in any view that sees it bend.
+Two cameras know bar and whisker in space, and so when they touch. To one camera both may be
+millimetres off along its sight; but that they touch while the whisker bends, and not before, shows
+in any view that sees it bend.
 """
 
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ _CURVED_PER_RAD = 0.1 / np.radians(1.0)
 _WINDOW_RAD = np.radians(4.0)
 # [rad] Between onsets that are tried: a fifth of the least sigma. Derived.
 _STEP_RAD = np.radians(0.02)
-# [rad] Added to an onset's sigma: it was told no better than this. Study: coverage.py alone.
+# [rad] Added to an onset's sigma: it is determined no better than this. Study: coverage.py alone.
 _LEAST_SIGMA_RAD = np.radians(0.1)
 # [frames] Two for a parabola from nothing, and one left over. Derived.
 _FEWEST_BENT = 3
@@ -39,52 +40,65 @@ class Onset:
 
 
 def seen_bend(bend_rad: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of bends (f, 2) with covariance (2 f, 2 f) the component that the pictures tell best: (f,), covariance (f, f)."""
+    """Return the component (f,) of bends (f, 2) that the pictures determine best, and its
+    covariance (f, f).
+
+    covariance (2 f, 2 f): of the bends.
+    """
     frames = len(bend_rad)
     by_frame = covariance.reshape(frames, 2, frames, 2)
-    own = np.linalg.inv(np.einsum("fifj->fij", by_frame))
-    best = np.linalg.eigh(np.sum(own, axis=0))[1][:, -1]
+    information = np.linalg.inv(np.einsum("fifj->fij", by_frame))
+    _, directions = np.linalg.eigh(np.sum(information, axis=0))
+    best = directions[:, -1]
     return bend_rad @ best, np.einsum("i,figj,j->fg", best, by_frame, best)
 
 
 def onset(motor_rad: np.ndarray, bend_rad: np.ndarray, covariance: np.ndarray) -> Onset | None:
-    """From a component of the bend (f,), covariance (f, f), in frames in order of the motor angle: none before the
-    onset, then a parabola. None where fewer than three frames are seen to bend.
+    """Estimate the onset by a component of the bend (f,), in frames in order of the motor angle.
+
+    covariance (f, f). The bend is none before the onset, then a parabola. Returns None where fewer
+    than three frames are seen to bend.
     """
     tries = np.arange(motor_rad[0], motor_rad[-1], _STEP_RAD)
     chi2 = np.array([_misfit(motor_rad, bend_rad, covariance, at) for at in tries])
-    if not np.any(np.isfinite(chi2)) or _chi2_of_none(bend_rad, covariance) < _LEAST_BEND:
+    possible = np.isfinite(chi2)
+    if not np.any(possible) or _chi2_of_none(bend_rad, covariance) < _LEAST_BEND:
         return None
-    best = int(np.argmin(chi2))
-    scatter = max(1.0, chi2[best] / len(motor_rad))
-    weight = np.exp(-0.5 * np.where(np.isfinite(chi2), chi2 - chi2[best], np.inf) / scatter)
+    least = np.min(chi2)
+    scatter = max(1.0, least / len(motor_rad))
+    above = np.where(possible, chi2 - least, np.inf)
+    weight = np.exp(-0.5 * above / scatter)
     mean = float(np.average(tries, weights=weight))
     spread = np.sqrt(np.average((tries - mean) ** 2, weights=weight))
     return Onset(mean, float(np.hypot(spread, _LEAST_SIGMA_RAD)))
 
 
-def _chi2_of_none(bend_rad, covariance) -> float:
-    """How badly no bend at all would fit."""
-    return float(
-        bend_rad @ np.linalg.solve(covariance + np.eye(len(bend_rad)) * _LINE_RAD**2, bend_rad)
-    )
+def _chi2_of_none(bend_rad: np.ndarray, covariance: np.ndarray) -> float:
+    """Return chi² of no bend at all."""
+    whole = covariance + np.eye(len(bend_rad)) * _LINE_RAD**2
+    return float(bend_rad @ np.linalg.solve(whole, bend_rad))
 
 
-def _misfit(motor_rad, bend_rad, covariance, at_rad: float) -> float:
-    """chi² of the best parabola from nothing at an angle; frames far beyond it say nothing."""
+def _misfit(
+    motor_rad: np.ndarray, bend_rad: np.ndarray, covariance: np.ndarray, at_rad: float
+) -> float:
+    """Return chi² of the best parabola from nothing at an angle; a frame far beyond it adds 1.
+
+    Infinite where fewer than three frames come after it.
+    """
     past = motor_rad - at_rad
     near = past < _WINDOW_RAD
     if np.sum(near & (past > 0)) < _FEWEST_BENT:
         return np.inf
-    whole = covariance[np.ix_(near, near)] + np.diag(
-        _LINE_RAD**2 + (_MODEL_SHARE * bend_rad[near]) ** 2
-    )
+    model_variance = _LINE_RAD**2 + (_MODEL_SHARE * bend_rad[near]) ** 2
+    whole = covariance[np.ix_(near, near)] + np.diag(model_variance)
     root = np.linalg.cholesky(whole)
     after = np.clip(past[near], 0.0, None)
     columns = np.linalg.solve(root, np.stack([after, after**2], axis=1))
     wanted = np.linalg.solve(root, bend_rad[near])
     slope = abs(columns[:, 0] @ wanted) / (columns[:, 0] @ columns[:, 0])
-    columns = np.vstack([columns, [0.0, 1.0 / max(slope * _CURVED_PER_RAD, 1e-9)]])
+    curvature_sigma = max(slope * _CURVED_PER_RAD, 1e-9)
+    columns = np.vstack([columns, [0.0, 1.0 / curvature_sigma]])
     wanted = np.append(wanted, 0.0)
     solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
     return float(np.sum((wanted - columns @ solution) ** 2) + np.sum(~near))

@@ -1,15 +1,16 @@
-"""How uncertain a fit is, and by which causes: line points, touching, givens, priors, cameras, the rig's place."""
+"""How uncertain a fit is, and by which causes: line points, touching, givens, priors, cameras, the
+rig's place.
+"""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import correlate1d
 
-from vision.fit.problem import BAR, REST, Problem, State, bar_axis, curves_of, point_rows, shifts_mm
+from vision.fit.problem import Problem, State, bar_axis, curves_of, point_rows, shifts_mm
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
-from vision.geometry.camera import N_PARAMETERS
+from vision.geometry.camera import N_PARAMETERS, Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.grazing import sights_beside
 from vision.geometry.silhouette import grazed
@@ -23,143 +24,173 @@ CAUSES = ("wire", "bar", "touch", "diameters", "light", "priors", "cameras", "pl
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Of the fit's parameters, (size, size) each. answer: (JᵀWJ)⁻¹, by which they answer what observations tell; noise,
-    lens: covariances, by the observations' and priors' own errors and by the cameras'."""
+    """Covariances of the fit's parameters, (size, size) each.
 
-    answer: np.ndarray
+    inverse_normal: (JᵀWJ)⁻¹, the factor of JᵀW in the parameters' sensitivity to observations.
+    noise, lens: covariances, by the observations' and priors' own errors and by the cameras'.
+    """
+
+    inverse_normal: np.ndarray
     noise: np.ndarray
     lens: np.ndarray
 
     @property
     def covariance(self) -> np.ndarray:
-        """All of it."""
+        """Return the whole covariance."""
         return self.noise + self.lens
 
 
-def uncertainty(problem: Problem, state: State, answer: np.ndarray) -> Uncertainty:
-    """What a fit is uncertain by. answer (size, size): what `solve` returns.
+def uncertainty(problem: Problem, state: State, inverse_normal: np.ndarray) -> Uncertainty:
+    """Return the uncertainty of a fit. inverse_normal (size, size): the second result of `solve`.
 
-    Neighbouring line points of the wire err alike: their sigmas are as wide as is right for what changes slowly along
-    the wire, and too wide for what does not, so that their errors are propagated as they are.
+    Neighbouring line points of the wire have correlated errors. Their sigmas are as wide as is
+    right for what changes slowly along the wire, and too wide for what does not, so that the errors
+    are propagated with their correlation.
     """
-    by_row = answer @ weighted_jacobian(problem, state).T
-    by_camera = by_lens(problem, state, answer)
-    return Uncertainty(
-        answer,
-        by_row @ alike(problem, by_row).T,
-        by_camera @ problem.cameras.covariance @ by_camera.T,
-    )
+    by_row = inverse_normal @ weighted_jacobian(problem, state).T
+    by_camera = by_lens(problem, state, inverse_normal)
+    noise = times_residual_covariance(problem, by_row) @ by_row.T
+    lens = by_camera @ problem.cameras.covariance @ by_camera.T
+    return Uncertainty(inverse_normal, noise, lens)
 
 
-def alike(problem: Problem, rows: np.ndarray) -> np.ndarray:
-    """Rows (k, n) of all observations times the covariance of their residuals: 1, but that a point of the wire shares a
-    part of its error with the next one, of that part as much with the one after, and so on, and has a sigma wider by as
-    much as all that makes a mean of them."""
-    found = rows.copy()
+def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:
+    """Return rows (k, n) over all observations times the covariance (n, n) of their residuals.
+
+    It is the unit matrix, but for points of the wire: each shares a part of its error with the next
+    one, of that part as much with the one after, and so on, and has a sigma wider by what all that
+    makes of a mean.
+    """
+    product = rows.copy()
+    if not problem.neighbour_correlation:
+        return product
     for seen, mine in point_rows(problem):
-        if seen.frame >= 0 and problem.alike:
-            shared = problem.alike[seen.camera] ** np.abs(np.arange(-_FARTHEST, _FARTHEST + 1))
-            found[:, mine] = correlate1d(
-                rows[:, mine], shared / shared.sum(), axis=1, mode="constant"
-            )
-    return found
+        if seen.frame >= 0:
+            correlation = problem.neighbour_correlation[seen.camera]
+            shared = correlation ** np.abs(np.arange(-_FARTHEST, _FARTHEST + 1))
+            weights = shared / shared.sum()
+            product[:, mine] = correlate1d(rows[:, mine], weights, axis=1, mode="constant")
+    return product
 
 
-def by_lens(problem: Problem, state: State, answer: np.ndarray) -> np.ndarray:
-    """Derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
+def by_lens(problem: Problem, state: State, inverse_normal: np.ndarray) -> np.ndarray:
+    """Return derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
 
-    They answer a change of the cameras by -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit sees, and with W as in
-    the fit a move of all cameras together moves the whole scene and nothing in it.
+    They are -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit is made of, and with W as in the
+    fit a move of all cameras together moves the whole scene and nothing in it.
     """
     linear = linear_at(problem, state)
     weights = robust_weights(linear, LAST_SCALE)[linear.is_point, None]
-    return -answer @ (linear.jacobian[linear.is_point].T @ (weights * camera_rows(problem, state)))
+    by_camera = weights * camera_rows(problem, state)
+    return -inverse_normal @ (linear.jacobian[linear.is_point].T @ by_camera)
 
 
 def variance_by_cause(
     problem: Problem, state: State, fitted: Uncertainty, gradient: np.ndarray
 ) -> dict[str, float]:
-    """What each cause adds to the variance of a quantity with this gradient (size,); the parts add up to it.
+    """Return the variance that each cause adds to a quantity with this gradient (size,); the parts
+    add up to it.
 
-    wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their sigmas; light: lines
-    off as a whole; priors: those of rest shape and bend; cameras: lenses, and poses towards the rig board;
-    placement: where the rig frame is, by rig board and free strokes (NaN where the cameras do not tell it apart: it is
-    in `cameras` then). What the fit answers to an error is its row times what a parameter answers to rows, so that each
-    observation's part is its own. The placement errs apart from corners and lenses, so that there are no cross-terms.
+    wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their
+    sigmas; light: lines off as a whole; priors: those of rest shape and bend; cameras: lenses, and
+    poses towards the rig board; placement: where the rig frame is, by rig board and free strokes
+    (NaN where the cameras do not distinguish it: it is in `cameras` then). An observation's part is
+    its row's sensitivity times the row's covariance with all others. The placement errs apart from
+    corners and lenses, so that there are no cross-terms.
     """
-    weighed = weighted_jacobian(problem, state)
-    by_row = weighed @ (fitted.answer @ gradient)
-    parts = by_row * alike(problem, by_row[None])[0]
-    on_wire = np.concatenate([np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen])
-    touch = len(on_wire) + int(np.sum(problem.touching))
-    reach = touch + BAR + REST
-    light = slice(reach + 1, touch + problem.bar_moves.start)
-    causes = {
-        "wire": parts[: len(on_wire)][on_wire],
-        "bar": parts[: len(on_wire)][~on_wire],
-        "touch": parts[len(on_wire) : touch],
+    blocks = problem.blocks
+    by_row = weighted_jacobian(problem, state) @ (fitted.inverse_normal @ gradient)
+    parts = by_row * times_residual_covariance(problem, by_row[None])[0]
+    is_wire = [np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen]
+    on_wire = np.concatenate(is_wire)
+    by_point = parts[: len(on_wire)]
+    first_prior = problem.prior_rows.start
+    reach = first_prior + blocks.reach.start
+    behind_light = first_prior + blocks.motion.start
+    variances = {
+        "wire": np.sum(by_point[on_wire]),
+        "bar": np.sum(by_point[~on_wire]),
+        "touch": np.sum(parts[problem.contact_rows]),
         "diameters": parts[reach],
-        "light": parts[light],
-        "priors": [parts[touch:reach].sum(), parts[touch + problem.bar_moves.start :].sum()],
+        "light": np.sum(parts[reach + 1 : behind_light]),
+        "priors": np.sum(parts[first_prior:reach]) + np.sum(parts[behind_light:]),
     }
     whole = float(gradient @ fitted.lens @ gradient)
-    placement = _by_placement(problem, state, fitted.answer, gradient)
-    own = (
-        whole if np.isnan(placement) else max(whole - placement, 0.0)
-    )  # rounding may leave less than nothing
-    parts = {name: float(np.sum(part)) for name, part in causes.items()}
-    return parts | {"cameras": own, "placement": placement}
+    placement = _placement_variance(problem, state, fitted.inverse_normal, gradient)
+    known = 0.0 if np.isnan(placement) else placement
+    variances["cameras"] = max(whole - known, 0.0)  # rounding may leave less than nothing
+    variances["placement"] = placement
+    return {name: float(variance) for name, variance in variances.items()}
 
 
-def _by_placement(problem: Problem, state: State, answer, gradient) -> float:
-    """Variance that the rig frame's placement adds to a quantity; NaN where the cameras do not tell it apart."""
+def _placement_variance(
+    problem: Problem, state: State, inverse_normal: np.ndarray, gradient: np.ndarray
+) -> float:
+    """Return the variance by the rig frame's placement; NaN where the cameras do not distinguish
+    it.
+    """
     cameras = problem.cameras
     if cameras.placement is None:
         return float("nan")
-    by = gradient @ by_lens(problem, state, answer) @ cameras.by_placement
-    return float(by @ cameras.placement @ by)
+    by_placement = gradient @ by_lens(problem, state, inverse_normal) @ cameras.by_placement
+    return float(by_placement @ cameras.placement @ by_placement)
 
 
 @lru_cache(maxsize=1)
 def camera_rows(problem: Problem, state: State) -> np.ndarray:
-    """Derivatives (n, 15 cameras) of the line points' residuals by the cameras' parameters."""
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
-    return np.concatenate(
-        [_by_cameras(problem, seen, _on_rod(problem, seen, state, curves)) for seen in problem.seen]
-    )
-
-
-def _by_cameras(problem: Problem, seen: Observed, on_rod_mm: Sequence[np.ndarray]) -> np.ndarray:
-    """Derivatives (n, 15 cameras) of one camera's residuals by the cameras' parameters: means over its points (n, 3).
-
-    Sights graze a rod's edge, so that what moves the point where they do so does not move the edge.
+    """Return derivatives (n, 15 cameras) of the line points' residuals by the cameras'
+    parameters.
     """
-    points, camera = seen.points, problem.cameras.cameras[seen.camera]
-    by_camera = np.mean([camera.project_with_jacobians(one)[2] for one in on_rod_mm], axis=0)
+    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
+    return np.concatenate([_by_cameras(problem, seen, state, curves) for seen in problem.seen])
+
+
+def _by_cameras(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
+    """Return derivatives (n, 15 cameras) of one observation's residuals by the cameras' parameters.
+
+    They are means over the points in space that its line points show. Sights graze a rod's edge, so
+    that what moves the point where they do so does not move the edge.
+    """
+    points = seen.points
+    camera = problem.cameras.cameras[seen.camera]
+    each = []
+    for on_rod_mm in _on_rod(problem, seen, state, curves):
+        _, _, by_parameter = camera.project_with_jacobians(on_rod_mm)
+        each.append(by_parameter)
+    by_camera = np.mean(each, axis=0)  # (n, 2, 15) px
     rows = np.zeros((len(points), N_PARAMETERS * len(problem.cameras)))
     first = N_PARAMETERS * seen.camera
-    rows[:, first : first + N_PARAMETERS] = (
-        np.einsum("ni,nij->nj", points.normal, by_camera) / points.sigma_px[:, None]
-    )
+    across_px = np.einsum("ni,nij->nj", points.normal, by_camera)
+    rows[:, first : first + N_PARAMETERS] = across_px / points.sigma_px[:, None]
     return rows
 
 
 def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> list[np.ndarray]:
-    """Points (n, 3) that line points are pictures of: of the wire's axis, of the bar's edge, or of both its edges."""
+    """Return points (n, 3) that line points are pictures of: of the wire's axis, the bar's edge, or
+    both its edges.
+    """
     if seen.frame >= 0:
-        one = Curves(curves.arc_mm, curves.points_mm[seen.frame], curves.tangents[seen.frame])
-        return [one.at(seen.points.place)[0]]
-    axis, camera = bar_axis(problem, state.vector), problem.cameras.cameras[seen.camera]
+        points_mm, _ = curves.one(seen.frame).at(seen.points.place)
+        return [points_mm]
+    axis = bar_axis(problem, state.vector)
+    camera = problem.cameras.cameras[seen.camera]
     if problem.is_rounded:
-        grazing = sights_beside(camera, axis, seen.points.px, seen.points.place)
-        return [grazing.points_mm]
-    points = axis.point_mm + seen.points.place[:, None] * axis.direction
-    points = points + shifts_mm(problem, state.vector)[seen.bar_in]
-    edges = grazed(
-        camera, points, np.broadcast_to(axis.direction, points.shape), problem.rods.bar.radius_mm
-    )
-    beside = [
-        np.sum((camera.project(edge) - camera.project(points)) * seen.points.normal)
-        for edge in edges
-    ]
-    return [edges[int(np.argmax(seen.side * np.array(beside)))]] if seen.side else list(edges)
+        return [sights_beside(camera, axis, seen.points.px, seen.points.place).points_mm]
+    middle_mm = axis.point_mm + seen.points.place[:, None] * axis.direction
+    middle_mm = middle_mm + shifts_mm(problem, state.vector)[seen.bar_in]
+    directions = np.broadcast_to(axis.direction, middle_mm.shape)
+    edges = grazed(camera, middle_mm, directions, problem.rods.bar.radius_mm)
+    if not seen.side:
+        return list(edges)
+    offsets_px = [_along_normals(camera, middle_mm, edge, seen) for edge in edges]
+    return [edges[int(np.argmax(seen.side * np.array(offsets_px)))]]
+
+
+def _along_normals(
+    camera: Camera, middle_mm: np.ndarray, edge_mm: np.ndarray, seen: Observed
+) -> float:
+    """Return how far an edge (n, 3) lies from the middle (n, 3) along the line points' normals: a
+    sum over points.
+    """
+    offset_px = camera.project(edge_mm) - camera.project(middle_mm)
+    return float(np.sum(offset_px * seen.points.normal))

@@ -1,44 +1,55 @@
-"""How a fit's geometry is moved for derivatives by differences: shared parameters alone, all frames' bends at once."""
+"""Perturbed parameter vectors for derivatives by differences: shared parameters alone, all frames'
+bends at once.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import BAR, REACH, REST, Problem
-
-# [mm, rad, 1] Steps of differences: about 1e-5 of what they move. Study: gradients.py.
-_SHIFT_MM, _TILT_RAD, _BEND_RAD, _PULL = 1e-4, 1e-6, 1e-5, 1e-3
+from vision.fit.blocks import columns_of
+from vision.fit.problem import Problem
 
 
-def steps(problem: Problem) -> np.ndarray:
-    """Step (size,) of each parameter."""
-    step = np.full(problem.size, _BEND_RAD)
-    step[0:2], step[2:4], step[BAR : BAR + REST], step[REACH] = (
-        _SHIFT_MM,
-        _TILT_RAD,
-        _SHIFT_MM,
-        _SHIFT_MM,
-    )
-    step[problem.bar_moves], step[problem.pull] = _SHIFT_MM, _PULL
-    return step
+@dataclass(frozen=True, eq=False)
+class Perturbation:
+    """How one copy of the parameter vector was moved.
+
+    step: by how much. column (f,): which parameter moved in each frame, -1 where none did.
+    is_shared: whether it is one parameter of all frames, not each frame's own bend.
+    """
+
+    step: float
+    column: np.ndarray
+    is_shared: bool
 
 
 def perturbed(
     problem: Problem, vector: np.ndarray, *, reach: bool = False
-) -> tuple[np.ndarray, Sequence]:
-    """The vector itself and moved copies (c + 1, size), and of each copy its step and, by frame, which parameter moved
-    (f,), -1 where none did. reach: move the reach's error, too."""
-    step, frames = steps(problem), len(problem.motor_rad)
-    rows, columns = [vector], []
-    for k in [*range(REACH + reach), *range(problem.size)[problem.bar_moves], problem.pull]:
-        rows.append(vector + step[k] * (np.arange(problem.size) == k))
-        columns.append((step[k], np.full(frames, k)))
-    order = np.cumsum(problem.bent) - 1
+) -> tuple[np.ndarray, Sequence[Perturbation]]:
+    """Return the vector itself with moved copies (c + 1, size), and how each of the c copies was
+    moved.
+
+    reach: move the reach's error, too.
+    """
+    blocks = problem.blocks
+    steps = blocks.steps
+    frames = len(problem.motor_rad)
+    geometry = [blocks.bar_axis, blocks.rest_shape, *([blocks.reach] if reach else [])]
+    objects = [blocks.motion, blocks.shift_along, blocks.outline_bias]
+    rows = [vector]
+    moves = []
+    for k in columns_of(*geometry, *objects, blocks.friction).tolist():
+        row = vector.copy()
+        row[k] += steps[k]
+        rows.append(row)
+        moves.append(Perturbation(steps[k], np.full(frames, k), is_shared=True))
+    order = np.cumsum(problem.bent) - 1  # (f,) number of each bent frame
+    step = blocks.bends.step
     for part in range(2):
         row = vector.copy()
-        row[problem.first_bend + part :: 2] += _BEND_RAD
+        row[blocks.bends.start + part :: 2] += step
+        column = np.where(problem.bent, blocks.bends.start + 2 * order + part, -1)
         rows.append(row)
-        columns.append(
-            (_BEND_RAD, np.where(problem.bent, problem.first_bend + 2 * order + part, -1))
-        )
-    return np.stack(rows), columns
+        moves.append(Perturbation(step, column, is_shared=False))
+    return np.stack(rows), moves

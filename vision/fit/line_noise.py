@@ -1,4 +1,6 @@
-"""What each camera's lines of wire and bar are worth, in a few numbers: as a fit found them, or as one is planned."""
+"""The precision of each camera's lines of wire and bar in a few numbers: of a fit, or of a planned
+one.
+"""
 
 from dataclasses import dataclass
 
@@ -9,12 +11,12 @@ from vision.fit.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class LineNoise:
-    """Of one camera's lines in one whisk.
+    """Precision of one camera's lines in one whisk.
 
-    wire_px: sigma of a point of the wire (one for each piece), scatter about the fit and what neighbours share
-    included; NaN where it has none. alike: how much of its error a point shares with the next one. bar_px (k, 3): of
-    each line of the bar its side (0 the middle, ±1 an edge), and sigma at the two places where it is handed on; none of
-    an outline that is no bar's.
+    wire_px: sigma of a point of the wire (one for each piece), scatter about the fit and what
+    neighbours share included; NaN where it has none. alike: the correlation of a point's error with
+    the next one's. bar_px (k, 3): of each line of the bar its side (0 the middle, ±1 an edge), and
+    sigma at the two places where it is handed on; none of an outline that is no bar's.
     """
 
     wire_px: float
@@ -23,26 +25,30 @@ class LineNoise:
 
 
 def line_noise(problem: Problem) -> dict[str, LineNoise]:
-    """By camera, from the line points of a fit; of many sigmas that which has the same information."""
-    alike = [*problem.alike, *[0.0] * (len(problem.cameras) - len(problem.alike))]
-    return {
-        name: LineNoise(_of_wire(problem, camera), alike[camera], _of_bar(problem, camera))
-        for camera, name in enumerate(problem.cameras.names)
-    }
+    """Return by camera the noise of a fit's line points; of many sigmas that with the same
+    precision.
+    """
+    correlation = problem.neighbour_correlation or [0.0] * len(problem.cameras)
+    found = {}
+    for camera, name in enumerate(problem.cameras.names):
+        wire_px = _wire_sigma_px(problem, camera)
+        found[name] = LineNoise(wire_px, correlation[camera], _bar_sigmas_px(problem, camera))
+    return found
 
 
-def _of_wire(problem: Problem, camera: int) -> float:
-    sigmas = [
-        seen.points.sigma_px for seen in problem.seen if seen.camera == camera and seen.frame >= 0
-    ]
-    return float(np.mean(np.concatenate(sigmas) ** -2.0) ** -0.5) if sigmas else float("nan")
+def _wire_sigma_px(problem: Problem, camera: int) -> float:
+    """Return the sigma of one camera's points of the wire, px; NaN where it has none."""
+    own = [one for one in problem.seen if one.camera == camera and one.frame >= 0]
+    if not own:
+        return float("nan")
+    sigma_px = np.concatenate([one.points.sigma_px for one in own])
+    return float(np.mean(sigma_px**-2.0) ** -0.5)
 
 
-def _of_bar(problem: Problem, camera: int) -> np.ndarray:
-    bars = (
-        ()
-        if problem.is_rounded
-        else [one for one in problem.seen if one.camera == camera and one.frame < 0]
-    )
-    lines = [[seen.side, *seen.points.sigma_px] for seen in bars]
+def _bar_sigmas_px(problem: Problem, camera: int) -> np.ndarray:
+    """Return side and two sigmas (k, 3) of one camera's lines of the bar."""
+    lines = []
+    for one in problem.seen:
+        if one.camera == camera and one.frame < 0 and not problem.is_rounded:
+            lines.append([one.side, *one.points.sigma_px])
     return np.array(lines, dtype=float).reshape(-1, 3)

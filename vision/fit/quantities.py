@@ -1,7 +1,8 @@
 """From the fit's parameters to what a user asks for, and how its uncertainty carries over.
 
-Definitions are those of the contact conventions: slip along the bar, deflection between the virtual point and the
-contact in the contact frame, phi the direction of the deflection, alpha the angle from contact normal to force.
+Definitions are those of the contact conventions: slip along the bar, deflection between the virtual
+point and the contact in the contact frame, phi the direction of the deflection, alpha the angle
+from contact normal to force.
 """
 
 from dataclasses import dataclass
@@ -23,89 +24,116 @@ from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis, bar_at, clearance, contact_frame_angles
 
+# [rounds] Of Newton's method for the virtual point: the resting whisker is nearly straight.
+# Derived.
+_ROUNDS = 3
+
 
 @dataclass(frozen=True)
 class Measured:
-    """Values by name: globals (…,) and per frame (…, f)."""
+    """Values by name: of the whisk (…,) and of its frames (…, f)."""
 
     whisk: dict[str, np.ndarray]
     frame: dict[str, np.ndarray]
 
+    def one(self, number: int) -> "Measured":
+        """Return the values of one parameter vector of a batch."""
+        whisk = {name: values[number] for name, values in self.whisk.items()}
+        frame = {name: values[number] for name, values in self.frame.items()}
+        return Measured(whisk, frame)
+
 
 def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measured:
-    """All quantities for one parameter vector or a batch (b, size)."""
+    """Return all quantities for one parameter vector (size,) or a batch (b, size)."""
     touch = first_touch(problem, vector)
-    axis = bar_axis(problem, vector)
     each = bar_axes(problem, vector)
     curves, _ = curves_of(problem, vector, arcs_mm)
     _, arc, point = clearance(curves, each)
-    touched = bar_at(axis, touch.point_mm)
+    touched = bar_at(bar_axis(problem, vector), touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
     whisk = {
         "touch": touch.motor_rad,
         "d_x": np.linalg.norm(touch.point_mm, axis=-1),
         "beta": beta,
         "psi": psi,
-        **{name: touch.point_mm[..., k] for k, name in enumerate("xyz")},
     }
-    came = shifts_mm(problem, vector) - shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
-    slip = np.sum(
-        (point - touch.point_mm[..., None, :] - came) * touched.direction[..., None, :], axis=-1
-    )
+    bar_at_touch = shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
+    bar_moved = shifts_mm(problem, vector) - bar_at_touch
+    contact_moved = point - touch.point_mm[..., None, :] - bar_moved
     d_y, d_z = _deflection(problem, vector, touch, point)
-    alpha = _angle_to_normal(_force(curves, touch, arc, d_y, d_z), bar_at(each, point), point, beta)
+    force = _force_direction(curves, touch, arc, d_y, d_z)
     frame = {
-        "slip": slip,
+        "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
         "longitudinal_slip": arc - touch.arc_mm[..., None],
         "d_y": d_y,
         "d_z": d_z,
         "arc": arc,
         "phi": np.arctan2(d_z, d_y),
-        "alpha": alpha,
-        **{name: point[..., k] for k, name in enumerate("xyz")},
+        "alpha": _angle_to_normal(force, bar_at(each, point), point, beta),
     }
+    for k, name in enumerate("xyz"):
+        whisk[name] = touch.point_mm[..., k]
+        frame[name] = point[..., k]
     return Measured(whisk, frame)
 
 
-def _deflection(problem: Problem, vector, touch: FirstTouch, point):
-    """d_y = V_y - P_y and d_z = P_z - V_z (…, f) in the contact frame."""
-    shape = point.shape[:-1]
-    rest = np.broadcast_to(rest_shape(vector)[..., None, :, :], (*shape, 2, REST_POWERS))
+def _deflection(
+    problem: Problem, vector: np.ndarray, touch: FirstTouch, point_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return d_y = V_y - P_y and d_z = P_z - V_z (…, f), mm, in the contact frame.
+
+    P is the contact point (…, f, 3). V, the virtual point, is that of the resting whisker which is
+    as far along the contact frame's x axis as the contact at touch.
+    """
+    shape = point_mm.shape[:-1]
+    rest = rest_shape(problem, vector)[..., None, :, :]
+    rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
     motor = np.broadcast_to(problem.motor_rad, shape)
-    unbent = centrelines(
-        rest, np.zeros((*shape, 2)), np.full(shape, problem.wire.length_mm / 2), motor, problem.wire
-    )
-    cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
-
-    def forward(v):
-        return cosine * v[..., 0] + sine * v[..., 1]
-
-    wanted = forward(touch.point_mm[..., None, :])
+    middle = np.full(shape, problem.wire.length_mm / 2)
+    unbent = centrelines(rest, np.zeros((*shape, 2)), middle, motor, problem.wire)
+    cosine = np.cos(touch.motor_rad)[..., None]
+    sine = np.sin(touch.motor_rad)[..., None]
+    at_touch = touch.point_mm[..., None, :]
+    wanted = cosine * at_touch[..., 0] + sine * at_touch[..., 1]
     arc = np.broadcast_to(touch.arc_mm[..., None], shape)
-    for _ in range(3):
-        virtual, tangent = (a[..., 0, :] for a in unbent.at(arc[..., None]))
-        arc = arc + (wanted - forward(virtual)) / forward(tangent)
+    for _ in range(_ROUNDS):
+        virtual, tangent = unbent.at(arc[..., None])  # (…, f, 1, 3)
+        here = cosine * virtual[..., 0, 0] + sine * virtual[..., 0, 1]
+        slope = cosine * tangent[..., 0, 0] + sine * tangent[..., 0, 1]
+        arc = arc + (wanted - here) / slope
     virtual, _ = unbent.at(arc[..., None])
-    away = virtual[..., 0, :] - point
-    return -sine * away[..., 0] + cosine * away[..., 1], -away[..., 2]
+    offset = virtual[..., 0, :] - point_mm
+    return -sine * offset[..., 0] + cosine * offset[..., 1], -offset[..., 2]
 
 
-def _force(curves: Curves, touch: FirstTouch, arc, d_y, d_z):
-    """Way (…, f, 3) in which the contact's force on the whisker points, across it: that in which it was bent, from the
-    virtual point to the contact."""
-    _, tangent = curves.at(arc[..., None])
-    along = tangent[..., 0, :] / np.linalg.norm(tangent[..., 0, :], axis=-1, keepdims=True)
-    cosine, sine = np.cos(touch.motor_rad)[..., None], np.sin(touch.motor_rad)[..., None]
-    bent = np.stack([sine * d_y, -cosine * d_y, d_z], axis=-1)
-    return bent - np.sum(bent * along, axis=-1, keepdims=True) * along
+def _force_direction(
+    curves: Curves, touch: FirstTouch, arc_mm: np.ndarray, d_y: np.ndarray, d_z: np.ndarray
+) -> np.ndarray:
+    """Return the direction (…, f, 3) of the contact's force on the whisker, across it, of any
+    length.
+
+    It is that in which the whisker was bent: from the virtual point to the contact.
+    """
+    _, tangent = curves.at(arc_mm[..., None])
+    tangent = tangent[..., 0, :]
+    along = tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
+    cosine = np.cos(touch.motor_rad)[..., None]
+    sine = np.sin(touch.motor_rad)[..., None]
+    deflection = np.stack([sine * d_y, -cosine * d_y, d_z], axis=-1)
+    return deflection - np.sum(deflection * along, axis=-1, keepdims=True) * along
 
 
-def _angle_to_normal(force, axis: BarAxis, point, beta):
-    """Angle (…, f) between the contact's force and its normal, uphill: |beta| - |phi| where psi = 0."""
-    away = point - axis.point_mm
-    normal = away - np.sum(away * axis.direction, axis=-1, keepdims=True) * axis.direction
+def _angle_to_normal(
+    force: np.ndarray, axis: BarAxis, point_mm: np.ndarray, beta_rad: np.ndarray
+) -> np.ndarray:
+    """Return the angle (…, f) from the contact's normal to its force, uphill: |beta| - |phi| where
+    psi = 0."""
+    from_axis = point_mm - axis.point_mm
+    along_mm = np.sum(from_axis * axis.direction, axis=-1, keepdims=True)
+    normal = from_axis - along_mm * axis.direction
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    uphill = -np.sum(force * axis.direction, axis=-1) * np.where(beta >= 0, 1.0, -1.0)[..., None]
+    sign = np.where(beta_rad >= 0, 1.0, -1.0)[..., None]
+    uphill = -np.sum(force * axis.direction, axis=-1) * sign
     return np.arctan2(uphill, np.sum(force * normal, axis=-1))
 
 
@@ -118,29 +146,30 @@ class Jacobians:
 
 
 def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
-    """All quantities and their derivatives by finite differences, the frames' bends moved all at once."""
-    moved, moves = perturbed(problem, state.vector, reach=True)
-    all_rows = measure(problem, moved, state.arcs_mm)
-    whisk = {name: np.zeros(problem.size) for name in all_rows.whisk}
-    frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in all_rows.frame}
-    for number, (step, columns) in enumerate(moves, start=1):
-        shared = 0 <= columns[0] < problem.first_bend
-        for name, values in all_rows.whisk.items():
-            if shared:
-                whisk[name][columns[0]] = (values[number] - values[0]) / step
-        for name, values in all_rows.frame.items():
-            use = np.flatnonzero(columns >= 0)
-            frame[name][use, columns[use]] = (
-                _difference(name, values[number, use], values[0, use]) / step
-            )
-    here = Measured(
-        {name: v[0] for name, v in all_rows.whisk.items()},
-        {name: v[0] for name, v in all_rows.frame.items()},
-    )
+    """Return all quantities and their derivatives by finite differences, all frames' bends at
+    once.
+    """
+    vectors, moves = perturbed(problem, state.vector, reach=True)
+    values = measure(problem, vectors, state.arcs_mm)
+    here = values.one(0)
+    whisk = {name: np.zeros(problem.size) for name in here.whisk}
+    frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in here.frame}
+    for number, move in enumerate(moves, start=1):
+        moved = values.one(number)
+        if move.is_shared:
+            for name, column in whisk.items():
+                change = moved.whisk[name] - here.whisk[name]
+                column[move.column[0]] = change / move.step
+        frames = np.flatnonzero(move.column >= 0)
+        for name, rows in frame.items():
+            change = _difference(name, moved.frame[name][frames], here.frame[name][frames])
+            rows[frames, move.column[frames]] = change / move.step
     return here, Jacobians(whisk, frame)
 
 
-def _difference(name: str, moved, here):
-    """Difference of values; of angles the short way round."""
-    change = moved - here
-    return (change + np.pi) % (2 * np.pi) - np.pi if name in ("phi", "alpha") else change
+def _difference(name: str, after: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Return the difference of values; of angles the short way round."""
+    change = after - before
+    if name in ("phi", "alpha"):
+        return (change + np.pi) % (2 * np.pi) - np.pi
+    return change

@@ -1,11 +1,14 @@
-"""What the truth of a whisk would be without one refinement of the model: one linear step from the fit that has all.
+"""The truth of a whisk without one refinement of the model: one linear step from the fit that has
+all.
 
-A refinement is left out in one of three ways, each of which the fit answers by its own normal equations, JᵀWJ:
+A refinement is left out in one of three ways, each of which the fit follows by its own normal
+equations, JᵀWJ:
 
-- a parameter, or a function of them, is held at what the plainer model has there (a least-squares fit with an equality
-  constraint; Björck, Numerical Methods for Least Squares Problems, SIAM 1996, 5.1);
-- lines or centrelines are predicted elsewhere, which changes residuals, and slip or touch directly, too;
-- the cameras are those of a calibration without a lens term, which answers by its own covariance.
+- a parameter, or a function of them, is held at what the plainer model has there (a least-squares
+  fit with an equality constraint; Björck, Numerical Methods for Least Squares Problems, SIAM 1996,
+  5.1);
+- lines or centrelines are predicted elsewhere, which changes residuals, and slip or touch directly;
+- the cameras are those of a calibration without a lens term, by its own covariance.
 
 Where a plainer model is far off, the step is no more than the size of its error.
 """
@@ -15,8 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.fit.blocks import columns_of
 from vision.fit.covariance import by_lens
-from vision.fit.problem import BAR, REACH, Problem, State, bar_axes, bends, curves_of
+from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import Jacobians, Measured, measure
 from vision.fit.reshaped import by_contacts, by_lines
 from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
@@ -36,15 +40,14 @@ from vision.wire.one_sided import WireAppearance
 NAN = float("nan")
 LENS_TERMS = {"lens k1 k2": ("k1", "k2"), "lens k3": ("k3",), "lens p1 p2": ("p1", "p2")}
 ALONG = "friction along the whisker"
-# [columns] A layout, no threshold: curvature of the rest shape and its change, across and along
-# the axis.
-_CURVED = [BAR + across + power for across in (0, REST_POWERS) for power in (2, 3)]
+# [indices] Of the rest shape, a layout, no threshold: curvature and its change, in y and in z.
+_CURVED = np.array([2, 3, REST_POWERS + 2, REST_POWERS + 3])
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """By how much d_x (mm), touch (rad) and slip at the largest pushing angle (mm) differ without a refinement from
-    with it; NaN where that is not known. why: of a zero or a NaN."""
+    """Differences of d_x (mm), touch (rad) and slip at the largest pushing angle (mm) without a
+    refinement from those with it; NaN where that is not known. why: of a zero or a NaN."""
 
     d_x_mm: float = 0.0
     touch_rad: float = 0.0
@@ -54,70 +57,89 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit that is done. answer (size, size): how its parameters answer observations (see `Uncertainty`)."""
+    """A fit that has converged. inverse_normal (size, size): see `Uncertainty`."""
 
     problem: Problem
     state: State
-    answer: np.ndarray
+    inverse_normal: np.ndarray
     measured: Measured
     by: Jacobians
 
     @property
     def last(self) -> int:
-        """The touching frame of the largest pushing angle."""
+        """Return the touching frame of the largest pushing angle."""
         return int(np.flatnonzero(self.problem.touching)[-1])
 
     def after(self, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
-        """What a step (size,) of the parameters moves, and slip beside it."""
-        of_slip = float(self.by.frame["slip"][self.last] @ step) + slip_mm
+        """Return what a step (size,) of the parameters moves, with slip_mm added to the slip."""
         return LeftOut(
-            float(self.by.whisk["d_x"] @ step), float(self.by.whisk["touch"] @ step), of_slip
+            d_x_mm=float(self.by.whisk["d_x"] @ step),
+            touch_rad=float(self.by.whisk["touch"] @ step),
+            slip_mm=float(self.by.frame["slip"][self.last] @ step) + slip_mm,
         )
 
     def held(self, rows: np.ndarray, values: np.ndarray) -> LeftOut:
-        """With functions of the parameters, whose derivatives are rows (k, size), changed by values (k,)."""
-        told = self.answer @ rows.T
-        return self.after(told @ np.linalg.lstsq(rows @ told, values, rcond=None)[0])
+        """Return what it moves to change functions of the parameters by values (k,).
+
+        rows (k, size): derivatives of these functions.
+        """
+        gain = self.inverse_normal @ rows.T
+        return self.after(gain @ np.linalg.lstsq(rows @ gain, values, rcond=None)[0])
+
+    def held_parameters(self, columns: np.ndarray, changes: np.ndarray) -> LeftOut:
+        """Return what it moves to change the parameters of these columns (k,) by changes (k,)."""
+        return self.held(np.eye(self.problem.size)[columns], changes)
 
     def step(self, residual: np.ndarray) -> np.ndarray:
-        """The step (size,) by which the parameters answer a change (n,) of the first n residuals."""
+        """Return the step (size,) by which the parameters follow a change (n,) of the first n
+        residuals.
+        """
         linear = linear_at(self.problem, self.state)
         weights = robust_weights(linear, LAST_SCALE)[: len(residual)]
-        return -self.answer @ (linear.jacobian[: len(residual)].T @ (weights * residual))
+        jacobian = linear.jacobian[: len(residual)]
+        return -self.inverse_normal @ (jacobian.T @ (weights * residual))
 
 
 def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
-    """Each refinement of the truth by name. light: how each camera sees the wire."""
-    eye, vector = np.eye(fit.problem.size), fit.state.vector
-    return {
+    """Return the effect of each refinement of the truth by name. light: how each camera sees the
+    wire.
+    """
+    vector = fit.state.vector
+    blocks = fit.problem.blocks
+    reach = columns_of(blocks.reach)
+    friction = columns_of(blocks.friction)
+    curved = columns_of(blocks.rest_shape)[_CURVED]
+    psi = -np.atleast_1d(fit.measured.whisk["psi"])
+    found = {
         "large bending": _large_bending(fit),
-        "bar radius": fit.held(
-            eye[[REACH]], np.array([-fit.problem.rods.bar.radius_mm - vector[REACH]])
-        ),
-        "psi": fit.held(fit.by.whisk["psi"][None], -np.atleast_1d(fit.measured.whisk["psi"])),
-        ALONG: fit.held(eye[[fit.problem.pull]], -vector[[fit.problem.pull]]),
+        "bar radius": fit.held_parameters(reach, -fit.problem.rods.bar.radius_mm - vector[reach]),
+        "psi": fit.held(fit.by.whisk["psi"][None], psi),
+        ALONG: fit.held_parameters(friction, -vector[friction]),
         "taper": _taper(fit),
-        "sag and set": fit.held(eye[_CURVED], -vector[_CURVED]),
-        **{name: _lens(fit, terms) for name, terms in LENS_TERMS.items()},
-        "one-sided light": _one_sided(fit, light),
+        "sag and set": fit.held_parameters(curved, -vector[curved]),
     }
+    for name, terms in LENS_TERMS.items():
+        found[name] = _lens(fit, terms)
+    found["one-sided light"] = _one_sided(fit, light)
+    return found
 
 
 def _large_bending(fit: Fit) -> LeftOut:
-    """As a beam of small angles, with no more pull than it has."""
-    problem, state = fit.problem, fit.state
+    """Return the effect of a beam of small angles, with no more friction along the whisker than it
+    has.
+    """
+    problem = fit.problem
+    state = fit.state
     curves, arcs = curves_of(problem, state.vector, state.arcs_mm)
-    plain = _small_angles(
-        problem, state, curves, _contacts_of_small_angles(problem, state, curves, arcs)
-    )
-    moves = _in_rig(problem, curves, plain)
-    contacts, slip = by_contacts(problem, state, curves, moves, fit.last)
-    rows = np.concatenate([by_lines(problem, curves, moves), contacts])
+    contacts_mm = _contacts_of_small_angles(problem, state, curves, arcs)
+    moves = _in_rig(problem, curves, _small_angles(problem, state, curves, contacts_mm))
+    on_contacts, slip = by_contacts(problem, state, curves, moves, fit.last)
+    rows = np.concatenate([by_lines(problem, curves, moves), on_contacts])
     return fit.after(fit.step(rows[:, 0]), float(slip[0]))
 
 
 def _in_rig(problem: Problem, curves: Curves, of_tangents: np.ndarray) -> Curves:
-    """The move of the centrelines by that of their tangents in the hub's frame (f, m, 3)."""
+    """Return the move of the centrelines by that of their tangents in the hub's frame (f, m, 3)."""
     turned = np.swapaxes(rotation_z(problem.motor_rad), -1, -2)
     tangents = of_tangents[None] @ turned
     return Curves(curves.arc_mm, simpson() @ tangents * curves.arc_mm[1], tangents)
@@ -126,86 +148,96 @@ def _in_rig(problem: Problem, curves: Curves, of_tangents: np.ndarray) -> Curves
 def _small_angles(
     problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray
 ) -> np.ndarray:
-    """What the tangents (f, m, 3) of a beam of small angles that touches at arcs_mm (f,) differ by: slopes for sines,
-    and distance for arc."""
+    """Return the difference of the tangents (f, m, 3) of a beam of small angles that touches at
+    arcs_mm (f,): slopes for sines, and distance for arc."""
     along = curves.tangents @ rotation_z(problem.motor_rad)
-    turn = np.linalg.norm(bends(problem, state.vector), axis=-1)[:, None]
-    here = bend_growth(
-        turn, state.vector[problem.pull], curves.arc_mm, state.arcs_mm[:, None], problem.wire
-    )
+    bend = bends(problem, state.vector)
+    turn = np.linalg.norm(bend, axis=-1)[:, None]
+    friction = state.vector[problem.blocks.friction.start]
+    contact_mm = state.arcs_mm[:, None]
+    here = bend_growth(turn, friction, curves.arc_mm, contact_mm, problem.wire)
     there = tangent_growth(curves.arc_mm, arcs_mm[:, None], problem.wire)
     slope = there - np.sinc(turn * here / np.pi) * here
-    aside = slope[..., None] * bends(problem, state.vector)[:, None]
-    return np.concatenate([1.0 - along[..., :1], aside], axis=-1)
+    across = slope[..., None] * bend[:, None]
+    return np.concatenate([1.0 - along[..., :1], across], axis=-1)
 
 
 def _contacts_of_small_angles(
     problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray
 ) -> np.ndarray:
-    """Where (f,) along itself such a beam touches: distances along it are shorter than arcs."""
+    """Return where (f,) along itself a beam of small angles touches: distances are shorter than
+    arcs.
+    """
     moves = _in_rig(problem, curves, _small_angles(problem, state, curves, arcs_mm))
-    moved = Curves(
-        curves.arc_mm, curves.points_mm + moves.points_mm[0], curves.tangents + moves.tangents[0]
-    )
+    points = curves.points_mm + moves.points_mm[0]
+    tangents = curves.tangents + moves.tangents[0]
+    shape = (len(arcs_mm), 3)
     axis = bar_axes(problem, state.vector)
-    point, direction = (
-        np.broadcast_to(part, (len(arcs_mm), 3)) for part in (axis.point_mm, axis.direction)
+    each = replace(
+        axis,
+        point_mm=np.broadcast_to(axis.point_mm, shape),
+        direction=np.broadcast_to(axis.direction, shape),
     )
-    each = replace(axis, point_mm=point, direction=direction)
-    return closest_arc(moved, each, arcs_mm)
+    return closest_arc(Curves(curves.arc_mm, points, tangents), each, arcs_mm)
 
 
 def _taper(fit: Fit) -> LeftOut:
-    """The whisker as a cylinder of its base's diameter."""
-    problem, wire = fit.problem, fit.problem.wire
-    if wire.taper_per_mm == 0.0:
+    """Return the effect of the whisker as a cylinder of its base's diameter."""
+    problem = fit.problem
+    state = fit.state
+    if problem.wire.taper_per_mm == 0.0:
         return LeftOut(why="the whisker does not taper")
-    base = Wire(
+    cylinder = replace(problem, rods=replace(problem.rods, wire=_cylinder(problem.wire)))
+    with_taper = linear_at(problem, state)
+    plain, _ = linearise(cylinder, state, with_taper.jacobian)
+    by_lines_moved = fit.after(fit.step(plain.residual - with_taper.residual))
+    there = measure(cylinder, state.vector, state.arcs_mm)
+    here = fit.measured
+    slip = there.frame["slip"] - here.frame["slip"]
+    return LeftOut(
+        d_x_mm=by_lines_moved.d_x_mm + float(there.whisk["d_x"] - here.whisk["d_x"]),
+        touch_rad=by_lines_moved.touch_rad + float(there.whisk["touch"] - here.whisk["touch"]),
+        slip_mm=by_lines_moved.slip_mm + float(slip[fit.last]),
+    )
+
+
+def _cylinder(wire: Wire) -> Wire:
+    """Return a cylinder of a wire's length and its base's diameter."""
+    return Wire(
         "cylinder", wire.length_mm, wire.diameter_mm, wire.length_sigma_mm, wire.diameter_sigma_mm
     )
-    other, with_taper = (
-        replace(problem, rods=replace(problem.rods, wire=base)),
-        linear_at(problem, fit.state),
-    )
-    plain = linearise(other, fit.state, with_taper.jacobian)[0]
-    found = fit.after(fit.step(plain.residual - with_taper.residual))
-    there = measure(other, fit.state.vector, fit.state.arcs_mm)
-    d_x, touch = (float(there.whisk[name] - fit.measured.whisk[name]) for name in ("d_x", "touch"))
-    slip = float((there.frame["slip"] - fit.measured.frame["slip"])[fit.last])
-    return LeftOut(found.d_x_mm + d_x, found.touch_rad + touch, found.slip_mm + slip)
 
 
 def _lens(fit: Fit, terms: Sequence[str]) -> LeftOut:
-    """The cameras calibrated without these terms."""
+    """Return the effect of cameras that are calibrated without these terms."""
     cameras = fit.problem.cameras
     own = [PARAMETERS.index(term) for term in terms]
-    all_of_them = np.concatenate([N_PARAMETERS * k + np.array(own) for k in range(len(cameras))])
+    columns = np.concatenate([N_PARAMETERS * k + np.array(own) for k in range(len(cameras))])
     values = np.concatenate([camera.lens[own] for camera in cameras])
     if not values.any():
         return LeftOut(why="the lenses have none")
-    free = np.diag(cameras.covariance)[all_of_them] > 0
+    free = np.diag(cameras.covariance)[columns] > 0
     if np.any(values[~free]):
-        return LeftOut(
-            NAN, NAN, NAN, "the cameras are taken as exact, and do not tell what else would answer"
-        )
-    rows = all_of_them[free]
-    told = cameras.covariance[:, rows]
-    moved = -told @ np.linalg.lstsq(told[rows], values[free], rcond=None)[0]
-    return fit.after(by_lens(fit.problem, fit.state, fit.answer) @ moved)
+        why = "the cameras are taken as exact, and do not tell what else would answer"
+        return LeftOut(NAN, NAN, NAN, why)
+    rows = columns[free]
+    gain = cameras.covariance[:, rows]
+    moved = -gain @ np.linalg.lstsq(gain[rows], values[free], rcond=None)[0]
+    return fit.after(by_lens(fit.problem, fit.state, fit.inverse_normal) @ moved)
 
 
 def _one_sided(fit: Fit, light: Mapping[str, WireAppearance]) -> LeftOut:
-    """The wire's axis in the middle of what is seen, in cameras that do not see both its edges."""
-    names = fit.problem.cameras.names
-    off_px = {
-        k: light[name].width.off_px
-        for k, name in enumerate(names)
-        if name in light and light[name].width.one_sided
-    }
+    """Return the effect of the wire's axis in the middle of what is seen, in cameras that do not
+    see both its edges.
+    """
+    off_px = {}
+    for camera, name in enumerate(fit.problem.cameras.names):
+        if name in light and light[name].width.one_sided:
+            off_px[camera] = light[name].width.off_px
     if not off_px:
         return LeftOut(why="every camera sees both edges of the wire")
-    moved = [
-        -off_px.get(seen.camera, 0.0) * (seen.frame >= 0) / seen.points.sigma_px
-        for seen in fit.problem.seen
-    ]
+    moved = []
+    for seen in fit.problem.seen:
+        by_light_px = off_px.get(seen.camera, 0.0) if seen.frame >= 0 else 0.0
+        moved.append(-by_light_px / seen.points.sigma_px)
     return fit.after(fit.step(np.concatenate(moved)))

@@ -1,17 +1,17 @@
-"""First touch as the pictures show it: the motor angle at which the unbent whisker reaches the bar."""
+"""First touch as the pictures show it: the motor angle at which the unbent whisker reaches the
+bar.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import REACH, Problem, bar_axis, rest_shape, shift_at_mm
+from vision.fit.problem import Problem, bar_axis, rest_shape, shift_at_mm
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import Axis, clearance
 from vision.geometry.rods import Rods
 
-# [frames] Before touch: one gives the rest shape, two tell that it swings with the motor.
-# Derived.
-# frames before touch: one gives the rest shape, two tell that it swings with the motor
+# [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
 FEWEST_FREE = 2
 # [rad] A frame that bends by more surely touches; where no two in a row do, none does. Set by
 # eye. Study: thresholds.py fit.touch _SURE_BEND_RAD ….
@@ -21,21 +21,21 @@ _SURE_BEND_RAD = np.radians(0.25)
 _STEP = 1e-5
 # [mm] Secant steps below this would divide rounding by rounding. Derived.
 _TOUCH_GAP_MM = 1e-10
-# [rad] Half a millimetre at the contact, when a rounded object's touch is looked for. Stated.
+# [rad] Half a millimetre at the contact, when a rounded object's touch is searched for. Stated.
 _SCAN_RAD = np.radians(0.5)
-# [1] Starts of the hinge that are tried between frames: finer than frames tell. Derived.
+# [1] Starts of the hinge that are tried between frames: finer than frames determine. Derived.
 _STARTS_PER_FRAME = 10
-# [1, rad] From touch, within which a frame is left undecided: three sigma, and never less than a
-# motor's step. Stated.
-_SURE_SIGMAS, _LEAST_MARGIN_RAD = (
-    3.0,
-    np.radians(0.02),
-)
+# [1] Sigmas from touch within which a frame is left undecided. Stated.
+_SURE_SIGMAS = 3.0
+# [rad] The least distance from touch of a frame that is not left undecided: a motor's step. Stated.
+_LEAST_MARGIN_RAD = np.radians(0.02)
 
 
 @dataclass(frozen=True)
 class FirstTouch:
-    """Motor angle (…) of first touch, contact point (…, 3) of the centreline and its arc length (…)."""
+    """Motor angle (…) of first touch, contact point (…, 3) of the centreline and its arc length
+    (…).
+    """
 
     motor_rad: np.ndarray
     point_mm: np.ndarray
@@ -43,105 +43,142 @@ class FirstTouch:
 
 
 def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
-    """Secant search for the motor angle at which axis and resting centreline are reach apart; batches allowed."""
+    """Find the motor angle at which axis and resting centreline are reach apart; batches allowed.
+
+    A secant search, from the ends of the swing or, of a rounded object, from about touch.
+    """
     axis = bar_axis(problem, vector)
+    rest = rest_shape(problem, vector)
+    wider_mm = vector[..., problem.blocks.reach.start]
 
     def gap(motor_rad):
-        there = replace(axis, point_mm=axis.point_mm + shift_at_mm(problem, vector, motor_rad))
-        return _gap(rest, motor_rad, there, vector[..., REACH], problem.rods)
+        """Return `_gap` at motor angles (…)."""
+        shift_mm = shift_at_mm(problem, vector, motor_rad)
+        there = replace(axis, point_mm=axis.point_mm + shift_mm)
+        return _gap(rest, motor_rad, there, wider_mm, problem.rods)
 
-    rest = rest_shape(vector)
-    ends = np.min(problem.motor_rad), np.max(problem.motor_rad)
     if problem.is_rounded:
-        ends = _about_touch(problem, vector)
-    low, high = (np.full(vector.shape[:-1], end) for end in ends)
-    gap_low, gap_high = (gap(m)[0] for m in (low, high))
+        first, last = _about_touch(problem, vector)
+    else:
+        first = np.min(problem.motor_rad)
+        last = np.max(problem.motor_rad)
+    low = np.full(vector.shape[:-1], first)
+    high = np.full(vector.shape[:-1], last)
+    gap_low, _, _ = gap(low)
+    gap_high, arc, point = gap(high)
     for _ in range(rounds):
-        moving = np.abs(gap_high) > _TOUCH_GAP_MM
-        slope = (gap_high - gap_low) / np.where(moving, high - low, 1.0)
-        new = np.where(moving, high - gap_high / np.where(moving, slope, 1.0), high)
-        low, gap_low = np.where(moving, high, low), np.where(moving, gap_high, gap_low)
-        high, (gap_high, arc, point) = new, gap(new)
+        is_open = np.abs(gap_high) > _TOUCH_GAP_MM
+        slope = (gap_high - gap_low) / np.where(is_open, high - low, 1.0)
+        new = np.where(is_open, high - gap_high / np.where(is_open, slope, 1.0), high)
+        low = np.where(is_open, high, low)
+        gap_low = np.where(is_open, gap_high, gap_low)
+        high = new
+        gap_high, arc, point = gap(new)
     return FirstTouch(high, point, arc)
 
 
 def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:
-    """Two motor angles, rad, between which the resting whisker first comes to touch a rounded object, which it may pass
-    beside later: by the first of a batch. The whole swing where it does not touch."""
+    """Return two motor angles, rad, between which the resting whisker first comes to touch a
+    rounded object, which it may pass later: by the first of a batch; the whole swing where it does
+    not touch.
+    """
     first = vector.reshape(-1, vector.shape[-1])[0]
-    low, high = float(np.min(problem.motor_rad)), float(np.max(problem.motor_rad))
+    low = float(np.min(problem.motor_rad))
+    high = float(np.max(problem.motor_rad))
     angles = np.linspace(low, high, 2 + int((high - low) / _SCAN_RAD))
-    gaps, _, _ = _gap(
-        rest_shape(first), angles, bar_axis(problem, first), first[REACH], problem.rods
-    )
-    touches = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
-    return (angles[touches[0]], angles[touches[0] + 1]) if len(touches) else (low, high)
+    wider_mm = first[problem.blocks.reach.start]
+    axis = bar_axis(problem, first)
+    gaps, _, _ = _gap(rest_shape(problem, first), angles, axis, wider_mm, problem.rods)
+    closes = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
+    if not len(closes):
+        return low, high
+    return angles[closes[0]], angles[closes[0] + 1]
 
 
 def touch_and_sigma(
-    problem: Problem, vector: np.ndarray, answer: np.ndarray
+    problem: Problem, vector: np.ndarray, covariance: np.ndarray
 ) -> tuple[float, float]:
-    """Motor angle of first touch and its sigma, rad, by noise and priors alone: what it takes to part the frames.
+    """Return the motor angle of first touch and its sigma, rad, by noise and priors alone.
 
-    answer (size, size): covariance that the fit gives.
+    This is what it takes to part the frames. covariance (size, size): the second result of `solve`.
     """
-    geometry = np.r_[: REACH + 1, problem.bar_moves]
+    blocks = problem.blocks
+    columns = np.append(np.arange(blocks.reach.start + 1), blocks.placement)
     here = float(first_touch(problem, vector).motor_rad)
-    moved = first_touch(problem, vector + _STEP * np.eye(len(vector))[geometry]).motor_rad
-    slope = (moved - here) / _STEP
-    return here, float(np.sqrt(slope @ answer[np.ix_(geometry, geometry)] @ slope))
+    moved = vector + _STEP * np.eye(len(vector))[columns]
+    slope = (first_touch(problem, moved).motor_rad - here) / _STEP
+    return here, float(np.sqrt(slope @ covariance[np.ix_(columns, columns)] @ slope))
 
 
-def _gap(rest_mm, motor_rad, axis: Axis, wider_mm, rods: Rods):
-    """How far the resting whisker still is from touching, mm; contact arc and point. wider_mm: the reach's error."""
-    none = np.zeros((*motor_rad.shape, 2))
-    curves = centrelines(
-        rest_mm, none, np.full(motor_rad.shape, rods.wire.length_mm / 2), motor_rad, rods.wire
-    )
+def _gap(
+    rest_mm: np.ndarray, motor_rad: np.ndarray, axis: Axis, wider_mm: np.ndarray, rods: Rods
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return how far the resting whisker still is from touching, mm; contact arc and point.
+
+    wider_mm: the reach's error.
+    """
+    straight = np.zeros((*motor_rad.shape, 2))
+    middle = np.full(motor_rad.shape, rods.wire.length_mm / 2)
+    curves = centrelines(rest_mm, straight, middle, motor_rad, rods.wire)
     distance, arc, point = clearance(curves, axis)
     return distance - rods.reach_mm(arc) - wider_mm, arc, point
 
 
 def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """From coarse bends (f, 2): which frames surely touch, and which surely do not; (f,) bool each.
+    """Return which frames surely touch and which surely do not, (f,) bool each, by coarse bends (f,
+    2).
 
-    The bend is nothing up to touch and then grows with the motor's angle, towards where it ends: the touch that
-    explains all bends best parts the frames. One frame to either side of it is left undecided, but the first two
-    are taken as free: whether they are, the fit will show. None touches where no two frames in a row are surely bent.
+    The bend is nothing up to touch and then grows with the motor's angle, towards where it ends:
+    the touch that explains all bends best parts the frames. One frame to either side of it is left
+    undecided, but the first two are taken as free: whether they are, the fit will show. None
+    touches where no two frames in a row are surely bent.
     """
     sure = np.linalg.norm(bend_rad, axis=1) > _SURE_BEND_RAD
-    if not np.any(sure & np.append(sure[1:], sure[-1])):
+    next_sure = np.append(sure[1:], sure[-1])
+    if not np.any(sure & next_sure):
         return np.zeros(len(sure), dtype=bool), np.ones(len(sure), dtype=bool)
-    touch, step = _hinge(motor_rad, bend_rad), np.median(np.abs(np.diff(motor_rad)))
-    first = np.arange(len(sure)) < 2
-    return (motor_rad > touch + step) & sure & ~first, (motor_rad < touch - step) | first
+    touch = _hinge(motor_rad, bend_rad)
+    step = np.median(np.abs(np.diff(motor_rad)))
+    first = np.arange(len(sure)) < FEWEST_FREE
+    touching = (motor_rad > touch + step) & sure & ~first
+    return touching, (motor_rad < touch - step) | first
 
 
 def begins_free(motor_rad: np.ndarray, bend_rad: np.ndarray) -> bool:
-    """Whether coarse bends (f, 2) show that the first frames come before touch: by more than the motor turns until a
-    bend is sure. Where none is, there is no touch."""
+    """Return whether coarse bends (f, 2) show that the first frames come before touch.
+
+    They do by more than the motor turns until a bend is sure. Without any sure bend there is no
+    touch.
+    """
     touching, _ = frames_that_touch(motor_rad, bend_rad)
-    return (
-        not np.any(touching)
-        or motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
-    )
+    if not np.any(touching):
+        return True
+    return motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
 
 
-def _hinge(motor_rad, bend_rad) -> float:
-    """The motor angle up to which there is no bend and from which on it grows in proportion; least absolute misfit."""
-    towards = np.median(bend_rad[-max(2, len(bend_rad) // 3) :], axis=0)
-    bend = bend_rad @ (towards / max(np.linalg.norm(towards), 1e-12))
+def _hinge(motor_rad: np.ndarray, bend_rad: np.ndarray) -> float:
+    """Find the motor angle up to which there is no bend and from which on it grows in proportion:
+    that of the least absolute misfit."""
+    last = bend_rad[-max(2, len(bend_rad) // 3) :]
+    towards = np.median(last, axis=0)
+    direction = towards / max(np.linalg.norm(towards), 1e-12)
+    bend = bend_rad @ direction  # (f,)
     starts = np.linspace(motor_rad[0], motor_rad[-2], _STARTS_PER_FRAME * len(motor_rad))
-    rises = np.maximum(motor_rad - starts[:, None], 0.0)
+    rises = np.maximum(motor_rad - starts[:, None], 0.0)  # (starts, f)
     slopes = np.sum(rises * bend, axis=1) / np.sum(rises**2, axis=1)
-    return float(starts[np.argmin(np.sum(np.abs(bend - slopes[:, None] * rises), axis=1))])
+    misfit = np.sum(np.abs(bend - slopes[:, None] * rises), axis=1)
+    return float(starts[np.argmin(misfit)])
 
 
 def frames_by_touch(
     motor_rad: np.ndarray, touch_rad: float, sigma_rad: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same once touch is known to sigma: frames within three sigma of it are left undecided, but for the first two:
-    they are free if touch comes after them."""
+    """Return which frames surely touch and which surely do not, (f,) bool each, by a touch known to
+    sigma.
+
+    Frames within three sigma of it are left undecided, but for the first two: they are free if
+    touch comes after them.
+    """
     margin = max(_SURE_SIGMAS * sigma_rad, _LEAST_MARGIN_RAD)
     free = motor_rad < touch_rad - margin
     free[:FEWEST_FREE] |= motor_rad[:FEWEST_FREE] < touch_rad
@@ -149,7 +186,8 @@ def frames_by_touch(
 
 
 def bends_tell_more(motor_rad: np.ndarray, sigma_rad: float) -> bool:
-    """Whether bends part the frames better than a touch known to sigma, as where sights hardly cross: they do to a
-    frame, or to what the motor turns by until a bend is sure."""
+    """Return whether bends part the frames better than a touch known to sigma, as where sights
+    hardly cross: they do to a frame, or to what the motor turns by until a bend is sure.
+    """
     to_a_frame = np.median(np.abs(np.diff(motor_rad)))
     return bool(_SURE_SIGMAS * sigma_rad > max(to_a_frame, _SURE_BEND_RAD))

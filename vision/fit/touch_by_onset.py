@@ -1,4 +1,6 @@
-"""Touch where cameras do not know whisker and bar well enough in space: by when the whisker begins to bend."""
+"""Touch where cameras do not know whisker and bar well enough in space: by when the whisker begins
+to bend.
+"""
 
 from dataclasses import replace
 
@@ -9,41 +11,49 @@ from vision.fit.problem import Problem, State, bends
 from vision.fit.touch import FEWEST_FREE, frames_by_touch
 from vision.geometry.refusals import Refused
 
-# [rad] An onset told less well leaves no truth: one known to 2.4° had free frames touch, and the
-# bar 10 mm off. Study: coverage.py alone.
+# [rad] An onset with a larger sigma leaves no truth: one known to 2.4° had free frames touch, and
+# the bar 10 mm off. Study: coverage.py alone.
 _MOST_ONSET_RAD = np.radians(0.5)
 
 
 def touch_by_onset(problem: Problem, state: State, covariance: np.ndarray) -> tuple[Problem, State]:
-    """The problem with what its frames, once fitted, show of when the whisker begins to bend; a state to go on from.
+    """Return the problem with the onset of bending that its fitted frames show, and a state to go
+    on from.
 
-    Raises Refused where no bend is seen, or fewer than two frames before it.
+    covariance (size, size): of the fit's parameters. Raises Refused where no bend is seen, or fewer
+    than two frames before it.
     """
-    bent, bend = problem.bent, bends(problem, state.vector)
-    seen, spread = seen_bend(bend[bent], covariance[problem.first_bend :, problem.first_bend :])
-    values, whole = np.zeros(len(bend)), np.eye(len(bend)) * np.median(np.diag(spread))
-    values[bent], whole[np.ix_(bent, bent)] = seen, spread
-    begins = onset(problem.motor_rad, values, whole)
+    bent = problem.bent
+    bend = bends(problem, state.vector)
+    of_bends = problem.blocks.bends.slice
+    component, spread = seen_bend(bend[bent], covariance[of_bends, of_bends])
+    values = np.zeros(len(bend))
+    values[bent] = component
+    variances = np.eye(len(bend)) * np.median(np.diag(spread))
+    variances[np.ix_(bent, bent)] = spread
+    begins = onset(problem.motor_rad, values, variances)
     if begins is None:
         raise Refused(
-            "no bend of the whisker is seen: it never touches, or bends along the sight of all cameras",
+            "no bend of the whisker is seen: it never touches, or bends along the sight of all "
+            "cameras",
             code="no_bend_seen",
         )
     if begins.sigma_rad > _MOST_ONSET_RAD:
         raise Refused(
-            f"when the whisker begins to bend is known to {np.degrees(begins.sigma_rad):.1f} deg only, "
-            f"{np.degrees(_MOST_ONSET_RAD):g} is allowed: which frames touch is not known",
+            "when the whisker begins to bend is known to "
+            f"{np.degrees(begins.sigma_rad):.1f} deg only, {np.degrees(_MOST_ONSET_RAD):g} is "
+            "allowed: which frames touch is not known",
             code="bend_onset_vague",
         )
     touching, free = frames_by_touch(problem.motor_rad, begins.motor_rad, 0.5 * begins.sigma_rad)
     if np.sum(free) < FEWEST_FREE:
-        at_deg, sigma_deg = np.degrees([begins.motor_rad, begins.sigma_rad])
+        at_deg = np.degrees(begins.motor_rad)
+        sigma_deg = np.degrees(begins.sigma_rad)
         raise Refused(
-            f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: fewer than "
-            "two frames of free stroke",
+            f"the whisker is seen to bend from {at_deg:.1f} deg on, known to {sigma_deg:.1f} deg: "
+            "fewer than two frames of free stroke",
             code="bends_from_start",
         )
     vector = np.concatenate([state.vector[: problem.first_bend], bend[~free].ravel()])
-    return replace(problem, onset=begins, touching=touching, bent=~free), replace(
-        state, vector=vector
-    )
+    with_onset = replace(problem, onset=begins, touching=touching, bent=~free)
+    return with_onset, replace(state, vector=vector)

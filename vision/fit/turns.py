@@ -1,7 +1,9 @@
-"""How far the whisker is seen turned in each frame beyond what the motor says: the encoder against the pictures.
+"""How far the whisker is turned in each frame beyond the motor's angle: the encoder against the
+pictures.
 
-A fit takes motor angles for exact. Here each frame may turn by itself about the motor's axis: one more step of the same
-fit, with a column for each frame. What all frames have in common is the whisker's clamp and is not told.
+A fit takes motor angles for exact. Here each frame may turn by itself about the motor's axis: one
+more step of the same fit, with a column for each frame. What all frames have in common is the
+whisker's clamp and is not determined.
 """
 
 from collections.abc import Sequence
@@ -20,8 +22,11 @@ _PRIOR_RAD = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """By frame index (f,) the motor angle it was taken at, rad, and how far the whisker is turned beyond it, rad, with
-    the covariance (f, f)."""
+    """Turns of frames beyond the motor's angle.
+
+    index (f,): of the frames. motor_rad (f,): angle at which each was taken. turn_rad (f,): by how
+    much the whisker is turned beyond it, with covariance (f, f).
+    """
 
     index: np.ndarray
     motor_rad: np.ndarray
@@ -30,33 +35,27 @@ class Turns:
 
 
 def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
-    """Turns of the frames (f,) of a fit that is done."""
+    """Return the turns of the frames (f,) of a fit that has converged."""
     linear = linear_at(problem, state)
-    turned = linearise(
-        replace(problem, motor_rad=problem.motor_rad + _STEP_RAD), state, linear.jacobian
-    )[0]
-    by_turn, of_row = (
-        (turned.residual - linear.residual) / _STEP_RAD,
-        _frame_of_row(problem, len(linear.residual)),
-    )
+    turned_problem = replace(problem, motor_rad=problem.motor_rad + _STEP_RAD)
+    turned, _ = linearise(turned_problem, state, linear.jacobian)
+    by_turn = (turned.residual - linear.residual) / _STEP_RAD
+    of_row = _frame_of_row(problem, len(linear.residual))
     count = len(problem.motor_rad)
     columns = np.where(of_row[:, None] == np.arange(count), by_turn[:, None], 0.0)
-    rows = (
-        np.hstack([linear.jacobian, columns]) * np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
-    )
-    residual = linear.residual * np.sqrt(robust_weights(linear, LAST_SCALE))
+    root = np.sqrt(robust_weights(linear, LAST_SCALE))
+    rows = np.hstack([linear.jacobian, columns]) * root[:, None]
     prior = np.append(np.zeros(problem.size), np.full(count, _PRIOR_RAD**-2.0))
     covariance = np.linalg.inv(rows.T @ rows + np.diag(prior))
-    step = -covariance @ (rows.T @ residual)
+    step = -covariance @ (rows.T @ (linear.residual * root))
     own = slice(problem.size, None)
     return Turns(np.asarray(index, dtype=int), problem.motor_rad, step[own], covariance[own, own])
 
 
 def _frame_of_row(problem: Problem, count: int) -> np.ndarray:
-    """Frame of each row of residuals (n,), -1 of bar and priors: points come first, then the frames that touch."""
-    frames, last = np.full(count, -1), 0
+    """Return the frame of each row of residuals (count,), -1 of bar and priors."""
+    frames = np.full(count, -1)
     for seen, rows in point_rows(problem):
-        frames[rows], last = max(seen.frame, -1), rows.stop
-    touching = np.flatnonzero(problem.touching)
-    frames[last : last + len(touching)] = touching
+        frames[rows] = max(seen.frame, -1)
+    frames[problem.contact_rows] = np.flatnonzero(problem.touching)
     return frames

@@ -15,7 +15,7 @@ import numpy as np
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.first_bends import contact_arc
-from vision.fit.motion import Gives, Told
+from vision.fit.motion import Gives, StatedVelocity
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
@@ -153,7 +153,7 @@ def _whisks_of(
 
 def _told(
     pictures: TrialPictures, strokes, views: Sequence[View], is_rounded: bool
-) -> tuple[Told | None, Sequence[View]]:
+) -> tuple[StatedVelocity | None, Sequence[View]]:
     """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
     stands: of that frame alone. Raises Refused for what is not told of it."""
     if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):
@@ -175,7 +175,9 @@ def _told(
         raise Refused("no frame is seen by every camera", code="no_shared_frame")
     middle = both[len(both) // 2]
     velocity, sigma = np.asarray(pictures.object_velocity_mm_s), pictures.object_velocity_sigma_mm_s
-    return Told(velocity, sigma, float(pictures.time_s[middle])), in_one_frame(views, middle)
+    return StatedVelocity(velocity, sigma, float(pictures.time_s[middle])), in_one_frame(
+        views, middle
+    )
 
 
 def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[View]:
@@ -280,7 +282,7 @@ def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut
     fit = Fit(
         fitted.problem,
         fitted.state,
-        fitted.uncertainty.answer,
+        fitted.uncertainty.inverse_normal,
         fitted.measured,
         fitted.by_parameter,
     )

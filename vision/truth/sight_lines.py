@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import WIRE_MODES_PX, Problem, wire_modes
+from vision.fit.blocks import WIRE_MODES_PX
+from vision.fit.problem import Problem, wire_modes
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
 

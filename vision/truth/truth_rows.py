@@ -74,7 +74,7 @@ def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
     """Of a bar that moves, as told and seen, mm/s (3,)."""
     if whisk.told is None:
         return None
-    own = fitted.problem.bar_moves
+    own = fitted.problem.blocks.motion.slice
     sigma = np.sqrt(np.diag(fitted.covariance)[own])
     return Value(whisk.told.velocity_mm_s + fitted.state.vector[own], sigma)
 
@@ -82,14 +82,14 @@ def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
 def _gave(fitted: FittedWhisk) -> GaveWay:
     """How far a bar that gives way has come in each touching frame, away from the contact and across that."""
     problem = fitted.problem
-    by = problem.motion.by_values(fitted.state.vector[problem.bar_moves])
+    by = problem.motion.by_values(fitted.state.vector[problem.blocks.motion.slice])
     keep, axis = problem.touching, bar_axes(problem, fitted.state.vector)
     point = np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
     direction = axis.direction[0]
     normal = (axis.point_mm - point) @ (np.eye(3) - np.outer(direction, direction))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     own, came = (
-        fitted.covariance[problem.bar_moves, problem.bar_moves],
+        fitted.covariance[problem.blocks.motion.slice, problem.blocks.motion.slice],
         shifts_mm(problem, fitted.state.vector),
     )
     found = []
@@ -126,7 +126,7 @@ def _at_touch(fitted: FittedWhisk, touch: Value, beta: Value) -> dict[str, Value
 def _shape(fitted: FittedWhisk) -> WireShape:
     problem, state = fitted.problem, fitted.state
     return WireShape(
-        rest_shape(state.vector),
+        rest_shape(problem, state.vector),
         np.array(fitted.frames),
         bends(problem, state.vector),
         state.arcs_mm,

@@ -9,7 +9,7 @@ import numpy as np
 from vision.fit.bend_onset import Onset
 from vision.fit.covariance import Uncertainty, uncertainty
 from vision.fit.exposure import Exposure, slip_in_exposure
-from vision.fit.motion import Gives, Motion, Told, Yielding
+from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.quantities import Jacobians, Measured, jacobians
@@ -54,7 +54,7 @@ class WhiskPictures:
     settings: VisionSettings
     light: dict[str, WireAppearance] = field(default_factory=dict)
     left_out: tuple[Reason, ...] = ()
-    told: Told | None = None
+    told: StatedVelocity | None = None
     gives: Gives | None = None
 
     @property
@@ -93,7 +93,7 @@ class WhiskPictures:
         moved = (
             0.0
             if self.told is None
-            else float(np.linalg.norm(self.motion.told_mm, axis=1).max(initial=0.0))
+            else float(np.linalg.norm(self.motion.expected_mm, axis=1).max(initial=0.0))
         )
         return self.rods.bar.radius_mm + moved
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vision.fit.first_bends import Sight, contact_arc, find_rest, follow_bends
+from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
 from vision.fit.problem import (
-    BAR,
-    REST,
     Problem,
     State,
     bar_axis,
@@ -112,7 +110,7 @@ def _fitted_by(
         look = _Look(
             upward(bar_axis(problem, state.vector)),
             shifts_mm(problem, state.vector),
-            rest_shape(state.vector),
+            rest_shape(problem, state.vector),
             bends(problem, state.vector),
             state.arcs_mm,
             _fitted_curves(problem, state, whisk.frames),
@@ -137,7 +135,7 @@ def _first_look(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Loo
     curves = {
         f: one_curve(rest, b, a, m, wire) for (f, m), b, a in zip(whisk.motor.items(), bend, arcs)
     }
-    came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.told_mm
+    came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
     if whisk.gives is not None:
         came = _given_way(whisk, list(curves.values()), touching)
         first = int(np.argmax(touching))
@@ -152,7 +150,8 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
     is seen to swing."""
     axis = whisk.bar.axis
     sights = [
-        Sight.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm) for view in whisk.views
+        SwingPictures.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm)
+        for view in whisk.views
     ]
     free = np.array(whisk.frames)[early(whisk.angles_rad)]
     rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
@@ -204,7 +203,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     problem, state, wire = fitted.problem, fitted.state, whisk.rods.wire
     touched = {f for f, bent in zip(fitted.frames, problem.bent) if bent}
     whisk = whisk.during([f for f in whisk.frames if f not in touched])
-    rest, axis = rest_shape(state.vector), bar_axis(problem, state.vector)
+    rest, axis = rest_shape(problem, state.vector), bar_axis(problem, state.vector)
     curves = {
         f: one_curve(rest, np.zeros(2), wire.length_mm, angle, wire)
         for f, angle in whisk.motor.items()
@@ -240,9 +239,9 @@ def _blurs_px(whisk: WhiskPictures) -> dict[str, float]:
 
 def _begin(problem: Problem, look: _Look) -> State:
     vector = np.zeros(problem.size)
-    vector[BAR : BAR + REST] = np.ravel(look.rest_mm)
+    vector[problem.blocks.rest_shape.slice] = np.ravel(look.rest_mm)
     if problem.motion is not None and problem.motion.from_touch:
-        vector[problem.bar_moves] = problem.motion.values(look.came_mm)
+        vector[problem.blocks.motion.slice] = problem.motion.values(look.came_mm)
     vector[problem.first_bend :] = look.bend_rad[problem.bent].ravel()
     return State(vector, np.asarray(look.arcs_mm, dtype=float))
 

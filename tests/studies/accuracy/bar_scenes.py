@@ -19,7 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from vision.calibration.cameras_file import read_cameras
-from vision.fit.problem import BAR_OFFSET_PX
+from vision.fit.blocks import BAR_OFFSET_PX
 from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis, upward
 from vision.geometry.refusals import Refused

@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.studies.accuracy.bar_scenes import off_px, read_scene
-from vision.fit.problem import BAR_OFFSET_PX
+from vision.fit.blocks import BAR_OFFSET_PX
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import BarAxis, axis_frame

@@ -29,7 +29,7 @@ from tests.studies.accuracy.scenes import (
     draw_scene,
     line_points,
 )
-from vision.fit.problem import BAR, Problem, State, curves_of
+from vision.fit.problem import Problem, State, curves_of
 from vision.fit.quantities import Measured, measure
 from vision.fit.solve import solve
 from vision.geometry.centreline import Curves
@@ -76,7 +76,9 @@ def own_errors(scene: Scene) -> dict[str, float]:
     problem = exact_problem(scene)
     near, _ = solve(problem, begin(problem), scales=ROUNDS[:8])
     vector = near.vector.copy()
-    vector[BAR : problem.first_bend] = 0.0  # straight at rest, no line off as a whole
+    vector[problem.blocks.rest_shape.start : problem.first_bend] = (
+        0.0  # straight at rest, no line off as a whole
+    )
     loose = own_points(problem, State(vector, near.arcs_mm), LOOSE_SIGMA_PX)
     true, _ = solve(loose, State(vector, near.arcs_mm), scales=ROUNDS)
     problem = own_points(problem, true, OWN_SIGMA_PX)

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.studies.accuracy.scenes import Scene, as_problem, begin, draw_scene, line_points
 from vision.fit.covariance import camera_rows
-from vision.fit.problem import BAR, Problem, State
+from vision.fit.problem import Problem, State
 from vision.fit.quantities import jacobians, measure
 from vision.fit.solve import linearise, solve
 
@@ -40,7 +40,7 @@ def off_solution(scene: Scene) -> tuple[Problem, State]:
 
 def _steps(problem: Problem) -> np.ndarray:
     step = np.full(problem.size, _LENGTH)
-    step[2:BAR], step[problem.first_bend :] = _TILT, _BEND
+    step[2:4], step[problem.first_bend :] = _TILT, _BEND
     return step
 
 

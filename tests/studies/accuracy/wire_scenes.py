@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.studies.accuracy.path_traced import see_scene
-from vision.fit.problem import WIRE_OFFSET_PX
+from vision.fit.blocks import WIRE_OFFSET_PX
 from vision.geometry.silhouette import outline
 from vision.truth import whisk_truth as seeing
 

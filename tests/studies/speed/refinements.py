@@ -28,7 +28,7 @@ import numpy as np  # noqa: E402
 from bench.analyses.left_out import NAMES  # noqa: E402
 from bench.base.settings import Settings  # noqa: E402
 from bench.commands.evaluate import evaluate  # noqa: E402
-from vision.fit.problem import BAR, REST  # noqa: E402
+from vision.fit.blocks import BAR_PRIOR, REST_PRIOR_MM  # noqa: E402
 from vision.geometry.centreline import REST_POWERS, centrelines, rotation_z, simpson, tangent_growth  # noqa: E402
 from vision.geometry.rods import Wire  # noqa: E402
 
@@ -51,7 +51,9 @@ CARRIED_BY: Mapping[str, tuple[str, ...]] = {
     "second friction coefficient": ("bench/trials/gate.py:kinetic_of",),
 }
 COLUMNS_OF = {"psi": 1, "sag and set": 4}
-COLUMNS = BAR + REST + 2  # all frames' bends are moved at once, each of their two parts
+COLUMNS = (
+    len(BAR_PRIOR) + 2 * len(REST_PRIOR_MM) + 2
+)  # all frames' bends are moved at once, each of their two parts
 LEDGER = ("vision/fit/refinements.py:left_out", "bench/analyses/ledger.py:ledger")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.scenes.model_scenes import begun, scene, with_points
 from vision.fit.bend_onset import Onset
-from vision.fit.motion import Gives, Motion, Told, Yielding, between
+from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding, between
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import measure
 from vision.fit.solve import linearise, solve
@@ -20,7 +20,7 @@ VELOCITY = np.array([1.0, 2.0, -1.5])
 
 def moving(frames=6):
     """A bar at constant velocity, frames 0.09 s apart, counted from the fourth."""
-    return Motion.steady(Told(VELOCITY, 0.5, 0.27), 0.09 * np.arange(frames))
+    return Motion.steady(StatedVelocity(VELOCITY, 0.5, 0.27), 0.09 * np.arange(frames))
 
 
 @cache
@@ -43,14 +43,16 @@ def test_how_a_bar_gives_way_is_found_with_the_rest():
     here, true = (measure(problem, s.vector, s.arcs_mm) for s in (found, truth))
     assert here.whisk["touch"] == pytest.approx(true.whisk["touch"], abs=1e-6)
     assert here.whisk["d_x"] == pytest.approx(true.whisk["d_x"], abs=1e-4)
-    shifts = [problem.motion.shift_mm(s.vector[problem.bar_moves]) for s in (found, truth)]
+    shifts = [
+        problem.motion.shift_mm(s.vector[problem.blocks.motion.slice]) for s in (found, truth)
+    ]
     assert np.abs(shifts[1]).max() > 0.05
     assert shifts[0] == pytest.approx(shifts[1], abs=1e-4)
 
 
 def test_a_bar_that_gives_way_stands_until_touch():
     problem, truth = giving()
-    shift = problem.motion.shift_mm(truth.vector[problem.bar_moves])
+    shift = problem.motion.shift_mm(truth.vector[problem.blocks.motion.slice])
     touch = first_touch(problem, truth.vector).motor_rad
     assert not shift[problem.motor_rad < touch].any()
     assert shift[problem.motor_rad > touch].any(axis=1).all()
@@ -68,7 +70,7 @@ def test_a_motion_is_found_with_the_rest():
     here, true = (measure(problem, s.vector, s.arcs_mm) for s in (found, truth))
     assert here.whisk["d_x"] == pytest.approx(true.whisk["d_x"], abs=1e-5)
     assert here.whisk["touch"] == pytest.approx(true.whisk["touch"], abs=1e-7)
-    off = found.vector[problem.bar_moves] - 0.1
+    off = found.vector[problem.blocks.motion.slice] - 0.1
     along = bar_axis(problem, truth.vector).direction
     assert off - (off @ along) * along == pytest.approx(np.zeros(3), abs=1e-5)
 
@@ -92,7 +94,7 @@ def test_jacobian_is_the_derivative_of_the_residual(rng, made):
     problem = with_points(problem, truth, rng)
     state = State(truth.vector + 1e-3 * rng.standard_normal(problem.size), truth.arcs_mm)
     linear, _ = linearise(problem, state)
-    for k in [0, 2, *range(problem.size)[problem.bar_moves], problem.first_bend]:
+    for k in [0, 2, *range(problem.size)[problem.blocks.motion.slice], problem.first_bend]:
         step = (1e-5 if k in (2, problem.first_bend) else 1e-3) * np.eye(problem.size)[k]
         ahead, behind = (
             linearise(problem, State(state.vector + s * step, state.arcs_mm))[0].residual

@@ -10,8 +10,8 @@ from scipy.integrate import cumulative_simpson
 from bench.rig.protocol import MotorTable, PicturesTable, TrialTable, WhiskerTable
 from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
+from vision.fit import blocks, solve
 from vision.fit import problem as model
-from vision.fit import solve
 from vision.fit.problem import Problem
 from vision.fit.quantities import jacobians
 from vision.fit.refinements import Fit, left_out
@@ -55,7 +55,7 @@ def told(fit: Fit, name: str, light=()) -> np.ndarray:
 def sigmas(fit: Fit) -> np.ndarray:
     """By noise alone, of the same three."""
     rows = fit.by.whisk["d_x"], fit.by.whisk["touch"], fit.by.frame["slip"][fit.last]
-    return np.array([np.sqrt(row @ fit.answer @ row) for row in rows])
+    return np.array([np.sqrt(row @ fit.inverse_normal @ row) for row in rows])
 
 
 def small_angles(rest_mm, bend_rad, contact_mm, motor_rad, wire, _pull=0.0) -> Curves:
@@ -86,11 +86,11 @@ def test_large_bending_is_what_a_fit_of_small_angles_differs_by(monkeypatch):
 def test_sag_and_set_are_what_a_straight_whisker_differs_by(monkeypatch):
     """A tenth is what large set leaves to the second order."""
     fit = drawn(3)
-    stiff = solve.REST_PRIOR_MM.copy()
+    stiff = blocks.REST_PRIOR_MM.copy()
     stiff[2:] = 1e-6
     predicted = told(fit, "sag and set")
-    monkeypatch.setattr(solve, "REST_PRIOR_MM", stiff)
-    true = moved(fit, fitted(fit.problem))
+    monkeypatch.setattr(blocks, "REST_PRIOR_MM", stiff)
+    true = moved(fit, fitted(replace(fit.problem)))
     assert np.all(np.abs(predicted - true) < 0.1 * np.abs(true) + 0.1 * sigmas(fit))
     assert np.max(np.abs(true) / sigmas(fit)) > 0.5
 
@@ -109,7 +109,7 @@ def test_taper_left_out_is_seen_in_its_size():
 def test_a_tilt_that_is_held_is_held():
     """The step that holds psi at 0 changes psi by what it was, and the constrained optimum costs least."""
     fit = drawn(3)
-    step = fit.answer @ fit.by.whisk["psi"]
+    step = fit.inverse_normal @ fit.by.whisk["psi"]
     step *= -fit.measured.whisk["psi"] / (fit.by.whisk["psi"] @ step)
     assert fit.by.whisk["psi"] @ step == pytest.approx(-fit.measured.whisk["psi"])
     found = left_out(fit, {})["psi"]
@@ -123,8 +123,8 @@ def test_friction_along_the_whisker_is_what_a_fit_without_any_differs_by(monkeyp
     scene = draw_scene(3, whisker=WhiskerTable(), trials=held, motor=motor, pictures=pictures)
     fit = fitted(as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene)))
     predicted = told(fit, "friction along the whisker")
-    monkeypatch.setattr(solve, "PULL_PRIOR", 1e-6)
-    true = moved(fit, fitted(fit.problem))
+    monkeypatch.setattr(blocks, "PULL_PRIOR", 1e-6)
+    true = moved(fit, fitted(replace(fit.problem)))
     assert np.all(np.abs(predicted - true) < 0.2 * np.abs(true) + 0.01 * sigmas(fit))
     assert np.max(np.abs(true) / sigmas(fit)) > 0.1
 
@@ -147,7 +147,9 @@ def test_lens_terms_answer_by_the_calibration_s_covariance():
     assert "exact" in left_out(fit, {})["lens k1 k2"].why and np.isnan(told(fit, "lens k1 k2")[0])
     cameras = fit.problem.cameras
     free = Cameras(cameras.cameras, 1e-8 * np.eye(len(cameras.covariance)))
-    loose = Fit(replace(fit.problem, cameras=free), fit.state, fit.answer, fit.measured, fit.by)
+    loose = Fit(
+        replace(fit.problem, cameras=free), fit.state, fit.inverse_normal, fit.measured, fit.by
+    )
     step = np.zeros((len(cameras), 15))
     step[:, 4:6] = [-camera.lens[4:6] for camera in cameras]
     other = fitted(replace(fit.problem, cameras=cameras.moved(step.ravel())))

@@ -38,7 +38,7 @@ def off(problem, state):
     """A start that knows the bends to a fifth, the object to half a millimetre and 0.01 rad, and no rest shape."""
     vector = state.vector.copy()
     vector[: problem.first_bend] = 0.0
-    vector[:4], vector[problem.bar_moves.start] = [0.5, -0.4, 0.01, -0.01], 0.5
+    vector[:4], vector[problem.blocks.shift_along.start] = [0.5, -0.4, 0.01, -0.01], 0.5
     vector[problem.first_bend :] *= 0.8
     return State(vector, state.arcs_mm)
 
@@ -65,7 +65,7 @@ def test_derivatives_of_the_outline_are_those_of_differences(scene):
     problem = with_outline(problem, truth)
     rows = slice(sum(len(one.points) for one in problem.seen if one.frame >= 0) // 2, None)
     jacobian = linear_at(problem, truth).jacobian
-    for k in (0, 1, 2, 3, problem.bar_moves.start, problem.bar_moves.start + 1):
+    for k in (0, 1, 2, 3, problem.blocks.shift_along.start, problem.blocks.outline_bias.start):
         step = 1e-4 * (np.arange(problem.size) == k)
         ahead, behind = (
             linear_at(problem, State(truth.vector + way * step, truth.arcs_mm)).residual

@@ -25,7 +25,7 @@ def fitted():
     """A scene of exact points whose neighbours are said to err alike."""
     scene = draw_scene(0)
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
-    problem = replace(problem, alike=[ALIKE] * len(scene.cameras))
+    problem = replace(problem, neighbour_correlation=[ALIKE] * len(scene.cameras))
     state, answer = solve(problem, begin(problem), scales=(1e9,) * 8)
     return problem, state, answer
 
@@ -77,7 +77,10 @@ def test_what_neighbours_share_is_measured(group):
         seen=[_with_noise(seen, group, rng) if seen.frame >= 0 else seen for seen in exact.seen],
     )
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
-    wider = [(1.0 + alike) / (1.0 - alike) for alike in inflated_by_residuals(problem, state).alike]
+    wider = [
+        (1.0 + alike) / (1.0 - alike)
+        for alike in inflated_by_residuals(problem, state).neighbour_correlation
+    ]
     assert np.mean(wider) == pytest.approx(
         {1: 1.0, GROUP: 0.8 * GROUP}[group], abs={1: 0.3, GROUP: 0.8}[group]
     )

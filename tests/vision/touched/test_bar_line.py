@@ -16,7 +16,7 @@ from tests.studies.accuracy.bar_lines import (
     measured,
     noisy_view,
 )
-from vision.fit.problem import BAR_OFFSET_PX
+from vision.fit.blocks import BAR_OFFSET_PX
 from vision.geometry.contact import BarAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise

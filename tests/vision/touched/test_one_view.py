@@ -52,7 +52,9 @@ def alone(onset_at=None):
     """A whisk before the first camera only, its bar told by its edges; and the state that is its truth."""
     problem, truth = scene()
     (view,) = cameras = Cameras(CAMERAS.cameras[:1])
-    offsets_of_second = np.r_[problem.wire_off(1), problem.bar_off(1)]
+    offsets_of_second = np.r_[
+        problem.blocks.wire_offsets[1].slice, problem.blocks.bar_offsets[1].slice
+    ]
     problem = replace(problem, cameras=cameras, onset=onset_at)
     truth = State(np.delete(truth.vector, offsets_of_second), truth.arcs_mm)
     problem = with_points(problem, truth)

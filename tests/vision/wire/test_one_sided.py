@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.studies.accuracy.lines import SCENES, errors, first_look
-from vision.fit.problem import WIRE_OFFSET_PX
+from vision.fit.blocks import WIRE_OFFSET_PX
 from vision.wire.one_sided import SeenWidth, WireAppearance, one_sided_lines, seen_width
 from vision.wire.trace import to_points
 

@@ -18,7 +18,7 @@ from tests.studies.accuracy.lines import (
     drawn,
     errors,
 )
-from vision.fit.first_bends import Sight
+from vision.fit.first_bends import SwingPictures
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import BarAxis, outline_of_bar
 from vision.geometry.rods import Bar, Rods, Wire
@@ -105,7 +105,7 @@ def test_a_wire_that_the_bar_hides_whole_has_no_points(still):
     """There is no median width of no pieces: that ended the whole run."""
     view, curves, wire = still
     over_all = np.array([[640.0, 360.0]]), np.array([2000.0])
-    seen = Sight(view, Rods(wire, Bar(4.0)), view.background, 1.0, over_all).votes(curves)
+    seen = SwingPictures(view, Rods(wire, Bar(4.0)), view.background, 1.0, over_all).votes(curves)
     assert len(seen.pieces) == len(seen.share) == len(seen.points(np.zeros(0))) == 0
 
 
