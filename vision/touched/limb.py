@@ -16,9 +16,9 @@ from vision.geometry.rounded import Rounded
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.edges import EDGE_PX, FORMAL_TO_TRUE
-from vision.touched.evidence import LitRod, evidence
-from vision.touched.posterior import overstated
-from vision.touched.profiles import FULL_SCALE, OUTSIDE_PX, profiles
+from vision.touched.evidence import LitRod, compute_evidence
+from vision.touched.posterior import estimate_temperature
+from vision.touched.profiles import FULL_SCALE, OUTSIDE_PX, compute_profiles
 from vision.wire.bands import Pieces
 from vision.wire.points import LinePoints
 
@@ -379,17 +379,24 @@ def _look(
     *,
     fine: bool,
 ) -> _Look:
-    seen = profiles(pieces, STRETCHES, reach_px, gamma)
+    seen = compute_profiles(pieces, STRETCHES, reach_px, gamma)
     rod = LitRod(seen)
     under = [
-        evidence(rod, reach_px, float(blur), 2 if fine else 1, all_light=fine, every=every)
+        compute_evidence(
+            rod,
+            reach_px,
+            float(blur),
+            positions=2 if fine else 1,
+            with_smooth_priors=fine,
+            every=every,
+        )
         for blur in blurs_px
     ]
-    best = min(under, key=lambda one: one.least.sum())
-    temper = overstated(best, seen)
+    best = min(under, key=lambda one: one.least_deviance.sum())
+    temper = estimate_temperature(best, seen)
     against, mean, variance = [], [], []
     for one in under:
-        own = -0.5 * one.of_bar / temper[:, None, None]
+        own = -0.5 * one.bar_deviance / temper[:, None, None]
         total = logsumexp(own, axis=(1, 2))
         chance = np.sum(np.exp(own - total[:, None, None]), axis=2)
         mean.append(chance @ one.shift_px)
@@ -399,8 +406,8 @@ def _look(
         np.array(against),
         np.array(mean),
         np.array(variance),
-        (best.of_none - best.least) / temper,
-        float(np.mean(best.least / temper)),
+        (best.no_bar_deviance - best.least_deviance) / temper,
+        float(np.mean(best.least_deviance / temper)),
     )
 
 

@@ -13,7 +13,7 @@ from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
-from vision.touched.posterior import log_width, moved
+from vision.touched.posterior import estimate_log_width, move_to_line
 from vision.touched.search import SeenBar, see_bar
 
 # [1] Of one trial, what light on the edges and the axis leave: with it z is 0.75 RMS over 37
@@ -62,7 +62,10 @@ def seen_over_given(seen: SeenBar) -> dict[str, tuple[float, float]]:
     """How wide the bar looks over how wide it should, and sigma, by camera, of those that show it: in what was looked
     at for it."""
     lines = {name: seen.lines[name] for name in seen.seen_by}
-    return {name: _share(*log_width(moved(one.pieces, one.line))) for name, one in lines.items()}
+    return {
+        name: _share(*estimate_log_width(move_to_line(one.pieces, one.line)))
+        for name, one in lines.items()
+    }
 
 
 def _share(log: float, sigma: float) -> tuple[float, float]:

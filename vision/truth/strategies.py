@@ -27,7 +27,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edges import measure_edges
 from vision.touched.limb import Limb, measure_limbs
-from vision.touched.line import BarLine, measure_bars
+from vision.touched.line import BarLineEstimate, measure_bars
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.whisk_pictures import WhiskPictures
 from vision.wire.points import LinePoints
@@ -64,7 +64,7 @@ class BarMiddles:
     views: Sequence[View]
     radius_mm: float
     settings: VisionSettings
-    lines: dict[str, BarLine] = field(default_factory=dict)
+    lines: dict[str, BarLineEstimate] = field(default_factory=dict)
     are_fine: bool = False
 
     def points(

@@ -129,7 +129,7 @@ def line_rows(
     error = off_px(camera, true, radius_mm, line.points.px, line.points.normal)
     parts = [f"{e:+.3f} ± {s:.3f}" for e, s in zip(error, line.points.sigma_px)]
     print(
-        f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.for_bar:.0f}, left {line.unresolved:.3f}",
+        f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.evidence_for_bar:.0f}, left {line.unresolved_share:.3f}",
         flush=True,
     )
     return list(zip(error, line.points.sigma_px))
