@@ -1,10 +1,11 @@
 """The bar's two edges in one camera: its apparent width, and so its distance.
 
-Two cameras locate a bar by where their sights cross, and there its width adds next to nothing. One camera has only the
-width. The model is linear in the shading of the rims, which is fitted for each q = (shift, tilt, widening, taper,
-log blur), and the sum of squares that remains is minimised over q. The shading is as free as for the bar's line
-(`vision.touched.line`). An error in a rim's shading cancels in the middle of the two edges, but not in the width, so
-each edge has an error of its own, EDGE_PX.
+Two cameras locate a bar by where their sights cross, and there its width adds next to nothing. One
+camera has only the width. The model is linear in the shading of the rims, which is fitted for each
+q = (shift, tilt, widening, taper, log blur), and the sum of squares that remains is minimised over
+q. The shading is as free as for the bar's line (`vision.touched.line`). An error in a rim's shading
+cancels in the middle of the two edges, but not in the width, so each edge has an error of its own,
+EDGE_PX.
 """
 
 from collections.abc import Sequence
@@ -75,9 +76,9 @@ def measure_edges(
 ) -> dict[int, LinePoints] | None:
     """Measure two points of each of the bar's edges in the mean picture.
 
-    Returns the points by side, 1 towards the pieces' normals and -1 against them; None where too little of the bar is
-    clear, or the pixels show no bar. wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis and the
-    width may be some pixels off.
+    Returns the points by side, 1 towards the pieces' normals and -1 against them; None where too
+    little of the bar is clear, or the pixels show no bar. wires_px: lines (m, 2) where the wire
+    lies in some frame. coarse: the axis and the width may be some pixels off.
     """
     noise = view.noise.times(view.mean_share + 1.0)  # of the mean minus one background
     knots = bar_knots(settings)
@@ -99,15 +100,16 @@ def measure_edges(
 
 
 def _fit_rims(rims: Pieces, knots: Knots, q) -> float:
-    """Fit the shading of rims aligned by q[:4] under a lens blur of exp(q[4]) px, and return chi² per pixel."""
+    """Fit the shading of rims aligned by q[:4] under a lens blur of exp(q[4]) px, and return chi²
+    per pixel."""
     return fit_shading(_align(rims, q), float(np.exp(q[4])), RIMS, knots)[1]
 
 
 def _align(pieces: Pieces, q) -> Pieces:
     """Return the pieces about a rod of another place and width.
 
-    It is shifted by q[0] px and tilted by q[1] px over ARM_MM; its half width is larger by q[2] px and grows by q[3] px
-    over ARM_MM.
+    It is shifted by q[0] px and tilted by q[1] px over ARM_MM; its half width is larger by q[2] px
+    and grows by q[3] px over ARM_MM.
     """
     lever = pieces.place / ARM_MM
     shifted = pieces.moved(q[0] + q[1] * lever)
@@ -116,7 +118,8 @@ def _align(pieces: Pieces, q) -> Pieces:
 
 
 def _search_coarse(pieces: Pieces, knots: Knots) -> np.ndarray:
-    """Find shift, tilt, widening and taper (4,) by coordinate descent with a blurred model, near the contact."""
+    """Find shift, tilt, widening and taper (4,) by coordinate descent with a blurred model, near
+    the contact."""
     is_near = np.abs(pieces.place) < _SEARCH_REACH_MM
     is_enough = np.sum(is_near) >= FEWEST_PIECES
     bins, _ = binned(pieces.select(is_near) if is_enough else pieces, _BIN_PX)
@@ -138,7 +141,8 @@ def _search_coarse(pieces: Pieces, knots: Knots) -> np.ndarray:
 
 
 def _points_of_edges(pieces: Pieces, q, covariance) -> dict[int, LinePoints]:
-    """Return points at ± ARM_MM of both edges, by side, each with its sigma. q (4,) and its covariance (4, 4)."""
+    """Return points at ± ARM_MM of both edges, by side, each with its sigma. q (4,) and its
+    covariance (4, 4)."""
     place, foot, normal, radius = at_arms(pieces)
     lever = place / ARM_MM
     points = {}
@@ -153,7 +157,8 @@ def _points_of_edges(pieces: Pieces, q, covariance) -> dict[int, LinePoints]:
 
 
 def _normals_of_line(px, normal) -> np.ndarray:
-    """Return the unit normals (2, 2) of the line through two points, on the side of the given ones."""
+    """Return the unit normals (2, 2) of the line through two points, on the side of the given
+    ones."""
     along = (px[1] - px[0]) / np.linalg.norm(px[1] - px[0])
     across = np.array([-along[1], along[0]])
     return np.tile(across * np.sign(across @ normal.sum(axis=0)), (2, 1))

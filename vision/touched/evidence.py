@@ -1,21 +1,23 @@
-"""Bayesian evidence of a bar's position: how probable a light profile is for each position of a lit rod.
+"""Bayesian evidence of a bar's position: the probability of a light profile for each position.
 
-The model of a profile at distance x from its middle is the light on the rod between its edges c ± R, and the
-background beyond them; the lens blurs both by a Gaussian of sigma β, and noise of variance 1 / w is added.
+The model of a profile at distance x from its middle is the light on the rod between its edges c ±
+R, and the background beyond them; the lens blurs both by a Gaussian of sigma β, and noise of
+variance 1 / w is added.
 
-* On the rod, light is a function of the angle φ round it, sin φ = (x − c) / R: a spline with a smooth prior.
+* On the rod, light is a function of the angle φ round it, sin φ = (x − c) / R: a spline with a
+  smooth prior.
 * Beyond each edge it is a level and a slope, or a share of the picture without rods.
 
-Light adds up before the sensor's transfer curve, grey = 255 light^(1 / gamma), so for a given c, β and gamma the model
-is linear in its coefficients θ, which have wide Gaussian priors of precision P:
+Light adds up before the sensor's transfer curve, grey = 255 light^(1 / gamma), so for a given c, β
+and gamma the model is linear in its coefficients θ, which have wide Gaussian priors of precision P:
 
     y = A(c, β) θ + ε,    θ ~ N(0, P⁻¹),    ε ~ N(0, W⁻¹)
     −2 log p(y | c, β) = χ² + log |AᵀWA + P| − log |P| − log |W|    (up to a constant)
     χ² = yᵀWy − yᵀWA (AᵀWA + P)⁻¹ AᵀWy
 
-The coefficients are integrated out (marginal likelihood; MacKay, Neural Computation 4, 415, 1992). Highlights and dark
-rims inside the bar cannot pull its position, for the free light on the rod explains them at any c. `deviance` is short
-for −2 log evidence throughout.
+The coefficients are integrated out (marginal likelihood; MacKay, Neural Computation 4, 415, 1992).
+Highlights and dark rims inside the bar cannot pull its position, for the free light on the rod
+explains them at any c. `deviance` is short for −2 log evidence throughout.
 """
 
 from dataclasses import dataclass
@@ -62,7 +64,8 @@ _FEWEST_BINS = 5
 
 @dataclass(frozen=True)
 class LitRod:
-    """The prior model of profiles: a rod with any shading that the priors allow, before its background."""
+    """The prior model of profiles: a rod with any shading that the priors allow, before its
+    background."""
 
     profiles: Profiles
 
@@ -75,7 +78,8 @@ class LitRod:
 
     @cached_property
     def _inner_range(self) -> float:
-        """Return the range of light on the bar without its rims, or of the whole profile of a bar too thin for that."""
+        """Return the range of light on the bar without its rims, or of the whole profile of a bar
+        too thin for that."""
         profiles = self.profiles
         is_inner = np.abs(profiles.offset_px) < profiles.radius_px - _RIM_BLURRED_PX
         ranges = []
@@ -86,13 +90,15 @@ class LitRod:
 
     @cached_property
     def _outside_precision(self) -> np.ndarray:
-        """Return the prior precisions (6,) of level and slope beyond either edge, and of the background's two shares."""
+        """Return the prior precisions (6,) of level and slope beyond either edge, and of the
+        background's two shares."""
         sides = [self._level_sigma, _SLOPE_SHARE * self.profiles.contrast]
         return np.array([*sides, *sides, 1.0, 1.0]) ** -2.0
 
     @cached_property
     def _rod_precisions(self) -> list[np.ndarray]:
-        """Return the prior precisions (splines, splines) of the light on the rod, from smooth to rough."""
+        """Return the prior precisions (splines, splines) of the light on the rod, from smooth to
+        rough."""
         scale = np.hypot(self._inner_range, _RIM_SHARE * self.profiles.contrast)
         level = self._level_sigma**-2.0 * np.eye(_SPLINES)
         return [level + roughness / scale**2 for roughness in _roughness_penalties()]
@@ -104,7 +110,8 @@ class LitRod:
 
     @cached_property
     def _smooth_covariances(self) -> list[np.ndarray]:
-        """Return the covariances (splines, splines) of the smoother light in the basis of `_rough_root`."""
+        """Return the covariances (splines, splines) of the smoother light in the basis of
+        `_rough_root`."""
         inverse_root = np.linalg.inv(self._rough_root)
         covariances = []
         for precision in self._rod_precisions[:-1]:
@@ -114,12 +121,14 @@ class LitRod:
     def observable_modes(
         self, design: np.ndarray, *, with_smooth_priors: bool
     ) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return the modes (splines, r) of the light that pixels constrain, and the prior precisions (r + 6, r + 6).
+        """Return the modes (splines, r) of the light that pixels constrain, and the prior
+        precisions (r + 6, r + 6).
 
-        design (b, splines): whitened pictures of the splines. Modes are scaled so that each has prior variance 1 under
-        the roughest prior. Modes about which the pixels say less than _LEAST_INFORMATION are dropped: they do not
-        change the evidence. The precisions also hold those of the light beyond the edges; there is one for each
-        smoothness of the light, or the roughest alone.
+        design (b, splines): whitened pictures of the splines. Modes are scaled so that each has
+        prior variance 1 under the roughest prior. Modes about which the pixels say less than
+        _LEAST_INFORMATION are dropped: they do not change the evidence. The precisions also hold
+        those of the light beyond the edges; there is one for each smoothness of the light, or the
+        roughest alone.
         """
         whitened = design @ self._rough_root
         information, modes = np.linalg.eigh(whitened.T @ whitened)
@@ -137,12 +146,14 @@ class LitRod:
     def marginalise(
         self, normal: np.ndarray, precision: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deviance (k, …) of linear Gaussian models, and their misfit (k, …): χ² per bin.
+        """Return the deviance (k, …) of linear Gaussian models, and their misfit (k, …): χ² per
+        bin.
 
-        normal (k, …, n, n): products of the whitened columns [A y], the light y last; only its lower triangle is
-        used. precision (n - 1, n - 1): P of the coefficients.
+        normal (k, …, n, n): products of the whitened columns [A y], the light y last; only its
+        lower triangle is used. precision (n - 1, n - 1): P of the coefficients.
 
-        The last diagonal element of the Cholesky factor of [[AᵀWA + P, ·], [yᵀWA, yᵀWy]] is the root of χ².
+        The last diagonal element of the Cholesky factor of [[AᵀWA + P, ·], [yᵀWA, yᵀWy]] is the
+        root of χ².
         """
         normal = normal.copy()
         normal[..., :-1, :-1] += precision
@@ -158,7 +169,8 @@ class LitRod:
 
     @cached_property
     def without_rod(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deviance (k,) of the background alone, without a rod, and its misfit (k,) per bin."""
+        """Return the deviance (k,) of the background alone, without a rod, and its misfit (k,) per
+        bin."""
         return self._marginalise_columns(
             self._background_columns, self._outside_precision[[0, 1, 4]]
         )
@@ -174,8 +186,9 @@ class LitRod:
     def detection_score(self, evidence: "Evidence") -> float:
         """Return log of the misfit without the bar over that with it, of the median segment.
 
-        Alternatives are the background alone, and a single edge where the bar's left or right one is: the edge of
-        some wider thing. The one with the least misfit counts. The score does not depend on the contrast.
+        Alternatives are the background alone, and a single edge where the bar's left or right one
+        is: the edge of some wider thing. The one with the least misfit counts. The score does not
+        depend on the contrast.
         """
         misfits = [self.without_rod[1]]
         for side in (-1.0, 1.0):
@@ -185,7 +198,8 @@ class LitRod:
         return float(np.median(np.log(alternative / np.maximum(evidence.misfit, 1.0))))
 
     def _misfit_of_edge(self, edge_px: np.ndarray, blur_px: float) -> np.ndarray:
-        """Return the misfit (k,) per bin of a single edge at edge_px (k,) between two backgrounds."""
+        """Return the misfit (k,) per bin of a single edge at edge_px (k,) between two
+        backgrounds."""
         beyond = ndtr((self.profiles.offset_px - edge_px[:, None]) / blur_px)
         columns = self._background_columns
         both_sides = np.concatenate([(1.0 - beyond) * columns, beyond * columns])
@@ -195,7 +209,8 @@ class LitRod:
     def _marginalise_columns(
         self, columns: np.ndarray, precision: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deviance and the misfit (k,) of columns (n, k, b) whose coefficients have precision (n,)."""
+        """Return the deviance and the misfit (k,) of columns (n, k, b) whose coefficients have
+        precision (n,)."""
         profiles = self.profiles
         design = np.stack([*columns, profiles.light], axis=-1)  # (k, b, n + 1)
         whitened = np.sqrt(profiles.weight)[..., None] * design
@@ -208,8 +223,9 @@ class LitRod:
 class Evidence:
     """The evidence of k segments under one lens blur, as deviance: −2 log evidence.
 
-    shift_px (g,): positions of the bar's middle. bar_deviance (k, g, r): of each position and each of r priors of the
-    light. misfit (k,): χ² per bin at the best of these. no_bar_deviance (k,): of the background alone.
+    shift_px (g,): positions of the bar's middle. bar_deviance (k, g, r): of each position and each
+    of r priors of the light. misfit (k,): χ² per bin at the best of these. no_bar_deviance (k,): of
+    the background alone.
     """
 
     blur_px: float
@@ -233,12 +249,14 @@ class Evidence:
 
 @dataclass(frozen=True)
 class _Design:
-    """Columns of the model at offsets (n,) from the bar's middle, apart from the picture without rods.
+    """Columns of the model at offsets (n,) from the bar's middle, apart from the picture without
+    rods.
 
     light (n, r + 4): of the modes of light on the rod, and of level and slope beyond each edge.
     cover (n, 2): the share of the background that is visible beyond each edge.
-    leak (n, 2): the share of the background's slope that is visible, px. The picture without rods is blurred already,
-    and the blur of a product of two pictures is the product of the blurred ones plus blur² times that of their slopes.
+    leak (n, 2): the share of the background's slope that is visible, px. The picture without rods
+    is blurred already, and the blur of a product of two pictures is the product of the blurred ones
+    plus blur² times that of their slopes.
     """
 
     light: np.ndarray
@@ -258,8 +276,9 @@ def compute_evidence(
 ) -> Evidence:
     """Compute the evidence of positions of the bar's middle within reach_px, in each segment.
 
-    positions: how many for each step of the profiles' grid. every: uses only every so many steps. with_smooth_priors:
-    under all priors of the light, else under the roughest alone. width_factor: of the bar's width.
+    positions: how many for each step of the profiles' grid. every: uses only every so many steps.
+    with_smooth_priors: under all priors of the light, else under the roughest alone. width_factor:
+    of the bar's width.
     """
     profiles = rod.profiles
     radius_px = width_factor * profiles.radius_px
@@ -296,26 +315,29 @@ def compute_evidence(
 
 
 def _visible_steps(profiles: Profiles, most: int) -> np.ndarray:
-    """Return the offsets (n,) from a bar's middle, in steps, that have pixels for some shift of up to `most` steps."""
+    """Return the offsets (n,) from a bar's middle, in steps, that have pixels for some shift of up
+    to `most` steps."""
     any_observed = np.any(profiles.is_observed, axis=0)
     visible = np.flatnonzero(np.convolve(any_observed, np.ones(2 * most + 1)) > 0)
     return visible - (len(profiles.offset_px) // 2 + most)
 
 
 def _largest_root_weight(profiles: Profiles, steps: np.ndarray, most: int) -> np.ndarray:
-    """Return 1 / sigma (n,) at offsets `steps`, the largest over segments and shifts of up to `most` steps."""
+    """Return 1 / sigma (n,) at offsets `steps`, the largest over segments and shifts of up to
+    `most` steps."""
     weight = np.pad(np.max(profiles.weight, axis=0), most)
     largest = maximum_filter1d(weight, 2 * most + 1)
     return np.sqrt(largest[steps + len(largest) // 2])
 
 
 def _normal_matrices(profiles: Profiles, shifts, design: _Design, steps) -> np.ndarray:
-    """Compute the matrices [A y]ᵀ W [A y] (k, g, m, m) for middles at `shifts` (g,), in whole steps of the grid.
+    """Compute the matrices [A y]ᵀ W [A y] (k, g, m, m) for middles at `shifts` (g,), in whole steps
+    of the grid.
 
-    design: at offsets `steps` (n,) from the middle. Columns of A are the r + 4 of the light, then the background beyond
-    either edge, cover · g + leak · s of the background g and its slope s. So each element is a sum over products of two
-    columns of the design times one of the `moments` of the profiles, shifted: nine matrix products give all of them.
-    Only the lower triangle is right.
+    design: at offsets `steps` (n,) from the middle. Columns of A are the r + 4 of the light, then
+    the background beyond either edge, cover · g + leak · s of the background g and its slope s. So
+    each element is a sum over products of two columns of the design times one of the `moments` of
+    the profiles, shifted: nine matrix products give all of them. Only the lower triangle is right.
     """
     light = design.light
     cover = design.cover
@@ -358,8 +380,9 @@ def _normal_matrices(profiles: Profiles, shifts, design: _Design, steps) -> np.n
 def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return which element of `_normal_matrices` is which of its sums.
 
-    columns: number of columns of the light. row, column (columns (columns + 1) / 2,): of the lower triangle of their
-    products. element (columns + 3, columns + 3): index of each element among all sums, 0 above the diagonal.
+    columns: number of columns of the light. row, column (columns (columns + 1) / 2,): of the lower
+    triangle of their products. element (columns + 3, columns + 3): index of each element among all
+    sums, 0 above the diagonal.
     """
     element = np.zeros((columns + 3, columns + 3), dtype=np.intp)
     row, column = np.tril_indices(columns)
@@ -374,7 +397,8 @@ def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _make_design(offset_px, rod_light, radius_px: float, blur_px: float) -> _Design:
-    """Return the design at offset_px (n,), of the blurred pictures rod_light (n, r) of the modes of light on the rod."""
+    """Return the design at offset_px (n,), of the blurred pictures rod_light (n, r) of the modes of
+    light on the rod."""
     beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # (n, 2) left and right edge
     cover = ndtr(beyond_px / blur_px)
     density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
@@ -385,7 +409,8 @@ def _make_design(offset_px, rod_light, radius_px: float, blur_px: float) -> _Des
 
 
 def _blur_splines(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
-    """Return blurred pictures (n, splines) of rods whose radiance is one spline of the angle each."""
+    """Return blurred pictures (n, splines) of rods whose radiance is one spline of the angle
+    each."""
     z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
     step_rad = _ANGLES[1] - _ANGLES[0]
     area = radius_px * np.cos(_ANGLES) * step_rad / (blur_px * np.sqrt(2.0 * np.pi))
@@ -394,7 +419,8 @@ def _blur_splines(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def _roughness_penalties() -> list[np.ndarray]:
-    """Return DᵀD / sigma² (splines, splines) of first and second differences of the light, from smooth to rough."""
+    """Return DᵀD / sigma² (splines, splines) of first and second differences of the light, from
+    smooth to rough."""
     steps = np.diff(np.eye(_SPLINES), 1, axis=0)
     curvatures = np.diff(np.eye(_SPLINES), 2, axis=0)
     of_steps = steps.T @ steps / _STEP_SHARE**2

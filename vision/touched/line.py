@@ -1,10 +1,13 @@
-"""The bar's line in one camera: two line points with their sigmas, from the evidence of both its edges.
+"""The bar's line in one camera: two line points with their sigmas, from the evidence of both its
+edges.
 
-The bar stands still, so its frames are averaged. Its pixels near wires, clamps and the picture's border are left out.
-For each transfer curve (gamma) that the camera may have, `posterior.py` gives the posterior of shift and tilt. The
-cameras of a bench are of one kind, so they weigh the curves together; the line is the mean over the curves that remain
-probable, and its covariance is the mean covariance plus the scatter between curves. Where an edge is as dark as its
-background, or a shadow's border may be the edge, the posterior is wide or has several peaks, and the sigma is as wide.
+The bar stands still, so its frames are averaged. Its pixels near wires, clamps and the picture's
+border are left out. For each transfer curve (gamma) that the camera may have, `posterior.py` gives
+the posterior of shift and tilt. The cameras of a bench are of one kind, so they weigh the curves
+together; the line is the mean over the curves that remain probable, and its covariance is the mean
+covariance plus the scatter between curves. Where an edge is as dark as its background, or a
+shadow's border may be the edge, the posterior is wide or has several peaks, and the sigma is as
+wide.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -67,9 +70,11 @@ _LEAST_BEYOND = 0.01
 class BarLineEstimate:
     """The line of the bar's middle in one camera.
 
-    points: two line points; `place` is mm along the axis they were expected on. line (2,): shift and tilt over ARM_MM,
-    px. posteriors: by gamma of each probable transfer curve. pieces: the pixels it was measured in.
-    evidence_for_bar, detection_score, unresolved_share: as of `Posterior`, averaged over the transfer curves.
+    points: two line points; `place` is mm along the axis they were expected on. line (2,): shift
+    and tilt over ARM_MM, px. posteriors: by gamma of each probable transfer curve. pieces: the
+    pixels it was measured in.
+    evidence_for_bar, detection_score, unresolved_share: as of `Posterior`, averaged over the
+    transfer curves.
     """
 
     points: LinePoints
@@ -87,11 +92,13 @@ class BarLineEstimate:
 
     @property
     def has_edges(self) -> bool:
-        """Return whether the pixels also resolve where its edges lie among the lines that were tried."""
+        """Return whether the pixels also resolve where its edges lie among the lines that were
+        tried."""
         return self.is_bar and self.unresolved_share < _LARGEST_UNRESOLVED
 
     def posteriors_about(self, pieces: Pieces) -> dict[float, Posterior]:
-        """Return the posteriors by gamma, with their lines counted from the axis of other pieces."""
+        """Return the posteriors by gamma, with their lines counted from the axis of other
+        pieces."""
         place, foot, normal, _ = at_arms(pieces)
         offset = np.sum((self.points.px - foot) * normal, axis=1) / np.sum(normal**2, axis=1)
         levers = np.stack([np.ones(2), place / ARM_MM], axis=1)
@@ -109,7 +116,8 @@ def find_lines(
     wires_px: Mapping[str, Sequence[np.ndarray]],
     settings: VisionSettings,
 ) -> dict[str, BarLineEstimate]:
-    """Find the bar's line in each camera by one quick pass, for an axis that is up to NEAR_PX off, or no bar's.
+    """Find the bar's line in each camera by one quick pass, for an axis that is up to NEAR_PX off,
+    or no bar's.
 
     wires_px: by camera lines (m, 2) where the wire lies in some frame.
     """
@@ -145,9 +153,9 @@ def measure_bars(
 ) -> dict[str, BarLineEstimate]:
     """Measure the bar's line in the mean of each view's pictures, by camera.
 
-    Cameras that show too little of the bar are left out. wires_px: by camera lines (m, 2) where the wire lies in some
-    frame. before: measured about an axis nearby; with it lines are measured finely, without it to some tenths of their
-    sigma.
+    Cameras that show too little of the bar are left out. wires_px: by camera lines (m, 2) where the
+    wire lies in some frame. before: measured about an axis nearby; with it lines are measured
+    finely, without it to some tenths of their sigma.
     """
     pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
@@ -187,7 +195,8 @@ def _fit_coarse(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterio
 def _refine(
     pieces: Pieces, posteriors: Mapping[float, Posterior], positions: int
 ) -> dict[float, Posterior]:
-    """Return the refined posterior under each transfer curve, with `positions` for each step across."""
+    """Return the refined posterior under each transfer curve, with `positions` for each step
+    across."""
     refined = {}
     for gamma, posterior in posteriors.items():
         refined[gamma] = refine(pieces, posterior, gamma, positions)
@@ -219,8 +228,8 @@ def clear_pieces(
 def _gamma_probabilities(cameras: Iterable[Mapping[float, Posterior]]) -> np.ndarray:
     """Return the probability of each transfer curve, from the posteriors of all cameras.
 
-    All segments of a bar are lit nearly alike, so that the evidence of their light counts once for a camera: its mean.
-    The evidence of segments that no curve explains is tempered.
+    All segments of a bar are lit nearly alike, so that the evidence of their light counts once for
+    a camera: its mean. The evidence of segments that no curve explains is tempered.
     """
     total = 0.0
     for posteriors in cameras:
@@ -237,7 +246,8 @@ def _gamma_probabilities(cameras: Iterable[Mapping[float, Posterior]]) -> np.nda
 def _average_posteriors(
     pieces: Pieces, posteriors: Mapping[float, Posterior], probabilities: np.ndarray
 ) -> BarLineEstimate:
-    """Average the posteriors under all transfer curves, weighted by the curves' probabilities (g,)."""
+    """Average the posteriors under all transfer curves, weighted by the curves' probabilities
+    (g,)."""
     lines = np.array([one.line for one in posteriors.values()])  # (g, 2)
     covariances = np.array([one.covariance for one in posteriors.values()])
     line = probabilities @ lines
@@ -264,7 +274,8 @@ def _average_posteriors(
 def _read_pieces(
     view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings
 ) -> Pieces:
-    """Read the pieces of the bar in the view's mean picture, in grey levels of 8 bit; saturated pixels weigh nothing."""
+    """Read the pieces of the bar in the view's mean picture, in grey levels of 8 bit; saturated
+    pixels weigh nothing."""
     noise = view.noise.times(view.mean_share)
     pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
     if len(pieces) < FEWEST_PIECES and view.itself is None:
@@ -283,7 +294,8 @@ def _read_pieces(
 def _points_of_line(pieces: Pieces, line, covariance, shared_px) -> LinePoints:
     """Return the line as two points at ± ARM_MM with their sigmas.
 
-    line (2,), covariance (2, 2): shift and tilt, px. shared_px (2,): sigma of a further shift and tilt in common.
+    line (2,), covariance (2, 2): shift and tilt, px. shared_px (2,): sigma of a further shift and
+    tilt in common.
     """
     place, foot, normal, _ = at_arms(pieces)
     lever = place / ARM_MM

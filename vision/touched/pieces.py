@@ -1,7 +1,9 @@
-"""The pixels of a bar's image: patches of the band along it, clear of wires and clamps, and their rims.
+"""The pixels of a bar's image: patches of the band along it, clear of wires and clamps, and their
+rims.
 
-`Pieces` (`vision.wire.bands`) are patches of the band, each some pixels long and as wide as the band. This module
-reads them about a predicted axis, and selects those that show the bar before its background and nothing else.
+`Pieces` (`vision.wire.bands`) are patches of the band, each some pixels long and as wide as the
+band. This module reads them about a predicted axis, and selects those that show the bar before its
+background and nothing else.
 """
 
 from collections.abc import Callable, Sequence
@@ -55,9 +57,11 @@ def bar_pieces(
     wires_px: Sequence[np.ndarray],
     settings: VisionSettings,
 ) -> Pieces:
-    """Return the pieces of the bar in the mean picture, to either side of the axis's point, that show no wire.
+    """Return the pieces of the bar in the mean picture, to either side of the axis's point, that
+    show no wire.
 
-    noise: of the difference of mean and background. Raises Refused where no part of the bar lies before the camera.
+    noise: of the difference of mean and background. Raises Refused where no part of the bar lies
+    before the camera.
     """
     place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
     points = axis.point_mm + place[:, None] * axis.direction
@@ -92,7 +96,8 @@ def bar_knots(settings: VisionSettings) -> Knots:
 
 
 def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: float) -> np.ndarray:
-    """Return which pieces (s,) of the bar show no wire: each is a rectangle along and across the bar."""
+    """Return which pieces (s,) of the bar show no wire: each is a rectangle along and across the
+    bar."""
     tangent = np.stack([pieces.normal[:, 1], -pieces.normal[:, 0]], axis=1)
     is_clear = np.ones(len(pieces), dtype=bool)
     for line in wires_px:
@@ -120,7 +125,8 @@ def beside_wires(pieces: Pieces, wires_px: Sequence[np.ndarray]) -> Pieces:
 
 
 def of_bar_alone(pieces: Pieces, align: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
-    """Return the pieces that a bar before its background can explain: no clamps, no hub, no shadow's border.
+    """Return the pieces that a bar before its background can explain: no clamps, no hub, no
+    shadow's border.
 
     align: returns pieces with offsets counted from the bar's estimated axis.
     """
@@ -146,7 +152,8 @@ def rims_of(pieces: Pieces, aligned: Pieces) -> Pieces:
 
 
 def at_arms(pieces: Pieces) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half width (2,), by parabolas."""
+    """Return places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half width
+    (2,), by parabolas."""
     order = np.argsort(pieces.place)
     place = np.array([-ARM_MM, ARM_MM])
     curves = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order].T

@@ -1,15 +1,18 @@
-"""The posterior of a straight bar's line in one camera: a mean shift and tilt with their covariance.
+"""The posterior of a straight bar's line in one camera: a mean shift and tilt with their
+covariance.
 
-A line is a shift c₀ in the bar's middle and a tilt c₁ over ARM_MM, both in px across the bar. In the segment at place
-s_k along it, the bar's middle is then at c₀ + c₁ s_k / ARM_MM, and `evidence.py` gives the evidence of that position.
-Segments are independent, so their deviances D = −2 log evidence add up:
+A line is a shift c₀ in the bar's middle and a tilt c₁ over ARM_MM, both in px across the bar. In
+the segment at place s_k along it, the bar's middle is then at c₀ + c₁ s_k / ARM_MM, and
+`evidence.py` gives the evidence of that position. Segments are independent, so their deviances D =
+−2 log evidence add up:
 
     −2 log p(c₀, c₁, β, r) = sum_k D_k(c₀ + c₁ s_k / ARM_MM, β, r) / T_k
 
-T_k ≥ 1 is a temperature: it tempers the evidence of a segment whose errors are correlated or larger than stated.
-The lens blur β and the smoothness r of the light round the bar are shared by all segments. Neither is chosen; the
-posterior is summed over both, for a bar whose edge is dim may lie a fifth of a pixel elsewhere under another blur.
-The sums run over a grid of lines; each refinement places a smaller grid about the last posterior.
+T_k ≥ 1 is a temperature: it tempers the evidence of a segment whose errors are correlated or larger
+than stated. The lens blur β and the smoothness r of the light round the bar are shared by all
+segments. Neither is chosen; the posterior is summed over both, for a bar whose edge is dim may lie
+a fifth of a pixel elsewhere under another blur. The sums run over a grid of lines; each refinement
+places a smaller grid about the last posterior.
 """
 
 from collections.abc import Sequence
@@ -82,8 +85,9 @@ _LARGEST_DEVIANCE = 40.0
 class LineWindow:
     """The grid of lines and blurs over which a posterior is summed.
 
-    most_px (2,): largest shift, and largest tilt over ARM_MM. blurs_px (n,): lens blurs. is_coarse: only the roughest
-    prior of the light, and positions half a blur apart. positions: how many for each step of the profiles' grid.
+    most_px (2,): largest shift, and largest tilt over ARM_MM. blurs_px (n,): lens blurs. is_coarse:
+    only the roughest prior of the light, and positions half a blur apart. positions: how many for
+    each step of the profiles' grid.
     spacing_px: largest step between lines.
     """
 
@@ -119,11 +123,15 @@ class Posterior:
     """The posterior of a bar's line under one transfer curve.
 
     line (2,), covariance (2, 2): of shift, and tilt over ARM_MM, px.
-    segment_deviance (k,): −2 log evidence of each segment at the best line. temperature (k,): of each segment.
+    segment_deviance (k,): −2 log evidence of each segment at the best line. temperature (k,): of
+    each segment.
     volume_deviance: −2 log of the posterior's volume about the best line.
-    evidence_for_bar: 2 log of the odds of a bar against none. detection_score: see `LitRod.detection_score`.
-    unresolved_share: the share of the window's lines that remain probable, 1 where the posterior is flat.
-    blur_px, log_blur_sigma: mean and sigma of the blur's logarithm; log_blur_step: the grid's step in it.
+    evidence_for_bar: 2 log of the odds of a bar against none. detection_score: see
+    `LitRod.detection_score`.
+    unresolved_share: the share of the window's lines that remain probable, 1 where the posterior is
+    flat.
+    blur_px, log_blur_sigma: mean and sigma of the blur's logarithm; log_blur_step: the grid's step
+    in it.
     """
 
     line: np.ndarray
@@ -143,8 +151,8 @@ class Posterior:
 class _LineGrid:
     """Deviances on a grid of n lines, r priors of the light and b blurs.
 
-    lines (n, 2): shift and tilt, px. log_blurs (b,). deviance (n, r, b). segment_deviance (k,): of each segment at the
-    best of these, untempered. temperature (k,).
+    lines (n, 2): shift and tilt, px. log_blurs (b,). deviance (n, r, b). segment_deviance (k,): of
+    each segment at the best of these, untempered. temperature (k,).
     """
 
     lines: np.ndarray
@@ -155,13 +163,15 @@ class _LineGrid:
 
 
 def fit_coarse(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
-    """Return the posterior about a line (2,) that may be reach_px off, on a coarse grid of blurs."""
+    """Return the posterior about a line (2,) that may be reach_px off, on a coarse grid of
+    blurs."""
     window = LineWindow(np.full(2, reach_px), np.array(_BLURS_PX))
     return _fit(pieces, line, window, gamma)
 
 
 def refine(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
-    """Return the posterior on a finer grid about an earlier one, with `positions` for each step across."""
+    """Return the posterior on a finer grid about an earlier one, with `positions` for each step
+    across."""
     return _fit(pieces, before.line, LineWindow.about(before, positions), gamma)
 
 
@@ -288,10 +298,12 @@ def _best_of(evidences: Sequence[Evidence]) -> Evidence:
 
 
 def estimate_temperature(evidence: Evidence, profiles: Profiles) -> np.ndarray:
-    """Estimate the temperature (k,) of each segment: the factor by which its deviance is overstated.
+    """Estimate the temperature (k,) of each segment: the factor by which its deviance is
+    overstated.
 
-    Noise is correlated between bins as the patches show (`variance_inflation`). Misfit beyond noise is light that the
-    model cannot have; it is correlated as far as the lens blurs it, with exp(−x² / 4 blur²).
+    Noise is correlated between bins as the patches show (`variance_inflation`). Misfit beyond noise
+    is light that the model cannot have; it is correlated as far as the lens blurs it, with exp(−x²
+    / 4 blur²).
     """
     blurred = 2.0 * np.sqrt(np.pi) * evidence.blur_px / STEP_PX
     inflation = max(profiles.variance_inflation, blurred)
@@ -299,12 +311,14 @@ def estimate_temperature(evidence: Evidence, profiles: Profiles) -> np.ndarray:
 
 
 def _bound_deviance(deviance: np.ndarray) -> np.ndarray:
-    """Return deviances of segments that show anything else with a probability of exp(−_LARGEST_DEVIANCE / 2)."""
+    """Return deviances of segments that show anything else with a probability of
+    exp(−_LARGEST_DEVIANCE / 2)."""
     return -2.0 * np.log(np.exp(-0.5 * deviance) + np.exp(-0.5 * _LARGEST_DEVIANCE))
 
 
 def _misfit_of_line(deviance: np.ndarray, profiles: Profiles) -> float:
-    """Return the least deviance per degree of freedom of the segments' middles about a line, at least 1."""
+    """Return the least deviance per degree of freedom of the segments' middles about a line, at
+    least 1."""
     return max(1.0, float(deviance.min()) / max(len(profiles) - 2, 1))
 
 
@@ -313,7 +327,8 @@ def _evaluate_lines(
 ) -> _LineGrid:
     """Evaluate the deviance of each line of a window under each prior of the light and each blur.
 
-    Where the segments' own middles lie on no line to within their sigmas, all deviances are divided by their misfit.
+    Where the segments' own middles lie on no line to within their sigmas, all deviances are divided
+    by their misfit.
     """
     lines = window.grid()
     temperature = estimate_temperature(_best_of(evidences), profiles)
@@ -345,7 +360,8 @@ def _evaluate_lines(
 
 
 def _interpolate(knots: np.ndarray, curves: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Interpolate curves (k, g, m), given at knots (g,), at other places (k, n) each: cubic splines (k, n, m)."""
+    """Interpolate curves (k, g, m), given at knots (g,), at other places (k, n) each: cubic splines
+    (k, n, m)."""
     coefficients = CubicSpline(knots, curves, axis=1).c
     cell = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
     beyond = (at - knots[cell])[..., None]

@@ -1,20 +1,21 @@
 """Light profiles across a bar: the measurements that the evidence of its position is computed from.
 
-A profile is the light along a line across the bar. The bar is divided along its axis into a few segments, and the
-pixels of a segment are averaged into one profile on a regular grid across the bar, with a step of STEP_PX.
+A profile is the light along a line across the bar. The bar is divided along its axis into a few
+segments, and the pixels of a segment are averaged into one profile on a regular grid across the
+bar, with a step of STEP_PX.
 
-Each pixel is shared between the two nearest bins of the grid by linear interpolation weights, so that nothing jumps
-when the grid is moved by a fraction of a step. For bin b of a segment with pixels i, weights w_i = 1 / sigma_i² and
-interpolation weights a_ib:
+Each pixel is shared between the two nearest bins of the grid by linear interpolation weights, so
+that nothing jumps when the grid is moved by a fraction of a step. For bin b of a segment with
+pixels i, weights w_i = 1 / sigma_i² and interpolation weights a_ib:
 
     W_b     = sum_i a_ib w_i                      total weight of the bin
     y_b     = sum_i a_ib w_i y_i / W_b            its light
     sigma_b = sqrt(1 / W_b + T_b / n_b)           its standard deviation
 
-The variance has two terms: noise of the pixels, and texture T_b that the n_b patches of the segment show beyond that
-noise (printed patterns, compression). Errors of bins next to each other are correlated; `variance_inflation` states
-by how much. Because all bins lie on one grid, the normal equations of all positions of the bar are a few products of
-matrices (`evidence.py`).
+The variance has two terms: noise of the pixels, and texture T_b that the n_b patches of the segment
+show beyond that noise (printed patterns, compression). Errors of bins next to each other are
+correlated; `variance_inflation` states by how much. Because all bins lie on one grid, the normal
+equations of all positions of the bar are a few products of matrices (`evidence.py`).
 """
 
 from dataclasses import dataclass
@@ -62,7 +63,8 @@ class Profiles:
 
     offset_px (b,): the grid, from the bar's expected middle.
     light, sigma (k, b): in parts of full scale; sigma is infinite where a bin has no pixel.
-    background, background_slope (k, b): light of the picture without rods, about its median, and its slope per px.
+    background, background_slope (k, b): light of the picture without rods, about its median, and
+    its slope per px.
     light_per_grey (k, b): derivative of the light by the grey level.
     place_mm (k,): the segments' middles along the bar. radius_px: half the bar's width.
     variance_inflation: variance of a mean over bins, over that of independent bins.
@@ -102,9 +104,11 @@ class Profiles:
 
     @cached_property
     def moments(self) -> np.ndarray:
-        """Return the products (9, k, b) of w, the background g, its slope s and the light y for the normal equations.
+        """Return the products (9, k, b) of w, the background g, its slope s and the light y for the
+        normal equations.
 
-        In this order, which `evidence._normal_matrices` relies on: w, w g, w s, w g², w g s, w s², w y, w g y, w s y.
+        In this order, which `evidence._normal_matrices` relies on: w, w g, w s, w g², w g s, w s²,
+        w y, w g y, w s y.
         """
         weighted_background = self.weight * self.background
         weighted_slope = self.weight * self.background_slope
@@ -126,7 +130,8 @@ class Profiles:
     def log_jacobian(self) -> np.ndarray:
         """Return the term (k,) that makes −2 log evidence of the light that of the grey levels.
 
-        Evidences under two transfer curves are comparable only as densities of the same data, the grey levels.
+        Evidences under two transfer curves are comparable only as densities of the same data, the
+        grey levels.
         """
         whitened = np.where(self.is_observed, np.sqrt(self.weight) * self.light_per_grey, 1.0)
         return -2.0 * np.sum(np.log(whitened), axis=1)
@@ -136,8 +141,8 @@ class Profiles:
 class _PatchSums:
     """Weighted sums (s, b) over the pixels of each of s patches, in bins across the bar.
 
-    weight: of the weights; the next four: of weight times that quantity; variance_share: of interpolation weight times
-    pixel weight, which over weight² is the variance of the patch's mean.
+    weight: of the weights; the next four: of weight times that quantity; variance_share: of
+    interpolation weight times pixel weight, which over weight² is the variance of the patch's mean.
     """
 
     weight: np.ndarray
@@ -151,8 +156,9 @@ class _PatchSums:
 def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: float) -> Profiles:
     """Compute the profiles of a bar whose middle is at most reach_px from where it is expected.
 
-    pieces: patches of the bar's band, each some pixels long. segments: how many profiles; fewer where there are less
-    than two patches for each. gamma: of the transfer curve, grey = 255 light^(1/gamma).
+    pieces: patches of the bar's band, each some pixels long. segments: how many profiles; fewer
+    where there are less than two patches for each. gamma: of the transfer curve, grey = 255
+    light^(1/gamma).
     """
     radius_px = float(np.median(pieces.radius_px))
     offset_px = pieces.offset_px * (radius_px / pieces.radius_px)[:, None]  # at one common width
@@ -180,7 +186,8 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
 
 
 def _sum_in_bins(weight, value, position, size: int) -> np.ndarray:
-    """Compute weighted sums (s, size) of pixels (s, p), each shared between the two bins nearest to its position.
+    """Compute weighted sums (s, size) of pixels (s, p), each shared between the two bins nearest to
+    its position.
 
     value None: of the squared interpolation weights in place of interpolation weight times value.
     """
@@ -203,7 +210,8 @@ def _linearise_grey(grey, gamma: float) -> tuple[np.ndarray, np.ndarray]:
 def _average_patches(
     patches: _PatchSums, members, offset_px, place_mm, radius_px: float
 ) -> Profiles:
-    """Average patches into the profiles of segments. members: by segment the indices of its patches."""
+    """Average patches into the profiles of segments. members: by segment the indices of its
+    patches."""
     membership = np.zeros((len(members), len(patches.weight)))  # (k, s) 1 for a segment's patches
     for row, some in zip(membership, members):
         row[some] = 1.0
@@ -235,17 +243,20 @@ def _average_patches(
 
 
 def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, float]:
-    """Estimate the variance (k, b) between patches beyond their noise, and the inflation by correlated bins.
+    """Estimate the variance (k, b) between patches beyond their noise, and the inflation by
+    correlated bins.
 
-    membership (k, s - 2): 1 for the patches of each segment, the first and last patch of the bar left out.
+    membership (k, s - 2): 1 for the patches of each segment, the first and last patch of the bar
+    left out.
 
-    Each patch is compared with the mean of its two neighbours, so that light which changes steadily along the bar is
-    no texture; the share of the background's own difference that explains it best is subtracted. The variance is
-    the product of one factor for each segment and one function across the bar.
+    Each patch is compared with the mean of its two neighbours, so that light which changes steadily
+    along the bar is no texture; the share of the background's own difference that explains it best
+    is subtracted. The variance is the product of one factor for each segment and one function
+    across the bar.
 
-    Bins that hold hardly any of a pixel get hardly any weight, for rounding decides whether they hold one. The spread
-    is at least the noise: where a single patch has pixels, the fitted share of the background leaves only rounding,
-    compared with which any other segment would be rough.
+    Bins that hold hardly any of a pixel get hardly any weight, for rounding decides whether they
+    hold one. The spread is at least the noise: where a single patch has pixels, the fitted share of
+    the background leaves only rounding, compared with which any other segment would be rough.
     """
     divisor = np.where(patches.weight > 0, patches.weight, 1.0)
     light = _second_difference(patches.light / divisor)
@@ -276,12 +287,14 @@ def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, floa
 
 
 def _second_difference(values) -> np.ndarray:
-    """Return each row but the outermost two of values (s, b) minus the mean of its two neighbours."""
+    """Return each row but the outermost two of values (s, b) minus the mean of its two
+    neighbours."""
     return values[1:-1] - 0.5 * (values[:-2] + values[2:])
 
 
 def _sum_variances(variance) -> np.ndarray:
-    """Return the variance (s - 2, b) of `_second_difference` from those of independent rows (s, b)."""
+    """Return the variance (s - 2, b) of `_second_difference` from those of independent rows (s,
+    b)."""
     return variance[1:-1] + 0.25 * (variance[:-2] + variance[2:])
 
 
@@ -295,7 +308,8 @@ def _weighted_median(values, weight) -> np.ndarray:
 
 
 def _estimate_variance_inflation(residual) -> float:
-    """Estimate the variance of a mean over bins, over that of independent bins, by autocorrelation of residuals (s, b).
+    """Estimate the variance of a mean over bins, over that of independent bins, by autocorrelation
+    of residuals (s, b).
 
     1 + 2 sum_lag rho(lag), at least 1, over lags up to _CORRELATION_PX.
     """

@@ -1,14 +1,15 @@
 """The silhouette edges of a rounded object in one camera: line points beside a predicted outline.
 
-The outline (occluding contour) of a ring, sphere or cone has two sides. Each side is divided into segments of some 60
-px, and the edge of each segment is measured by itself, with the model of `vision.touched.evidence`: light on the object
-is free, beyond the edge lies the picture without rods, and the lens blurs both. The deviance D = −2 log evidence of each
-shift u, under a blur β and a transfer curve gamma, gives the mean and variance of the edge's position:
+The outline (occluding contour) of a ring, sphere or cone has two sides. Each side is divided into
+segments of some 60 px, and the edge of each segment is measured by itself, with the model of
+`vision.touched.evidence`: light on the object is free, beyond the edge lies the picture without
+rods, and the lens blurs both. The deviance D = −2 log evidence of each shift u, under a blur β and
+a transfer curve gamma, gives the mean and variance of the edge's position:
 
     p(u | β, gamma) ∝ exp(−D(u) / 2T)
 
-Blur and transfer curve are shared by the whole camera; positions are averaged over both by their probabilities. Which
-outlines are possible is left to the fit of the object.
+Blur and transfer curve are shared by the whole camera; positions are averaged over both by their
+probabilities. Which outlines are possible is left to the fit of the object.
 """
 
 from collections.abc import Mapping, Sequence
@@ -69,7 +70,8 @@ _LEAST_EVIDENCE = 6.0
 class SilhouetteEdges:
     """The edges beside an outline in one camera.
 
-    points: line points, their `place` is the distance at which the sight grazes, mm. segments: how many were tried.
+    points: line points, their `place` is the distance at which the sight grazes, mm. segments: how
+    many were tried.
     blur_px: of the lens. log_evidence: of these edges against edges anywhere within reach.
     """
 
@@ -83,8 +85,8 @@ class SilhouetteEdges:
 class _OutlineSide:
     """One side of a predicted outline as n stations, about a pixel apart.
 
-    px, normal (n, 2): in the picture, normals outwards. distance_mm (n,): from the camera. is_clear (n,): whether only
-    background lies outside. half_px (n,): half the object's width.
+    px, normal (n, 2): in the picture, normals outwards. distance_mm (n,): from the camera. is_clear
+    (n,): whether only background lies outside. half_px (n,): half the object's width.
     """
 
     px: np.ndarray
@@ -104,8 +106,8 @@ class _OutlineSide:
 class _EdgePosterior:
     """The edge of k segments of one side under one transfer curve and b blurs.
 
-    deviance (b,): of each blur. mean, variance (b, k): of the edge's shift, px. evidence (k,): 2 log of the odds of an
-    edge against none. curve_deviance: of the transfer curve.
+    deviance (b,): of each blur. mean, variance (b, k): of the edge's shift, px. evidence (k,): 2
+    log of the odds of an edge against none. curve_deviance: of the transfer curve.
     """
 
     deviance: np.ndarray
@@ -128,8 +130,8 @@ def measure_silhouette_edges(
 ) -> dict[str, SilhouetteEdges]:
     """Measure by camera the edges beside a predicted outline that is at most reach_px off.
 
-    before: of an earlier pass, whose blurs allow a fine one. coarse: by one quick pass. wires_px: by camera lines
-    (m, 2) where the wire lies in some frame.
+    before: of an earlier pass, whose blurs allow a fine one. coarse: by one quick pass. wires_px:
+    by camera lines (m, 2) where the wire lies in some frame.
     """
     before = before or {}
     outlines = []
@@ -154,7 +156,8 @@ def measure_silhouette_edges(
 class _OutlinePosterior:
     """Both sides of an outline in one camera, their pieces, and their edges' posteriors.
 
-    posteriors: by transfer curve, then by side. blurs_px (b,): of these. reach_px: how far edges were tried.
+    posteriors: by transfer curve, then by side. blurs_px (b,): of these. reach_px: how far edges
+    were tried.
     """
 
     sides: Sequence[_OutlineSide]
@@ -172,7 +175,8 @@ class _OutlinePosterior:
         return [sum(side.curve_deviance for side in curve) for curve in self.posteriors]
 
     def average(self, probabilities: np.ndarray) -> SilhouetteEdges:
-        """Return the edges averaged over transfer curves, with these probabilities, and over blurs."""
+        """Return the edges averaged over transfer curves, with these probabilities, and over
+        blurs."""
         if not self.sides:
             none = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
             return SilhouetteEdges(none, 0, _BLURS_PX[1])
@@ -223,7 +227,8 @@ def _fit_outline(
     before: SilhouetteEdges | None,
     coarse: bool,
 ) -> _OutlinePosterior:
-    """Return the posteriors of the edges beside predicted sides in one camera, as of `measure_silhouette_edges`."""
+    """Return the posteriors of the edges beside predicted sides in one camera, as of
+    `measure_silhouette_edges`."""
     is_fine = before is not None
     reach_px = _FINE_REACH_PX if is_fine else reach_px
     used = []
@@ -298,7 +303,8 @@ def _normalise(deviance: np.ndarray) -> np.ndarray:
 
 
 def _middle_stations(pieces: Pieces, segments: int) -> np.ndarray:
-    """Return the station (segments,) in the middle of each segment, divided as by `compute_profiles`."""
+    """Return the station (segments,) in the middle of each segment, divided as by
+    `compute_profiles`."""
     members = np.array_split(np.argsort(pieces.place), segments)
     return np.array([int(np.median(pieces.source[some])) for some in members])
 
@@ -306,7 +312,8 @@ def _middle_stations(pieces: Pieces, segments: int) -> np.ndarray:
 def _predict_sides(
     view: View, axis: Rounded, radius_mm: float, settings: VisionSettings
 ) -> list[_OutlineSide]:
-    """Predict both sides of the outline, a station every pixel or so; none where a part is not before the camera."""
+    """Predict both sides of the outline, a station every pixel or so; none where a part is not
+    before the camera."""
     camera = view.camera
     points, normals = axis.limb(camera.centre_mm, radius_mm, settings.bar_reach_mm, 400)
     px = camera.project(points.reshape(-1, 3)).reshape(2, -1, 2)
@@ -373,7 +380,8 @@ def _dense(line: np.ndarray) -> np.ndarray:
 def _pixels_near(
     shape: tuple[int, int], side: _OutlineSide, inside_px: float, outside_px: float
 ) -> np.ndarray:
-    """Return the whole pixels (n, 2), x and y, up to inside_px within and outside_px beyond the stations."""
+    """Return the whole pixels (n, 2), x and y, up to inside_px within and outside_px beyond the
+    stations."""
     height, width = shape
     steps = np.arange(-inside_px, outside_px + 0.5, 0.5)
     near = np.round(side.px[:, None] + steps[:, None] * side.normal[:, None])
@@ -393,10 +401,11 @@ def _no_pieces() -> Pieces:
 
 
 def _as_rows(view: View, side: _OutlineSide, pixels, offset, along, length_px: int) -> Pieces:
-    """Return pieces of length_px along the side, with their pixels as rows, filled up with pixels of no weight.
+    """Return pieces of length_px along the side, with their pixels as rows, filled up with pixels
+    of no weight.
 
-    pixels (n, 2): whole, x and y. offset, along (n,): across and along the side, px. `place` of a piece is along it, px;
-    `source` is its station.
+    pixels (n, 2): whole, x and y. offset, along (n,): across and along the side, px. `place` of a
+    piece is along it, px; `source` is its station.
     """
     column, row = pixels.astype(int).T
     grey = view.mean[row, column]

@@ -1,8 +1,9 @@
 """The apparent width of the bar: a known length, against which a board at the wrong scale shows.
 
-The evidence that locates the bar's line is evaluated for bars of other widths about the same axis; its logarithm has
-the posterior mean and sigma of `estimate_log_width`. Light on the bar is free, so that neither a highlight nor a dark
-rim passes for an edge, and where a rim is as dark as the bench the sigma is wide.
+The evidence that locates the bar's line is evaluated for bars of other widths about the same axis;
+its logarithm has the posterior mean and sigma of `estimate_log_width`. Light on the bar is free, so
+that neither a highlight nor a dark rim passes for an edge, and where a rim is as dark as the bench
+the sigma is wide.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,11 +33,12 @@ def bar_diameter_mm(
     wire: Wire,
     bar: Bar,
 ) -> float:
-    """Return the diameter of the bar as the cameras show it, mm; NaN where fewer than two cameras have pictures.
+    """Return the diameter of the bar as the cameras show it, mm; NaN where fewer than two cameras
+    have pictures.
 
-    One camera alone takes the distance of the bar from its diameter. pictures: grey (h, w) of one trial by camera,
-    spread over it; background: the same without rods. motor_rad: lowest and highest motor angle. Raises Refused where
-    nothing like the bar is found.
+    One camera alone takes the distance of the bar from its diameter. pictures: grey (h, w) of one
+    trial by camera, spread over it; background: the same without rods. motor_rad: lowest and
+    highest motor angle. Raises Refused where nothing like the bar is found.
     """
     names = []
     for name in cameras.names:
@@ -73,7 +75,8 @@ def measure_relative_widths(seen: SeenBar) -> dict[str, tuple[float, float]]:
 def combine_widths(widths: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
     """Return the weighted geometric mean of widths by camera, and its sigma.
 
-    The light is alike in all cameras, so the mean is no more certain than each by itself; scatter makes it less so.
+    The light is alike in all cameras, so the mean is no more certain than each by itself; scatter
+    makes it less so.
     """
     width, sigma = np.array(list(widths.values())).T
     log_width = np.log(width)
