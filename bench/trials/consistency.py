@@ -15,7 +15,7 @@ from bench.session.whisker import Whisker
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
 from vision.geometry.reasons import NO_REASON, Reason
-from vision.touched.width import in_all
+from vision.touched.width import combine_widths
 from vision.truth.value import UNKNOWN, Value
 
 # Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
@@ -180,7 +180,9 @@ def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | Non
     where no camera tells. bar_looks: how thick over how thick it is said to be, by camera."""
     if not bar_looks:
         return NO_REASON
-    looks, looks_sigma = in_all({name: (one.value, one.sigma) for name, one in bar_looks.items()})
+    looks, looks_sigma = combine_widths(
+        {name: (one.value, one.sigma) for name, one in bar_looks.items()}
+    )
     logs, variances = _logs(bar_looks)
     if not _agree(logs, variances):
         low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))

@@ -1,8 +1,11 @@
-"""The bar's two edges in one camera: how wide it looks, and so how far away it is.
+"""The bar's two edges in one camera: its apparent width, and so its distance.
 
-Two cameras tell where a bar is by where their sights cross, and there its width adds next to nothing. One camera has
-only the width. The rims' shading is as free as for the bar's line (see `vision.touched.line`); but what a wrong rim does to
-the middle cancels, and to the width it does not, so each edge has its own error.
+Two cameras locate a bar by where their sights cross, and there its width adds next to nothing. One
+camera has only the width. The model is linear in the shading of the rims, which is fitted for each
+q = (shift, tilt, widening, taper, log blur), and the sum of squares that remains is minimised over
+q. The shading is as free as for the bar's line (`vision.touched.line`). An error in a rim's shading
+cancels in the middle of the two edges, but not in the width, so each edge has an error of its own,
+EDGE_PX.
 """
 
 from collections.abc import Sequence
@@ -31,27 +34,35 @@ from vision.wire.cylinder import RIMS, WAVES
 from vision.wire.points import LinePoints
 from vision.wire.shading import Knots, fit_shading
 
-# [px, 1] An edge's error beyond its formal sigma, and how many times that one counts: half-widths
-# of path-traced and painted bars show it (docs/proof.md, one camera). Study: coverage.py alone.
-EDGE_PX, FORMAL_TO_TRUE = 0.12, 2.0
-# [px] Of the sweep and the rims' pixels. Set by eye. Study: coverage.py alone.
-_SWEEP_BLUR_PX, _BIN_PX = 1.5, 0.5
-# [mm] Length of bar that the sweep looks at. Set by eye. Study: coverage.py alone.
-_SWEEP_REACH_MM = 20.0
-# [px, half-widths] How far the sweep goes: shift and tilt; widening and taper, the latter of a
-# bar at 20° to the sight. Study: coverage.py alone.
-_SWEEP_MOST_PX, _SWEEP_MOST_SHARE = (5.0, 5.0), np.array([0.2, 0.15])
-# [1] The sweep's window, part by part smaller. Study: coverage.py alone.
-_SWEEP_PARTS = (1.0, 0.3, 0.1)
-# [rounds] What counts as a rim depends on where the edges are. Study: coverage.py alone.
-_ROUNDS = 2
-# [px, 1] For derivatives by shift, tilt, widening, taper, and log blur. Derived.
+# [px] An edge's error beyond its formal sigma: half widths of path-traced and painted bars show it
+# (docs/proof.md, one camera). Study: coverage.py alone.
+EDGE_PX = 0.12
+# [1] True over formal sigma of an edge, by the same bars. Study: coverage.py alone.
+FORMAL_TO_TRUE = 2.0
+# [px] Blur of the coarse search's model. Set by eye. Study: coverage.py alone.
+_SEARCH_BLUR_PX = 1.5
+# [px] Bins of the rims' pixels in the coarse search. Set by eye. Study: coverage.py alone.
+_BIN_PX = 0.5
+# [mm] Half the length of bar that the coarse search uses. Set by eye. Study: coverage.py alone.
+_SEARCH_REACH_MM = 20.0
+# [px] Half the range of the coarse search by shift and by tilt. Study: coverage.py alone.
+_SEARCH_MOST_PX = (5.0, 5.0)
+# [half widths] Half the range of the coarse search by widening and by taper, the latter of a bar
+# at 20° to the sight. Study: coverage.py alone.
+_SEARCH_MOST_SHARE = np.array([0.2, 0.15])
+# [1] Ranges of successive passes of the coarse search, over the first. Study: coverage.py alone.
+_SEARCH_RANGES = (1.0, 0.3, 0.1)
+# [passes] Of fitting the edges: which pixels are rims depends on where the edges are. Study:
+# coverage.py alone.
+_PASSES = 2
+# [px, 1] Steps of derivatives by shift, tilt, widening, taper, and log blur. Derived.
 _STEPS = np.array([0.15, 0.15, 0.15, 0.15, 0.1])
-# [px, 1] A step of the descent goes no farther. Study: coverage.py alone.
+# [px, 1] Largest step of the descent. Study: coverage.py alone.
 _LONGEST = np.array([0.7, 0.7, 0.7, 0.7, 0.4])
-# [px, 1] Where the descent ends: a twentieth of an edge's sigma; parts of a step that are tried.
-# Derived.
-_SETTLED_PX, _PARTS = 0.005, (1.0, 0.3, 0.1, 0.03)
+# [px] Last step of the descent: a twentieth of an edge's sigma. Derived.
+_CONVERGED_PX = 0.005
+# [1] Shares of a step that are tried. Derived.
+_STEP_SHARES = (1.0, 0.3, 0.1, 0.03)
 
 
 def measure_edges(
@@ -63,83 +74,91 @@ def measure_edges(
     *,
     coarse: bool = False,
 ) -> dict[int, LinePoints] | None:
-    """Two points of each of the bar's edges in the mean picture, by side: 1 towards the points' normals, -1
-    against them. None where too little of the bar is clear, or what is seen is no bar.
+    """Measure two points of each of the bar's edges in the mean picture.
 
-    wires_px: lines (m, 2) where the wire lies in some frame. coarse: the axis may be some pixels off, and its width.
+    Returns the points by side, 1 towards the pieces' normals and -1 against them; None where too
+    little of the bar is clear, or the pixels show no bar. wires_px: lines (m, 2) where the wire
+    lies in some frame. coarse: the axis and the width may be some pixels off.
     """
-    noise, knots = (
-        view.noise.times(view.mean_share + 1.0),
-        bar_knots(settings),
-    )  # of the mean beside one background
+    noise = view.noise.times(view.mean_share + 1.0)  # of the mean minus one background
+    knots = bar_knots(settings)
     pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
     if len(pieces) < FEWEST_PIECES:
         return None
-    found = np.append(_sweep(pieces, knots) if coarse else np.zeros(4), 0.0)
-    pieces = of_bar_alone(pieces, lambda some: _placed(some, found), knots)
-    for _ in range(_ROUNDS):
-        rims = rims_of(pieces, _placed(pieces, found))
-        found, left, curvature = descend(
-            partial(_misfit, rims, knots), found, _STEPS, _LONGEST, _SETTLED_PX, _PARTS
-        )
-    if left > NO_BAR:
+    start = _search_coarse(pieces, knots) if coarse else np.zeros(4)
+    q = np.append(start, 0.0)
+    pieces = of_bar_alone(pieces, partial(_align, q=q), knots)
+    for _ in range(_PASSES):
+        rims = rims_of(pieces, _align(pieces, q))
+        misfit = partial(_fit_rims, rims, knots)
+        q, chi2, curvature = descend(misfit, q, _STEPS, _LONGEST, _CONVERGED_PX, _STEP_SHARES)
+    if chi2 > NO_BAR:
         return None
-    return _edges(
-        pieces, found, covariance_of(curvature, left, float(np.sum(rims.weight > 0)))[:4, :4]
-    )
+    pixels = float(np.sum(rims.weight > 0))
+    covariance = covariance_of(curvature, chi2, pixels)
+    return _points_of_edges(pieces, q[:4], covariance[:4, :4])
 
 
-def _misfit(rims: Pieces, knots: Knots, q) -> float:
-    """Of rims placed by q[:4] under a lens blur of exp(q[4]) px."""
-    return fit_shading(_placed(rims, q), float(np.exp(q[4])), RIMS, knots)[1]
+def _fit_rims(rims: Pieces, knots: Knots, q) -> float:
+    """Fit the shading of rims aligned by q[:4] under a lens blur of exp(q[4]) px, and return chi²
+    per pixel."""
+    return fit_shading(_align(rims, q), float(np.exp(q[4])), RIMS, knots)[1]
 
 
-def _placed(pieces: Pieces, q) -> Pieces:
-    """The same pixels about a rod that is shifted by q[0] px and tilted by q[1] px over ARM_MM, whose half-width is
-    larger by q[2] px and grows by q[3] px over ARM_MM."""
+def _align(pieces: Pieces, q) -> Pieces:
+    """Return the pieces about a rod of another place and width.
+
+    It is shifted by q[0] px and tilted by q[1] px over ARM_MM; its half width is larger by q[2] px
+    and grows by q[3] px over ARM_MM.
+    """
     lever = pieces.place / ARM_MM
-    moved = pieces.moved(q[0] + q[1] * lever)
-    return replace(moved, radius_px=np.maximum(moved.radius_px + q[2] + q[3] * lever, 1.0))
+    shifted = pieces.moved(q[0] + q[1] * lever)
+    radius_px = np.maximum(shifted.radius_px + q[2] + q[3] * lever, 1.0)
+    return replace(shifted, radius_px=radius_px)
 
 
-def _sweep(pieces: Pieces, knots) -> np.ndarray:
-    """Coordinate descent over shift, widening, tilt and taper, with a coarse, blurred model, near the contact."""
-    near = np.abs(pieces.place) < _SWEEP_REACH_MM
-    some, _ = binned(pieces.select(near) if np.sum(near) >= FEWEST_PIECES else pieces, _BIN_PX)
-    found = np.zeros(4)
+def _search_coarse(pieces: Pieces, knots: Knots) -> np.ndarray:
+    """Find shift, tilt, widening and taper (4,) by coordinate descent with a blurred model, near
+    the contact."""
+    is_near = np.abs(pieces.place) < _SEARCH_REACH_MM
+    is_enough = np.sum(is_near) >= FEWEST_PIECES
+    bins, _ = binned(pieces.select(is_near) if is_enough else pieces, _BIN_PX)
 
     def misfit(q) -> float:
-        return fit_shading(_placed(some, q), _SWEEP_BLUR_PX, WAVES, knots)[1]
+        """Return chi² per pixel of the blurred model."""
+        return fit_shading(_align(bins, q), _SEARCH_BLUR_PX, WAVES, knots)[1]
 
-    most = np.array([*_SWEEP_MOST_PX, *np.median(pieces.radius_px) * _SWEEP_MOST_SHARE])
-    for part in _SWEEP_PARTS:
+    most = np.array([*_SEARCH_MOST_PX, *np.median(pieces.radius_px) * _SEARCH_MOST_SHARE])
+    best = np.zeros(4)
+    for share in _SEARCH_RANGES:
         for _ in range(2):
             for k in (0, 2, 1, 3):
-                steps = part * most[k] * np.linspace(-1.0, 1.0, 9)
-                tries = [np.clip(found + step * np.eye(4)[k], -most, most) for step in steps]
-                found = min(tries, key=misfit)
-    return found
+                tries = []
+                for step in share * most[k] * np.linspace(-1.0, 1.0, 9):
+                    tries.append(np.clip(best + step * np.eye(4)[k], -most, most))
+                best = min(tries, key=misfit)
+    return best
 
 
-def _edges(pieces: Pieces, found, covariance) -> dict[int, LinePoints]:
-    """Points at ± ARM_MM of both edges, each with its sigma."""
+def _points_of_edges(pieces: Pieces, q, covariance) -> dict[int, LinePoints]:
+    """Return points at ± ARM_MM of both edges, by side, each with its sigma. q (4,) and its
+    covariance (4, 4)."""
     place, foot, normal, radius = at_arms(pieces)
+    lever = place / ARM_MM
     points = {}
     for side in (-1, 1):
-        across = np.stack(
-            [np.ones(2), place / ARM_MM, np.full(2, side), side * place / ARM_MM], axis=1
-        )
-        formal = np.sqrt(np.einsum("ni,ij,nj->n", across, covariance, across))
-        off = across @ found[:4] + side * radius
-        px = foot + off[:, None] * normal
-        points[side] = LinePoints(
-            px, _across(px, normal), np.hypot(EDGE_PX, FORMAL_TO_TRUE * formal), place
-        )
+        jacobian = np.stack([np.ones(2), lever, np.full(2, side), side * lever], axis=1)
+        formal_px = np.sqrt(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian))
+        offset = jacobian @ q + side * radius
+        px = foot + offset[:, None] * normal
+        sigma_px = np.hypot(EDGE_PX, FORMAL_TO_TRUE * formal_px)
+        points[side] = LinePoints(px, _normals_of_line(px, normal), sigma_px, place)
     return points
 
 
-def _across(px, normal) -> np.ndarray:
-    """Unit normals (2, 2) of the line through two points, on the side of the given ones."""
+def _normals_of_line(px, normal) -> np.ndarray:
+    """Return the unit normals (2, 2) of the line through two points, on the side of the given
+    ones."""
     along = (px[1] - px[0]) / np.linalg.norm(px[1] - px[0])
     across = np.array([-along[1], along[0]])
     return np.tile(across * np.sign(across @ normal.sum(axis=0)), (2, 1))

@@ -1,10 +1,23 @@
-"""A lit rod of known width before its surroundings, seen across: how well each position of its axis explains the light.
+"""Bayesian evidence of a bar's position: the probability of a light profile for each position.
 
-Outside either edge the picture is nearly linear, or follows the picture without rods; between the edges it is the
-radiance of a cylinder, a smooth but otherwise free function of the angle round it. The lens blurs both. Light adds up
-before the sensor's transfer curve, grey = 255 · light^(1/gamma), so that all but position, blur and gamma is linear; it
-has wide Gaussian priors and is integrated out (marginal likelihood; MacKay, Neural Computation 4, 415, 1992). What
-light does inside the bar, highlights and dark rims, then cannot pull its axis: free radiance explains it anywhere.
+The model of a profile at distance x from its middle is the light on the rod between its edges c ±
+R, and the background beyond them; the lens blurs both by a Gaussian of sigma β, and noise of
+variance 1 / w is added.
+
+* On the rod, light is a function of the angle φ round it, sin φ = (x − c) / R: a spline with a
+  smooth prior.
+* Beyond each edge it is a level and a slope, or a share of the picture without rods.
+
+Light adds up before the sensor's transfer curve, grey = 255 light^(1 / gamma), so for a given c, β
+and gamma the model is linear in its coefficients θ, which have wide Gaussian priors of precision P:
+
+    y = A(c, β) θ + ε,    θ ~ N(0, P⁻¹),    ε ~ N(0, W⁻¹)
+    −2 log p(y | c, β) = χ² + log |AᵀWA + P| − log |P| − log |W|    (up to a constant)
+    χ² = yᵀWy − yᵀWA (AᵀWA + P)⁻¹ AᵀWy
+
+The coefficients are integrated out (marginal likelihood; MacKay, Neural Computation 4, 415, 1992).
+Highlights and dark rims inside the bar cannot pull its position, for the free light on the rod
+explains them at any c. `deviance` is short for −2 log evidence throughout.
 """
 
 from dataclasses import dataclass
@@ -17,313 +30,407 @@ from scipy.special import ndtr
 
 from vision.touched.profiles import OUTSIDE_PX, STEP_PX, Profiles, light_range
 
-# [splines] Of the angle round the rod: finer than the blur, so that a highlight is explained
-# wherever the axis is taken to be. Study: bar_scenes.py.
+# [splines] Of the angle round the rod: finer than the blur, so that a highlight is explained at
+# any position of the axis. Study: bar_scenes.py.
 _SPLINES = 36
-# [1] One sigma of what light on neighbouring splines differs by: this share of what it varies by
-# inside the bar, and of a part of the whole contrast, for a rim may be another than what is seen
-# farther in. Smaller shares take a bright bar's shaded rim for its edge. Study: bar_scenes.py.
-_STEP_SHARE, _RIM_SHARE = 0.3, 0.2
-# [1] One sigma of the light's second differences from spline to spline, by what it varies by
-# inside the bar; the last leaves light as free as `_STEP_SHARE` does. Mixed over by evidence,
-# which calls for 0.03 to 0.1 of matt bars. Study: bar_starts.py.
-_TURN_SHARES = 0.03, 0.1, 0.3
-# [px] Inside each edge, left out of what light varies by on the bar: two lens blurs, where the
-# background is seen, too. Derived.
+# [1] Sigma of the difference between neighbouring spline coefficients, over the range of light
+# inside the bar. Smaller shares take a bright bar's shaded rim for its edge. Study: bar_scenes.py.
+_STEP_SHARE = 0.3
+# [1] Part of the whole contrast that counts as range inside the bar, for a rim may differ from
+# what is visible farther in. Study: bar_scenes.py.
+_RIM_SHARE = 0.2
+# [1] Sigmas of the second differences of spline coefficients, over the range inside the bar, from
+# smooth to rough; the last is as free as `_STEP_SHARE`. Averaged over by evidence, which selects
+# 0.03 to 0.1 for matt bars. Study: bar_starts.py.
+_CURVATURE_SHARES = (0.03, 0.1, 0.3)
+# [px] Margin inside each edge without which the range of light on the bar is measured: two lens
+# blurs, where the background contributes. Derived.
 _RIM_BLURRED_PX = 2.0
-# [1] Of the contrast, one sigma: by so much the background changes over `OUTSIDE_PX`. Set by eye.
-# Study: thresholds.py bar.evidence _SLOPE_SHARE ….
+# [1] Sigma of the background's change over `OUTSIDE_PX`, over the contrast. Set by eye. Study:
+# thresholds.py touched.evidence _SLOPE_SHARE ….
 _SLOPE_SHARE = 0.3
-# [rad] At which the splines are added up: five a spline, 0.5 px apart at most on a bar of 56 px,
-# less than a blur. Derived.
+# [rad] Angles at which the splines are integrated: five a spline, 0.5 px apart at most on a bar
+# of 56 px, less than a blur. Derived.
 _ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 171)
-# [columns] A layout: level and slope beyond both edges.
+# [columns] Level and slope beyond both edges: a layout.
 _SIDES = 4
-# [1] Of its prior variance: a way in which light may differ, and no pixel tells more of it than
-# this, is left out; all of them together move no evidence by more than 0.4 where bars are likely.
-# Derived.
-_TOLD = 1e-3
+# [1] Information of the pixels on a mode of the light, over its prior precision, below which the
+# mode is left out: all of these together change no evidence by more than 0.4 at probable
+# positions. Derived.
+_LEAST_INFORMATION = 1e-3
+# [bins] Fewer give no range of light. Derived.
+_FEWEST_BINS = 5
 
 
 @dataclass(frozen=True)
 class LitRod:
-    """A model of these profiles: a rod lit in any way that its priors allow."""
+    """The prior model of profiles: a rod with any shading that the priors allow, before its
+    background."""
 
     profiles: Profiles
 
     @cached_property
-    def _level(self) -> float:
-        """One sigma of how bright anything is."""
-        across = self.profiles
-        return 3.0 * across.contrast + float(np.median(across.light[across.seen]))
+    def _level_sigma(self) -> float:
+        """Return the prior sigma of any level of light."""
+        profiles = self.profiles
+        median = float(np.median(profiles.light[profiles.is_observed]))
+        return 3.0 * profiles.contrast + median
 
     @cached_property
-    def _inside(self) -> float:
-        """What the light varies by on the bar, rims apart; of one too thin for that, over all of the profile."""
-        across = self.profiles
-        inner = across.seen & (np.abs(across.offset_px) < across.radius_px - _RIM_BLURRED_PX)
-        ranges = [
-            light_range(light[some])
-            for light, some in zip(across.light, inner)
-            if np.sum(some) >= 5
-        ]
-        return float(np.median(ranges)) if ranges else across.contrast
+    def _inner_range(self) -> float:
+        """Return the range of light on the bar without its rims, or of the whole profile of a bar
+        too thin for that."""
+        profiles = self.profiles
+        is_inner = np.abs(profiles.offset_px) < profiles.radius_px - _RIM_BLURRED_PX
+        ranges = []
+        for light, is_used in zip(profiles.light, profiles.is_observed & is_inner):
+            if np.sum(is_used) >= _FEWEST_BINS:
+                ranges.append(light_range(light[is_used]))
+        return float(np.median(ranges)) if ranges else profiles.contrast
 
     @cached_property
-    def _of_outside(self) -> np.ndarray:
-        """Inverse prior covariance, its diagonal, of levels and slopes beyond both edges, and of the background."""
-        sides = [self._level, _SLOPE_SHARE * self.profiles.contrast]
+    def _outside_precision(self) -> np.ndarray:
+        """Return the prior precisions (6,) of level and slope beyond either edge, and of the
+        background's two shares."""
+        sides = [self._level_sigma, _SLOPE_SHARE * self.profiles.contrast]
         return np.array([*sides, *sides, 1.0, 1.0]) ** -2.0
 
     @cached_property
-    def _of_rod(self) -> list[np.ndarray]:
-        """Inverse prior covariances (splines, splines) of the light on the rod: of ever rougher light, the last that
-        which turns as suddenly as it steps."""
-        varies = np.hypot(self._inside, _RIM_SHARE * self.profiles.contrast)
-        return [self._level**-2.0 * np.eye(_SPLINES) + one / varies**2 for one in _changes()]
+    def _rod_precisions(self) -> list[np.ndarray]:
+        """Return the prior precisions (splines, splines) of the light on the rod, from smooth to
+        rough."""
+        scale = np.hypot(self._inner_range, _RIM_SHARE * self.profiles.contrast)
+        level = self._level_sigma**-2.0 * np.eye(_SPLINES)
+        return [level + roughness / scale**2 for roughness in _roughness_penalties()]
 
     @cached_property
-    def _root(self) -> np.ndarray:
-        """Of the roughest light's covariance (splines, splines)."""
-        return np.linalg.inv(np.linalg.cholesky(self._of_rod[-1])).T
+    def _rough_root(self) -> np.ndarray:
+        """Return a square root (splines, splines) of the covariance of the roughest light."""
+        return np.linalg.inv(np.linalg.cholesky(self._rod_precisions[-1])).T
 
     @cached_property
-    def _smooth(self) -> list[np.ndarray]:
-        """Covariances (splines, splines) of the smoother kinds of light, in what that root multiplies."""
-        back = np.linalg.inv(self._root)
-        return [back @ np.linalg.inv(one) @ back.T for one in self._of_rod[:-1]]
+    def _smooth_covariances(self) -> list[np.ndarray]:
+        """Return the covariances (splines, splines) of the smoother light in the basis of
+        `_rough_root`."""
+        inverse_root = np.linalg.inv(self._rough_root)
+        covariances = []
+        for precision in self._rod_precisions[:-1]:
+            covariances.append(inverse_root @ np.linalg.inv(precision) @ inverse_root.T)
+        return covariances
 
-    def told(self, columns: np.ndarray, all_light: bool) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Ways (splines, r) in which the light on the rod may differ and pixels tell that it does, and inverse prior
-        covariances (r + 6, r + 6) of these and of the light beyond both edges: of each kind of light, or of the
-        roughest alone. columns (b, splines): weighted pictures of the splines.
+    def observable_modes(
+        self, design: np.ndarray, *, with_smooth_priors: bool
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return the modes (splines, r) of the light that pixels constrain, and the prior
+        precisions (r + 6, r + 6).
 
-        In these ways the roughest light varies by one each. What no pixel tells is left as each kind of light has it:
-        it takes no part in the evidence."""
-        seen = columns @ self._root
-        size, ways = np.linalg.eigh(seen.T @ seen)
-        ways = ways[:, size > _TOLD]
-        rough = np.diag(np.concatenate([np.ones(ways.shape[1]), self._of_outside]))
-        smooth = []
-        for kind in self._smooth if all_light else ():
-            smooth.append(rough.copy())
-            smooth[-1][: ways.shape[1], : ways.shape[1]] = np.linalg.inv(ways.T @ kind @ ways)
-        return self._root @ ways, [*smooth, rough]
+        design (b, splines): whitened pictures of the splines. Modes are scaled so that each has
+        prior variance 1 under the roughest prior. Modes about which the pixels say less than
+        _LEAST_INFORMATION are dropped: they do not change the evidence. The precisions also hold
+        those of the light beyond the edges; there is one for each smoothness of the light, or the
+        roughest alone.
+        """
+        whitened = design @ self._rough_root
+        information, modes = np.linalg.eigh(whitened.T @ whitened)
+        modes = modes[:, information > _LEAST_INFORMATION]
+        number = modes.shape[1]
+        rough = np.diag(np.concatenate([np.ones(number), self._outside_precision]))
+        precisions = []
+        if with_smooth_priors:
+            for covariance in self._smooth_covariances:
+                precision = rough.copy()
+                precision[:number, :number] = np.linalg.inv(modes.T @ covariance @ modes)
+                precisions.append(precision)
+        return self._rough_root @ modes, [*precisions, rough]
 
-    @cached_property
-    def of_none(self) -> tuple[np.ndarray, np.ndarray]:
-        """Minus twice the log evidence (k,) that there is no rod, and the misfit (k,) per bin then."""
-        across = self.profiles
-        return self._explained(
-            [1.0, across.offset_px / OUTSIDE_PX, across.behind], self._of_outside[[0, 1, 4]]
-        )
+    def marginalise(
+        self, normal: np.ndarray, precision: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the deviance (k, …) of linear Gaussian models, and their misfit (k, …): χ² per
+        bin.
 
-    def clearness(self, one: "Evidence") -> float:
-        """The log of how many times worse the light is explained without a bar, or with one edge of it, left or right,
-        as of another, wider thing beside which nothing is different: of the median stretch."""
-        others = [
-            self.of_none[1],
-            *(
-                self._misfit_of_edge(one.at_px + side * self.profiles.radius_px, one.blur_px)
-                for side in (-1.0, 1.0)
-            ),
-        ]
-        return float(
-            np.median(np.log(np.maximum(np.min(others, axis=0), 1.0) / np.maximum(one.misfit, 1.0)))
-        )
+        normal (k, …, n, n): products of the whitened columns [A y], the light y last; only its
+        lower triangle is used. precision (n - 1, n - 1): P of the coefficients.
 
-    def _misfit_of_edge(self, edge_px: np.ndarray, blur_px: float) -> np.ndarray:
-        """The misfit (k,) per bin of an edge (k,) alone."""
-        across = self.profiles
-        beyond = ndtr((across.offset_px - edge_px[:, None]) / blur_px)
-        columns = [
-            share * one
-            for share in (1.0 - beyond, beyond)
-            for one in (1.0, across.offset_px / OUTSIDE_PX, across.behind)
-        ]
-        return self._explained(columns, np.tile(self._of_outside[[0, 1, 4]], 2))[1]
-
-    def _explained(self, columns: list, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`marginal` (k,) of columns (k, b) each, their prior given by its diagonal."""
-        across = self.profiles
-        columns = [np.broadcast_to(one, across.light.shape) for one in (*columns, across.light)]
-        columns = np.sqrt(across.weight)[..., None] * np.stack(columns, axis=-1)
-        normal = np.swapaxes(columns, -1, -2) @ columns
-        value, misfit = self.marginal(normal[:, None], np.diag(prior))
-        return value[:, 0], misfit[:, 0]
-
-    def marginal(self, normal: np.ndarray, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Minus twice the log evidence (k, …), and the misfit (k, …) per bin, of models with these products
-        (k, …, n, n) of their weighted columns, the light the last of them, and a Gaussian prior with this inverse
-        covariance (n - 1, n - 1).
-
-        The light's own place in the root of the bordered normal equations is what the others leave of it.
+        The last diagonal element of the Cholesky factor of [[AᵀWA + P, ·], [yᵀWA, yᵀWy]] is the
+        root of χ².
         """
         normal = normal.copy()
-        normal[..., :-1, :-1] += prior
-        normal[..., -1, -1] += 1.0  # where nothing is left, a root yet
-        root = np.diagonal(np.linalg.cholesky(normal), axis1=-2, axis2=-1)
-        chi2 = root[..., -1] ** 2 - 1.0
-        widths = 2.0 * np.sum(np.log(root[..., :-1]), axis=-1)
-        value = chi2 + widths - np.linalg.slogdet(prior)[1] + self.profiles.in_grey[:, None]
-        return value, chi2 / np.maximum(np.sum(self.profiles.seen, axis=1), 1)[:, None]
+        normal[..., :-1, :-1] += precision
+        normal[..., -1, -1] += 1.0  # keeps it positive definite where χ² is 0
+        diagonal = np.diagonal(np.linalg.cholesky(normal), axis1=-2, axis2=-1)
+        chi2 = diagonal[..., -1] ** 2 - 1.0
+        log_determinant = 2.0 * np.sum(np.log(diagonal[..., :-1]), axis=-1)
+        prior_log_determinant = np.linalg.slogdet(precision)[1]
+        deviance = chi2 + log_determinant - prior_log_determinant
+        deviance = deviance + self.profiles.log_jacobian[:, None]
+        bins = np.maximum(np.sum(self.profiles.is_observed, axis=1), 1)
+        return deviance, chi2 / bins[:, None]
+
+    @cached_property
+    def without_rod(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the deviance (k,) of the background alone, without a rod, and its misfit (k,) per
+        bin."""
+        return self._marginalise_columns(
+            self._background_columns, self._outside_precision[[0, 1, 4]]
+        )
+
+    @cached_property
+    def _background_columns(self) -> np.ndarray:
+        """Return level, slope, and the picture without rods as columns (3, k, b)."""
+        background = self.profiles.background
+        slope = self.profiles.offset_px / OUTSIDE_PX
+        columns = [1.0, slope, background]
+        return np.stack([np.broadcast_to(column, background.shape) for column in columns])
+
+    def detection_score(self, evidence: "Evidence") -> float:
+        """Return log of the misfit without the bar over that with it, of the median segment.
+
+        Alternatives are the background alone, and a single edge where the bar's left or right one
+        is: the edge of some wider thing. The one with the least misfit counts. The score does not
+        depend on the contrast.
+        """
+        misfits = [self.without_rod[1]]
+        for side in (-1.0, 1.0):
+            edge_px = evidence.best_shift_px + side * self.profiles.radius_px
+            misfits.append(self._misfit_of_edge(edge_px, evidence.blur_px))
+        alternative = np.maximum(np.min(misfits, axis=0), 1.0)
+        return float(np.median(np.log(alternative / np.maximum(evidence.misfit, 1.0))))
+
+    def _misfit_of_edge(self, edge_px: np.ndarray, blur_px: float) -> np.ndarray:
+        """Return the misfit (k,) per bin of a single edge at edge_px (k,) between two
+        backgrounds."""
+        beyond = ndtr((self.profiles.offset_px - edge_px[:, None]) / blur_px)
+        columns = self._background_columns
+        both_sides = np.concatenate([(1.0 - beyond) * columns, beyond * columns])
+        precision = np.tile(self._outside_precision[[0, 1, 4]], 2)
+        return self._marginalise_columns(both_sides, precision)[1]
+
+    def _marginalise_columns(
+        self, columns: np.ndarray, precision: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the deviance and the misfit (k,) of columns (n, k, b) whose coefficients have
+        precision (n,)."""
+        profiles = self.profiles
+        design = np.stack([*columns, profiles.light], axis=-1)  # (k, b, n + 1)
+        whitened = np.sqrt(profiles.weight)[..., None] * design
+        normal = np.swapaxes(whitened, -1, -2) @ whitened
+        deviance, misfit = self.marginalise(normal[:, None], np.diag(precision))
+        return deviance[:, 0], misfit[:, 0]
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Under a lens blur, minus twice the log evidence (k, g, r) of each stretch's middle at each shift, for each prior;
-    the misfit (k,) per bin at its best; and the former (k,) of there being no bar."""
+    """The evidence of k segments under one lens blur, as deviance: −2 log evidence.
+
+    shift_px (g,): positions of the bar's middle. bar_deviance (k, g, r): of each position and each
+    of r priors of the light. misfit (k,): χ² per bin at the best of these. no_bar_deviance (k,): of
+    the background alone.
+    """
 
     blur_px: float
     shift_px: np.ndarray
-    of_bar: np.ndarray
+    bar_deviance: np.ndarray
     misfit: np.ndarray
-    of_none: np.ndarray
+    no_bar_deviance: np.ndarray
 
     @property
-    def least(self) -> np.ndarray:
-        """That (k,) of each stretch's best."""
-        return self.of_bar.min(axis=(1, 2))
+    def least_deviance(self) -> np.ndarray:
+        """Return the deviance (k,) of each segment at its best position."""
+        return self.bar_deviance.min(axis=(1, 2))
 
     @property
-    def at_px(self) -> np.ndarray:
-        """The shift (k,) of each stretch's best."""
-        best = np.argmin(self.of_bar.reshape(len(self.of_bar), -1), axis=1)
-        return self.shift_px[best // self.of_bar.shape[2]]
+    def best_shift_px(self) -> np.ndarray:
+        """Return the best position (k,) of each segment."""
+        segments, _, priors = self.bar_deviance.shape
+        best = np.argmin(self.bar_deviance.reshape(segments, -1), axis=1)
+        return self.shift_px[best // priors]
 
 
-def evidence(
+@dataclass(frozen=True)
+class _Design:
+    """Columns of the model at offsets (n,) from the bar's middle, apart from the picture without
+    rods.
+
+    light (n, r + 4): of the modes of light on the rod, and of level and slope beyond each edge.
+    cover (n, 2): the share of the background that is visible beyond each edge.
+    leak (n, 2): the share of the background's slope that is visible, px. The picture without rods
+    is blurred already, and the blur of a product of two pictures is the product of the blurred ones
+    plus blur² times that of their slopes.
+    """
+
+    light: np.ndarray
+    cover: np.ndarray
+    leak: np.ndarray
+
+
+def compute_evidence(
     rod: LitRod,
     reach_px: float,
     blur_px: float,
+    *,
     positions: int = 1,
-    all_light: bool = True,
+    with_smooth_priors: bool = True,
     every: int = 1,
-    wider: float = 1.0,
+    width_factor: float = 1.0,
 ) -> Evidence:
-    """Evidence of the bar's middle up to reach_px off, at so many positions for each step of the grid, or at every so
-    many steps, in each stretch; under all kinds of light, or the roughest only. wider: times the bar's width."""
-    seen, radius_px = rod.profiles, wider * rod.profiles.radius_px
+    """Compute the evidence of positions of the bar's middle within reach_px, in each segment.
+
+    positions: how many for each step of the profiles' grid. every: uses only every so many steps.
+    with_smooth_priors: under all priors of the light, else under the roughest alone. width_factor:
+    of the bar's width.
+    """
+    profiles = rod.profiles
+    radius_px = width_factor * profiles.radius_px
     most = int(np.ceil(reach_px / (every * STEP_PX)))
-    shifts = every * np.arange(-most, most + 1)
-    steps, more_px = _within(seen, every * most), STEP_PX / positions * np.arange(positions)
-    pictures = [_on_rod(STEP_PX * steps - more, radius_px, blur_px) for more in more_px]
-    light, priors = rod.told(
-        _best_seen(seen, steps, every * most)[:, None] * pictures[0], all_light
+    shifts = every * np.arange(-most, most + 1)  # (steps,) whole steps of the grid
+    steps = _visible_steps(profiles, every * most)
+    fractions_px = STEP_PX / positions * np.arange(positions)
+    pictures = []
+    for fraction_px in fractions_px:
+        pictures.append(_blur_splines(STEP_PX * steps - fraction_px, radius_px, blur_px))
+    root_weight = _largest_root_weight(profiles, steps, every * most)
+    modes, precisions = rod.observable_modes(
+        root_weight[:, None] * pictures[0], with_smooth_priors=with_smooth_priors
     )
-    normal = [
-        _normal(
-            seen, shifts, _columns(STEP_PX * steps - more, one @ light, radius_px, blur_px), steps
-        )
-        for more, one in zip(more_px, pictures)
-    ]
-    normal = np.stack(normal, axis=2).reshape(len(seen), -1, *normal[0].shape[-2:])
-    shift_px = (STEP_PX * shifts[:, None] + more_px).ravel()
-    under = [rod.marginal(normal, prior) for prior in priors]
-    value, misfit = (np.stack(one, axis=-1) for one in zip(*under))
-    best = np.argmin(value.reshape(len(seen), -1), axis=1)
-    misfit = misfit.reshape(len(seen), -1)[np.arange(len(seen)), best]
-    return Evidence(blur_px, shift_px, value, misfit, rod.of_none[0])
+    matrices = []
+    for fraction_px, picture in zip(fractions_px, pictures):
+        offset_px = STEP_PX * steps - fraction_px
+        design = _make_design(offset_px, picture @ modes, radius_px, blur_px)
+        matrices.append(_normal_matrices(profiles, shifts, design, steps))
+    size = matrices[0].shape[-1]
+    normal = np.stack(matrices, axis=2).reshape(len(profiles), -1, size, size)
+    shift_px = (STEP_PX * shifts[:, None] + fractions_px).ravel()
+    deviances = []
+    misfits = []
+    for precision in precisions:
+        deviance, misfit = rod.marginalise(normal, precision)
+        deviances.append(deviance)
+        misfits.append(misfit)
+    bar_deviance = np.stack(deviances, axis=-1)
+    misfit = np.stack(misfits, axis=-1).reshape(len(profiles), -1)
+    best = np.argmin(bar_deviance.reshape(len(profiles), -1), axis=1)
+    misfit = misfit[np.arange(len(profiles)), best]
+    return Evidence(blur_px, shift_px, bar_deviance, misfit, rod.without_rod[0])
 
 
-def _within(seen: Profiles, most: int) -> np.ndarray:
-    """The places (b,) of a bar that are seen somewhere when it is looked for so many steps aside, in steps from its
-    middle."""
-    used = np.flatnonzero(np.convolve(np.any(seen.seen, axis=0), np.ones(2 * most + 1)) > 0)
-    return used - (len(seen.offset_px) // 2 + most)
+def _visible_steps(profiles: Profiles, most: int) -> np.ndarray:
+    """Return the offsets (n,) from a bar's middle, in steps, that have pixels for some shift of up
+    to `most` steps."""
+    any_observed = np.any(profiles.is_observed, axis=0)
+    visible = np.flatnonzero(np.convolve(any_observed, np.ones(2 * most + 1)) > 0)
+    return visible - (len(profiles.offset_px) // 2 + most)
 
 
-def _best_seen(seen: Profiles, steps: np.ndarray, most: int) -> np.ndarray:
-    """One over sigma (b,) of what a model leaves at such places of the bar, where and in the stretch it is least."""
-    weight = maximum_filter1d(np.pad(np.max(seen.weight, axis=0), most), 2 * most + 1)
-    return np.sqrt(weight[steps + len(weight) // 2])
+def _largest_root_weight(profiles: Profiles, steps: np.ndarray, most: int) -> np.ndarray:
+    """Return 1 / sigma (n,) at offsets `steps`, the largest over segments and shifts of up to
+    `most` steps."""
+    weight = np.pad(np.max(profiles.weight, axis=0), most)
+    largest = maximum_filter1d(weight, 2 * most + 1)
+    return np.sqrt(largest[steps + len(largest) // 2])
 
 
-def _normal(seen: Profiles, shifts, columns, steps) -> np.ndarray:
-    """Products (k, g, n, n) of the weighted columns of what the light is made of, and of the light, for middles at
-    these whole steps (g,) of the grid. columns: see `_columns`, at such steps (b,) from the middle. Not to be used
-    above the diagonal."""
-    own, cover, leak = columns
-    most, middle = int(np.max(np.abs(shifts))), len(seen.offset_px) // 2
-    row, column, place = _layout(own.shape[1])
-    one, other = [0, 0, 1], [0, 1, 1]
-    mixed = ((own[:, None] * two[:, :, None]).reshape(len(own), -1) for two in (cover, leak))
-    tables = (
-        own[:, row] * own[:, column],
-        *mixed,
+def _normal_matrices(profiles: Profiles, shifts, design: _Design, steps) -> np.ndarray:
+    """Compute the matrices [A y]ᵀ W [A y] (k, g, m, m) for middles at `shifts` (g,), in whole steps
+    of the grid.
+
+    design: at offsets `steps` (n,) from the middle. Columns of A are the r + 4 of the light, then
+    the background beyond either edge, cover · g + leak · s of the background g and its slope s. So
+    each element is a sum over products of two columns of the design times one of the `moments` of
+    the profiles, shifted: nine matrix products give all of them. Only the lower triangle is right.
+    """
+    light = design.light
+    cover = design.cover
+    leak = design.leak
+    columns = light.shape[1]
+    row, column, element = _element_layout(columns)
+    one = [0, 0, 1]  # pairs of the two edges: left left, left right, right right
+    other = [0, 1, 1]
+    tables = [
+        light[:, row] * light[:, column],
+        (light[:, None] * cover[:, :, None]).reshape(len(light), -1),
+        (light[:, None] * leak[:, :, None]).reshape(len(light), -1),
         cover[:, one] * cover[:, other],
         cover[:, one] * leak[:, other] + leak[:, one] * cover[:, other],
         leak[:, one] * leak[:, other],
-        own,
+        light,
         cover,
         leak,
-    )
-    padded = np.pad(seen.moments, ((0, 0), (0, 0), (2 * most, 2 * most)))
-    windows = padded.take(2 * most + middle + shifts[:, None] + steps, axis=2).reshape(
-        len(tables), -1, len(own)
-    )
-    power = np.repeat(np.sum(seen.weight * seen.light**2, axis=1), len(shifts))[:, None]
-    alone, *parts = map(np.matmul, windows, tables)
-    sums = [
-        alone,
-        parts[0] + parts[1],
-        parts[2] + parts[3] + parts[4],
-        parts[5],
-        parts[6] + parts[7],
-        power,
     ]
-    sums = np.concatenate(sums, axis=1)
-    return sums.take(place.ravel(), axis=1).reshape(len(seen), len(shifts), *place.shape)
+    most = int(np.max(np.abs(shifts)))
+    middle = len(profiles.offset_px) // 2
+    padded = np.pad(profiles.moments, ((0, 0), (0, 0), (2 * most, 2 * most)))
+    bins = 2 * most + middle + shifts[:, None] + steps  # (g, n)
+    windows = padded.take(bins, axis=2).reshape(len(tables), -1, len(light))
+    products = [window @ table for window, table in zip(windows, tables)]
+    power = np.sum(profiles.weight * profiles.light**2, axis=1)
+    sums = [
+        products[0],
+        products[1] + products[2],
+        products[3] + products[4] + products[5],
+        products[6],
+        products[7] + products[8],
+        np.repeat(power, len(shifts))[:, None],
+    ]
+    elements = np.concatenate(sums, axis=1).take(element.ravel(), axis=1)
+    return elements.reshape(len(profiles), len(shifts), *element.shape)
 
 
 @lru_cache(maxsize=_SPLINES)
-def _layout(own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of so many own columns, which two (n (n + 1) / 2,) each of their products is of, and where (n + 3, n + 3) each
-    product is among the sums of `_normal`; above the diagonal the first."""
-    place, (row, column) = np.zeros((own + 3, own + 3), dtype=np.intp), np.tril_indices(own)
-    pairs = len(row)
-    place[row, column] = np.arange(pairs)
-    place[own:-1, :own] = pairs + np.arange(2 * own).reshape(2, own)
-    place[[-3, -2, -2], [-3, -3, -2]] = pairs + 2 * own + np.arange(3)
-    place[-1] = pairs + 2 * own + 3 + np.arange(own + 3)
-    return row, column, place
+def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which element of `_normal_matrices` is which of its sums.
 
-
-def _columns(
-    offset_px, on_rod, radius_px: float, blur_px: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Those of the light on the rod, (n, r), and blurred pictures of level and slope beyond each edge (n, r + 4); how
-    much of the background each side shows (n, 2); and what to take of its slope besides
-    (n, 2), for the picture without rods was blurred whole: a product of two pictures, blurred, is that of the blurred
-    ones and blur² times that of their slopes.
+    columns: number of columns of the light. row, column (columns (columns + 1) / 2,): of the lower
+    triangle of their products. element (columns + 3, columns + 3): index of each element among all
+    sums, 0 above the diagonal.
     """
-    beyond = np.stack([-offset_px, offset_px], axis=1) - radius_px
-    cover = ndtr(beyond / blur_px)
-    bell = np.exp(-0.5 * (beyond / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
-    sides = np.stack([cover, cover * beyond / OUTSIDE_PX], axis=2).reshape(len(offset_px), _SIDES)
-    return np.concatenate([on_rod, sides], axis=1), cover, blur_px * np.array([-1.0, 1.0]) * bell
+    element = np.zeros((columns + 3, columns + 3), dtype=np.intp)
+    row, column = np.tril_indices(columns)
+    first = len(row)
+    element[row, column] = np.arange(first)
+    element[columns:-1, :columns] = first + np.arange(2 * columns).reshape(2, columns)
+    first += 2 * columns
+    element[[-3, -2, -2], [-3, -3, -2]] = first + np.arange(3)
+    first += 3
+    element[-1] = first + np.arange(columns + 3)
+    return row, column, element
 
 
-def _on_rod(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
-    """Blurred pictures (n, splines) of a rod whose radiance is each spline of the angle round it."""
+def _make_design(offset_px, rod_light, radius_px: float, blur_px: float) -> _Design:
+    """Return the design at offset_px (n,), of the blurred pictures rod_light (n, r) of the modes of
+    light on the rod."""
+    beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # (n, 2) left and right edge
+    cover = ndtr(beyond_px / blur_px)
+    density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
+    sides = np.stack([cover, cover * beyond_px / OUTSIDE_PX], axis=2)
+    sides = sides.reshape(len(offset_px), _SIDES)
+    leak = blur_px * np.array([-1.0, 1.0]) * density
+    return _Design(np.concatenate([rod_light, sides], axis=1), cover, leak)
+
+
+def _blur_splines(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
+    """Return blurred pictures (n, splines) of rods whose radiance is one spline of the angle
+    each."""
     z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
-    area = (
-        radius_px * np.cos(_ANGLES) * (_ANGLES[1] - _ANGLES[0]) / (blur_px * np.sqrt(2.0 * np.pi))
-    )
+    step_rad = _ANGLES[1] - _ANGLES[0]
+    area = radius_px * np.cos(_ANGLES) * step_rad / (blur_px * np.sqrt(2.0 * np.pi))
     return (np.exp(-0.5 * z * z) * area) @ _splines()
 
 
 @lru_cache(maxsize=1)
-def _changes() -> list[np.ndarray]:
-    """What light changes by from spline to spline (splines, splines), squared and over what it may, of each kind."""
-    steps, turns = (np.diff(np.eye(_SPLINES), order, axis=0) for order in (1, 2))
-    return [steps.T @ steps / _STEP_SHARE**2 + turns.T @ turns / share**2 for share in _TURN_SHARES]
+def _roughness_penalties() -> list[np.ndarray]:
+    """Return DᵀD / sigma² (splines, splines) of first and second differences of the light, from
+    smooth to rough."""
+    steps = np.diff(np.eye(_SPLINES), 1, axis=0)
+    curvatures = np.diff(np.eye(_SPLINES), 2, axis=0)
+    of_steps = steps.T @ steps / _STEP_SHARE**2
+    return [of_steps + curvatures.T @ curvatures / share**2 for share in _CURVATURE_SHARES]
 
 
 @lru_cache(maxsize=1)
 def _splines() -> np.ndarray:
-    """Cubic B-splines (angles, splines) from edge to edge."""
-    ends = 0.5 * np.pi
-    inner = np.linspace(-ends, ends, _SPLINES - 2)
-    knots = np.concatenate([[-ends] * 3, inner, [ends] * 3])
-    return BSpline.design_matrix(np.clip(_ANGLES, -ends, ends - 1e-9), knots, 3).toarray()
+    """Return the cubic B-splines (angles, splines) of the angle from edge to edge."""
+    end = 0.5 * np.pi
+    inner = np.linspace(-end, end, _SPLINES - 2)
+    knots = np.concatenate([[-end] * 3, inner, [end] * 3])
+    return BSpline.design_matrix(np.clip(_ANGLES, -end, end - 1e-9), knots, 3).toarray()

@@ -1,8 +1,13 @@
-"""The bar's line in one camera: shift and tilt against where it was expected, by the evidence of both its edges.
+"""The bar's line in one camera: two line points with their sigmas, from the evidence of both its
+edges.
 
-The bar stands still, so its frames are averaged. Each stretch of it says by itself how probable a middle is; together
-they give the posterior of a straight line. Where an edge is as dark as what is behind it, or a shadow's border may be
-taken for it, the posterior is wide or has several peaks, and the line's sigma is as wide.
+The bar stands still, so its frames are averaged. Its pixels near wires, clamps and the picture's
+border are left out. For each transfer curve (gamma) that the camera may have, `posterior.py` gives
+the posterior of shift and tilt. The cameras of a bench are of one kind, so they weigh the curves
+together; the line is the mean over the curves that remain probable, and its covariance is the mean
+covariance plus the scatter between curves. Where an edge is as dark as its background, or a
+shadow's border may be the edge, the posterior is wide or has several peaks, and the sigma is as
+wide.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,76 +19,94 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
-from vision.touched.posterior import Posterior, closer_look, first_look, most_probable, roughly
+from vision.touched.posterior import (
+    Posterior,
+    find_most_probable,
+    fit_coarse,
+    fit_quick,
+    refine,
+)
 from vision.touched.profiles import FULL_SCALE
 from vision.wire.bands import Pieces
 from vision.wire.points import SHARED, LinePoints
 
-# [px] How far off an axis may be: found by a highlight in place of both edges, and settled by its
-# lines. Study: bar_scenes.py.
-FAR_PX, NEAR_PX = 9.0, 3.0
-# [px] An axis that rough lines settled is less far off: 1.7 at most in 61 path-traced scenes.
-# Study: bar_scenes.py.
-_WIDE_PX = 2.0
+# [px] Largest error of an axis that was found by a highlight in place of both edges. Study:
+# bar_scenes.py.
+FAR_PX = 9.0
+# [px] Largest error of an axis that its lines were fitted to. Study: bar_scenes.py.
+NEAR_PX = 3.0
+# [px] Reach of a coarse pass: an axis fitted to coarse lines was 1.7 off at most in 61 path-traced
+# scenes. Study: bar_scenes.py.
+_COARSE_REACH_PX = 2.0
 # [1] Transfer curves: of a sensor itself, and of a picture that was encoded for a screen (sRGB,
 # nearly). All cameras weigh them together. Stated.
 _GAMMAS = (1.0, 2.2)
-# [chance] Of a transfer curve that is still looked at closer by, and of one after a first look:
-# in 15 path-traced scenes that was wrong by 150 times at most. Study: chosen.
-_LEAST_CHANCE, _LEAST_AT_FIRST = 1e-3, 1e-6
-# [chi²] What one stretch may say against a transfer curve: odds of 22 000 to one; one with
-# squares behind it says anything. Study: bar_starts.py.
-_MOST = 20.0
-# [1] Share of a bar's pixels that are there and not saturated; with fewer there is no line. Set
-# by eye. Study: bar_scenes.py.
-_LEAST_SHOWN = 0.5
-# [chi²] Tempered, for a bar and against none: odds of 22 000 to one. Derived.
+# [probability] Least one of a transfer curve that is used. Study: chosen.
+_LEAST_PROBABILITY = 1e-3
+# [probability] Least one of a transfer curve after the first pass, which was wrong by a factor of
+# 150 at most in 15 path-traced scenes. Study: chosen.
+_LEAST_AT_FIRST = 1e-6
+# [chi²] Largest deviance of one segment against a transfer curve: odds of 22 000 to one; a segment
+# before printed squares may show anything. Study: bar_starts.py.
+_LARGEST_DEVIANCE = 20.0
+# [1] Least share of a bar's pixels that are there and not saturated; with fewer there is no line.
+# Set by eye. Study: bar_scenes.py.
+_LEAST_PIXEL_SHARE = 0.5
+# [chi²] Least tempered evidence for a bar against none: odds of 22 000 to one. Derived.
 _LEAST_EVIDENCE = 20.0
-# [1] Share of the possible lines that are left: bars leave 0.13 at most, clamps and shadows 0.2
-# to 1. Study: bar_scenes.py.
-_MOST_UNRESOLVED = 1.0 / 6.0
-# [px] What a bar's line is off by as a whole, and by tilt, beyond its own sigma, times the root
-# of by how much its evidence is overstated beyond 1: the true lines of 79 path-traced views are
-# most probable with 0.02 to 0.025, 95.6 % of their points are within 1.96 with the latter; the
-# second is half of it. Study: bar_starts.py.
+# [1] Largest share of the possible lines that remain: bars leave 0.13 at most, clamps and shadows
+# 0.2 to 1. Study: bar_scenes.py.
+_LARGEST_UNRESOLVED = 1.0 / 6.0
+# [px] Error of a bar's line in common to its points, by shift and by tilt, beyond its own sigma:
+# times the root of the median temperature beyond 1. The true lines of 79 path-traced views are
+# most probable with 0.02 to 0.025, and 95.6 % of their points are within 1.96 sigma with the
+# latter; the second is half of it. Study: bar_starts.py.
 OVERSTATED_PX = np.array([0.025, 0.0125])
-# [1] No light is so plain. Stated.
+# [1] Least temperature beyond 1: no light is so plain. Stated.
 _LEAST_BEYOND = 0.01
 
 
 @dataclass(frozen=True)
-class BarLine:
-    """Line points (two) of the bar's middle, `place` mm along the axis they were expected on; and how much more
-    probable a bar is there than none: twice the log of the ratio; and how clearly it is one, whatever its contrast: the
-    log of how many times worse the light is explained without it; and what share of the lines that were possible in the
-    last look still are. looks: the posterior under each transfer curve that is likely; line (2,): what they have
-    together, shift and tilt in px. pieces: what was looked at."""
+class BarLineEstimate:
+    """The line of the bar's middle in one camera.
+
+    points: two line points; `place` is mm along the axis they were expected on. line (2,): shift
+    and tilt over ARM_MM, px. posteriors: by gamma of each probable transfer curve. pieces: the
+    pixels it was measured in.
+    evidence_for_bar, detection_score, unresolved_share: as of `Posterior`, averaged over the
+    transfer curves.
+    """
 
     points: LinePoints
-    for_bar: float
-    clearness: float
-    unresolved: float
-    looks: Mapping[float, Posterior]
+    evidence_for_bar: float
+    detection_score: float
+    unresolved_share: float
+    posteriors: Mapping[float, Posterior]
     line: np.ndarray
     pieces: Pieces
 
     @property
     def is_bar(self) -> bool:
-        """Whether what is seen is a bar."""
-        return self.for_bar > _LEAST_EVIDENCE
+        """Return whether the pixels show a bar."""
+        return self.evidence_for_bar > _LEAST_EVIDENCE
 
     @property
     def has_edges(self) -> bool:
-        """Whether that bar's edges are seen, too, in a rough look: it lies somewhere among the lines that were
-        possible."""
-        return self.is_bar and self.unresolved < _MOST_UNRESOLVED
+        """Return whether the pixels also resolve where its edges lie among the lines that were
+        tried."""
+        return self.is_bar and self.unresolved_share < _LARGEST_UNRESOLVED
 
-    def seen_from(self, pieces: Pieces) -> dict[float, Posterior]:
-        """The looks, about another axis."""
+    def posteriors_about(self, pieces: Pieces) -> dict[float, Posterior]:
+        """Return the posteriors by gamma, with their lines counted from the axis of other
+        pieces."""
         place, foot, normal, _ = at_arms(pieces)
-        off = np.sum((self.points.px - foot) * normal, axis=1) / np.sum(normal**2, axis=1)
-        moved = np.linalg.solve(np.stack([np.ones(2), place / ARM_MM], axis=1), off) - self.line
-        return {gamma: replace(one, line=one.line + moved) for gamma, one in self.looks.items()}
+        offset = np.sum((self.points.px - foot) * normal, axis=1) / np.sum(normal**2, axis=1)
+        levers = np.stack([np.ones(2), place / ARM_MM], axis=1)
+        change = np.linalg.solve(levers, offset) - self.line
+        moved = {}
+        for gamma, posterior in self.posteriors.items():
+            moved[gamma] = replace(posterior, line=posterior.line + change)
+        return moved
 
 
 def find_lines(
@@ -92,24 +115,32 @@ def find_lines(
     radius_mm: float,
     wires_px: Mapping[str, Sequence[np.ndarray]],
     settings: VisionSettings,
-) -> dict[str, BarLine]:
-    """The lines by one quick look, for an axis that is NEAR_PX off, or no bar's. See `measure_bars`."""
+) -> dict[str, BarLineEstimate]:
+    """Find the bar's line in each camera by one quick pass, for an axis that is up to NEAR_PX off,
+    or no bar's.
+
+    wires_px: by camera lines (m, 2) where the wire lies in some frame.
+    """
     pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
-    return {name: _quick(some, np.zeros(2)) for name, some in pieces.items()}
+    return {name: _find_line(some, np.zeros(2)) for name, some in pieces.items()}
 
 
-def look_farther(lines: Mapping[str, BarLine]) -> dict[str, BarLine]:
-    """Quick looks at the same about the most probable lines up to FAR_PX off; where that lies within what a quick look
-    has seen, this one's."""
+def find_lines_farther(lines: Mapping[str, BarLineEstimate]) -> dict[str, BarLineEstimate]:
+    """Find the bar's lines in the same pixels about the most probable ones up to FAR_PX off.
+
+    Where the most probable line lies within reach of the quick pass, that pass's line is kept.
+    """
     farther = {}
-    for name, line in lines.items():
-        there = most_probable(line.pieces, FAR_PX)
-        farther[name] = line if np.all(np.abs(there) < NEAR_PX) else _quick(line.pieces, there)
+    for name, estimate in lines.items():
+        line = find_most_probable(estimate.pieces, FAR_PX)
+        is_near = np.all(np.abs(line) < NEAR_PX)
+        farther[name] = estimate if is_near else _find_line(estimate.pieces, line)
     return farther
 
 
-def _quick(pieces: Pieces, about: np.ndarray) -> BarLine:
-    return _bar_line(pieces, {1.0: roughly(pieces, about, NEAR_PX)}, np.ones(1))
+def _find_line(pieces: Pieces, about: np.ndarray) -> BarLineEstimate:
+    """Find the line within NEAR_PX of a line (2,) by one quick pass."""
+    return _average_posteriors(pieces, {1.0: fit_quick(pieces, about, NEAR_PX)}, np.ones(1))
 
 
 def measure_bars(
@@ -118,53 +149,58 @@ def measure_bars(
     radius_mm: float,
     wires_px: Mapping[str, Sequence[np.ndarray]],
     settings: VisionSettings,
-    before: Mapping[str, BarLine] | None = None,
-) -> dict[str, BarLine]:
-    """The bar's line in the mean of each view's pictures, by camera; without those where too little of it is clear.
+    before: Mapping[str, BarLineEstimate] | None = None,
+) -> dict[str, BarLineEstimate]:
+    """Measure the bar's line in the mean of each view's pictures, by camera.
 
-    wires_px: by camera lines (m, 2) where the wire lies in some frame. before: what was measured about an axis nearby,
-    by which the lines are measured finely; without it, to some tenths of their sigma.
+    Cameras that show too little of the bar are left out. wires_px: by camera lines (m, 2) where the
+    wire lies in some frame. before: measured about an axis nearby; with it lines are measured
+    finely, without it to some tenths of their sigma.
     """
     pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
         return {}
     if before:
-        gammas = list(next(iter(before.values())).looks)
-        seen = {
-            name: before[name].seen_from(some)
-            if name in before
-            else _closer(some, _first(some, gammas), 1)
-            for name, some in pieces.items()
-        }
+        gammas = list(next(iter(before.values())).posteriors)
+        posteriors = {}
+        for name, some in pieces.items():
+            if name in before:
+                posteriors[name] = before[name].posteriors_about(some)
+            else:
+                posteriors[name] = _refine(some, _fit_coarse(some, gammas), 1)
     else:
-        seen = {name: _first(some, _GAMMAS) for name, some in pieces.items()}
-        gammas = [
-            gamma
-            for gamma, chance in zip(_GAMMAS, _chances(seen.values()))
-            if chance > _LEAST_AT_FIRST
-        ]
-        seen = {name: {gamma: looks[gamma] for gamma in gammas} for name, looks in seen.items()}
-    seen = {name: _closer(pieces[name], looks, 2 if before else 1) for name, looks in seen.items()}
-    chances = _chances(seen.values())
-    likely = chances > _LEAST_CHANCE
-    kept = [gamma for gamma, is_likely in zip(gammas, likely) if is_likely]
-    chances = chances[likely] / chances[likely].sum()
-    return {
-        name: _bar_line(pieces[name], {gamma: looks[gamma] for gamma in kept}, chances)
-        for name, looks in seen.items()
-    }
+        posteriors = {name: _fit_coarse(some, _GAMMAS) for name, some in pieces.items()}
+        is_kept = _gamma_probabilities(posteriors.values()) > _LEAST_AT_FIRST
+        gammas = [gamma for gamma, keep in zip(_GAMMAS, is_kept) if keep]
+    refined = {}
+    for name, some in pieces.items():
+        by_gamma = {gamma: posteriors[name][gamma] for gamma in gammas}
+        refined[name] = _refine(some, by_gamma, 2 if before else 1)
+    probabilities = _gamma_probabilities(refined.values())
+    is_kept = probabilities > _LEAST_PROBABILITY
+    kept = [gamma for gamma, keep in zip(gammas, is_kept) if keep]
+    probabilities = probabilities[is_kept] / probabilities[is_kept].sum()
+    lines = {}
+    for name, some in pieces.items():
+        by_gamma = {gamma: refined[name][gamma] for gamma in kept}
+        lines[name] = _average_posteriors(some, by_gamma, probabilities)
+    return lines
 
 
-def _first(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
-    """First looks, by transfer curve."""
-    return {gamma: first_look(pieces, np.zeros(2), _WIDE_PX, gamma) for gamma in gammas}
+def _fit_coarse(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
+    """Return the coarse posterior under each transfer curve."""
+    return {gamma: fit_coarse(pieces, np.zeros(2), _COARSE_REACH_PX, gamma) for gamma in gammas}
 
 
-def _closer(
-    pieces: Pieces, looks: Mapping[float, Posterior], positions: int
+def _refine(
+    pieces: Pieces, posteriors: Mapping[float, Posterior], positions: int
 ) -> dict[float, Posterior]:
-    """The next looks, at so many positions for each step across."""
-    return {gamma: closer_look(pieces, one, gamma, positions) for gamma, one in looks.items()}
+    """Return the refined posterior under each transfer curve, with `positions` for each step
+    across."""
+    refined = {}
+    for gamma, posterior in posteriors.items():
+        refined[gamma] = refine(pieces, posterior, gamma, positions)
+    return refined
 
 
 def clear_pieces(
@@ -174,57 +210,72 @@ def clear_pieces(
     wires_px: Mapping[str, Sequence[np.ndarray]],
     settings: VisionSettings,
 ) -> dict[str, Pieces]:
-    """By camera the pieces of the bar, where enough are clear. wires_px: see `measure_bars`."""
-    pieces = {
-        view.camera.name: _pieces(
-            view, axis, radius_mm, wires_px.get(view.camera.name, []), settings
-        )
-        for view in views
-    }
-    return {
-        name: some for name, some in pieces.items() if len(some) >= FEWEST_PIECES and _shows(some)
-    }
+    """Return the clear pieces of the bar by camera, of cameras that show enough of it.
+
+    wires_px: by camera lines (m, 2) where the wire lies in some frame.
+    """
+    clear = {}
+    for view in views:
+        name = view.camera.name
+        pieces = _read_pieces(view, axis, radius_mm, wires_px.get(name, []), settings)
+        if len(pieces) < FEWEST_PIECES:
+            continue
+        if np.mean(pieces.weight > 0) > _LEAST_PIXEL_SHARE:
+            clear[name] = pieces
+    return clear
 
 
-def _chances(cameras: Iterable[Mapping[float, Posterior]]) -> np.ndarray:
-    """Of each transfer curve: the cameras of a bench are of one kind. All stretches of a bar are lit nearly alike, so
-    that what they say of a curve by their light counts once a camera; one that no curve explains says little."""
+def _gamma_probabilities(cameras: Iterable[Mapping[float, Posterior]]) -> np.ndarray:
+    """Return the probability of each transfer curve, from the posteriors of all cameras.
+
+    All segments of a bar are lit nearly alike, so that the evidence of their light counts once for
+    a camera: its mean. The evidence of segments that no curve explains is tempered.
+    """
     total = 0.0
-    for looks in cameras:
-        temper = np.max([one.temper for one in looks.values()], axis=0)
-        least = np.array([one.least for one in looks.values()]) / temper
-        against = -2.0 * np.logaddexp(-0.5 * (least - least.min(axis=0)), -0.5 * _MOST)
-        total = total + against.mean(axis=1) + [one.room for one in looks.values()]
-    chance = np.exp(-0.5 * (total - total.min()))
-    return chance / chance.sum()
+    for posteriors in cameras:
+        temperature = np.max([one.temperature for one in posteriors.values()], axis=0)
+        deviance = np.array([one.segment_deviance for one in posteriors.values()]) / temperature
+        excess = deviance - deviance.min(axis=0)
+        bounded = -2.0 * np.logaddexp(-0.5 * excess, -0.5 * _LARGEST_DEVIANCE)
+        volume = [one.volume_deviance for one in posteriors.values()]
+        total = total + bounded.mean(axis=1) + volume
+    density = np.exp(-0.5 * (total - total.min()))
+    return density / density.sum()
 
 
-def _bar_line(pieces: Pieces, looks: Mapping[float, Posterior], chances) -> BarLine:
-    """The line by all transfer curves, each by its chance."""
-    seen = looks.values()
-    lines, own = np.array([one.line for one in seen]), np.array([one.covariance for one in seen])
-    line = chances @ lines
-    covariance = np.einsum(
-        "g,gij->ij", chances, own + np.einsum("gi,gj->gij", lines - line, lines - line)
+def _average_posteriors(
+    pieces: Pieces, posteriors: Mapping[float, Posterior], probabilities: np.ndarray
+) -> BarLineEstimate:
+    """Average the posteriors under all transfer curves, weighted by the curves' probabilities
+    (g,)."""
+    lines = np.array([one.line for one in posteriors.values()])  # (g, 2)
+    covariances = np.array([one.covariance for one in posteriors.values()])
+    line = probabilities @ lines
+    scatter = np.einsum("gi,gj->gij", lines - line, lines - line)
+    covariance = np.einsum("g,gij->ij", probabilities, covariances + scatter)
+    figures = []
+    for one in posteriors.values():
+        figures.append([one.evidence_for_bar, one.detection_score, one.unresolved_share])
+    evidence_for_bar, detection_score, unresolved_share = probabilities @ np.array(figures)
+    temperatures = np.array([np.median(one.temperature) for one in posteriors.values()])
+    beyond = max(probabilities @ temperatures - 1.0, _LEAST_BEYOND)
+    points = _points_of_line(pieces, line, covariance, np.sqrt(beyond) * OVERSTATED_PX)
+    return BarLineEstimate(
+        points,
+        float(evidence_for_bar),
+        float(detection_score),
+        float(unresolved_share),
+        posteriors,
+        line,
+        pieces,
     )
-    mixed = chances @ np.array([[one.for_bar, one.clearness, one.unresolved] for one in seen])
-    beyond = chances @ np.array([np.median(one.temper) for one in seen]) - 1.0
-    points = _two_points(
-        pieces, line, covariance, np.sqrt(max(beyond, _LEAST_BEYOND)) * OVERSTATED_PX
-    )
-    return BarLine(points, *map(float, mixed), looks, line, pieces)
 
 
-def _shows(pieces: Pieces) -> bool:
-    """Whether more than a half of the pixels are there, and not saturated."""
-    return bool(np.mean(pieces.weight > 0) > _LEAST_SHOWN)
-
-
-def _pieces(
+def _read_pieces(
     view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings
 ) -> Pieces:
-    """Pieces of the bar in the view's mean picture, with its noise, in grey levels of 8 bit; saturated pixels weigh
-    nothing."""
+    """Read the pieces of the bar in the view's mean picture, in grey levels of 8 bit; saturated
+    pixels weigh nothing."""
     noise = view.noise.times(view.mean_share)
     pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
     if len(pieces) < FEWEST_PIECES and view.itself is None:
@@ -240,14 +291,17 @@ def _pieces(
     )
 
 
-def _two_points(pieces: Pieces, line, covariance, shared_px) -> LinePoints:
-    """The line as two points at ± ARM_MM, each with its sigma; shared_px (2,): sigma of a shift and a tilt besides."""
+def _points_of_line(pieces: Pieces, line, covariance, shared_px) -> LinePoints:
+    """Return the line as two points at ± ARM_MM with their sigmas.
+
+    line (2,), covariance (2, 2): shift and tilt, px. shared_px (2,): sigma of a further shift and
+    tilt in common.
+    """
     place, foot, normal, _ = at_arms(pieces)
     lever = place / ARM_MM
-    across = np.stack([np.ones(2), lever], axis=1)
-    sigma = np.sqrt(np.einsum("ni,ij,nj->n", across, covariance, across))
+    jacobian = np.stack([np.ones(2), lever], axis=1)  # of the points' offsets by shift and tilt
+    sigma = np.sqrt(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian))
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    shared = np.hstack([across * shared_px, np.zeros((2, SHARED - 2))])
-    return LinePoints(
-        foot + (line[0] + line[1] * lever)[:, None] * normal, normal, sigma, place, shared
-    )
+    shared = np.hstack([jacobian * shared_px, np.zeros((2, SHARED - 2))])
+    offset = line[0] + line[1] * lever
+    return LinePoints(foot + offset[:, None] * normal, normal, sigma, place, shared)

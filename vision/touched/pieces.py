@@ -1,7 +1,13 @@
-"""What the bar's line and its edges are read from: pieces of its band, clear of wire and clamps, and their rims."""
+"""The pixels of a bar's image: patches of the band along it, clear of wires and clamps, and their
+rims.
+
+`Pieces` (`vision.wire.bands`) are patches of the band, each some pixels long and as wide as the
+band. This module reads them about a predicted axis, and selects those that show the bar before its
+background and nothing else.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -17,29 +23,30 @@ from vision.wire.shading import Knots, fit_shading, locate
 
 # [mm] The line is handed on as two points, this far to either side: a layout.
 ARM_MM = 20.0
-# [radii] What lies nearer to the axis is no rim, where edges are looked for. Origin not known.
-# Study: thresholds.py bar.pieces _INNER_SHARE ….
+# [radii] Pixels nearer to the axis are no rim, where edges are measured. Origin not known. Study:
+# thresholds.py touched.pieces _INNER_SHARE ….
 _INNER_SHARE = 0.72
-# [1] Of a piece's pixels. Set by eye. Study: bar_scenes.py.
+# [1] Least share of a piece's pixels in the picture. Set by eye. Study: bar_scenes.py.
 _LEAST_IN_PICTURE = 0.5
 # [pieces] Four: two for a line, two left over. Derived.
 FEWEST_PIECES = 4
-# [1] Of the median piece's, or of what noise alone gives, if that is more: then it shows
-# something else than the bar. Set by eye. Study: coverage.py alone.
+# [1] Largest misfit of a piece over the median piece's, or over that of noise alone where this is
+# more: beyond, the piece shows something else than the bar. Set by eye. Study: coverage.py alone.
 _WORST_MISFIT = 3.0
 # [px] To either side of a wire's middle its pixels, and those that the lens spreads it to: half a
 # wire of 4 px and four blurs of a pixel. Derived.
-# to either side of a wire's middle its pixels, and those that the lens spreads it to
 _WIRE_PX = 6.0
-# [1] Of a piece's pixels: where a wire hides more, the piece tells little. Set by eye. Study:
-# bar_scenes.py.
-_LEAST_BESIDE = 0.3
-# [mm] Between knots of the rims' shading, where edges are looked for. Origin not known. Study:
-# thresholds.py bar.pieces _KNOT_MM ….
+# [1] Least share of a piece's pixels that no wire hides: with fewer the piece constrains little.
+# Set by eye. Study: bar_scenes.py.
+_LEAST_CLEAR_SHARE = 0.3
+# [mm] Between knots of the rims' shading, where edges are measured. Origin not known. Study:
+# thresholds.py touched.pieces _KNOT_MM ….
 _KNOT_MM = 14.0
 # [1] Chi² per pixel of the edges' model: a bar before its background leaves 0.1 to 2. Study:
 # coverage.py alone.
 NO_BAR = 3.5
+# [passes] Of excluding pieces by their misfit. Origin not known.
+_PASSES = 3
 
 
 def bar_pieces(
@@ -50,105 +57,111 @@ def bar_pieces(
     wires_px: Sequence[np.ndarray],
     settings: VisionSettings,
 ) -> Pieces:
-    """Pieces of the bar's band in the mean picture, to either side of the axis's point, that show no wire. noise: what
-    the difference of mean and background is taken to have.
+    """Return the pieces of the bar in the mean picture, to either side of the axis's point, that
+    show no wire.
 
-    Raises Refused where no part of the bar lies before the camera."""
+    noise: of the difference of mean and background. Raises Refused where no part of the bar lies
+    before the camera.
+    """
     place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
     points = axis.point_mm + place[:, None] * axis.direction
-    middle, radius = outline(
-        view.camera, points, np.broadcast_to(axis.direction, points.shape), radius_mm
-    )
+    directions = np.broadcast_to(axis.direction, points.shape)
+    middle, radius = outline(view.camera, points, directions, radius_mm)
     if not np.any(np.isfinite(radius)):
         raise Refused(
             f"camera {view.camera.name} would have the bar behind it: check T_camera_rig",
             code="bar_behind_camera",
         )
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
-    band = _from_whole(
-        read_band(view.mean, view.background, middle, place, radius, half), settings.bar_piece_px
-    )
-    pieces = cut_pieces([band], settings.bar_piece_px, noise)
-    in_picture = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
-    wires_px = (
-        wires_px if view.itself is None else ()
-    )  # where they are known they are not in the mean
-    return pieces.select(
-        in_picture & clear_of_wire(pieces, wires_px, settings.bar_piece_px / 2 + 5.0)
-    )
+    band = read_band(view.mean, view.background, middle, place, radius, half)
+    length_px = settings.bar_piece_px
+    pieces = cut_pieces([_from_whole(band, length_px)], length_px, noise)
+    is_used = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
+    if view.itself is None:  # else the wires are known, and not in the mean
+        is_used &= clear_of_wire(pieces, wires_px, length_px / 2 + 5.0)
+    return pieces.select(is_used)
 
 
 def _from_whole(band: Band, length_px: int) -> Band:
-    """The band from a pixel on whose number is a multiple of a piece's length: pieces do not move with the axis."""
-    steps = band.foot_px[
-        :, int(np.argmin(np.abs(np.ptp(band.foot_px, axis=0) - len(band.place) + 1)))
-    ]
-    first = int(-steps[0] % length_px)
-    return Band(*(getattr(band, name)[first:] for name in band.__dataclass_fields__))
+    """Return the band from a pixel whose number is a multiple of a piece's length on.
+
+    So pieces do not move with the axis.
+    """
+    extent = np.ptp(band.foot_px, axis=0)
+    along = int(np.argmin(np.abs(extent - len(band.place) + 1)))
+    first = int(-band.foot_px[0, along] % length_px)
+    return Band(*(getattr(band, field.name)[first:] for field in fields(Band)))
 
 
 def bar_knots(settings: VisionSettings) -> Knots:
-    """Places between which the bar's shading changes linearly."""
+    """Return the places between which the bar's shading changes linearly."""
     return Knots(np.arange(-settings.bar_reach_mm, settings.bar_reach_mm + 1e-9, _KNOT_MM))
 
 
 def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: float) -> np.ndarray:
-    """Which pieces (s,) of the bar show no wire: each reads a rectangle along and across the bar."""
+    """Return which pieces (s,) of the bar show no wire: each is a rectangle along and across the
+    bar."""
     tangent = np.stack([pieces.normal[:, 1], -pieces.normal[:, 0]], axis=1)
-    clear = np.ones(len(pieces), dtype=bool)
+    is_clear = np.ones(len(pieces), dtype=bool)
     for line in wires_px:
-        away = line[None] - pieces.foot_px[:, None]
-        along = np.abs(np.einsum("smi,si->sm", away, tangent))
-        across = np.abs(np.einsum("smi,si->sm", away, pieces.normal))
-        clear &= ~np.any(
-            (along < margin_px) & (across < pieces.radius_px[:, None] + margin_px), axis=1
-        )
-    return clear
+        displacement = line[None] - pieces.foot_px[:, None]  # (s, m, 2) px
+        along = np.abs(np.einsum("smi,si->sm", displacement, tangent))
+        across = np.abs(np.einsum("smi,si->sm", displacement, pieces.normal))
+        is_inside = (along < margin_px) & (across < pieces.radius_px[:, None] + margin_px)
+        is_clear &= ~np.any(is_inside, axis=1)
+    return is_clear
 
 
 def beside_wires(pieces: Pieces, wires_px: Sequence[np.ndarray]) -> Pieces:
-    """Pieces whose pixels near a wire weigh nothing, of those that have enough others: of a bar that a wire sweeps
-    along, where hardly a piece is clear of it."""
-    px = pieces.foot_px[:, None] + pieces.offset_px[..., None] * pieces.normal[:, None]
-    hidden = np.zeros(pieces.weight.shape, dtype=bool)
-    for line in wires_px:
-        for row, there in zip(hidden, px):
-            row |= (
-                np.min(np.linalg.norm(there[:, None] - line, axis=-1), axis=1, initial=np.inf)
-                < _WIRE_PX
-            )
-    pieces = replace(pieces, weight=np.where(hidden, 0.0, pieces.weight))
-    return pieces.select(np.mean(pieces.weight > 0, axis=1) > _LEAST_BESIDE)
+    """Return pieces whose pixels near a wire weigh nothing, of those that have enough others.
 
-
-def of_bar_alone(pieces: Pieces, placed: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
-    """Without the pieces that a bar before its background cannot explain: clamps, the hub, a shadow's border.
-
-    placed: brings pieces to where the bar is taken to be.
+    For a bar that a wire sweeps along, where hardly a piece is clear of it.
     """
-    for _ in range(3):
-        there = placed(pieces)
-        misfit = locate(there, fit_shading(there, 1.0, WAVES, knots)[0], rounds=1).chi2
-        good = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
-        if np.all(good) or np.sum(good) < FEWEST_PIECES:
+    px = pieces.foot_px[:, None] + pieces.offset_px[..., None] * pieces.normal[:, None]
+    is_hidden = np.zeros(pieces.weight.shape, dtype=bool)
+    for line in wires_px:
+        for row, pixels in zip(is_hidden, px):
+            distance = np.linalg.norm(pixels[:, None] - line, axis=-1)
+            row |= np.min(distance, axis=1, initial=np.inf) < _WIRE_PX
+    pieces = replace(pieces, weight=np.where(is_hidden, 0.0, pieces.weight))
+    return pieces.select(np.mean(pieces.weight > 0, axis=1) > _LEAST_CLEAR_SHARE)
+
+
+def of_bar_alone(pieces: Pieces, align: Callable[[Pieces], Pieces], knots: Knots) -> Pieces:
+    """Return the pieces that a bar before its background can explain: no clamps, no hub, no
+    shadow's border.
+
+    align: returns pieces with offsets counted from the bar's estimated axis.
+    """
+    for _ in range(_PASSES):
+        aligned = align(pieces)
+        shading = fit_shading(aligned, 1.0, WAVES, knots)[0]
+        misfit = locate(aligned, shading, rounds=1).chi2
+        is_bar = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
+        if np.all(is_bar) or np.sum(is_bar) < FEWEST_PIECES:
             break
-        pieces = pieces.select(good)
+        pieces = pieces.select(is_bar)
     return pieces
 
 
-def rims_of(pieces: Pieces, placed: Pieces) -> Pieces:
-    """Pieces without their middle: highlights there say nothing about the edges. placed: the same, where the bar is."""
-    inner = np.abs(placed.offset_px) < _INNER_SHARE * placed.radius_px[:, None]
-    rims = replace(pieces, weight=np.where(inner, 0.0, pieces.weight))
+def rims_of(pieces: Pieces, aligned: Pieces) -> Pieces:
+    """Return the pieces without their middle, where highlights do not constrain the edges.
+
+    aligned: the same pieces with offsets counted from the bar's estimated axis.
+    """
+    is_inner = np.abs(aligned.offset_px) < _INNER_SHARE * aligned.radius_px[:, None]
+    rims = replace(pieces, weight=np.where(is_inner, 0.0, pieces.weight))
     return rims.columns(np.any(rims.weight > 0, axis=0))
 
 
 def at_arms(pieces: Pieces) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half-width (2,), by parabolas."""
-    order, place = np.argsort(pieces.place), np.array([-ARM_MM, ARM_MM])
-    columns = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order].T
-    there = np.stack(
-        [np.polyval(np.polyfit(pieces.place[order], column, 2), place) for column in columns],
-        axis=1,
-    )
-    return place, there[:, :2], there[:, 2:4], there[:, 4]
+    """Return places (2,) at ± ARM_MM, and there the band's foot and normal (2, 2) and half width
+    (2,), by parabolas."""
+    order = np.argsort(pieces.place)
+    place = np.array([-ARM_MM, ARM_MM])
+    curves = np.column_stack([pieces.foot_px, pieces.normal, pieces.radius_px])[order].T
+    values = []
+    for curve in curves:
+        values.append(np.polyval(np.polyfit(pieces.place[order], curve, 2), place))
+    values = np.stack(values, axis=1)  # (2, 5)
+    return place, values[:, :2], values[:, 2:4], values[:, 4]

@@ -1,7 +1,18 @@
-"""Where a straight bar lies, by the evidence of its stretches: a posterior of shift and tilt, all else mixed over.
+"""The posterior of a straight bar's line in one camera: a mean shift and tilt with their
+covariance.
 
-The lens blur, and how smooth the light round the bar is, are numbers of the whole camera. Neither is chosen: a bar
-whose edge is dim may lie a fifth of a pixel elsewhere under another blur.
+A line is a shift c₀ in the bar's middle and a tilt c₁ over ARM_MM, both in px across the bar. In
+the segment at place s_k along it, the bar's middle is then at c₀ + c₁ s_k / ARM_MM, and
+`evidence.py` gives the evidence of that position. Segments are independent, so their deviances D =
+−2 log evidence add up:
+
+    −2 log p(c₀, c₁, β, r) = sum_k D_k(c₀ + c₁ s_k / ARM_MM, β, r) / T_k
+
+T_k ≥ 1 is a temperature: it tempers the evidence of a segment whose errors are correlated or larger
+than stated. The lens blur β and the smoothness r of the light round the bar are shared by all
+segments. Neither is chosen; the posterior is summed over both, for a bar whose edge is dim may lie
+a fifth of a pixel elsewhere under another blur. The sums run over a grid of lines; each refinement
+places a smaller grid about the last posterior.
 """
 
 from collections.abc import Sequence
@@ -10,278 +21,353 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from vision.touched.evidence import Evidence, LitRod, evidence
+from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.pieces import ARM_MM
-from vision.touched.profiles import STEP_PX, Profiles, profiles
+from vision.touched.profiles import STEP_PX, Profiles, compute_profiles
 from vision.wire.bands import Pieces
 
-# [stretches] Of the bar, each with its own light: two for a line, four left over to show one that
-# sees something else. Study: thresholds.py bar.posterior STRETCHES ….
-STRETCHES = 6
-# [sigma] A next look reaches as far: 6 in 100 000 Gaussian lines lie beyond. Derived.
+# [segments] Of the bar, each with its own light: two for a line, four left over to show one that
+# shows something else. Study: thresholds.py touched.posterior SEGMENTS ….
+SEGMENTS = 6
+# [sigma] Half the width of a refined window: 6 in 100 000 Gaussian lines lie beyond. Derived.
 _WITHIN_SIGMAS = 4.0
-# [px, 1] Least and most that a next look reaches: a step of the grid; and in the logarithm of the
-# blur, where a tenth has three places of its posterior. Study: bar_starts.py.
-_LINE_PX, _LOG_BLUR = (0.25, 2.0), (0.1, 0.5)
-# [px] Lens blurs of a first look. Study: bar_starts.py.
-_BLURS_PX = 0.6, 0.85, 1.2, 1.7
-# [px] Lens blur of a quick look, by which a bar is told from what is none; and of the far look:
-# the widest, so that no peak lies between its positions. Study: bar_scenes.py.
-_ROUGH_BLUR_PX, _FAR_BLUR_PX = 1.0, 1.6
-# [blurs] Between positions of a look that is not close, a cubic spline between: at 0.83 of a blur
-# that undershot, and a transfer curve's chance was 0.2 in place of 0.99 in one of 18 scenes.
-# Study: bar_scenes.py.
-_APART_BLURS = 0.5
-# [1] Blurs nearer to each other, in their logarithm, have a cubic spline between; farther apart
-# it undershoots. Study: bar_starts.py.
-_SPLINE = 0.25
-# [lines, blurs] Of the grid: a third of a sigma apart, by shift and by tilt; and a sigma by blur:
-# sums over a Gaussian are exact to 1e-8. Derived.
-_LINES, _BLURS = 25, 9
-# [px] Lines of a wide window lie so near at least, and of the far look, of which another begins:
-# at 0.56 px they stepped over the right one in one of 53 path-traced scenes. Study:
+# [px] Least and largest half width of a refined window of lines: the least is a step of the grid.
+# Study: bar_starts.py.
+_LINE_LIMITS_PX = (0.25, 2.0)
+# [1] Least and largest half width of a refined window of the blur's logarithm: a tenth has three
+# points of its posterior. Study: bar_starts.py.
+_LOG_BLUR_LIMITS = (0.1, 0.5)
+# [px] Lens blurs of the first pass. Study: bar_starts.py.
+_BLURS_PX = (0.6, 0.85, 1.2, 1.7)
+# [px] The one lens blur of a quick pass, which distinguishes a bar from none. Study:
 # bar_scenes.py.
-_APART_PX, _FAR_APART_PX = 0.1, 0.3
-# [blurs] Of a next look: fewer leave no spline. Derived.
-_NEXT_BLURS = 4
-# [px] A look goes no farther. Derived.
-_LONGEST_PX = 3.0
-# [px] The middle of a bar of another width, from where it is expected: half of what a bar of 4 mm
-# for 6 is wider by. Derived.
-_ASIDE_PX = 2.0
-# [1, log] Other widths that are tried, those within 0.16 first: a bar of 4 mm for 6 is 0.41 off;
-# a cubic spline between, two sigma of a clear bar apart. Study: bar_scenes.py, faults.py.
-_LOG_WIDTHS, _NEAR_WIDTHS = (
-    np.linspace(-0.48, 0.48, 25),
-    slice(8, -8),
-)
-# [arms] The outermost stretch's place, over `ARM_MM`: 30 of 36 mm. Derived.
-_STRETCH_ARM = 1.5
-# [chi²] What one stretch may say against a line, 6.3 sigma; a clamp or a hole in the bench says
-# anything. Study: thresholds.py bar.posterior _MOST ….
-_MOST = 40.0
+_QUICK_BLUR_PX = 1.0
+# [px] The one lens blur of the far search: the widest, so that no peak lies between its
+# positions. Study: bar_scenes.py.
+_FAR_BLUR_PX = 1.6
+# [blurs] Between positions of a coarse pass, with a cubic spline between: at 0.83 of a blur that
+# undershot, and a transfer curve's probability was 0.2 in place of 0.99 in one of 18 scenes.
+# Study: bar_scenes.py.
+_SPACING_BLURS = 0.5
+# [1] Steps of the blur's logarithm below this are interpolated by a cubic spline; at larger ones
+# it undershoots. Study: bar_starts.py.
+_LARGEST_SPLINE_STEP = 0.25
+# [lines] Of the grid by shift and by tilt: a third of a sigma apart; sums over a Gaussian are
+# then exact to 1e-8. Derived.
+_LINES = 25
+# [blurs] Of the interpolated grid: a sigma apart. Derived.
+_BLURS = 9
+# [px] Largest step between lines of a wide window. Study: bar_scenes.py.
+_SPACING_PX = 0.1
+# [px] Largest step between lines of the far search, where another pass begins: at 0.56 px lines
+# stepped over the right one in one of 53 path-traced scenes. Study: bar_scenes.py.
+_FAR_SPACING_PX = 0.3
+# [blurs] Of a refined window: fewer allow no spline. Derived.
+_REFINED_BLURS = 4
+# [px] Largest reach of a pass. Derived.
+_LARGEST_REACH_PX = 3.0
+# [px] Distance of the middle of a bar of another width from where it is expected: half of what a
+# bar of 4 mm in place of 6 is wider by. Derived.
+_WIDTH_REACH_PX = 2.0
+# [log] Other widths that are tried: a bar of 4 mm in place of 6 is 0.41 off; two sigma of a clear
+# bar apart, with a cubic spline between. Study: bar_scenes.py, faults.py.
+_LOG_WIDTHS = np.linspace(-0.48, 0.48, 25)
+# [widths] Those within 0.16, which are tried first. Study: bar_scenes.py, faults.py.
+_NEAR_WIDTHS = slice(8, -8)
+# [arms] The outermost segment's place, over `ARM_MM`: 30 of 36 mm. Derived.
+_SEGMENT_ARM = 1.5
+# [chi²] Largest deviance of one segment against a line, 6.3 sigma; a clamp or a hole in the bench
+# may show anything. Study: thresholds.py touched.posterior _LARGEST_DEVIANCE ….
+_LARGEST_DEVIANCE = 40.0
 
 
 @dataclass(frozen=True)
-class Window:
-    """Where a line is looked for: up to so far off (2,), px, in the middle and over ARM_MM; under lens blurs (n,), px;
-    whether closely: under all kinds of light and at each step of the grid, or roughly, under the roughest alone; and at
-    how many positions for each step."""
+class LineWindow:
+    """The grid of lines and blurs over which a posterior is summed.
+
+    most_px (2,): largest shift, and largest tilt over ARM_MM. blurs_px (n,): lens blurs. is_coarse:
+    only the roughest prior of the light, and positions half a blur apart. positions: how many for
+    each step of the profiles' grid.
+    spacing_px: largest step between lines.
+    """
 
     most_px: np.ndarray
     blurs_px: np.ndarray
-    closely: bool = True
+    is_coarse: bool = True
     positions: int = 1
-    apart_px: float = _APART_PX
+    spacing_px: float = _SPACING_PX
 
     @property
     def lines(self) -> int:
-        """How many lines are tried, by shift and by tilt."""
-        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.apart_px)))
+        """Return how many lines are tried by shift, and how many by tilt."""
+        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.spacing_px)))
+
+    def grid(self) -> np.ndarray:
+        """Return the lines (lines², 2): shift and tilt, px."""
+        axes = [np.linspace(-most, most, self.lines) for most in self.most_px]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
     @classmethod
-    def after(cls, one: "Posterior", positions: int) -> "Window":
-        """The next, about a posterior, at so many positions for each step across."""
-        most = np.clip(_WITHIN_SIGMAS * np.sqrt(np.diag(one.covariance)), *_LINE_PX)
-        wide = np.clip(np.hypot(_WITHIN_SIGMAS * one.log_blur_sigma, one.log_blur_step), *_LOG_BLUR)
-        return cls(
-            most, one.blur_px * np.exp(np.linspace(-wide, wide, _NEXT_BLURS)), positions=positions
-        )
+    def about(cls, posterior: "Posterior", positions: int) -> "LineWindow":
+        """Return the refined window about a posterior, with `positions` for each step across."""
+        sigma_px = np.sqrt(np.diag(posterior.covariance))
+        most_px = np.clip(_WITHIN_SIGMAS * sigma_px, *_LINE_LIMITS_PX)
+        wide = np.hypot(_WITHIN_SIGMAS * posterior.log_blur_sigma, posterior.log_blur_step)
+        wide = np.clip(wide, *_LOG_BLUR_LIMITS)
+        blurs_px = posterior.blur_px * np.exp(np.linspace(-wide, wide, _REFINED_BLURS))
+        return cls(most_px, blurs_px, is_coarse=False, positions=positions)
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Of shift and tilt over ARM_MM (2,), px, under one transfer curve: mean, covariance; minus twice the log evidence
-    (k,) of each stretch at its best, by how much that is overstated (k,), and minus twice the log of how much room
-    there is about the best; how much more probable a bar is than none, how clearly it is one, and what share of the
-    lines that were possible still are; mean and sigma of the logarithm of the blur, and the step in which it was looked
-    at."""
+    """The posterior of a bar's line under one transfer curve.
+
+    line (2,), covariance (2, 2): of shift, and tilt over ARM_MM, px.
+    segment_deviance (k,): −2 log evidence of each segment at the best line. temperature (k,): of
+    each segment.
+    volume_deviance: −2 log of the posterior's volume about the best line.
+    evidence_for_bar: 2 log of the odds of a bar against none. detection_score: see
+    `LitRod.detection_score`.
+    unresolved_share: the share of the window's lines that remain probable, 1 where the posterior is
+    flat.
+    blur_px, log_blur_sigma: mean and sigma of the blur's logarithm; log_blur_step: the grid's step
+    in it.
+    """
 
     line: np.ndarray
     covariance: np.ndarray
-    least: np.ndarray
-    temper: np.ndarray
-    room: float
-    for_bar: float
-    clearness: float
-    unresolved: float
+    segment_deviance: np.ndarray
+    temperature: np.ndarray
+    volume_deviance: float
+    evidence_for_bar: float
+    detection_score: float
+    unresolved_share: float
     blur_px: float
     log_blur_sigma: float
     log_blur_step: float
 
 
-def first_look(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
-    """The posterior about a line (2,) that may be reach_px off, under coarse blurs."""
-    return _look(
-        pieces, line, Window(np.full(2, reach_px), np.array(_BLURS_PX), closely=False), gamma
-    )
+@dataclass(frozen=True)
+class _LineGrid:
+    """Deviances on a grid of n lines, r priors of the light and b blurs.
+
+    lines (n, 2): shift and tilt, px. log_blurs (b,). deviance (n, r, b). segment_deviance (k,): of
+    each segment at the best of these, untempered. temperature (k,).
+    """
+
+    lines: np.ndarray
+    log_blurs: np.ndarray
+    deviance: np.ndarray
+    segment_deviance: np.ndarray
+    temperature: np.ndarray
 
 
-def closer_look(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
-    """The posterior about another one, at so many positions for each step across."""
-    return _look(pieces, before.line, Window.after(before, positions), gamma)
+def fit_coarse(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
+    """Return the posterior about a line (2,) that may be reach_px off, on a coarse grid of
+    blurs."""
+    window = LineWindow(np.full(2, reach_px), np.array(_BLURS_PX))
+    return _fit(pieces, line, window, gamma)
 
 
-def roughly(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
-    """The posterior of one quick look, good enough to tell a bar from what is none."""
-    return _look(
-        pieces, line, Window(np.full(2, reach_px), np.array([_ROUGH_BLUR_PX]), closely=False), 1.0
-    )
+def refine(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
+    """Return the posterior on a finer grid about an earlier one, with `positions` for each step
+    across."""
+    return _fit(pieces, before.line, LineWindow.about(before, positions), gamma)
 
 
-def most_probable(pieces: Pieces, off_px: float) -> np.ndarray:
-    """The most probable line (2,) by blurred pictures, up to off_px off, to _FAR_APART_PX."""
-    window = Window(
-        np.full(2, off_px), np.array([_FAR_BLUR_PX]), closely=False, apart_px=_FAR_APART_PX
-    )
-    seen = profiles(pieces, STRETCHES, off_px, 1.0)
-    under = [
-        evidence(LitRod(seen), off_px, _FAR_BLUR_PX, all_light=False, every=_every(_FAR_BLUR_PX))
-    ]
-    lines, _, misfit, *_ = _over_lines(under, seen, window)
-    return lines[np.argmin(misfit[:, 0, 0])]
+def fit_quick(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
+    """Return the posterior under a single blur, good enough to distinguish a bar from none."""
+    window = LineWindow(np.full(2, reach_px), np.array([_QUICK_BLUR_PX]))
+    return _fit(pieces, line, window, 1.0)
 
 
-def log_width(pieces: Pieces) -> tuple[float, float]:
-    """Mean and sigma of the logarithm of the bar's width over the given one, its middle as far as _ASIDE_PX off."""
-    for logs in (_LOG_WIDTHS[_NEAR_WIDTHS], _LOG_WIDTHS):
-        against = _against_widths(pieces, logs)
-        if 0 < np.argmin(against) < len(logs) - 1:
+def find_most_probable(pieces: Pieces, reach_px: float) -> np.ndarray:
+    """Find the most probable line (2,) within reach_px, to _FAR_SPACING_PX, under a wide blur."""
+    blurs_px = np.array([_FAR_BLUR_PX])
+    window = LineWindow(np.full(2, reach_px), blurs_px, spacing_px=_FAR_SPACING_PX)
+    profiles = compute_profiles(pieces, SEGMENTS, reach_px, 1.0)
+    grid = _evaluate_lines(_evidences(profiles, window, reach_px), profiles, window)
+    return grid.lines[np.argmin(grid.deviance[:, 0, 0])]
+
+
+def estimate_log_width(pieces: Pieces) -> tuple[float, float]:
+    """Return mean and sigma of the logarithm of the bar's width over the given one.
+
+    The bar's middle may be _WIDTH_REACH_PX from where it is expected.
+    """
+    for log_widths in (_LOG_WIDTHS[_NEAR_WIDTHS], _LOG_WIDTHS):
+        deviance = _evaluate_widths(pieces, log_widths)
+        if 0 < np.argmin(deviance) < len(log_widths) - 1:
             break
-    fine = np.linspace(logs[0], logs[-1], 10 * len(logs))
-    chance = np.exp(-0.5 * (CubicSpline(logs, against)(fine) - against.min()))
-    mean = float(chance @ fine / chance.sum())
-    return mean, float(np.sqrt(chance @ (fine - mean) ** 2 / chance.sum()))
+    fine = np.linspace(log_widths[0], log_widths[-1], 10 * len(log_widths))
+    density = np.exp(-0.5 * (CubicSpline(log_widths, deviance)(fine) - deviance.min()))
+    mean = float(density @ fine / density.sum())
+    return mean, float(np.sqrt(density @ (fine - mean) ** 2 / density.sum()))
 
 
-def _against_widths(pieces: Pieces, logs: np.ndarray) -> np.ndarray:
-    """Minus twice the log probability (n,) of widths over the given one, of these logarithms, each at its best middle."""
-    reach_px = max(float(np.median(pieces.radius_px)) * float(np.expm1(logs[-1])), _ASIDE_PX)
-    seen = profiles(pieces, STRETCHES, reach_px, 1.0)
-    rod = LitRod(seen)
-    under = [
-        evidence(rod, _ASIDE_PX, _ROUGH_BLUR_PX, 1, False, _every(_ROUGH_BLUR_PX), wider)
-        for wider in np.exp(logs)
-    ]
-    own = np.array([one.of_bar[..., 0] for one in under]) / overstated(_best(under), seen)[:, None]
-    total = np.sum(_tempered(own - own.min(axis=(0, 2), keepdims=True)), axis=1)
-    return np.min(total, axis=1) / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
+def _evaluate_widths(pieces: Pieces, log_widths: np.ndarray) -> np.ndarray:
+    """Evaluate the deviance (n,) of widths over the given one, each at its best middle."""
+    widening_px = float(np.median(pieces.radius_px)) * float(np.expm1(log_widths[-1]))
+    profiles = compute_profiles(pieces, SEGMENTS, max(widening_px, _WIDTH_REACH_PX), 1.0)
+    rod = LitRod(profiles)
+    evidences = []
+    for width_factor in np.exp(log_widths):
+        evidence = compute_evidence(
+            rod,
+            _WIDTH_REACH_PX,
+            _QUICK_BLUR_PX,
+            with_smooth_priors=False,
+            every=_coarse_steps(_QUICK_BLUR_PX),
+            width_factor=width_factor,
+        )
+        evidences.append(evidence)
+    temperature = estimate_temperature(_best_of(evidences), profiles)
+    deviances = np.array([evidence.bar_deviance[..., 0] for evidence in evidences])  # (n, k, g)
+    tempered = deviances / temperature[:, None]
+    excess = _bound_deviance(tempered - tempered.min(axis=(0, 2), keepdims=True))
+    total = np.sum(excess, axis=1)  # (n, g)
+    return np.min(total, axis=1) / _misfit_of_line(total, profiles)
 
 
-def moved(pieces: Pieces, line: np.ndarray) -> Pieces:
-    """The pieces seen from a line (2,)."""
+def move_to_line(pieces: Pieces, line: np.ndarray) -> Pieces:
+    """Return the pieces with offsets counted from a line (2,)."""
     return pieces.moved(line[0] + line[1] * pieces.place / ARM_MM)
 
 
-def _look(pieces: Pieces, line, window: Window, gamma: float) -> Posterior:
-    """Over lines within a window about one (2,)."""
-    reach_px = min(float(window.most_px @ [1.0, _STRETCH_ARM]), _LONGEST_PX)
-    seen = profiles(moved(pieces, line), STRETCHES, reach_px, gamma)
-    rod, closely = LitRod(seen), window.closely
-    under = [
-        evidence(
-            rod, reach_px, blur_px, window.positions, closely, 1 if closely else _every(blur_px)
-        )
-        for blur_px in window.blurs_px
-    ]
-    lines, log_blurs, misfit, least, temper = _over_lines(under, seen, window)
-    chance = np.exp(-0.5 * (misfit - misfit.min()))
-    total = chance.sum()
-    of_line, of_blur = chance.sum(axis=(1, 2)) / total, chance.sum(axis=(0, 1)) / total
-    mean, log_blur = of_line @ lines, float(of_blur @ log_blurs)
-    away, step = lines - mean, float(np.max(np.diff(log_blurs), initial=0.0))
+def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> Posterior:
+    """Return the posterior over a window about a line (2,)."""
+    reach_px = min(float(window.most_px @ [1.0, _SEGMENT_ARM]), _LARGEST_REACH_PX)
+    profiles = compute_profiles(move_to_line(pieces, line), SEGMENTS, reach_px, gamma)
+    evidences = _evidences(profiles, window, reach_px)
+    grid = _evaluate_lines(evidences, profiles, window)
+    density = np.exp(-0.5 * (grid.deviance - grid.deviance.min()))
+    total = density.sum()
+    line_probability = density.sum(axis=(1, 2)) / total
+    blur_probability = density.sum(axis=(0, 1)) / total
+    mean = line_probability @ grid.lines
+    residual = grid.lines - mean
+    covariance = (line_probability * residual.T) @ residual
+    log_blur = float(blur_probability @ grid.log_blurs)
+    log_blur_sigma = float(np.sqrt(blur_probability @ (grid.log_blurs - log_blur) ** 2))
+    step = float(np.max(np.diff(grid.log_blurs), initial=0.0))
     cell = float(np.prod(2.0 * window.most_px / (window.lines - 1))) * max(step, 1e-300)
-    best, covariance = _best(under), (of_line * away.T) @ away
-    unresolved = float(
-        3.0 * np.sqrt(np.linalg.det(covariance)) / np.prod(window.most_px)
-    )  # 1 of a flat one
+    # A flat posterior over a window of half widths a, b has the determinant (a b)² / 9.
+    area = 3.0 * np.sqrt(np.linalg.det(covariance))
+    best = _best_of(evidences)
+    odds = (best.no_bar_deviance - best.least_deviance) / grid.temperature
     return Posterior(
-        line + mean,
-        covariance,
-        least,
-        temper,
-        -2.0 * np.log(total * cell),
-        float(np.sum((best.of_none - best.least) / temper)),
-        rod.clearness(best),
-        unresolved,
-        np.exp(log_blur),
-        float(np.sqrt(of_blur @ (log_blurs - log_blur) ** 2)),
-        step,
+        line=line + mean,
+        covariance=covariance,
+        segment_deviance=grid.segment_deviance,
+        temperature=grid.temperature,
+        volume_deviance=-2.0 * np.log(total * cell),
+        evidence_for_bar=float(np.sum(odds)),
+        detection_score=LitRod(profiles).detection_score(best),
+        unresolved_share=float(area / np.prod(window.most_px)),
+        blur_px=np.exp(log_blur),
+        log_blur_sigma=log_blur_sigma,
+        log_blur_step=step,
     )
 
 
-def _between(places: np.ndarray, curves: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Curves (k, g, m), given at places (g,), at others (k, n) for each: cubic splines, (k, n, m)."""
-    parts = CubicSpline(places, curves, axis=1).c
-    cell = np.clip(np.searchsorted(places, there, side="right") - 1, 0, len(places) - 2)
-    beyond, each = (there - places[cell])[..., None], np.arange(len(curves))[:, None]
-    value = parts[0][cell, each]
-    for part in parts[1:]:
-        value *= beyond
-        value += part[cell, each]
-    return value
+def _evidences(profiles: Profiles, window: LineWindow, reach_px: float) -> list[Evidence]:
+    """Compute the evidence under each blur of a window, of positions within reach_px."""
+    rod = LitRod(profiles)
+    evidences = []
+    for blur_px in window.blurs_px:
+        evidence = compute_evidence(
+            rod,
+            reach_px,
+            blur_px,
+            positions=window.positions,
+            with_smooth_priors=not window.is_coarse,
+            every=_coarse_steps(blur_px) if window.is_coarse else 1,
+        )
+        evidences.append(evidence)
+    return evidences
 
 
-def _tempered(against: np.ndarray) -> np.ndarray:
-    """What stretches say against lines, as chi², where one may say anything with a chance of exp(-_MOST / 2)."""
-    return -2.0 * np.log(np.exp(-0.5 * against) + np.exp(-0.5 * _MOST))
+def _coarse_steps(blur_px: float) -> int:
+    """Return how many steps of the grid lie between positions of a coarse pass."""
+    return max(1, int(_SPACING_BLURS * blur_px / STEP_PX))
 
 
-def _every(blur_px: float) -> int:
-    """Of how many steps of the grid one is looked at."""
-    return max(1, int(_APART_BLURS * blur_px / STEP_PX))
+def _best_of(evidences: Sequence[Evidence]) -> Evidence:
+    """Return the evidence under the blur that has the most of it."""
+    return min(evidences, key=lambda evidence: evidence.least_deviance.sum())
 
 
-def _best(under: Sequence[Evidence]) -> Evidence:
-    """By the blur with the most evidence."""
-    return min(under, key=lambda one: one.least.sum())
+def estimate_temperature(evidence: Evidence, profiles: Profiles) -> np.ndarray:
+    """Estimate the temperature (k,) of each segment: the factor by which its deviance is
+    overstated.
 
-
-def overstated(one: Evidence, seen: Profiles) -> np.ndarray:
-    """By how much (k,) the evidence of each stretch is: noise goes together as far as pieces show it; what is left
-    beyond noise is light that no such model has, and goes together as far as the lens blurs it: exp(-x² / 4 blur²).
+    Noise is correlated between bins as the patches show (`variance_inflation`). Misfit beyond noise
+    is light that the model cannot have; it is correlated as far as the lens blurs it, with exp(−x²
+    / 4 blur²).
     """
-    smeared = 2.0 * np.sqrt(np.pi) * one.blur_px / STEP_PX
-    return seen.alike + max(seen.alike, smeared) * np.maximum(one.misfit - 1.0, 0.0)
+    blurred = 2.0 * np.sqrt(np.pi) * evidence.blur_px / STEP_PX
+    inflation = max(profiles.variance_inflation, blurred)
+    return profiles.variance_inflation + inflation * np.maximum(evidence.misfit - 1.0, 0.0)
 
 
-def _over_lines(under: Sequence[Evidence], seen: Profiles, window: Window):
-    """Lines (n, 2), shift and tilt in px; logarithms of blurs (b,); minus twice the log probability (n, r, b) of each
-    under each kind of light and blur; minus twice the log evidence (k,) at the best of these, as it stands; and by how
-    much (k,) that is overstated.
+def _bound_deviance(deviance: np.ndarray) -> np.ndarray:
+    """Return deviances of segments that show anything else with a probability of
+    exp(−_LARGEST_DEVIANCE / 2)."""
+    return -2.0 * np.log(np.exp(-0.5 * deviance) + np.exp(-0.5 * _LARGEST_DEVIANCE))
 
-    Where the stretches' own middles lie on no line to their sigmas, these are taken to be as much larger.
+
+def _misfit_of_line(deviance: np.ndarray, profiles: Profiles) -> float:
+    """Return the least deviance per degree of freedom of the segments' middles about a line, at
+    least 1."""
+    return max(1.0, float(deviance.min()) / max(len(profiles) - 2, 1))
+
+
+def _evaluate_lines(
+    evidences: Sequence[Evidence], profiles: Profiles, window: LineWindow
+) -> _LineGrid:
+    """Evaluate the deviance of each line of a window under each prior of the light and each blur.
+
+    Where the segments' own middles lie on no line to within their sigmas, all deviances are divided
+    by their misfit.
     """
-    ends = [np.linspace(-most, most, window.lines) for most in window.most_px]
-    lines = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 2)
-    logs, log_blurs = (np.log(window.blurs_px) for _ in range(2))
-    temper = overstated(_best(under), seen)
-    shift = under[0].shift_px  # of the narrowest blur
-    own = [
-        one.of_bar
-        if len(one.shift_px) == len(shift)
-        else CubicSpline(one.shift_px, one.of_bar, axis=1)(shift)
-        for one in under
-    ]
-    own = np.stack(own, axis=-1) / temper[:, None, None, None]
-    if len(logs) > 2 and np.max(np.diff(logs)) < _SPLINE:
-        log_blurs = np.linspace(logs[0], logs[-1], _BLURS)
-        own = CubicSpline(logs, own, axis=-1)(log_blurs)
-    shape = len(lines), own.shape[2], len(log_blurs)
-    own = own.reshape(len(seen), len(shift), -1)
-    least = own.min(axis=1)
-    there = np.clip(
-        lines[:, 0] + seen.place_mm[:, None] / ARM_MM * lines[:, 1], shift[0], shift[-1]
-    )
-    against = np.maximum(_between(shift, own - least[:, None], there), 0.0)
-    against = _tempered(against)
-    total = against.sum(axis=0)
-    total = least.sum(axis=0) + total / max(1.0, float(total.min()) / max(len(seen) - 2, 1))
+    lines = window.grid()
+    temperature = estimate_temperature(_best_of(evidences), profiles)
+    shift_px = evidences[0].shift_px  # of the narrowest blur, which has the most positions
+    curves = []
+    for evidence in evidences:
+        curve = evidence.bar_deviance
+        if len(evidence.shift_px) != len(shift_px):
+            curve = CubicSpline(evidence.shift_px, curve, axis=1)(shift_px)
+        curves.append(curve)
+    deviance = np.stack(curves, axis=-1) / temperature[:, None, None, None]  # (k, g, r, b)
+    log_blurs = np.log(window.blurs_px)
+    if len(log_blurs) > 2 and np.max(np.diff(log_blurs)) < _LARGEST_SPLINE_STEP:
+        fine = np.linspace(log_blurs[0], log_blurs[-1], _BLURS)
+        deviance = CubicSpline(log_blurs, deviance, axis=-1)(fine)
+        log_blurs = fine
+    shape = (len(lines), deviance.shape[2], len(log_blurs))
+    deviance = deviance.reshape(len(profiles), len(shift_px), -1)  # (k, g, r b)
+    least = deviance.min(axis=1)
+    middle_px = lines[:, 0] + profiles.place_mm[:, None] / ARM_MM * lines[:, 1]  # (k, n)
+    middle_px = np.clip(middle_px, shift_px[0], shift_px[-1])
+    excess = _interpolate(shift_px, deviance - least[:, None], middle_px)
+    excess = _bound_deviance(np.maximum(excess, 0.0))  # (k, n, r b)
+    total = excess.sum(axis=0)
+    total = least.sum(axis=0) + total / _misfit_of_line(total, profiles)
     line, other = np.unravel_index(np.argmin(total), total.shape)
-    return (
-        lines,
-        log_blurs,
-        total.reshape(shape),
-        temper * (least[:, other] + against[:, line, other]),
-        temper,
-    )
+    segment_deviance = temperature * (least[:, other] + excess[:, line, other])
+    return _LineGrid(lines, log_blurs, total.reshape(shape), segment_deviance, temperature)
+
+
+def _interpolate(knots: np.ndarray, curves: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Interpolate curves (k, g, m), given at knots (g,), at other places (k, n) each: cubic splines
+    (k, n, m)."""
+    coefficients = CubicSpline(knots, curves, axis=1).c
+    cell = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
+    beyond = (at - knots[cell])[..., None]
+    curve = np.arange(len(curves))[:, None]
+    value = coefficients[0][cell, curve]
+    for coefficient in coefficients[1:]:  # Horner's scheme
+        value *= beyond
+        value += coefficient[cell, curve]
+    return value

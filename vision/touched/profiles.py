@@ -1,8 +1,21 @@
-"""Pixels of the bar as profiles across it: light, what is behind it, and how sure each is, stretch by stretch.
+"""Light profiles across a bar: the measurements that the evidence of its position is computed from.
 
-Each pixel is shared between the two nearest places of a regular grid across the bar, so that nothing jumps as the bar
-is looked for a little beside; on that grid the normal equations of all positions are one product of matrices
-(`evidence.py`). What pieces of a stretch differ by beyond noise, texture of the bench or compression, counts as noise.
+A profile is the light along a line across the bar. The bar is divided along its axis into a few
+segments, and the pixels of a segment are averaged into one profile on a regular grid across the
+bar, with a step of STEP_PX.
+
+Each pixel is shared between the two nearest bins of the grid by linear interpolation weights, so
+that nothing jumps when the grid is moved by a fraction of a step. For bin b of a segment with
+pixels i, weights w_i = 1 / sigma_i² and interpolation weights a_ib:
+
+    W_b     = sum_i a_ib w_i                      total weight of the bin
+    y_b     = sum_i a_ib w_i y_i / W_b            its light
+    sigma_b = sqrt(1 / W_b + T_b / n_b)           its standard deviation
+
+The variance has two terms: noise of the pixels, and texture T_b that the n_b patches of the segment
+show beyond that noise (printed patterns, compression). Errors of bins next to each other are
+correlated; `variance_inflation` states by how much. Because all bins lie on one grid, the normal
+equations of all positions of the bar are a few products of matrices (`evidence.py`).
 """
 
 from dataclasses import dataclass
@@ -13,227 +26,303 @@ from scipy.ndimage import uniform_filter1d
 
 from vision.wire.bands import Pieces
 
-# [grey] Of a picture of 8 bit. Stated.
+# [grey] Largest value of a picture of 8 bit. Stated.
 FULL_SCALE = 255.0
-# [px] Of the grid across, between whose places pixels are shared: a third of a lens blur. Study:
-# thresholds.py bar.profiles STEP_PX ….
+# [px] Step of the grid across the bar: a third of a lens blur. Study: thresholds.py
+# touched.profiles STEP_PX ….
 STEP_PX = 0.25
-# [px] Beyond either edge, wherever it is looked for: wide beside the blur, and a shadow's border
+# [px] The profile's length beyond either edge: wide compared with the blur, and a shadow's border
 # is seldom as near. Study: bar_scenes.py.
-# beyond either edge, wherever it is looked for: a shadow's border is seldom as near
 OUTSIDE_PX = 6.0
-# [px] Of a thick bar so much inside either edge is looked at: farther in nothing tells of the
-# edge, and it costs time. Set by eye. Study: bar_scenes.py.
-_RIM_PX = 8.0
-# [1] Of the contrast: least sigma of what no such model explains; what there is beyond shows in
-# the misfit. Study: bar_starts.py.
-_MODEL_SHARE = 0.001
-# [px] A lens blur: how far across the errors of neighbours are taken to go together. Study:
+# [px] The profile's length inside either edge of a thick bar: pixels farther in do not constrain
+# the edge, and cost time. Set by eye. Study: bar_scenes.py.
+_INSIDE_PX = 8.0
+# [1] Least sigma of what the model does not explain, over the contrast; larger model errors show
+# in the misfit. Study: bar_starts.py.
+_MODEL_ERROR_SHARE = 0.001
+# [px] Greatest distance across at which errors count as correlated: a lens blur. Study:
 # bar_starts.py.
-_ALIKE_PX = 1.0
-# [steps] Of the grid over which texture is averaged: as far as neighbours go together. Derived.
-_SMOOTHED = 5
-# [1] Median of a squared Gaussian; and how many times the variance by the median is texture yet:
-# the edge of a bar that is looked for tilted passes a few pieces. Study: bar_scenes.py.
-_MEDIAN_SQUARED, _FEW_DIFFER = 0.455, 3.0
-# [1] In place of none, where it is divided by. Derived.
-_NOTHING = 1e-100
-# [steps] For which a stretch counts as rough as the others: half of what one has. Set by eye.
-# Study: bar_starts.py.
-_AS_ROUGH = 50
+_CORRELATION_PX = 1.0
+# [steps] Window over which the texture is averaged: the distance of correlated errors. Derived.
+_TEXTURE_WINDOW = 5
+# [1] Median of the square of a standard Gaussian variable. Derived.
+_MEDIAN_SQUARED = 0.455
+# [1] Largest texture over the one that the median gives: the edge of a bar that is tilted against
+# its expected axis passes a few patches only, and is no texture. Study: bar_scenes.py.
+_LARGEST_OVER_MEDIAN = 3.0
+# [1] Divisor in place of zero. Derived.
+_TINY = 1e-100
+# [bins] Weight of the prior that a segment has the mean texture: half the bins of a segment. Set
+# by eye. Study: bar_starts.py.
+_PRIOR_BINS = 50
 
 
 @dataclass(frozen=True)
 class Profiles:
-    """Stretches of the bar, seen across. offset_px (b,): the grid, from where the middle is expected; in each stretch
-    light, sigma, behind, steep, by_grey (k, b): light in parts of full scale, its sigma (infinite where nothing is
-    seen), the light of the picture without rods, about its median, and its slope per px, and the light's derivative by
-    grey; place_mm (k,): along the bar; radius_px: half its width; alike: by how much errors that neighbours share make
-    a mean's variance larger.
+    """Light profiles of k segments of a bar, on a grid of b bins across it.
+
+    offset_px (b,): the grid, from the bar's expected middle.
+    light, sigma (k, b): in parts of full scale; sigma is infinite where a bin has no pixel.
+    background, background_slope (k, b): light of the picture without rods, about its median, and
+    its slope per px.
+    light_per_grey (k, b): derivative of the light by the grey level.
+    place_mm (k,): the segments' middles along the bar. radius_px: half the bar's width.
+    variance_inflation: variance of a mean over bins, over that of independent bins.
     """
 
     offset_px: np.ndarray
     light: np.ndarray
     sigma: np.ndarray
-    behind: np.ndarray
-    steep: np.ndarray
-    by_grey: np.ndarray
+    background: np.ndarray
+    background_slope: np.ndarray
+    light_per_grey: np.ndarray
     place_mm: np.ndarray
     radius_px: float
-    alike: float
+    variance_inflation: float
 
     def __len__(self) -> int:
+        """Return the number of segments."""
         return len(self.place_mm)
 
     @cached_property
-    def seen(self) -> np.ndarray:
-        """Where (k, b) anything is seen."""
+    def is_observed(self) -> np.ndarray:
+        """Return which bins (k, b) have a pixel."""
         return np.isfinite(self.sigma)
 
     @cached_property
     def contrast(self) -> float:
-        """What the light varies by, of the median stretch."""
-        return float(
-            np.median([light_range(light[seen]) for light, seen in zip(self.light, self.seen)])
-        )
+        """Return the range of the light in the median segment."""
+        ranges = []
+        for light, is_observed in zip(self.light, self.is_observed):
+            ranges.append(light_range(light[is_observed]))
+        return float(np.median(ranges))
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """One over the variance (k, b) of what a model leaves."""
-        return 1.0 / (self.sigma**2 + (_MODEL_SHARE * self.contrast) ** 2)
+        """Return the inverse variance (k, b) of the light about a model of it."""
+        return 1.0 / (self.sigma**2 + (_MODEL_ERROR_SHARE * self.contrast) ** 2)
 
     @cached_property
     def moments(self) -> np.ndarray:
-        """Weighted products (9, k, b) of what light is made of, in the order of `evidence._normal`."""
-        behind, steep = self.weight * self.behind, self.weight * self.steep
+        """Return the products (9, k, b) of w, the background g, its slope s and the light y for the
+        normal equations.
+
+        In this order, which `evidence._normal_matrices` relies on: w, w g, w s, w g², w g s, w s²,
+        w y, w g y, w s y.
+        """
+        weighted_background = self.weight * self.background
+        weighted_slope = self.weight * self.background_slope
         return np.stack(
             [
                 self.weight,
-                behind,
-                steep,
-                behind * self.behind,
-                behind * self.steep,
-                steep * self.steep,
+                weighted_background,
+                weighted_slope,
+                weighted_background * self.background,
+                weighted_background * self.background_slope,
+                weighted_slope * self.background_slope,
                 self.weight * self.light,
-                behind * self.light,
-                steep * self.light,
+                weighted_background * self.light,
+                weighted_slope * self.light,
             ]
         )
 
     @cached_property
-    def in_grey(self) -> np.ndarray:
-        """What makes minus twice the log evidence (k,) that of grey levels."""
-        root = np.where(self.seen, np.sqrt(self.weight) * self.by_grey, 1.0)
-        return -2.0 * np.sum(np.log(root), axis=1)
+    def log_jacobian(self) -> np.ndarray:
+        """Return the term (k,) that makes −2 log evidence of the light that of the grey levels.
+
+        Evidences under two transfer curves are comparable only as densities of the same data, the
+        grey levels.
+        """
+        whitened = np.where(self.is_observed, np.sqrt(self.weight) * self.light_per_grey, 1.0)
+        return -2.0 * np.sum(np.log(whitened), axis=1)
 
 
-def profiles(pieces: Pieces, count: int, reach_px: float, gamma: float) -> Profiles:
-    """So many stretches of the bar, or fewer where there are few pieces, for middles up to reach_px off."""
-    radius = float(np.median(pieces.radius_px))
-    stretched = pieces.offset_px * (radius / pieces.radius_px)[:, None]
-    half = int(np.ceil((radius + reach_px + OUTSIDE_PX) / STEP_PX))
-    place = stretched / STEP_PX + half
-    seen = (place >= 0) & (place < 2 * half)
-    seen &= np.abs(stretched) > radius - reach_px - _RIM_PX
-    light, slope = _light(pieces.grey, gamma)
-    weight = np.where(seen, (pieces.weight / slope) ** 2, 0.0)
-    behind, by_background = _light(pieces.background, gamma)
+@dataclass(frozen=True)
+class _PatchSums:
+    """Weighted sums (s, b) over the pixels of each of s patches, in bins across the bar.
+
+    weight: of the weights; the next four: of weight times that quantity; variance_share: of
+    interpolation weight times pixel weight, which over weight² is the variance of the patch's mean.
+    """
+
+    weight: np.ndarray
+    light: np.ndarray
+    background: np.ndarray
+    background_slope: np.ndarray
+    light_per_grey: np.ndarray
+    variance_share: np.ndarray
+
+
+def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: float) -> Profiles:
+    """Compute the profiles of a bar whose middle is at most reach_px from where it is expected.
+
+    pieces: patches of the bar's band, each some pixels long. segments: how many profiles; fewer
+    where there are less than two patches for each. gamma: of the transfer curve, grey = 255
+    light^(1/gamma).
+    """
+    radius_px = float(np.median(pieces.radius_px))
+    offset_px = pieces.offset_px * (radius_px / pieces.radius_px)[:, None]  # at one common width
+    half = int(np.ceil((radius_px + reach_px + OUTSIDE_PX) / STEP_PX))
+    position = offset_px / STEP_PX + half
+    is_used = (position >= 0) & (position < 2 * half)
+    is_used &= np.abs(offset_px) > radius_px - reach_px - _INSIDE_PX
+    light, light_per_grey = _linearise_grey(pieces.grey, gamma)
+    weight = np.where(is_used, (pieces.weight / light_per_grey) ** 2, 0.0)
+    background, background_per_grey = _linearise_grey(pieces.background, gamma)
+    background_slope = background_per_grey * pieces.slope
     order = np.argsort(pieces.place)
-    values = [np.ones_like(light), light, behind, by_background * pieces.slope, slope]
-    added = _shared(weight, values, place, 2 * half + 1)[:, order]
-    stretches = np.array_split(np.arange(len(pieces)), max(1, min(count, len(pieces) // 2)))
-    offset, place_mm = STEP_PX * np.arange(-half, half + 1), pieces.place[order]
-    return _profiles(
-        added, stretches, offset, np.array([place_mm[some].mean() for some in stretches]), radius
-    )
+    values = [np.ones_like(light), light, background, background_slope, light_per_grey]
+    sums = []
+    for value in values:
+        sums.append(_sum_in_bins(weight, value, position, 2 * half + 1)[order])
+    variance_share = _sum_in_bins(weight, None, position, 2 * half + 1)[order]
+    patches = _PatchSums(*sums, variance_share)
+    number = max(1, min(segments, len(pieces) // 2))
+    members = np.array_split(np.arange(len(pieces)), number)
+    place_mm = pieces.place[order]
+    segment_place_mm = np.array([place_mm[some].mean() for some in members])
+    grid_px = STEP_PX * np.arange(-half, half + 1)
+    return _average_patches(patches, members, grid_px, segment_place_mm, radius_px)
 
 
-def _shared(weight, values, place, size: int) -> np.ndarray:
-    """Weighted sums (v + 1, s, size) of values (s, p), each pixel between the two nearest whole places; and of the
-    shares themselves, which make variances of weighted means."""
-    before = np.clip(np.floor(place), 0, size - 2)
-    part = np.clip(place - before, 0.0, 1.0)
-    rows = size * np.arange(len(place))[:, None] + before.astype(int)
-    both = np.concatenate([rows.ravel(), rows.ravel() + 1])
-    share = np.concatenate([(1.0 - part).ravel(), part.ravel()])
+def _sum_in_bins(weight, value, position, size: int) -> np.ndarray:
+    """Compute weighted sums (s, size) of pixels (s, p), each shared between the two bins nearest to
+    its position.
+
+    value None: of the squared interpolation weights in place of interpolation weight times value.
+    """
+    below = np.clip(np.floor(position), 0, size - 2)
+    fraction = np.clip(position - below, 0.0, 1.0)
+    first = size * np.arange(len(position))[:, None] + below.astype(int)
+    bins = np.concatenate([first.ravel(), first.ravel() + 1])
+    share = np.concatenate([(1.0 - fraction).ravel(), fraction.ravel()])
+    factor = share if value is None else np.tile(value.ravel(), 2)
     weighted = share * np.tile(weight.ravel(), 2)
-    return np.stack(
-        [
-            np.bincount(both, weighted * one, len(place) * size).reshape(-1, size)
-            for one in (*(np.tile(one.ravel(), 2) for one in values), share)
-        ]
-    )
+    return np.bincount(bins, weighted * factor, len(position) * size).reshape(-1, size)
 
 
-def _light(grey, gamma: float):
-    """Light in parts of full scale, and its derivative by grey."""
+def _linearise_grey(grey, gamma: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the light in parts of full scale, and its derivative by the grey level."""
     share = np.maximum(grey, 1.0) / FULL_SCALE
     return share**gamma, gamma / FULL_SCALE * share ** (gamma - 1.0)
 
 
-def _profiles(added, stretches, offset_px, place_mm, radius_px: float) -> Profiles:
-    """Of sums (6, s, b) over the pieces, in their order along the bar: weights, and weighted light, light behind, its
-    slope across, the light's derivative by grey, and shares of pixels."""
-    own = added[0]
-    of_stretch = np.zeros((len(stretches), len(own)))
-    for row, some in zip(of_stretch, stretches):
+def _average_patches(
+    patches: _PatchSums, members, offset_px, place_mm, radius_px: float
+) -> Profiles:
+    """Average patches into the profiles of segments. members: by segment the indices of its
+    patches."""
+    membership = np.zeros((len(members), len(patches.weight)))  # (k, s) 1 for a segment's patches
+    for row, some in zip(membership, members):
         row[some] = 1.0
-    total = of_stretch @ own
-    seen = total > 0
-    light, behind, steep, by_grey = (
-        (of_stretch @ part) / np.where(seen, total, 1.0) for part in added[1:5]
+    total = membership @ patches.weight
+    is_observed = total > 0
+    divisor = np.where(is_observed, total, 1.0)
+    light = (membership @ patches.light) / divisor
+    background = (membership @ patches.background) / divisor
+    background_slope = (membership @ patches.background_slope) / divisor
+    light_per_grey = (membership @ patches.light_per_grey) / divisor
+    texture, variance_inflation = _estimate_texture(membership[:, 1:-1], patches)
+    squares = np.where(is_observed, membership @ patches.weight**2, 1.0)
+    number = np.where(is_observed, total**2 / squares, 1.0)  # effective number of patches
+    sigma = np.where(is_observed, np.sqrt(1.0 / divisor + texture / number), np.inf)
+    medians = []
+    for row, some in zip(background, is_observed):
+        medians.append(np.median(row[some]) if np.any(some) else 0.0)
+    return Profiles(
+        offset_px,
+        light,
+        sigma,
+        background - np.array(medians)[:, None],
+        background_slope,
+        light_per_grey,
+        place_mm,
+        radius_px,
+        variance_inflation,
     )
-    there = np.where(own > 0, own, 1.0)
-    texture, alike = _texture(
-        of_stretch[:, 1:-1], own, added[1] / there, added[2] / there, added[5] / there**2
-    )
-    number = np.where(seen, total**2 / np.where(seen, of_stretch @ own**2, 1.0), 1.0)
-    sigma = np.where(seen, np.sqrt(1.0 / np.where(seen, total, 1.0) + texture / number), np.inf)
-    middle = [np.median(row[some]) if np.any(some) else 0.0 for row, some in zip(behind, seen)]
-    behind = behind - np.array(middle)[:, None]
-    return Profiles(offset_px, light, sigma, behind, steep, by_grey, place_mm, radius_px, alike)
 
 
-def _texture(of_stretch, weight, light, behind, noise) -> tuple[np.ndarray, float]:
-    """Variance (k, b) of what pieces of each stretch differ by beyond noise: texture of the bench, compression; and how
-    alike neighbours across are, see `Profiles`. of_stretch (k, s - 2): 1 for its pieces, the first and last left out;
-    weight, light, behind, noise (s, b): of each piece, the last one's a variance.
+def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, float]:
+    """Estimate the variance (k, b) between patches beyond their noise, and the inflation by
+    correlated bins.
 
-    By a piece and the mean of the two beside it, so that what changes steadily along the bar does not count, nor what
-    follows the picture without rods, by the share that is seen. A product of one figure a stretch and one across. A
-    piece of which a place has hardly a part of a pixel counts as little: whether it has any, rounding may say. Pieces
-    differ by their noise at least: the only one that tells leaves nothing but rounding, beside which any is rough.
+    membership (k, s - 2): 1 for the patches of each segment, the first and last patch of the bar
+    left out.
+
+    Each patch is compared with the mean of its two neighbours, so that light which changes steadily
+    along the bar is no texture; the share of the background's own difference that explains it best
+    is subtracted. The variance is the product of one factor for each segment and one function
+    across the bar.
+
+    Bins that hold hardly any of a pixel get hardly any weight, for rounding decides whether they
+    hold one. The spread is at least the noise: where a single patch has pixels, the fitted share of
+    the background leaves only rounding, compared with which any other segment would be rough.
     """
-    light, behind = (one[1:-1] - 0.5 * (one[:-2] + one[2:]) for one in (light, behind))
-    doubt, noise = (
-        one[1:-1] + 0.25 * (one[:-2] + one[2:])
-        for one in (1.0 / np.maximum(weight, _NOTHING), noise)
-    )
-    told = np.where(doubt < 0.1 / _NOTHING, 1.0 / doubt, 0.0)
-    share = np.sum(told * light * behind, axis=0) / np.maximum(
-        np.sum(told * behind**2, axis=0), _NOTHING
-    )
-    left = light - np.clip(share, 0.0, 1.0) * behind
-    counts = (
-        told * np.sum(told, axis=0) / np.maximum(np.sum(told**2, axis=0), _NOTHING)
-    )  # 1 where all tell as much
-    number = np.maximum(np.sum(counts, axis=0), _NOTHING)
-    spread, noise = (np.sum(counts * one, axis=0) / (1.5 * number) for one in (left**2, noise))
-    # where a tilted bar's edge passes a few pieces differ
-    usual = _weighted_median(left**2, told) / (1.5 * _MEDIAN_SQUARED)
-    spread, noise = (
-        uniform_filter1d(one, _SMOOTHED) for one in (np.minimum(spread, _FEW_DIFFER * usual), noise)
-    )
-    spread = np.maximum(spread, np.maximum(noise, _NOTHING))
-    left = left * np.sqrt(counts / (1.5 * spread))
-    rougher = (np.sum(of_stretch @ left**2, axis=1) + _AS_ROUGH) / (
-        np.sum(of_stretch @ counts, axis=1) + _AS_ROUGH
-    )
-    return np.maximum(rougher[:, None] * spread - noise, 0.0), _alike(left)
+    divisor = np.where(patches.weight > 0, patches.weight, 1.0)
+    light = _second_difference(patches.light / divisor)
+    background = _second_difference(patches.background / divisor)
+    noise = _sum_variances(patches.variance_share / divisor**2)
+    variance = _sum_variances(1.0 / np.maximum(patches.weight, _TINY))
+    weight = np.where(variance < 0.1 / _TINY, 1.0 / variance, 0.0)
+    background_power = np.sum(weight * background**2, axis=0)
+    share = np.sum(weight * light * background, axis=0) / np.maximum(background_power, _TINY)
+    residual = light - np.clip(share, 0.0, 1.0) * background
+    # (s - 2, b) 1 where all patches weigh the same
+    relative = weight * np.sum(weight, axis=0) / np.maximum(np.sum(weight**2, axis=0), _TINY)
+    number = np.maximum(np.sum(relative, axis=0), _TINY)
+    # The difference to the mean of two neighbours has 1.5 times the variance of one patch.
+    spread = np.sum(relative * residual**2, axis=0) / (1.5 * number)
+    noise = np.sum(relative * noise, axis=0) / (1.5 * number)
+    by_median = _weighted_median(residual**2, weight) / (1.5 * _MEDIAN_SQUARED)
+    spread = np.minimum(spread, _LARGEST_OVER_MEDIAN * by_median)
+    spread = uniform_filter1d(spread, _TEXTURE_WINDOW)
+    noise = uniform_filter1d(noise, _TEXTURE_WINDOW)
+    spread = np.maximum(spread, np.maximum(noise, _TINY))
+    standardised = residual * np.sqrt(relative / (1.5 * spread))
+    power = np.sum(membership @ standardised**2, axis=1)
+    bins = np.sum(membership @ relative, axis=1)
+    roughness = (power + _PRIOR_BINS) / (bins + _PRIOR_BINS)  # (k,) of each segment
+    texture = np.maximum(roughness[:, None] * spread - noise, 0.0)
+    return texture, _estimate_variance_inflation(standardised)
+
+
+def _second_difference(values) -> np.ndarray:
+    """Return each row but the outermost two of values (s, b) minus the mean of its two
+    neighbours."""
+    return values[1:-1] - 0.5 * (values[:-2] + values[2:])
+
+
+def _sum_variances(variance) -> np.ndarray:
+    """Return the variance (s - 2, b) of `_second_difference` from those of independent rows (s,
+    b)."""
+    return variance[1:-1] + 0.25 * (variance[:-2] + variance[2:])
 
 
 def _weighted_median(values, weight) -> np.ndarray:
-    """Of each column (b,) of values (s, b)."""
+    """Return the weighted median (b,) of each column of values (s, b)."""
     order = np.argsort(values, axis=0)
-    summed = np.cumsum(np.take_along_axis(weight, order, axis=0), axis=0)
-    middle = np.argmax(summed >= 0.5 * summed[-1], axis=0)
-    return np.take_along_axis(values, np.take_along_axis(order, middle[None], axis=0), axis=0)[0]
+    cumulative = np.cumsum(np.take_along_axis(weight, order, axis=0), axis=0)
+    middle = np.argmax(cumulative >= 0.5 * cumulative[-1], axis=0)
+    row = np.take_along_axis(order, middle[None], axis=0)
+    return np.take_along_axis(values, row, axis=0)[0]
 
 
-def _alike(left) -> float:
-    """By how much the variance of a mean is larger than were neighbours across, of these (s, b), independent."""
-    lags = range(1, 1 + round(_ALIKE_PX / STEP_PX))
-    power = max(float(np.sum(left**2)), 1e-300)
-    return max(
-        1.0, 1.0 + 2.0 * sum(float(np.sum(left[:, lag:] * left[:, :-lag])) for lag in lags) / power
-    )
+def _estimate_variance_inflation(residual) -> float:
+    """Estimate the variance of a mean over bins, over that of independent bins, by autocorrelation
+    of residuals (s, b).
+
+    1 + 2 sum_lag rho(lag), at least 1, over lags up to _CORRELATION_PX.
+    """
+    power = max(float(np.sum(residual**2)), 1e-300)
+    correlated = 0.0
+    for lag in range(1, 1 + round(_CORRELATION_PX / STEP_PX)):
+        correlated += float(np.sum(residual[:, lag:] * residual[:, :-lag]))
+    return max(1.0, 1.0 + 2.0 * correlated / power)
 
 
 def light_range(light: np.ndarray) -> float:
-    """From dark to bright of light (n,), but for the outermost twentieths; a grey level at least."""
+    """Return the range of light (n,) between its 5th and 95th percentile, a grey level at least."""
     if len(light) == 0:
         return 1.0 / FULL_SCALE
-    low, high = np.interp(
-        [0.05 * (len(light) - 1), 0.95 * (len(light) - 1)], np.arange(len(light)), np.sort(light)
-    )
+    low, high = np.percentile(light, [5.0, 95.0])
     return max(float(high - low), 1.0 / FULL_SCALE)

@@ -18,8 +18,12 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.change import HALF
 from vision.pictures.view import View
 from vision.touched.find import Clear, clear_edges, coarse_to_fine, half_steps, spread_out
-from vision.touched.limb import STRETCHES, Limb, measure_limbs
 from vision.touched.rings import Differs, filled, likely_rings
+from vision.touched.silhouette_edges import (
+    SEGMENTS_OF_SIDE,
+    SilhouetteEdges,
+    measure_silhouette_edges,
+)
 from vision.wire.points import LinePoints
 
 # [mm] Half the width of a bar whose edges are as sharp as what is looked for. Stated.
@@ -178,7 +182,7 @@ def polished(
     """`settled` by closer looks."""
     radius_mm = rods.bar.radius_mm
     for _ in range(_POLISHES):
-        limbs = measure_limbs(views, axis, radius_mm, wires, settings, _REACHES_PX[-1])
+        limbs = measure_silhouette_edges(views, axis, radius_mm, wires, settings, _REACHES_PX[-1])
         before = axis
         axis = settle_by_limbs(
             axis, cameras, {name: limb.points for name, limb in limbs.items()}, radius_mm
@@ -204,8 +208,10 @@ def settled(
     -1 to 1: see `_clearness`, mean of the cameras."""
     radius_mm = rods.bar.radius_mm
     for reach_px in reaches_px:
-        limbs = measure_limbs(views, axis, radius_mm, wires, settings, reach_px, rough=True)
-        limbs = {name: limb for name, limb in limbs.items() if limb.asked}
+        limbs = measure_silhouette_edges(
+            views, axis, radius_mm, wires, settings, reach_px, coarse=True
+        )
+        limbs = {name: limb for name, limb in limbs.items() if limb.segments}
         if not any(len(limb.points) for limb in limbs.values()):
             return axis, 0.0
         before = axis
@@ -222,7 +228,7 @@ def settled(
     ) / len(views)
 
 
-def _clearness(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> float:
+def _clearness(axis: Rounded, camera: Camera, limb: SilhouetteEdges, radius_mm: float) -> float:
     """How much more probable edges are where an outline is than anywhere within reach: the mean logarithm over all
     stretches that a whole outline has, over the most that a stretch may say."""
     left, _ = _rows(axis, np.zeros((2, 3)), camera, limb.points, radius_mm, none=True)
@@ -230,7 +236,9 @@ def _clearness(axis: Rounded, camera: Camera, limb: Limb, radius_mm: float) -> f
         np.log(2.0 * _REACHES_PX[-1] / (np.sqrt(2.0 * np.pi) * limb.points.sigma_px))
         - 0.5 * left**2
     )
-    return float(np.sum(np.clip(there, -_MOST_SAID, _MOST_SAID))) / (2 * STRETCHES * _MOST_SAID)
+    return float(np.sum(np.clip(there, -_MOST_SAID, _MOST_SAID))) / (
+        2 * SEGMENTS_OF_SIDE * _MOST_SAID
+    )
 
 
 def settle_by_limbs(

@@ -16,7 +16,7 @@ from vision.pictures.change import HALF
 from vision.pictures.view import View, median_of
 from vision.touched.axis import settle_axis
 from vision.touched.find import Clear, clear_edges, find_bars
-from vision.touched.line import BarLine, find_lines, look_farther, measure_bars
+from vision.touched.line import BarLineEstimate, find_lines, find_lines_farther, measure_bars
 from vision.touched.one_view import (
     find_bars_alone,
     see_bar_alone,
@@ -51,7 +51,7 @@ class SeenBar:
     """An axis and the lines of the bar by which it was settled; of a rounded object none."""
 
     axis: Axis
-    lines: Mapping[str, BarLine]
+    lines: Mapping[str, BarLineEstimate]
 
     @property
     def seen_by(self) -> list[str]:
@@ -64,7 +64,7 @@ class SeenBar:
         one along something bright in one camera has more evidence there than the bar has in both. A camera that shows
         the place and no edge there speaks against it."""
         return sum(
-            max(line.clearness, 0.0) if line.has_edges else -_NO_EDGES
+            max(line.detection_score, 0.0) if line.has_edges else -_NO_EDGES
             for line in self.lines.values()
         )
 
@@ -76,7 +76,7 @@ class SeenBar:
     @property
     def at_best(self) -> float:
         """How clearly, were its edges seen in all of them."""
-        return sum(max(line.clearness, 0.0) for line in self.lines.values())
+        return sum(max(line.detection_score, 0.0) for line in self.lines.values())
 
 
 def see_bar(
@@ -108,7 +108,7 @@ def see_bar(
         for view in views
     }
 
-    def by_lines(axis: BarAxis, lines: Mapping[str, BarLine]) -> BarAxis:
+    def by_lines(axis: BarAxis, lines: Mapping[str, BarLineEstimate]) -> BarAxis:
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return settle_axis(axis, cameras, bars, rods.bar.radius_mm)
 
@@ -117,7 +117,7 @@ def see_bar(
         return SeenBar(by_lines(axis, lines), lines)
 
     likely = _likeliest((settled(axis) for axis in find_bars(clear, rods, span)), settled)
-    lines = look_farther(likely.lines)  # a bar whose rims are dark, found by its highlight
+    lines = find_lines_farther(likely.lines)  # a bar whose rims are dark, found by its highlight
     best = max(likely, SeenBar(by_lines(likely.axis, lines), lines), key=lambda one: one.clearness)
     best = best if best.stood else settled(best.axis)
     if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:

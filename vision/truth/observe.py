@@ -31,7 +31,7 @@ from vision.pictures.others import RodLines
 from vision.pictures.pyramid import shrunk_cameras
 from vision.pictures.view import View
 from vision.touched.search import SeenBar, see_bar
-from vision.touched.width import seen_over_given
+from vision.touched.width import measure_relative_widths
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
@@ -71,7 +71,7 @@ def observe_trial(
         return _nothing(whisks, reason.reason)
     rows = tuple(_see_whisk(whisk) for whisk in seen)
     axis, light = drawn_as_bar(bar_seen.axis), [whisk.light for whisk in seen]
-    looks = seen_over_given(bar_seen)
+    looks = measure_relative_widths(bar_seen)
     bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 

@@ -26,9 +26,9 @@ from vision.geometry.rounded import Rounded
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edges import measure_edges
-from vision.touched.limb import Limb, measure_limbs
-from vision.touched.line import BarLine, measure_bars
+from vision.touched.line import BarLineEstimate, measure_bars
 from vision.touched.one_view import seen_from_one_side
+from vision.touched.silhouette_edges import SilhouetteEdges, measure_silhouette_edges
 from vision.truth.whisk_pictures import WhiskPictures
 from vision.wire.points import LinePoints
 
@@ -64,7 +64,7 @@ class BarMiddles:
     views: Sequence[View]
     radius_mm: float
     settings: VisionSettings
-    lines: dict[str, BarLine] = field(default_factory=dict)
+    lines: dict[str, BarLineEstimate] = field(default_factory=dict)
     are_fine: bool = False
 
     def points(
@@ -107,7 +107,7 @@ class Outline:
     views: Sequence[View]
     radius_mm: float
     settings: VisionSettings
-    limbs: dict[str, Limb] = field(default_factory=dict)
+    limbs: dict[str, SilhouetteEdges] = field(default_factory=dict)
 
     def observed(
         self,
@@ -121,16 +121,16 @@ class Outline:
         """As `BarMiddles.observed`; all points are of an edge, against what lies within. Raises Refused where no
         outline is clear, or a camera contradicts the others."""
         for _ in range(2 if last and not self.limbs else 1):
-            self.limbs = measure_limbs(
+            self.limbs = measure_silhouette_edges(
                 self.views, axis, self.radius_mm, wires_px, self.settings, _OFF_PX, self.limbs
             )
         for name, limb in self.limbs.items():
-            if limb.asked >= _ASKED and not len(limb.points):
+            if limb.segments >= _ASKED and not len(limb.points):
                 raise Refused(
                     f"camera {name} shows no edge of the object where the other cameras have it",
                     code="no_object_edge",
                 )
-        if sum(limb.said for limb in self.limbs.values()) < _LEAST_SAID:
+        if sum(limb.log_evidence for limb in self.limbs.values()) < _LEAST_SAID:
             raise Refused(
                 "no clear outline of the object is seen: too little of its edges stands out",
                 code="no_object_outline",

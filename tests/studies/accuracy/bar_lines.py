@@ -23,7 +23,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.line import BarLine, measure_bars
+from vision.touched.line import BarLineEstimate, measure_bars
 
 SIZE, FOCAL_PX, AWAY_MM, RADIUS_MM, BLUR_PX, FRAMES = (420, 300), 2010.0, 376.0, 3.0, 0.9, 13
 CENTRE = np.array([209.5, 149.5])
@@ -85,7 +85,7 @@ def noisy_view(shade, behind, angle: float, across_mm: float, rng) -> View:
     return View(camera, frames, background, Noise(NOISE**2, 0.0))
 
 
-def measured(view: View, axis: BarAxis) -> BarLine:
+def measured(view: View, axis: BarAxis) -> BarLineEstimate:
     """The bar's line, from a coarse one."""
     coarse = measure_bars([view], axis, RADIUS_MM, {}, VisionSettings())
     return measure_bars([view], axis, RADIUS_MM, {}, VisionSettings(), coarse)[view.camera.name]

@@ -30,7 +30,7 @@ from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.touched.find import axis_from_angles
 from vision.touched.search import SeenBar, see_bar
-from vision.touched.width import in_all, seen_over_given
+from vision.touched.width import combine_widths, measure_relative_widths
 
 FOUND_PX = 1.0
 
@@ -99,8 +99,8 @@ def main() -> None:
             max(axis_off_px(camera, true, seen.axis, rods.bar.radius_mm) for camera in cameras)
         )
         print(f"{folder.name:<6} axis off by {worst[-1]:.2f} px", flush=True)
-        looks = seen_over_given(seen)
-        for share, sigma in [in_all(looks)] if looks else []:
+        looks = measure_relative_widths(seen)
+        for share, sigma in [combine_widths(looks)] if looks else []:
             widths.append(np.log(share) / (sigma / share))
             print(f"       looks {share:.3f} ± {sigma:.3f} times as wide as it is", flush=True)
         every += [
@@ -129,7 +129,7 @@ def line_rows(
     error = off_px(camera, true, radius_mm, line.points.px, line.points.normal)
     parts = [f"{e:+.3f} ± {s:.3f}" for e, s in zip(error, line.points.sigma_px)]
     print(
-        f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.for_bar:.0f}, left {line.unresolved:.3f}",
+        f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.evidence_for_bar:.0f}, left {line.unresolved_share:.3f}",
         flush=True,
     )
     return list(zip(error, line.points.sigma_px))

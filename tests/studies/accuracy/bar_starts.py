@@ -24,7 +24,7 @@ from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
-from vision.touched.line import BarLine, measure_bars
+from vision.touched.line import BarLineEstimate, measure_bars
 
 STARTS_PX = (0.01, 0.1, 0.5, 1.5)
 ARM_MM, WIRES, ALLOWED = 20.0, 8, 0.2
@@ -60,7 +60,9 @@ def moves(
         found.append(measure_bars(views, start, radius_mm, wires_px, VisionSettings(), coarse))
     rows = []
     for view in views:
-        lines: list[BarLine] = [one[view.camera.name] for one in found if view.camera.name in one]
+        lines: list[BarLineEstimate] = [
+            one[view.camera.name] for one in found if view.camera.name in one
+        ]
         if len(lines) == len(found) and all(line.is_bar for line in lines):
             points = [line.points for line in lines]
             error = np.array(

@@ -22,7 +22,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.touched.line import clear_pieces, find_lines
 from vision.touched.pieces import ARM_MM
-from vision.touched.posterior import log_width
+from vision.touched.posterior import estimate_log_width
 from vision.touched.width import SIGMA_SHARE
 
 BARS = 4
@@ -96,7 +96,7 @@ def test_a_bar_of_another_width_than_given_tells_its_own(bar, factor, rng):
     )
     view = noisy_view(*SCENES[bar], 1.3, 0.4, rng)
     pieces = clear_pieces([view], axis, RADIUS_MM / factor, {}, VisionSettings())[view.camera.name]
-    log, sigma = log_width(pieces)
+    log, sigma = estimate_log_width(pieces)
     assert abs(log - np.log(factor)) < 3.0 * np.hypot(sigma, SIGMA_SHARE)
     assert sigma < 0.05
 
@@ -111,7 +111,7 @@ def test_what_lies_beside_a_bar_is_less_clearly_one(rng):
         for aside in (0.0, 2.0 * RADIUS_MM)
     )
     clear = [
-        find_lines([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name].clearness
+        find_lines([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name].detection_score
         for axis in (there, beside)
     ]
     assert clear[1] < 0.25 * clear[0]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vision.touched.posterior import STRETCHES
-from vision.touched.profiles import profiles
+from vision.touched.posterior import SEGMENTS
+from vision.touched.profiles import compute_profiles
 from vision.wire.bands import Pieces
 
 PIECES, NOISE, NEAR_PX = 36, 1.5, 9.0
@@ -44,7 +44,7 @@ def test_a_place_that_one_piece_tells_makes_no_stretch_rough():
     that is fitted to it leaves rounding, beside which rounding was 1e60 times as rough: whether a stretch was seen at
     all changed with the cameras' last digit. Four such places of some 100 that its texture is told by."""
     without, beside = (
-        profiles(drawn(np.random.default_rng(3), more), STRETCHES, 3.0, 1.0)
+        compute_profiles(drawn(np.random.default_rng(3), more), SEGMENTS, 3.0, 1.0)
         for more in (False, True)
     )
     near = np.abs(without.offset_px) < NEAR_PX - 2.0

@@ -11,8 +11,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.limb import measure_limbs
 from vision.touched.rounded_search import see_rounded
+from vision.touched.silhouette_edges import measure_silhouette_edges
 
 RADIUS_MM, CENTRE = 8.0, np.array([58.0, 11.0, -1.5])
 SPHERE = Rounded(CENTRE, np.array([0.0, 0.0, 1.0]), Form("sphere"), CENTRE - [0.0, RADIUS_MM, 0.0])
@@ -61,9 +61,12 @@ def test_edges_are_where_they_are(views):
     off = Rounded(
         CENTRE + np.array([0.3, 0.2, -0.2]), SPHERE.direction, SPHERE.form, SPHERE.spot_mm
     )
-    rough = measure_limbs(views, off, RADIUS_MM, {}, VisionSettings(), 4.0)
+    rough = measure_silhouette_edges(views, off, RADIUS_MM, {}, VisionSettings(), 4.0)
     for view, limb in zip(
-        views, measure_limbs(views, SPHERE, RADIUS_MM, {}, VisionSettings(), 2.0, rough).values()
+        views,
+        measure_silhouette_edges(
+            views, SPHERE, RADIUS_MM, {}, VisionSettings(), 2.0, rough
+        ).values(),
     ):
         near = sights_beside(view.camera, SPHERE, limb.points.px, limb.points.place)
         left_px = (near.outside_mm - RADIUS_MM) * near.px_per_mm(view.camera, limb.points.normal)
