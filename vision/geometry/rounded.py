@@ -73,6 +73,11 @@ class Rounded:
     form: Form
     spot_mm: np.ndarray
 
+    def each(self) -> list["Rounded"]:
+        """Return the objects of a batch (n,) one by one; spot_mm (n, 3)."""
+        parts = zip(self.point_mm, self.direction, self.spot_mm)
+        return [Rounded(point, direction, self.form, spot) for point, direction, spot in parts]
+
     def near(self, points_mm: np.ndarray) -> Local:
         """What points (…, k, 3) see."""
         centre, axis = (
