@@ -1,8 +1,9 @@
 """The axis of a straight bar in space, from its line in each camera.
 
-Each camera gives points of the bar's middle line. The axis has four degrees of freedom, two shifts across itself and
-two tilts; Gauss–Newton finds the one whose projected outline has its middle on all the points, in units of their sigmas
-and with Cauchy weights against lines of something else. A wide prior keeps what no camera determines.
+Each camera gives points of the bar's middle line. The axis has four degrees of freedom, two shifts
+across itself and two tilts; Gauss–Newton finds the one whose projected outline has its middle on
+all the points, in units of their sigmas and with Cauchy weights against lines of something else. A
+wide prior keeps what no camera determines.
 """
 
 from collections.abc import Mapping
@@ -34,8 +35,8 @@ def settle_axis(
 ) -> BarAxis:
     """Fit the axis whose outline passes through line points in each camera, from an axis nearby.
 
-    lines: by camera, their `place` mm along the axis given. rounds: most Gauss–Newton steps. Where the cameras see the
-    bar from nearly the same side, what they cannot determine stays as it was.
+    lines: by camera, their `place` mm along the axis given. rounds: most Gauss–Newton steps. Where
+    the cameras see the bar from nearly the same side, what they cannot determine stays as it was.
     """
     across = axis_frame(axis.direction)
 
@@ -57,9 +58,10 @@ def _axis_rows(
     points: LinePoints,
     radius_mm: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the residuals (n,) of line points over sigma, robustly weighted, and their Jacobian (n, 4).
+    """Compute weighted residuals (n,) of line points, and their Jacobian (n, 4).
 
-    vector (4,): shifts and tilts of the axis, see `vision.geometry.contact.shifted_axis`.
+    Residuals are in sigmas, with Cauchy weights. vector (4,): shifts and tilts of the axis, see
+    `vision.geometry.contact.shifted_axis`.
     """
     steps = np.concatenate([np.zeros((1, 4)), np.diag(_STEPS)])
     shifted = shifted_axis(axis, across, vector + steps)  # a batch of five axes

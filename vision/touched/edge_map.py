@@ -1,10 +1,11 @@
-"""The edges in one camera's picture that the picture without rods does not have, as a tensor at every pixel.
+"""The edges of a picture that the picture without rods does not have, as a tensor at every pixel.
 
-The gradients of both pictures are taken at the blur of an edge. Other light on the same background scales its gradient,
-so the multiple of the background's gradient that fits best at a pixel is subtracted: a square of the board in a shadow
-is no edge. What is left counts against the noise and against the mean of its surroundings, because a soft shadow changes
-everywhere and a rod's edge only across its line. The result is a strength from 0 to 1 times the tensor of the
-gradient's direction, (xx, xy, yy). Like a structure tensor it can be blurred without opposite gradients cancelling, and
+The gradients of both pictures are taken at the blur of an edge. Other light on the same background
+scales its gradient, so the multiple of the background's gradient that fits best at a pixel is
+subtracted: a square of the board in a shadow is no edge. What is left counts against the noise and
+against the mean of its surroundings, because a soft shadow changes everywhere and a rod's edge only
+across its line. The result is a strength from 0 to 1 times the tensor of the gradient's direction,
+(xx, xy, yy). Like a structure tensor it can be blurred without opposite gradients cancelling, and
 n' T n is how strong the edge across a direction n is.
 """
 
@@ -38,8 +39,8 @@ _TINY = 1e-12
 class EdgeMap:
     """The edges that one camera sees, at every HALF-th pixel.
 
-    tensor (h, w, 3): strength times direction across the edge, see `edge_strength_tensor`. half_width_px: half the
-    width of the bar at the middle of the whisker, in these pixels.
+    tensor (h, w, 3): strength times direction across the edge, see `edge_strength_tensor`.
+    half_width_px: half the width of the bar at the middle of the whisker, in these pixels.
     """
 
     camera: Camera
@@ -47,7 +48,7 @@ class EdgeMap:
     half_width_px: float
 
     def blurred(self, half_widths: float) -> "EdgeMap":
-        """Return the map blurred by so many half-widths of the bar, without edges at the picture's border.
+        """Return the map blurred by so many half-widths of the bar, without edges at its border.
 
         At the border lines end that leave the picture.
         """
@@ -58,7 +59,10 @@ class EdgeMap:
         return replace(self, tensor=tensor)
 
     def tensor_at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the tensors (..., 3) of the pixels nearest to x, y (...); outside the picture those of its border."""
+        """Return the tensors (..., 3) of the pixels nearest to x, y (...).
+
+        Outside the picture they are those of its border.
+        """
         height, width = self.tensor.shape[:2]
         column = np.fmin(np.fmax(x, 0.0), width - 1.0) + 0.5
         row = np.fmin(np.fmax(y, 0.0), height - 1.0) + 0.5
@@ -69,8 +73,9 @@ class EdgeMap:
 def compute_edge_map(
     camera: Camera, still: np.ndarray, background: np.ndarray, rods: Rods, motor_rad: float
 ) -> EdgeMap:
-    """Compute the edges of what stands still, by its picture and the one without rods, (h, w) at every HALF-th pixel.
+    """Compute the edges of what stands still in one camera.
 
+    still, background (h, w): its picture and the one without rods, at every HALF-th pixel.
     motor_rad: where the whisker about touches, which says how far away the bar is.
     """
     middle_mm = 0.5 * rods.wire.length_mm * rotation_z(motor_rad)[:, 0]
@@ -84,8 +89,9 @@ def compute_edge_map(
 def edge_strength_tensor(grey: np.ndarray, background: np.ndarray, blur_px: float) -> np.ndarray:
     """Compute the edges (h, w, 3) of a picture (h, w) that its background (h, w) does not have.
 
-    The three are strength · (xx, xy, yy) with (x, y) the unit vector across the edge. The strength goes from 0 to 1: it
-    compares what the gradient has beyond its surroundings with the median gradient, which is that of noise.
+    The three are strength · (xx, xy, yy) with (x, y) the unit vector across the edge. The strength
+    goes from 0 to 1: it compares what the gradient has beyond its surroundings with the median
+    gradient, which is that of noise.
     """
     gradient = _gradient(grey, blur_px)  # (2, h, w)
     behind = _gradient(background, blur_px)
@@ -120,5 +126,8 @@ def _gaussian_and_derivative(blur_px: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _filter(picture: np.ndarray, along_rows: np.ndarray, along_columns: np.ndarray) -> np.ndarray:
-    """Filter a picture (h, w) or (h, w, 3) by one kernel along x and one along y, reflected at its border."""
+    """Filter a picture (h, w) or (h, w, 3) by one kernel along x and one along y.
+
+    At its border it is reflected.
+    """
     return cv2.sepFilter2D(picture, -1, along_rows, along_columns, borderType=cv2.BORDER_REFLECT)

@@ -1,13 +1,15 @@
-"""Where a straight bar may be in space: the cylinders whose two edges stand out in all cameras at once.
+"""Find where a straight bar may be: cylinders whose two edges stand out in all cameras at once.
 
-The whisker touches the bar somewhere along itself and somewhere in its stroke. So a hypothesis is where it first
-touches: a distance x along the straight whisker, a motor angle, and the slope beta and tilt psi of the bar there.
-Each hypothesis is a cylinder of known radius, whose two edges project to two lines in every camera. Its score is the
-mean edge strength along these lines (see `vision.touched.edge_map`), the geometric mean of both edges, averaged over
-the cameras: a shadow has no second edge at the bar's width, and a line that is bright in one camera alone scores little
-in the others. A dark rim makes the outermost edge invisible; therefore an edge a little farther in counts as well, by
-less, and one farther out counts against. The best hypotheses of a grid are refined from coarse to fine (see
-`vision.touched.grid_search`). Which of the few that are left is the bar is decided by its lines in `vision.touched.search`.
+The whisker touches the bar somewhere along itself and somewhere in its stroke. So a hypothesis is
+where it first touches: a distance x along the straight whisker, a motor angle, and the slope beta
+and tilt psi of the bar there. Each hypothesis is a cylinder of known radius, whose two edges
+project to two lines in every camera. Its score is the mean edge strength along these lines (see
+`vision.touched.edge_map`), the geometric mean of both edges, averaged over the cameras: a shadow
+has no second edge at the bar's width, and a line that is bright in one camera alone scores little
+in the others. A dark rim makes the outermost edge invisible; therefore an edge a little farther in
+counts as well, by less, and one farther out counts against. The best hypotheses of a grid are
+refined from coarse to fine (see `vision.touched.grid_search`). Which of the few that are left is
+the bar is decided by its lines in `vision.touched.search`.
 """
 
 from collections.abc import Callable, Sequence
@@ -90,8 +92,8 @@ def search_bars(
 ) -> list[BarAxis]:
     """Find the axes whose edges are the strongest, from a grid of hypotheses, the best first.
 
-    values: k arrays, the grid's values of each number. axes_of: function of hypotheses (n, k) that returns their axes,
-    points and directions (n, 3).
+    values: k arrays, the grid's values of each number. axes_of: function of hypotheses (n, k) that
+    returns their axes, points and directions (n, 3).
     """
     passes = []
     for blur, kept in zip(_BLURS, _KEPT):
@@ -113,8 +115,8 @@ def search_bars(
 class EdgeScore:
     """Score of hypothetical bars: the strength of both edges, mean over the cameras.
 
-    axes_of: function of hypotheses (n, k) that returns their axes. weights: of edges at _OFFSETS. along_mm (t,): places
-    at which edges are read, from each axis's point.
+    axes_of: function of hypotheses (n, k) that returns their axes. weights: of edges at _OFFSETS.
+    along_mm (t,): places at which edges are read, from each axis's point.
     """
 
     edge_maps: Sequence[EdgeMap]
@@ -134,7 +136,10 @@ class EdgeScore:
         return np.mean(strengths, axis=0)
 
     def both_edges(self, axes: BarAxis, edges: EdgeMap) -> np.ndarray:
-        """Compute the strength (n,) of both edges of bars (n, 3) in one camera: their geometric mean, 0 to 1."""
+        """Compute the strength (n,) of both edges of bars (n, 3) in one camera.
+
+        It is their geometric mean, 0 to 1.
+        """
         middle, half_width = _bar_in_picture(axes, edges.camera, self.radius_mm, self.along_mm)
         # Both edges run nearly as the middle does: one normal (x, y) = (-dy, dx) serves all lines.
         dx, dy = np.gradient(middle, axis=-1)  # (n, t) each
@@ -157,9 +162,10 @@ class EdgeScore:
 def _bar_in_picture(
     axes: BarAxis, camera: Camera, radius_mm: float, along_mm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Project bars (n, 3): their middles (2, n, t), x and y, and the vectors (2, n, t) from there to one edge.
+    """Project bars (n, 3): x and y of their middles (2, n, t), and the vectors to one edge.
 
-    Both are in pixels of an edge map. Perspective makes the two edges differ by less than a coarse search resolves.
+    Both are in pixels of an edge map. Perspective makes the two edges differ by less than a coarse
+    search resolves.
     """
     points = axes.point_mm[:, None] + along_mm[:, None] * axes.direction[:, None]  # (n, t, 3)
     sideways = np.cross(axes.direction, axes.point_mm - camera.centre_mm)
@@ -181,8 +187,9 @@ def axis_from_angles(
     psi_rad: ArrayLike,
     reach_mm: ArrayLike,
 ) -> BarAxis:
-    """Return the bars (n, 3) that a straight whisker first touches at a distance x, a motor angle, a slope and a tilt.
+    """Return the bars (n, 3) that a straight whisker first touches where these numbers say.
 
+    x_mm: along the whisker. touch_rad: motor angle. beta_rad, psi_rad: slope and tilt of the bar.
     All arguments (n,). reach_mm: distance between the axes of bar and whisker where they touch.
     """
     turn = rotation_z(np.asarray(touch_rad, dtype=float))  # (n, 3, 3)

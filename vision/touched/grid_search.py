@@ -1,11 +1,13 @@
 """Coarse-to-fine search for the most probable of many hypotheses about where an object is.
 
-A hypothesis is a row of k numbers, such as a distance along the whisker, a motor angle and a slope. First all
-hypotheses of a regular grid are scored on blurred measurements, so that the true object scores at a grid point half a
-step away from it. Non-maximum suppression keeps the best of them that are no neighbours of a better one. Then a few
-passes follow, each on sharper measurements: every hypothesis climbs to the best of its neighbours by ever smaller
-steps, and those that arrive at the same place are suppressed. What is left is at most a handful of hypotheses, the best
-first. Bars, rings, spheres and cones are all found this way: they differ in what the numbers mean and in the score.
+A hypothesis is a row of k numbers, such as a distance along the whisker, a motor angle and a slope.
+First all hypotheses of a regular grid are scored on blurred measurements, so that the true object
+scores at a grid point half a step away from it. Non-maximum suppression keeps the best of them that
+are no neighbours of a better one. Then a few passes follow, each on sharper measurements: every
+hypothesis climbs to the best of its neighbours by ever smaller steps, and those that arrive at the
+same place are suppressed. What is left is at most a handful of hypotheses, the best first. Bars,
+rings, spheres and cones are all found this way: they differ in what the numbers mean and in the
+score.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,8 +33,9 @@ class SearchPass:
     """One pass of `coarse_to_fine`.
 
     score: function of hypotheses (n, k) that returns their scores (n,), the higher the better.
-    step_share: a climb's first step over the step of the search. separation_share: hypotheses that end nearer to each
-    other than this many steps of the search count as one. kept: number of hypotheses that go on to the next pass.
+    step_share: a climb's first step over the step of the search. separation_share: hypotheses that
+    end nearer to each other than this many steps of the search count as one. kept: number of
+    hypotheses that go on to the next pass.
     """
 
     score: Score
@@ -50,9 +53,9 @@ def coarse_to_fine(
 ) -> np.ndarray:
     """Return the best hypotheses (n, k) after the last pass, the best first.
 
-    values: k arrays, the grid's values of each number. steps (k,): the step of the search in each number; 0 holds a
-    number at its grid values. separation: least distance between two hypotheses of the grid that go on, in steps.
-    starts: number of hypotheses of the grid that go on.
+    values: k arrays, the grid's values of each number. steps (k,): the step of the search in each
+    number; 0 holds a number at its grid values. separation: least distance between two hypotheses
+    of the grid that go on, in steps. starts: number of hypotheses of the grid that go on.
     """
     grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
     best = suppress_neighbours(grid, passes[0].score(grid), separation * steps, starts)
@@ -69,7 +72,10 @@ def half_steps(values: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def touch_angles(motor_rad: tuple[float, float], length_mm: float, step_mm: float) -> np.ndarray:
-    """Return motor angles (n,) from the lowest to the highest, step_mm apart on the arc of the whisker's middle."""
+    """Return motor angles (n,) from the lowest to the highest.
+
+    step_mm: their distance on the arc of the whisker's middle.
+    """
     arc_mm = np.ptp(motor_rad) * 0.5 * length_mm
     count = int(np.ceil(arc_mm / step_mm))
     return np.linspace(*motor_rad, max(_FEWEST_ANGLES, count))
@@ -78,9 +84,10 @@ def touch_angles(motor_rad: tuple[float, float], length_mm: float, step_mm: floa
 def suppress_neighbours(
     hypotheses: np.ndarray, scores: np.ndarray, separation: np.ndarray, most: int
 ) -> np.ndarray:
-    """Return the best hypotheses, at most so many, without the neighbours of better ones (non-maximum suppression).
+    """Return the best hypotheses without neighbours of better ones (non-maximum suppression).
 
-    hypotheses (n, k), scores (n,). Two are neighbours where no number differs by more than its separation (k,).
+    At most so many are returned. hypotheses (n, k), scores (n,). Two are neighbours where no number
+    differs by more than its separation (k,).
     """
     remaining = hypotheses[np.argsort(scores)[::-1]]
     chosen = []
@@ -97,8 +104,8 @@ def climb(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the local maxima (n, k) that hypotheses (n, k) climb to, and their scores (n,).
 
-    A neighbour differs by one step in two numbers at most. Where no neighbour is better, the step is halved, from
-    first_step (k,) on.
+    A neighbour differs by one step in two numbers at most. Where no neighbour is better, the step
+    is halved, from first_step (k,) on.
     """
     k = len(first_step)
     signs = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * k, indexing="ij"), axis=-1).reshape(-1, k)
@@ -124,7 +131,10 @@ def climb(
 
 
 def score_in_batches(score: Score, hypotheses: np.ndarray, batch: int) -> np.ndarray:
-    """Return the scores (n,) of hypotheses (n, k), evaluated so many at a time: arrays that fit the processor's cache."""
+    """Return the scores (n,) of hypotheses (n, k), evaluated so many at a time.
+
+    A batch's arrays fit the processor's cache.
+    """
     batches = np.array_split(hypotheses, -(-len(hypotheses) // batch))
     scores = [score(some) for some in batches]
     return np.concatenate(scores)

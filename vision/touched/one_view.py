@@ -1,9 +1,10 @@
-"""The bar as a single camera finds it: a line across the whisker, and its distance from how wide it is in the picture.
+"""The bar as one camera finds it: a line across the whisker, and its distance from its width.
 
-The two planes through the camera's centre that graze a bar intersect along its direction, and the angle between them is
-that of the bar's diameter at its distance. So shift and tilt of both edges in the picture, four numbers, determine the
-four of an axis in space. The search assumes at first that the bar is at right angles to the line of sight; its edges
-then correct that. Cameras whose planes through the bar coincide know no more than one camera does.
+The two planes through the camera's centre that graze a bar intersect along its direction, and the
+angle between them is that of the bar's diameter at its distance. So shift and tilt of both edges in
+the picture, four numbers, determine the four of an axis in space. The search assumes at first that
+the bar is at right angles to the line of sight; its edges then correct that. Cameras whose planes
+through the bar coincide know no more than one camera does.
 """
 
 from collections.abc import Mapping
@@ -43,9 +44,9 @@ _SAME_PLANE_RAD = np.radians(1.0)
 
 
 def find_bars_alone(edges: EdgeMap, rods: Rods, motor_rad: float) -> list[BarAxis]:
-    """Find axes of what may be the bar in one camera, the best first, all at right angles to the line of sight.
+    """Find axes of what may be the bar in one camera, the best first.
 
-    motor_rad: where the whisker about touches.
+    All are at right angles to the line of sight. motor_rad: where the whisker about touches.
     """
     step_mm = _X_STEP * rods.bar.radius_mm
     x_mm = np.arange(_NEAREST_CONTACT_MM, rods.wire.length_mm, step_mm)
@@ -54,8 +55,9 @@ def find_bars_alone(edges: EdgeMap, rods: Rods, motor_rad: float) -> list[BarAxi
 
 
 def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float) -> BarAxis:
-    """Return the axes (n, 3) of hypotheses (n, 3): x mm on the straight whisker, turn about the sight, and distance.
+    """Return the axes (n, 3) of hypotheses (n, 3) about a bar across the line of sight.
 
+    The numbers are x mm on the straight whisker, a turn about the line of sight, and a distance.
     The distance is the share by which a bar is farther away than the whisker.
     """
     x_mm, turn, farther = hypotheses.T[..., None]
@@ -76,7 +78,7 @@ def see_bar_alone(
     motor_rad: np.ndarray,
     settings: VisionSettings,
 ) -> BarAxis:
-    """Compute the bar's axis from its edges in one camera, from a coarse axis, before any wire is known.
+    """Compute the bar's axis from its edges in one camera, from a coarse axis.
 
     motor_rad (n,): motor angles of all frames. Raises Refused where its edges are not seen.
     """
@@ -90,7 +92,8 @@ def see_bar_alone(
         ratio = _distance_mm(axis, camera) / _distance_mm(first, camera)
         if not _NEAREST < ratio < _FARTHEST or (coarse and edges is None):
             raise Refused(
-                f"camera {camera.name} alone does not tell how far away the bar is: its edges are not seen"
+                f"camera {camera.name} alone does not tell how far away the bar is: "
+                "its edges are not seen"
             )
     return axis
 
@@ -101,12 +104,15 @@ def _distance_mm(axis: BarAxis, camera: Camera) -> float:
 
 
 def seen_from_one_side(cameras: Cameras, axis: BarAxis) -> bool:
-    """Return whether all cameras' planes through the bar coincide to a degree: only its width says how far it is."""
+    """Return whether all cameras' planes through the bar coincide to a degree.
+
+    Then only its width says how far away it is.
+    """
     return widest_angle_rad(cameras, axis) < _SAME_PLANE_RAD
 
 
 def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
-    """Return the widest angle, rad, between the planes that two of the cameras span with the bar."""
+    """Return the widest angle, rad, between the planes that two cameras span with the bar."""
     sights = np.array([axis.point_mm - camera.centre_mm for camera in cameras])
     normals = np.cross(axis.direction, sights)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -115,9 +121,10 @@ def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
 
 
 def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: float) -> BarAxis:
-    """Return the axis whose two grazing planes pass through the edges, two points each, by side (-1 and 1).
+    """Return the axis whose two grazing planes pass through the edges.
 
-    Its point is where the mean ray through the edge points meets it.
+    edges: two points each, by side (-1 and 1). Its point is where the mean ray through the edge
+    points meets it.
     """
     rays = {side: camera.rays(points.px) for side, points in edges.items()}  # (2, 3) each
     planes = np.array([np.cross(rays[-1][0], rays[-1][1]), np.cross(rays[1][0], rays[1][1])])

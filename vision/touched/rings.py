@@ -1,15 +1,17 @@
 """Where a ring may be in space, before any wire is known: by what it covers in all cameras.
 
-The edges beside the contact determine neither the ring's plane nor its centre, and a tube has highlights and rims whose
-edges are as strong as its own. So the whole ring is used: a map of each camera says how surely every pixel differs from
-the picture without rods. Just within the ring's outer silhouette, which no part of it hides, the picture must differ,
-and just beyond it must not. The score of a ring is the difference of these, in the camera where it is lowest. The best
-of a grid of rings that the whisker would touch are refined from coarse to fine (`vision.touched.grid_search`) on maps
-that are blurred less and less.
+The edges beside the contact determine neither the ring's plane nor its centre, and a tube has
+highlights and rims whose edges are as strong as its own. So the whole ring is used: a map of each
+camera says how surely every pixel differs from the picture without rods. Just within the ring's
+outer silhouette, which no part of it hides, the picture must differ, and just beyond it must not.
+The score of a ring is the difference of these, in the camera where it is lowest. The best of a grid
+of rings that the whisker would touch are refined from coarse to fine (`vision.touched.grid_search`)
+on maps that are blurred less and less.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -26,6 +28,7 @@ from vision.touched.grid_search import (
     score_in_batches,
     touch_angles,
 )
+from vision.touched.rounded_places import touched_first
 
 # [px] Blur of the maps, pass by pass. Set by eye. Study: rounded_seen.py.
 _BLURS_PX = (5.0, 2.5, 1.0)
@@ -68,14 +71,20 @@ _BATCH = 2000
 
 @dataclass(frozen=True)
 class ChangeMap:
-    """How surely a camera's picture differs from the one without rods, (h, w) from 0 to 1, at every HALF-th pixel."""
+    """How surely one camera's picture differs from the one without rods.
+
+    field (h, w): from 0 to 1, at every HALF-th pixel.
+    """
 
     camera: Camera
     field: np.ndarray
 
     @classmethod
     def from_pictures(cls, view: View, still: np.ndarray) -> "ChangeMap":
-        """Compute the map of a view; still (h, w): the picture of what stands still, at every HALF-th pixel."""
+        """Compute the map of a view.
+
+        still (h, w): the picture of what stands still, at every HALF-th pixel.
+        """
         background = view.background[::HALF, ::HALF]
         noise = view.noise.times(view.mean_share)
         field = changed(still.astype(float), background, noise).astype(np.float32)
@@ -91,29 +100,29 @@ def find_rings(
     maps: Sequence[ChangeMap],
     rods: Rods,
     motor_rad: tuple[float, float],
-    objects_of: Callable[[np.ndarray], Rounded],
 ) -> list[Rounded]:
-    """Find rings that cover what differs, of those that the whisker would touch, the best first; eight at most.
+    """Find rings that cover what differs and that the whisker would touch, the best first.
 
-    motor_rad: lowest and highest motor angle, between which the whisker touches. objects_of: function of hypotheses
-    (n, 5) that returns the rings, see `vision.touched.rounded_search.touched_first`.
+    At most eight are found. motor_rad: lowest and highest motor angle, between which the whisker
+    touches. Numbers of a hypothesis (n, 5): see `vision.touched.rounded_places.touched_first`.
     """
     length_mm = rods.wire.length_mm
     x_mm = np.arange(_NEAREST_MM, length_mm, _X_MM)
     touch_rad = touch_angles(motor_rad, length_mm, _TOUCH_MM)
     values = [x_mm, touch_rad, _BETA_RAD, _PSI_RAD, _TURN_RAD]
+    rings_of = partial(touched_first, rods.bar.form, rods)
     passes = []
     for blur_px, stations, kept in zip(_BLURS_PX, _STATIONS, _KEPT):
         blurred = [one.blurred(blur_px) for one in maps]
-        score = CoverageScore(blurred, objects_of, rods.bar.radius_mm, stations)
+        score = CoverageScore(blurred, rings_of, rods.bar.radius_mm, stations)
         share = blur_px / _BLURS_PX[0]
         passes.append(SearchPass(score, share, share, kept))
     best = coarse_to_fine(values, half_steps(values), passes, _SEPARATION, _STARTS)
-    return objects_of(best).each()
+    return rings_of(best).each()
 
 
 def coverage_score(maps: Sequence[ChangeMap], ring: Rounded, radius_mm: float) -> float:
-    """Return how well a ring covers what differs, up to 1, in the camera where it does so the least."""
+    """Compute how well a ring covers what differs, up to 1, in its worst camera."""
     one_ring = Rounded(ring.point_mm[None], ring.direction[None], ring.form, ring.spot_mm[None])
     blurred = [one.blurred(_BLURS_PX[-1]) for one in maps]
     return float(_lowest_coverage(blurred, one_ring, radius_mm, _STATIONS[-1])[0])
@@ -121,10 +130,13 @@ def coverage_score(maps: Sequence[ChangeMap], ring: Rounded, radius_mm: float) -
 
 @dataclass(frozen=True)
 class CoverageScore:
-    """Score of hypothetical rings: how well they cover what differs. stations: points of a silhouette that are read."""
+    """Score of hypothetical rings: how well they cover what differs.
+
+    stations: points of a silhouette that are read.
+    """
 
     maps: Sequence[ChangeMap]
-    objects_of: Callable[[np.ndarray], Rounded]
+    rings_of: Callable[[np.ndarray], Rounded]
     radius_mm: float
     stations: int
 
@@ -134,7 +146,7 @@ class CoverageScore:
 
     def _score(self, hypotheses: np.ndarray) -> np.ndarray:
         """Return the scores (n,) of a batch of hypotheses (n, 5)."""
-        rings = self.objects_of(hypotheses)
+        rings = self.rings_of(hypotheses)
         return _lowest_coverage(self.maps, rings, self.radius_mm, self.stations)
 
 
@@ -147,7 +159,7 @@ def _lowest_coverage(
 
 
 def _coverage(change: ChangeMap, rings: Rounded, radius_mm: float, stations: int) -> np.ndarray:
-    """Compute how much more (n,) a picture differs within the outer silhouettes of rings (n, 3) than beyond them."""
+    """Compute how much more (n,) a picture differs within rings (n, 3) than beyond them."""
     camera = change.camera
     limb, normals = rings.limb(camera.centre_mm, radius_mm, np.inf, stations)  # (n, 2, stations, 3)
     outwards = (limb - rings.point_mm[:, None, None]) * normals

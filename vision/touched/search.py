@@ -1,12 +1,14 @@
 """Find the touched object from the pictures of one whisk, before any wire is known.
 
-A bar is found in three stages. First, its edges: a search over all places where the whisker may touch it gives a few
-axes whose two edges are strong in all cameras (`vision.touched.find`). Second, its lines: the pixels about each of these
-axes say in every camera where the bar's line is and how clearly it is a bar (`vision.touched.line`); the axis through
-these lines is computed (`vision.touched.axis`), and measured once more if it moved. The axis with the highest detection
-score over all cameras wins. Third, where not all cameras see it or their planes through it nearly coincide, each camera
-is evaluated alone as well, by the bar's width (`vision.touched.one_view`), and replaces the axis if it scores clearly
-higher. Rings, spheres and cones have their own search, `vision.touched.rounded_search`.
+A bar is found in three stages. First, its edges: a search over all places where the whisker may
+touch it gives a few axes whose two edges are strong in all cameras (`vision.touched.find`). Second,
+its lines: the pixels about each of these axes say in every camera where the bar's line is and how
+clearly it is a bar (`vision.touched.line`); the axis through these lines is computed
+(`vision.touched.axis`), and measured once more if it moved. The axis with the highest detection
+score over all cameras wins. Third, where not all cameras see it or their planes through it nearly
+coincide, each camera is evaluated alone as well, by the bar's width (`vision.touched.one_view`),
+and replaces the axis if it scores clearly higher. Rings, spheres and cones have their own search,
+`vision.touched.rounded_search`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,12 +50,18 @@ _CONVERGED_PX = 0.5
 # [log] By so much one camera's axis must score higher than one that edges in all cameras led to;
 # two measurements about the same axis differ by 0.5. Study: bar_scenes.py.
 _CLEARER = 1.0
-_NO_BAR = "no bar of diameter {:g} mm is seen near the whisker; record with the bar in view of every camera"
+_NO_BAR = (
+    "no bar of diameter {:g} mm is seen near the whisker; "
+    "record with the bar in view of every camera"
+)
 
 
 @dataclass(frozen=True)
 class SeenBar:
-    """The axis of the touched object, and by camera the bar's lines that it passes through; none of a rounded object."""
+    """The axis of the touched object, and by camera the bar's lines that it passes through.
+
+    Of a rounded object there are no lines.
+    """
 
     axis: Axis
     lines: Mapping[str, BarLine]
@@ -67,9 +75,9 @@ class SeenBar:
     def detection_score(self) -> float:
         """Return how clearly all cameras see a bar there: a sum of logs, higher is clearer.
 
-        A camera that shows the place and no edge there counts against it. The evidence is no such score: each
-        hypothesis has its own pixels, and a wrong one along something bright in one camera has more evidence there
-        than the bar has in both.
+        A camera that shows the place and no edge there counts against it. The evidence is no such
+        score: each hypothesis has its own pixels, and a wrong one along something bright in one
+        camera has more evidence there than the bar has in both.
         """
         scores = [
             max(line.clearness, 0.0) if line.has_edges else -_NO_EDGES
@@ -84,7 +92,10 @@ class SeenBar:
 
     @property
     def converged(self) -> bool:
-        """Return whether the lines lie where they were expected, so that another measurement would give the same."""
+        """Return whether the lines lie where they were expected.
+
+        Another measurement from there would give the same.
+        """
         return all(np.all(np.abs(line.line) < _CONVERGED_PX) for line in self.lines.values())
 
 
@@ -128,7 +139,7 @@ class BarSearch:
             )
 
     def best_by_all_cameras(self) -> SeenBar:
-        """Return the bar that the edges in all cameras lead to, with the highest detection score."""
+        """Find the bar by the edges in all cameras: that with the highest detection score."""
         scene = self.scene
         axes = find_bars(list(self.edge_maps.values()), scene.rods, scene.motor_range_rad)
         best = self._most_probable([self._measured(axis) for axis in axes])
@@ -139,10 +150,10 @@ class BarSearch:
         return best if best.converged else self._measured(best.axis)
 
     def best_with_single_cameras(self, by_all: SeenBar) -> SeenBar:
-        """Return the bar by all cameras, or the one that a single camera found, where that scores clearly higher.
+        """Return the bar by all cameras, or by a single one where that scores clearly higher.
 
-        Where all cameras stand on one side of the bar, the single cameras come first: they alone know how far away it
-        is. Raises Refused where no camera sees a bar.
+        Where all cameras stand on one side of the bar, the single cameras come first: they alone
+        know how far away it is. Raises Refused where no camera sees a bar.
         """
         found = [by_all] if by_all.seen_by else []
         for view in self.scene.views:
@@ -160,7 +171,10 @@ class BarSearch:
         return clearest if is_clearer else first
 
     def axis_of_one_camera(self, view: View) -> BarAxis:
-        """Return the axis by one camera alone. Raises Refused where its edges do not say how far away it is."""
+        """Compute the axis by one camera alone.
+
+        Raises Refused where its edges do not say how far away it is.
+        """
         scene = self.scene
         edges = self.edge_maps[view.camera.name]
         first = find_bars_alone(edges, scene.rods, float(np.mean(scene.motor_rad)))[0]
@@ -168,7 +182,10 @@ class BarSearch:
         return see_bar_alone(first, view, wire, scene.radius_mm, scene.motor_rad, scene.settings)
 
     def measured_finely(self, bar: SeenBar) -> SeenBar:
-        """Return the bar with its axis through finely measured lines: a quick measurement may turn it about the sight."""
+        """Return the bar with its axis through finely measured lines.
+
+        A quick measurement may turn the axis about the line of sight.
+        """
         scene = self.scene
         lines = measure_bars(scene.views, bar.axis, scene.radius_mm, scene.wires_px, scene.settings)
         return replace(bar, axis=self._axis_through(bar.axis, lines))
@@ -180,15 +197,18 @@ class BarSearch:
         return SeenBar(self._axis_through(axis, lines), lines)
 
     def _axis_through(self, axis: BarAxis, lines: Mapping[str, BarLine]) -> BarAxis:
-        """Return the axis through those lines that are a bar's; lines: by camera, measured about the axis given."""
+        """Return the axis through those lines that are a bar's.
+
+        lines: by camera, measured about the axis given.
+        """
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return settle_axis(axis, self.scene.cameras, bars, self.scene.radius_mm)
 
     def _most_probable(self, bars: Sequence[SeenBar]) -> SeenBar:
         """Return the bar with the highest detection score after a second measurement.
 
-        Bars that have converged are not measured again, nor those that would score lower than the best so far even if
-        all cameras saw their edges.
+        Bars that have converged are not measured again, nor those that would score lower than the
+        best so far even if all cameras saw their edges.
         """
         best = None
         for bar in sorted(bars, key=lambda one: one.highest_score, reverse=True):

@@ -1,4 +1,4 @@
-"""What a search for the touched object has: the pictures of one whisk, its cameras and rods, and where the wire may be."""
+"""The pictures of one whisk, its cameras and rods: all that a search for the object needs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,10 @@ _MEDIAN_OF = 11
 
 @dataclass(frozen=True)
 class SearchScene:
-    """The pictures of one whisk before any wire is known. motor_rad (n,): motor angles of all frames."""
+    """The pictures of one whisk before any wire is known.
+
+    motor_rad (n,): motor angles of all frames.
+    """
 
     views: Sequence[View]
     cameras: Cameras
@@ -56,10 +59,10 @@ class SearchScene:
 
 
 def still_picture(view: View) -> np.ndarray:
-    """Return the picture (h, w) of what stands still, at every HALF-th pixel: the median of some frames.
+    """Return the picture (h, w) of what stands still, at every HALF-th pixel.
 
-    A wire that moves vanishes. Where rods are known it is the mean without these, so that a wire that rests on the bar
-    vanishes, too.
+    It is the median of some frames. A wire that moves vanishes. Where rods are known it is the mean
+    without these, so that a wire that rests on the bar vanishes, too.
     """
     frames = [np.ascontiguousarray(frame[::HALF, ::HALF]) for frame in view.some(_MEDIAN_OF)]
     median = median_of(frames)
