@@ -41,6 +41,7 @@ def settle_axis(
     across = axis_frame(axis.direction)
 
     def rows_of(vector: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Compute residuals and Jacobian of each camera at a step from the begin."""
         return [
             _axis_rows(axis, across, vector, cameras[name], points, radius_mm)
             for name, points in lines.items()

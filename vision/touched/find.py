@@ -78,6 +78,7 @@ def find_bars(
     touch_rad = touch_angles(motor_rad, length_mm, _TOUCH_STEP * radius_mm)
 
     def axes_of(hypotheses: np.ndarray) -> BarAxis:
+        """Return the axes (n, 3) of hypotheses (n, 4)."""
         x, touch, beta, psi = hypotheses.T
         return axis_from_angles(x, touch, beta, psi, rods.reach_mm(x))
 

@@ -129,6 +129,7 @@ def touched_first(form: Form, rods: Rods, hypotheses: np.ndarray) -> Rounded:
     motor = rotation_z(touch)  # (n, 3, 3)
 
     def turned(vectors: np.ndarray) -> np.ndarray:
+        """Rotate vectors (n, 3) by the motor angles."""
         return np.einsum("nij,nj->ni", motor, vectors)
 
     return Rounded(turned(point), turned(direction), form, turned(spot))

@@ -160,6 +160,7 @@ def _see_ring(maps: Sequence[ChangeMap], scene: SearchScene) -> Rounded:
     places = find_rings(maps, rods, scene.motor_range_rad)
 
     def score(ring: Rounded) -> float:
+        """Return how well a ring covers what differs."""
         return coverage_score(maps, ring, scene.radius_mm)
 
     best_covering = sorted(places, key=score, reverse=True)[:_REFINED]
@@ -251,6 +252,7 @@ def fit_silhouette(
     across = axis_frame(place.direction)
 
     def rows_of(vector: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Compute residuals and Jacobian of each camera at a step from the begin."""
         here = shifted_object(place, across, vector)
         return [
             _weighted_rows(here, across, cameras[name], points, radius_mm)
