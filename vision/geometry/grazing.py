@@ -1,6 +1,7 @@
-"""The outline of a rounded object against points of it: how far the sights through these pass outside of its surface.
+"""Residuals of points on a rounded object's silhouette: how far sights pass outside its surface.
 
-So no outline is drawn, and each of them has one residual, whatever the shape: 0 where a sight grazes the surface.
+A sight that grazes the surface has residual 0. So no silhouette has to be drawn, and every point
+has one residual, whatever the object's shape.
 """
 
 from dataclasses import dataclass
@@ -13,25 +14,36 @@ from vision.geometry.rounded import Rounded
 
 @dataclass(frozen=True)
 class Grazing:
-    """Where sights come nearest to an object: how far from its middle (…, n), mm, see `Rounded.outside_mm`, and of the
-    first object of a batch the nearest points of its surface and their normals (n, 3)."""
+    """Where sights come nearest to an object, or to a batch of objects.
+
+    outside_mm (..., n): distance from the object's middle, see `Rounded.outside_mm`. points_mm (n,
+    3), normals (n, 3): the nearest points on the sights and the surface's normals there, of the
+    first object of a batch.
+    """
 
     outside_mm: np.ndarray
     points_mm: np.ndarray
     normals: np.ndarray
 
     def px_per_mm(self, camera: Camera, normals_px: np.ndarray) -> np.ndarray:
-        """By how much (n,) the outline moves across itself, along normals (n, 2), with a millimetre outwards."""
+        """Return how far (n,) the silhouette moves, px, per mm that the surface moves outwards.
+
+        normals_px (n, 2): of the silhouette, along which it moves.
+        """
         _, by_point, _ = camera.project_with_jacobians(self.points_mm)
         return np.einsum("ni,nij,nj->n", normals_px, by_point, self.normals)
 
 
 def sights_beside(camera: Camera, axis: Rounded, px: np.ndarray, far_mm: np.ndarray) -> Grazing:
-    """Sights through pixels (n, 2) beside an object, or a batch of them; far_mm (n,): about how far away they graze."""
+    """Compute where the sights through pixels (n, 2) come nearest to an object, or to a batch.
+
+    far_mm (n,): about how far from the camera they graze it.
+    """
     rays = camera.rays(px)
     shape = np.broadcast_shapes((*axis.point_mm.shape[:-1], 1), (len(px),))
-    far = axis.nearest_on_lines(camera.centre_mm, rays, np.broadcast_to(far_mm, shape))
-    outside, normals, _ = axis.outside_mm(camera.centre_mm + far[..., None] * rays)
-    one = (0,) * (len(shape) - 1)
-    nearest = camera.centre_mm + far[one][:, None] * rays
-    return Grazing(outside, nearest, normals[one])
+    begin_mm = np.broadcast_to(far_mm, shape)
+    nearest_mm = axis.nearest_on_lines(camera.centre_mm, rays, begin_mm)  # (..., n) from the camera
+    outside, normals, _ = axis.outside_mm(camera.centre_mm + nearest_mm[..., None] * rays)
+    first = (0,) * (len(shape) - 1)
+    points = camera.centre_mm + nearest_mm[first][:, None] * rays
+    return Grazing(outside, points, normals[first])

@@ -1,56 +1,72 @@
-"""The outline of a round rod in a picture: where the middle between its two edges is, and how wide it is."""
+"""The outline of a round rod in a picture: the middle between its two edges, and its half-width.
+
+The two lines of sight that graze a cylinder of radius r touch it r²/d before its axis and r √(1 -
+r²/d²) to its side, with d the camera's distance from the axis. Both points are projected exactly,
+so that perspective and lens count.
+"""
 
 import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.rotation import cross
 
+# [px] Least length of a tangent that is divided by. Stated.
+_TINY = 1e-12
+
 
 def outline(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Middle (n, 2) and half-width (n,) in pixels of a rod's outline at points (n, 3) of its axis.
+    """Return the middle (n, 2) and half-width (n,) px of a rod's outline at points of its axis.
 
-    directions (n, 3) unit: the rod's local direction.
+    points_mm (n, 3). directions (n, 3): unit vectors along the rod. radius_mm: one, or (n,).
     """
     one, other = edges(camera, points_mm, directions, radius_mm)
     middle = 0.5 * (one + other)
-    return middle, 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=1))
+    width = np.abs(np.sum((one - other) * normals(middle), axis=1))
+    return middle, 0.5 * width
 
 
 def edges(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The two edges (n, 2) each of a rod's outline at points (n, 3) of its axis; directions (n, 3), unit."""
-    one, other = np.split(
-        camera.project(np.concatenate(grazed(camera, points_mm, directions, radius_mm))), 2
-    )
+    """Return the two edges, each (n, 2) px, of a rod's outline at points (n, 3) of its axis.
+
+    directions (n, 3): unit vectors along the rod. radius_mm: one, or (n,).
+    """
+    grazing_mm = grazed(camera, points_mm, directions, radius_mm)
+    one, other = np.split(camera.project(np.concatenate(grazing_mm)), 2)
     return one, other
 
 
 def grazed(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) and (n, 3) of a rod's surface on its two edges, as the camera sees them, see `outline`.
+    """Return the points (n, 3) and (n, 3) of a rod's surface where lines of sight graze it.
 
-    The two lines of sight that graze a cylinder touch it r²/d before its axis and r √(1 - r²/d²) beside it, d being
-    the distance of the camera from the axis.
+    points_mm (n, 3): of its axis. directions (n, 3): unit vectors along the rod. radius_mm: one, or
+    (n,).
     """
-    points, directions = np.atleast_2d(points_mm), np.atleast_2d(directions)
+    points = np.atleast_2d(points_mm)
+    directions = np.atleast_2d(directions)
     radius = np.broadcast_to(radius_mm, len(points))[:, None]
     sight = points - camera.centre_mm
     sight = sight - np.sum(sight * directions, axis=1, keepdims=True) * directions
     distance = np.linalg.norm(sight, axis=1, keepdims=True)
     sideways = cross(directions, sight / distance)
     near = points - radius**2 / distance**2 * sight
-    aside = radius * np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0)) * sideways
-    return near + aside, near - aside
+    cosine = np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0))
+    offset = radius * cosine * sideways
+    return near + offset, near - offset
 
 
 def normals(curve_px: np.ndarray) -> np.ndarray:
-    """Unit normals (…, n, 2) of curves (…, n, 2) given point by point."""
+    """Return the unit normals (..., n, 2) of curves (..., n, 2) given point by point.
+
+    Of a single point it is (0, 1).
+    """
     if curve_px.shape[-2] < 2:
         return np.broadcast_to([0.0, 1.0], curve_px.shape)
     tangent = np.gradient(curve_px, axis=-2)
     normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
-    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), _TINY)

@@ -1,20 +1,29 @@
-"""The bar's axis in space, by its outline in the pictures."""
+"""The axis of a straight bar in space, from its line in each camera.
+
+Each camera gives points of the bar's middle line. The axis has four degrees of freedom, two shifts
+across itself and two tilts; Gauss–Newton finds the one whose projected outline has its middle on
+all the points, in units of their sigmas and with Cauchy weights against lines of something else. A
+wide prior keeps what no camera determines.
+"""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from vision.geometry.camera import Cameras
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
 from vision.geometry.newton import cauchy_weights, settle
 from vision.geometry.silhouette import edges
 from vision.wire.points import LinePoints
 
-# [mm, rad] Of the axis from where it was: wide, keeps only what no camera tells. Stated.
+# [mm, rad] Prior sigmas of the axis about where it was: wide, they keep only what no camera
+# determines. Stated.
 _PRIOR = np.array([5.0, 5.0, 0.5, 0.5])
-# [mm, rad] Of differences; a smaller step of the axis is the last: a hundredth of a pixel.
+# [mm, rad] Steps of differences; a smaller step of the axis is the last: a hundredth of a pixel.
 # Derived.
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5])
+# [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
+_CAUCHY_SIGMAS = 5.0
 
 
 def settle_axis(
@@ -24,13 +33,15 @@ def settle_axis(
     radius_mm: float,
     rounds: int = 5,
 ) -> BarAxis:
-    """The axis whose outline passes through line points in each camera; `place` is mm along the axis given.
+    """Fit the axis whose outline passes through line points in each camera, from an axis nearby.
 
-    Where the cameras see the bar from nearly the same side, what they cannot tell stays as it was.
+    lines: by camera, their `place` mm along the axis given. rounds: most Gauss–Newton steps. Where
+    the cameras see the bar from nearly the same side, what they cannot determine stays as it was.
     """
     across = axis_frame(axis.direction)
 
-    def rows_of(vector):
+    def rows_of(vector: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Compute residuals and Jacobian of each camera at a step from the begin."""
         return [
             _axis_rows(axis, across, vector, cameras[name], points, radius_mm)
             for name, points in lines.items()
@@ -40,16 +51,27 @@ def settle_axis(
     return upward(shifted_axis(axis, across, settle(rows_of, _PRIOR, _STEPS, rounds)))
 
 
-def _axis_rows(axis, across, vector, camera, points: LinePoints, radius_mm):
-    """What is left between line points and outline over sigma, robustly weighted, and its Jacobian (n, 4)."""
-    moved = shifted_axis(axis, across, vector + np.concatenate([np.zeros((1, 4)), np.diag(_STEPS)]))
-    on_axis = moved.point_mm[:, None] + points.place[:, None] * moved.direction[:, None]
-    directions = np.broadcast_to(moved.direction[:, None], on_axis.shape)
+def _axis_rows(
+    axis: BarAxis,
+    across: np.ndarray,
+    vector: np.ndarray,
+    camera: Camera,
+    points: LinePoints,
+    radius_mm: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute weighted residuals (n,) of line points, and their Jacobian (n, 4).
+
+    Residuals are in sigmas, with Cauchy weights. vector (4,): shifts and tilts of the axis, see
+    `vision.geometry.contact.shifted_axis`.
+    """
+    steps = np.concatenate([np.zeros((1, 4)), np.diag(_STEPS)])
+    shifted = shifted_axis(axis, across, vector + steps)  # a batch of five axes
+    on_axis = shifted.point_mm[:, None] + points.place[:, None] * shifted.direction[:, None]
+    directions = np.broadcast_to(shifted.direction[:, None], on_axis.shape)  # (5, n, 3)
     one, other = edges(camera, on_axis.reshape(-1, 3), directions.reshape(-1, 3), radius_mm)
-    here, *there = 0.5 * (one + other).reshape(*on_axis.shape[:2], 2)
-    left = np.sum(points.normal * (points.px - here), axis=1) / points.sigma_px
-    weight = np.sqrt(cauchy_weights(left, 5.0))
-    columns = [
-        np.sum(points.normal * (px - here), axis=1) / step for px, step in zip(there, _STEPS)
-    ]
-    return left * weight, np.stack(columns, axis=1) / points.sigma_px[:, None] * weight[:, None]
+    middle, *stepped = 0.5 * (one + other).reshape(*on_axis.shape[:2], 2)
+    residual = np.sum(points.normal * (points.px - middle), axis=1) / points.sigma_px
+    weight = np.sqrt(cauchy_weights(residual, _CAUCHY_SIGMAS))
+    by_axis = np.sum(points.normal * (np.array(stepped) - middle), axis=-1)  # (4, n)
+    jacobian = (by_axis / _STEPS[:, None]).T / points.sigma_px[:, None]
+    return residual * weight, jacobian * weight[:, None]

@@ -1,10 +1,14 @@
-"""The bar as one camera alone finds it: a line across the whisker, and its depth from how wide it looks.
+"""The bar as one camera finds it: a line across the whisker, and its distance from its width.
 
-The two planes of sight that graze a bar meet in its direction, and the angle between them is that of its diameter at
-its distance: four numbers in the picture, shift and tilt of each edge, are the four of an axis in space.
+The two planes through the camera's centre that graze a bar intersect along its direction, and the
+angle between them is that of the bar's diameter at its distance. So shift and tilt of both edges in
+the picture, four numbers, determine the four of an axis in space. The search assumes at first that
+the bar is at right angles to the line of sight; its edges then correct that. Cameras whose planes
+through the bar coincide know no more than one camera does.
 """
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -15,39 +19,51 @@ from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
+from vision.touched.edge_map import EdgeMap
 from vision.touched.edges import measure_edges
-from vision.touched.find import Clear, likely
+from vision.touched.find import search_bars
 from vision.wire.points import LinePoints
 
-# [radii] Of the grid along the whisker. Derived.
+# [radii] Step of the grid along the whisker. Derived.
 _X_STEP = 0.35
-# [rad, 1] Of the grid round the sight, and of the depth. Study: coverage.py alone.
-_TURN_RAD, _FURTHER = np.radians(np.arange(0.0, 180.0, 5.0)), np.array([-0.05, 0.0, 0.05])
-# [1] Of the distance at first: beyond, what passed for edges is none. Study: coverage.py alone.
-_NEAREST, _FARTHEST = 0.7, 1.4
-# [rad] Planes through the bar nearer than this tell no slope: at 1° its sigma is some 1°, by
-# views.py. Study: views.py.
+# [mm] Nearest contact to the whisker's base. Stated.
+_NEAREST_CONTACT_MM = 10.0
+# [rad] Turns of the grid about the line of sight. Study: coverage.py alone.
+_TURN_RAD = np.radians(np.arange(0.0, 180.0, 5.0))
+# [1] Distances of the grid, beyond the whisker, as a share. Study: coverage.py alone.
+_FARTHER = np.array([-0.05, 0.0, 0.05])
+# [1] Of the first distance: nearer than this, what passed for edges is none. Study: coverage.py
+# alone.
+_NEAREST = 0.7
+# [1] Of the first distance: farther than this, what passed for edges is none. Study: coverage.py
+# alone.
+_FARTHEST = 1.4
+# [rad] Planes through the bar nearer to each other than this do not determine its slope: at 1°
+# its sigma is some 1°, by views.py. Study: views.py.
 _SAME_PLANE_RAD = np.radians(1.0)
 
 
-def find_bars_alone(seen: Clear, rods: Rods, motor_rad: float) -> list[BarAxis]:
-    """Coarse axes of what may be the bar in one camera, taken to be at right angles to the sight: its edges tell its
-    tilt. motor_rad: about where the whisker touches."""
-    x = np.arange(10.0, rods.wire.length_mm, _X_STEP * rods.bar.radius_mm)
-    return likely(
-        [seen],
-        (x, _TURN_RAD, _FURTHER),
-        lambda each: _axis(each, seen.camera, motor_rad),
-        rods.bar.radius_mm,
-    )
+def find_bars_alone(edges: EdgeMap, rods: Rods, motor_rad: float) -> list[BarAxis]:
+    """Find axes of what may be the bar in one camera, the best first.
+
+    All are at right angles to the line of sight. motor_rad: where the whisker about touches.
+    """
+    step_mm = _X_STEP * rods.bar.radius_mm
+    x_mm = np.arange(_NEAREST_CONTACT_MM, rods.wire.length_mm, step_mm)
+    axes_of = partial(_axes_across_sight, camera=edges.camera, motor_rad=motor_rad)
+    return search_bars([edges], [x_mm, _TURN_RAD, _FARTHER], axes_of, rods.bar.radius_mm)
 
 
-def _axis(hypotheses, camera: Camera, motor_rad: float) -> BarAxis:
-    """Axes (n, 3) through the straight whisker at x mm, turned round the sight, further away by a share."""
-    x, turn, further = hypotheses.T[..., None]
-    on_whisker = x * rotation_z(motor_rad)[:, 0]
+def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float) -> BarAxis:
+    """Return the axes (n, 3) of hypotheses (n, 3) about a bar across the line of sight.
+
+    The numbers are x mm on the straight whisker, a turn about the line of sight, and a distance.
+    The distance is the share by which a bar is farther away than the whisker.
+    """
+    x_mm, turn, farther = hypotheses.T[..., None]
+    on_whisker = x_mm * rotation_z(motor_rad)[:, 0]
     sight = on_whisker - camera.centre_mm
-    point = camera.centre_mm + (1.0 + further) * sight
+    point = camera.centre_mm + (1.0 + farther) * sight
     ahead = sight / np.linalg.norm(sight, axis=1, keepdims=True)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right, axis=1, keepdims=True)
@@ -62,53 +78,63 @@ def see_bar_alone(
     motor_rad: np.ndarray,
     settings: VisionSettings,
 ) -> BarAxis:
-    """The bar's axis from one camera, from a coarse one, before any wire is known. motor_rad (n,): of all frames.
+    """Compute the bar's axis from its edges in one camera, from a coarse axis.
 
-    Raises Refused where its edges are not seen.
+    motor_rad (n,): motor angles of all frames. Raises Refused where its edges are not seen.
     """
-    camera, axis = view.camera, first
+    camera = view.camera
+    axis = first
     straight = resting_lines(camera, wire, np.unique(motor_rad))
     for coarse in (True, False):
         edges = measure_edges(view, axis, radius_mm, straight, settings, coarse=coarse)
-        found = axis if edges is None else axis_from_edges(edges, camera, radius_mm)
-        if not _NEAREST < _distance_mm(found, camera) / _distance_mm(first, camera) < _FARTHEST or (
-            coarse and edges is None
-        ):
+        if edges is not None:
+            axis = axis_from_edges(edges, camera, radius_mm)
+        ratio = _distance_mm(axis, camera) / _distance_mm(first, camera)
+        if not _NEAREST < ratio < _FARTHEST or (coarse and edges is None):
             raise Refused(
-                f"camera {camera.name} alone does not tell how far away the bar is: its edges are not seen",
+                f"camera {camera.name} alone does not tell how far away the bar is: "
+                "its edges are not seen",
                 code="bar_distance_unseen",
             )
-        axis = found
     return axis
 
 
 def _distance_mm(axis: BarAxis, camera: Camera) -> float:
+    """Return the distance from a camera's centre to the axis's point, mm."""
     return float(np.linalg.norm(axis.point_mm - camera.centre_mm))
 
 
 def seen_from_one_side(cameras: Cameras, axis: BarAxis) -> bool:
-    """Whether all cameras' planes through the bar are the same to a degree: only its width tells how far away it is."""
+    """Return whether all cameras' planes through the bar coincide to a degree.
+
+    Then only its width says how far away it is.
+    """
     return widest_angle_rad(cameras, axis) < _SAME_PLANE_RAD
 
 
 def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
-    """Between the planes through the bar of the two cameras that see it from the most different sides."""
-    across = np.array(
-        [np.cross(axis.direction, axis.point_mm - camera.centre_mm) for camera in cameras]
-    )
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return float(np.arccos(min(np.min(np.abs(across @ across.T)), 1.0)))
+    """Return the widest angle, rad, between the planes that two cameras span with the bar."""
+    sights = np.array([axis.point_mm - camera.centre_mm for camera in cameras])
+    normals = np.cross(axis.direction, sights)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    least_cosine = np.min(np.abs(normals @ normals.T))
+    return float(np.arccos(min(least_cosine, 1.0)))
 
 
 def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: float) -> BarAxis:
-    """The axis whose two grazing planes pass through the edges; its point is opposite the middle of what is seen."""
-    planes = np.array([np.cross(*camera.rays(edges[side].px)) for side in (-1, 1)])
+    """Return the axis whose two grazing planes pass through the edges.
+
+    edges: two points each, by side (-1 and 1). Its point is where the mean ray through the edge
+    points meets it.
+    """
+    rays = {side: camera.rays(points.px) for side, points in edges.items()}  # (2, 3) each
+    planes = np.array([np.cross(rays[-1][0], rays[-1][1]), np.cross(rays[1][0], rays[1][1])])
     one, other = planes / np.linalg.norm(planes, axis=1, keepdims=True)
     direction = np.cross(one, other)
     direction /= np.linalg.norm(direction)
-    distance_mm = radius_mm / np.sin(0.5 * np.arccos(np.clip(one @ other, -1.0, 1.0)))
-    middle = np.sum([camera.rays(points.px) for points in edges.values()], axis=(0, 1))
+    half_angle_rad = 0.5 * np.arccos(np.clip(one @ other, -1.0, 1.0))
+    distance_mm = radius_mm / np.sin(half_angle_rad)
+    middle = np.sum(list(rays.values()), axis=(0, 1))
     away = middle - (middle @ direction) * direction
-    return upward(
-        BarAxis(camera.centre_mm + distance_mm / np.linalg.norm(away) * middle, direction)
-    )
+    point_mm = camera.centre_mm + distance_mm / np.linalg.norm(away) * middle
+    return upward(BarAxis(point_mm, direction))

@@ -1,9 +1,12 @@
-"""A ring in space before any wire is known: the rings that are before what differs from the picture without rods, and
-that reach no farther.
+"""Where a ring may be in space, before any wire is known: by what it covers in all cameras.
 
-The edges beside the whisker alone tell neither the ring's plane nor where its middle is, and a tube has highlights and
-rims whose edges are as clear as its own. What is looked for here is all of the ring: within its outer outline, which
-nothing of it hides, the picture differs, and beyond it does not.
+The edges beside the contact determine neither the ring's plane nor its centre, and a tube has
+highlights and rims whose edges are as strong as its own. So the whole ring is used: a map of each
+camera says how surely every pixel differs from the picture without rods. Just within the ring's
+outer silhouette, which no part of it hides, the picture must differ, and just beyond it must not.
+The score of a ring is the difference of these, in the camera where it is lowest. The best of a grid
+of rings that the whisker would touch are refined from coarse to fine (`vision.touched.grid_search`)
+on maps that are blurred less and less.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,123 +21,163 @@ from vision.geometry.rods import Rods
 from vision.geometry.rounded import Rounded
 from vision.pictures.change import HALF, changed
 from vision.pictures.view import View
-from vision.touched.find import coarse_to_fine, half_steps
+from vision.touched.grid_search import (
+    SearchPass,
+    coarse_to_fine,
+    half_steps,
+    score_in_batches,
+    touch_angles,
+)
+from vision.touched.rounded_places import touched_first
 
-# [px, places, points] By how much what differs is blurred, look by look, how many places go on,
-# and by how many points of an outline. Set by eye. Study: rounded_seen.py.
-_BLURS_PX, _KEPT, _STATIONS = (
-    (5.0, 2.5, 1.0),
-    (24, 12, 8),
-    (24, 32, 48),
-)
-# [places] That are climbed from, of a grid. Set by eye. Study: rounded_seen.py.
+# [px] Blur of the maps, pass by pass. Set by eye. Study: rounded_seen.py.
+_BLURS_PX = (5.0, 2.5, 1.0)
+# [places] That each pass keeps. Set by eye. Study: rounded_seen.py.
+_KEPT = (24, 12, 8)
+# [points] Of a silhouette, pass by pass. Set by eye. Study: rounded_seen.py.
+_STATIONS = (24, 32, 48)
+# [places] Of the grid that go on. Set by eye. Study: rounded_seen.py.
 _STARTS = 64
-# [rad] Slopes of the grid, and turns of a ring about its tangent. Stated.
-_BETA_RAD, _PSI_RAD, _TURN_RAD = (
-    np.radians(np.arange(-most, most + 1.0, step))
-    for most, step in ((70.0, 10.0), (16.0, 8.0), (20.0, 20.0))
-)
-# [mm] Steps of the grid along the whisker and along its swing: about the tube's radius. Stated.
-_X_MM, _TOUCH_MM = 3.0, 4.0
-# [radii] Beside an outline, outwards: where it is asked whether the picture differs. Set by eye.
-# Study: rounded_seen.py.
-_AT = np.array([-1.2, -0.6, 0.35, 0.9])
-# [1] What differs beyond an outline, over what does not within: another thing may hide a ring,
+# [steps] Least separation of two places of the grid. Set by eye. Study: rounded_seen.py.
+_SEPARATION = 2.0
+# [rad] Slopes of the grid. Stated.
+_BETA_RAD = np.radians(np.arange(-70.0, 71.0, 10.0))
+# [rad] Tilts of the grid. Stated.
+_PSI_RAD = np.radians(np.arange(-16.0, 17.0, 8.0))
+# [rad] Turns of the grid about the ring's tangent where it is touched. Stated.
+_TURN_RAD = np.radians(np.arange(-20.0, 21.0, 20.0))
+# [mm] Step of the grid along the whisker: about the tube's radius. Stated.
+_X_MM = 3.0
+# [mm] Step of the grid along the arc of the whisker's middle: about the tube's radius. Stated.
+_TOUCH_MM = 4.0
+# [mm] Nearest contact to the whisker's base. Stated.
+_NEAREST_MM = 10.0
+# [radii] From a silhouette outwards, where the map is read: two places within it, two beyond. Set
+# by eye. Study: rounded_seen.py.
+_OUTWARDS = np.array([-1.2, -0.6, 0.35, 0.9])
+# [places] Of these that lie within. A layout.
+_WITHIN = 2
+# [1] Weight of what differs beyond a silhouette, over that within: another thing may hide a ring,
 # and adds nothing to it. Set by eye. Study: rounded_seen.py.
 _BEYOND = 1.5
-# [1] Of an outline in a picture: less counts as so much. Stated.
-# of an outline in a picture: what is outside speaks neither for nor against, up to here
+# [1] Share of a silhouette in the picture: what is outside speaks neither for nor against a ring,
+# but a smaller share counts as this one. Stated.
 _LEAST_SHARE = 0.6
 # [px] Gaps that are closed in what differs. Set by eye. Study: rounded_seen.py.
 _CLOSED_PX = 5
-# [places] Arrays that stay in the processor's cache. Not measured.
-_AT_ONCE = 2000
+# [places] Evaluated together: arrays that stay in the processor's cache. Not measured.
+_BATCH = 2000
 
 
 @dataclass(frozen=True)
-class Differs:
-    """How surely a camera's picture differs from the one without rods, (h, w) from 0 to 1, at every HALF-th pixel."""
+class ChangeMap:
+    """How surely one camera's picture differs from the one without rods.
+
+    field (h, w): from 0 to 1, at every HALF-th pixel.
+    """
 
     camera: Camera
     field: np.ndarray
 
     @classmethod
-    def of(cls, view: View, still: np.ndarray) -> "Differs":
-        """still: the picture of what stands still, at every HALF-th pixel."""
-        behind = view.background[::HALF, ::HALF]
-        field = changed(still.astype(float), behind, view.noise.times(view.mean_share)).astype(
-            np.float32
-        )
-        return cls(
-            view.camera, cv2.morphologyEx(field, cv2.MORPH_CLOSE, np.ones((_CLOSED_PX, _CLOSED_PX)))
-        )
+    def from_pictures(cls, view: View, still: np.ndarray) -> "ChangeMap":
+        """Compute the map of a view.
 
-    def blurred(self, blur_px: float) -> "Differs":
-        """The same, less sharp."""
-        return Differs(self.camera, cv2.GaussianBlur(self.field, (0, 0), blur_px))
+        still (h, w): the picture of what stands still, at every HALF-th pixel.
+        """
+        background = view.background[::HALF, ::HALF]
+        noise = view.noise.times(view.mean_share)
+        field = changed(still.astype(float), background, noise).astype(np.float32)
+        square = np.ones((_CLOSED_PX, _CLOSED_PX))
+        return cls(view.camera, cv2.morphologyEx(field, cv2.MORPH_CLOSE, square))
+
+    def blurred(self, blur_px: float) -> "ChangeMap":
+        """Return the map blurred by a Gaussian."""
+        return ChangeMap(self.camera, cv2.GaussianBlur(self.field, (0, 0), blur_px))
 
 
-def likely_rings(
-    seen: Sequence[Differs], rods: Rods, motor_rad: tuple[float, float], placed: Callable
+def find_rings(
+    maps: Sequence[ChangeMap],
+    rods: Rods,
+    motor_rad: tuple[float, float],
 ) -> list[Rounded]:
-    """Rings that fill what differs the best in the camera where they do the worst, of those that the whisker would
-    touch. placed: the rings (n,) of hypotheses (n, 5), see `vision.touched.rounded_search.placed`."""
-    length = rods.wire.length_mm
-    touch = np.linspace(
-        *motor_rad, max(3, int(np.ceil(np.ptp(motor_rad) * 0.5 * length / _TOUCH_MM)))
-    )
-    values = [np.arange(10.0, length, _X_MM), touch, _BETA_RAD, _PSI_RAD, _TURN_RAD]
+    """Find rings that cover what differs and that the whisker would touch, the best first.
 
-    def score(blur_px: float, stations: int) -> Callable:
-        return partial(
-            _of_each, [one.blurred(blur_px) for one in seen], placed, rods.bar.radius_mm, stations
-        )
-
-    looks = (
-        (score(blur_px, stations), share, share, kept)
-        for blur_px, share, kept, stations in zip(
-            _BLURS_PX, np.divide(_BLURS_PX, _BLURS_PX[0]), _KEPT, _STATIONS
-        )
-    )
-    found = placed(coarse_to_fine(values, half_steps(values), looks, 2.0, _STARTS))
-    return [
-        Rounded(*where, found.form, spot)
-        for *where, spot in zip(found.point_mm, found.direction, found.spot_mm)
-    ]
+    At most eight are found. motor_rad: lowest and highest motor angle, between which the whisker
+    touches. Numbers of a hypothesis (n, 5): see `vision.touched.rounded_places.touched_first`.
+    """
+    length_mm = rods.wire.length_mm
+    x_mm = np.arange(_NEAREST_MM, length_mm, _X_MM)
+    touch_rad = touch_angles(motor_rad, length_mm, _TOUCH_MM)
+    values = [x_mm, touch_rad, _BETA_RAD, _PSI_RAD, _TURN_RAD]
+    rings_of = partial(touched_first, rods.bar.form, rods)
+    passes = []
+    for blur_px, stations, kept in zip(_BLURS_PX, _STATIONS, _KEPT):
+        blurred = [one.blurred(blur_px) for one in maps]
+        score = CoverageScore(blurred, rings_of, rods.bar.radius_mm, stations)
+        share = blur_px / _BLURS_PX[0]
+        passes.append(SearchPass(score, share, share, kept))
+    best = coarse_to_fine(values, half_steps(values), passes, _SEPARATION, _STARTS)
+    return rings_of(best).each()
 
 
-def filled(seen: Sequence[Differs], ring: Rounded, radius_mm: float) -> float:
-    """How well a ring fills what differs, up to 1, in the camera where it does the worst."""
-    each = Rounded(ring.point_mm[None], ring.direction[None], ring.form, ring.spot_mm[None])
-    return float(
-        _in_all([one.blurred(_BLURS_PX[-1]) for one in seen], each, radius_mm, _STATIONS[-1])[0]
-    )
+def coverage_score(maps: Sequence[ChangeMap], ring: Rounded, radius_mm: float) -> float:
+    """Compute how well a ring covers what differs, up to 1, in its worst camera."""
+    one_ring = Rounded(ring.point_mm[None], ring.direction[None], ring.form, ring.spot_mm[None])
+    blurred = [one.blurred(_BLURS_PX[-1]) for one in maps]
+    return float(_lowest_coverage(blurred, one_ring, radius_mm, _STATIONS[-1])[0])
 
 
-def _of_each(
-    seen: Sequence[Differs], placed: Callable, radius_mm: float, stations: int, each: np.ndarray
-):
-    groups = np.array_split(each, -(-len(each) // _AT_ONCE))
-    return np.concatenate([_in_all(seen, placed(some), radius_mm, stations) for some in groups])
+@dataclass(frozen=True)
+class CoverageScore:
+    """Score of hypothetical rings: how well they cover what differs.
+
+    stations: points of a silhouette that are read.
+    """
+
+    maps: Sequence[ChangeMap]
+    rings_of: Callable[[np.ndarray], Rounded]
+    radius_mm: float
+    stations: int
+
+    def __call__(self, hypotheses: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of hypotheses (n, 5), up to 1."""
+        return score_in_batches(self._score, hypotheses, _BATCH)
+
+    def _score(self, hypotheses: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of a batch of hypotheses (n, 5)."""
+        rings = self.rings_of(hypotheses)
+        return _lowest_coverage(self.maps, rings, self.radius_mm, self.stations)
 
 
-def _in_all(seen: Sequence[Differs], rings: Rounded, radius_mm: float, stations: int) -> np.ndarray:
-    return np.min([_filled(one, rings, radius_mm, stations) for one in seen], axis=0)
+def _lowest_coverage(
+    maps: Sequence[ChangeMap], rings: Rounded, radius_mm: float, stations: int
+) -> np.ndarray:
+    """Return the coverage (n,) of rings in the camera where it is lowest."""
+    each = [_coverage(one, rings, radius_mm, stations) for one in maps]
+    return np.min(each, axis=0)
 
 
-def _filled(seen: Differs, rings: Rounded, radius_mm: float, stations: int) -> np.ndarray:
-    """By how much more (n,) the picture differs within the outer outlines of rings than beyond."""
-    limb, normals = rings.limb(seen.camera.centre_mm, radius_mm, np.inf, stations)
-    outwards = np.nansum((limb - rings.point_mm[:, None, None]) * normals, axis=(-1, -2))
-    rows, outer = np.arange(len(limb)), np.argmax(outwards, axis=-1)
-    beside = limb[rows, outer, :, None] + radius_mm * _AT[:, None] * normals[rows, outer, :, None]
-    px = seen.camera.project(beside.reshape(-1, 3)).reshape(*beside.shape[:-1], 2) / HALF
-    height, width = seen.field.shape
-    there = np.all((px >= 0.0) & (px < np.array([width, height]) - 1.0), axis=-1)
-    column, row = (np.where(there, px[..., k] + 0.5, 0.0).astype(np.intp) for k in range(2))
-    field = seen.field.ravel().take(row * width + column)
-    told = np.all(there, axis=-1)
-    more = np.mean(field[..., :2], axis=-1) - _BEYOND * np.mean(field[..., 2:], axis=-1)
-    return np.sum(np.where(told, more, 0.0), axis=-1) / np.maximum(
-        np.sum(told, axis=-1), _LEAST_SHARE * stations
-    )
+def _coverage(change: ChangeMap, rings: Rounded, radius_mm: float, stations: int) -> np.ndarray:
+    """Compute how much more (n,) a picture differs within rings (n, 3) than beyond them."""
+    camera = change.camera
+    limb, normals = rings.limb(camera.centre_mm, radius_mm, np.inf, stations)  # (n, 2, stations, 3)
+    outwards = (limb - rings.point_mm[:, None, None]) * normals
+    outer = np.argmax(np.nansum(outwards, axis=(-1, -2)), axis=-1)  # of the two sides
+    rows = np.arange(len(limb))
+    silhouette = limb[rows, outer, :, None]
+    offsets_mm = radius_mm * _OUTWARDS[:, None] * normals[rows, outer, :, None]
+    places = silhouette + offsets_mm  # (n, stations, 4, 3)
+    px = camera.project(places.reshape(-1, 3)).reshape(*places.shape[:-1], 2) / HALF
+    height, width = change.field.shape
+    last = np.array([width, height]) - 1.0
+    is_inside = np.all((px >= 0.0) & (px < last), axis=-1)
+    column = np.where(is_inside, px[..., 0] + 0.5, 0.0).astype(np.intp)
+    row = np.where(is_inside, px[..., 1] + 0.5, 0.0).astype(np.intp)
+    field = change.field.ravel().take(row * width + column)
+    within = np.mean(field[..., :_WITHIN], axis=-1)
+    beyond = np.mean(field[..., _WITHIN:], axis=-1)
+    is_read = np.all(is_inside, axis=-1)  # (n, stations)
+    difference = np.where(is_read, within - _BEYOND * beyond, 0.0)
+    count = np.maximum(np.sum(is_read, axis=-1), _LEAST_SHARE * stations)
+    return np.sum(difference, axis=-1) / count

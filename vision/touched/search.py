@@ -1,21 +1,32 @@
-"""Where the bar is, before any wire is known: looked for by its edges, then by its lines in all cameras."""
+"""Find the touched object from the pictures of one whisk, before any wire is known.
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+A bar is found in three stages. First, its edges: a search over all places where the whisker may
+touch it gives a few axes whose two edges are strong in all cameras (`vision.touched.find`). Second,
+its lines: the pixels about each of these axes say in every camera where the bar's line is and how
+clearly it is a bar (`vision.touched.line`); the axis through these lines is computed
+(`vision.touched.axis`), and measured once more if it moved. The axis with the highest detection
+score over all cameras wins. Third, where not all cameras see it or their planes through it nearly
+coincide, each camera is evaluated alone as well, by the bar's width (`vision.touched.one_view`),
+and replaces the axis if it scores clearly higher. Rings, spheres and cones have their own search,
+`vision.touched.rounded_search`.
+"""
+
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import Axis, BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.change import HALF
-from vision.pictures.view import View, median_of
+from vision.pictures.view import View
 from vision.touched.axis import settle_axis
-from vision.touched.find import Clear, clear_edges, find_bars
+from vision.touched.edge_map import EdgeMap, compute_edge_map
+from vision.touched.find import find_bars
 from vision.touched.line import BarLineEstimate, find_lines, find_lines_farther, measure_bars
 from vision.touched.one_view import (
     find_bars_alone,
@@ -24,59 +35,68 @@ from vision.touched.one_view import (
     widest_angle_rad,
 )
 from vision.touched.rounded_search import see_rounded
+from vision.touched.search_scene import SearchScene, still_picture
 
-# [rad] Planes through the bar nearer to each other than this have it at another slope as soon as
-# one line is a little off. Study: bar_scenes.py.
+# [rad] Where the cameras' planes through the bar are nearer to each other than this, a small error
+# of one line gives it another slope. Study: bar_scenes.py.
 _NARROW_RAD = np.radians(8.0)
-# [log] What a camera that shows the place but no edge takes from a hypothesis: bars are 5 to 9
-# clear. Study: bar_scenes.py.
+# [log] What a camera that shows the place but no edge takes from the score of a hypothesis: bars
+# score 5 to 9. Study: bar_scenes.py.
 _NO_EDGES = 3.0
-# [px] Lines that lay so near to where they were looked for are not looked at again: half of a
-# quick look's blur. From 1.5 px the width in one camera moved by 3.8 of its sigma. Study:
+# [px] Lines that lie so near to where they were expected are not measured again: half of a quick
+# measurement's blur. From 1.5 px the width in one camera moved by 3.8 of its sigma. Study:
 # bar_scenes.py.
-_STOOD_PX = 0.5
-# [log] By so much one camera's axis must be clearer than one that edges in all cameras led to;
-# looks at one axis differ by 0.5. Study: bar_scenes.py.
+_CONVERGED_PX = 0.5
+# [log] By so much one camera's axis must score higher than one that edges in all cameras led to;
+# two measurements about the same axis differ by 0.5. Study: bar_scenes.py.
 _CLEARER = 1.0
-# [lines] Over the stroke: where pieces of the bar may show the wire, too. Set by eye. Study:
-# bar_scenes.py.
-_WIRES = 8
-_NO_BAR = "no bar of diameter {:g} mm is seen near the whisker; record with the bar in view of every camera"
-# [frames] More would not make the bar clearer; a wire that moves vanishes. Study: bar_scenes.py.
-_MEDIAN_OF = 11
+_NO_BAR = (
+    "no bar of diameter {:g} mm is seen near the whisker; "
+    "record with the bar in view of every camera"
+)
 
 
 @dataclass(frozen=True)
 class SeenBar:
-    """An axis and the lines of the bar by which it was settled; of a rounded object none."""
+    """The axis of the touched object, and by camera the bar's lines that it passes through.
+
+    Of a rounded object there are no lines.
+    """
 
     axis: Axis
     lines: Mapping[str, BarLineEstimate]
 
     @property
     def seen_by(self) -> list[str]:
-        """The cameras that see a bar there, and its edges."""
+        """Return the names of the cameras that see a bar there, and its edges."""
         return [name for name, line in self.lines.items() if line.has_edges]
 
     @property
-    def clearness(self) -> float:
-        """How clearly all cameras see a bar there. Not by the evidence: each hypothesis has its own pixels, and a wrong
-        one along something bright in one camera has more evidence there than the bar has in both. A camera that shows
-        the place and no edge there speaks against it."""
-        return sum(
+    def detection_score(self) -> float:
+        """Return how clearly all cameras see a bar there: a sum of logs, higher is clearer.
+
+        A camera that shows the place and no edge there counts against it. The evidence is no such
+        score: each hypothesis has its own pixels, and a wrong one along something bright in one
+        camera has more evidence there than the bar has in both.
+        """
+        scores = [
             max(line.detection_score, 0.0) if line.has_edges else -_NO_EDGES
             for line in self.lines.values()
-        )
+        ]
+        return sum(scores)
 
     @property
-    def stood(self) -> bool:
-        """Whether the lines lie where they were looked for: another look from there would see the same."""
-        return all(np.all(np.abs(line.line) < _STOOD_PX) for line in self.lines.values())
-
-    @property
-    def at_best(self) -> float:
-        """How clearly, were its edges seen in all of them."""
+    def highest_score(self) -> float:
+        """Return the detection score that it would have if all cameras saw its edges."""
         return sum(max(line.detection_score, 0.0) for line in self.lines.values())
+
+    @property
+    def converged(self) -> bool:
+        """Return whether the lines lie where they were expected.
+
+        Another measurement from there would give the same.
+        """
+        return all(np.all(np.abs(line.line) < _CONVERGED_PX) for line in self.lines.values())
 
 
 def see_bar(
@@ -86,83 +106,120 @@ def see_bar(
     motor_rad: np.ndarray,
     settings: VisionSettings,
 ) -> SeenBar:
-    """The bar from the pictures of all frames, before any wire is known. Raises Refused where none is seen.
+    """Find the touched object in the pictures of all frames, before any wire is known.
 
-    Of the axes whose edges are clear in all cameras, that whose lines are the best seen in all of them. Where the
-    sights of all cameras are nearly the same, or not all see it, each is asked alone, too: by its two edges one camera
-    tells roughly how far away a bar is, and finds no other for it.
+    motor_rad (n,): motor angles of all frames. Raises Refused where nothing like it is seen.
     """
     if rods.bar.form is not None:
-        return SeenBar(see_rounded(views, cameras, rods, motor_rad, settings, _median_picture), {})
-    span = float(np.min(motor_rad)), float(np.max(motor_rad))
-    clear = [
-        clear_edges(
-            view.camera, _median_picture(view), view.background[::HALF, ::HALF], rods, sum(span) / 2
-        )
-        for view in views
-    ]
+        return SeenBar(see_rounded(views, cameras, rods, motor_rad, settings, still_picture), {})
+    search = BarSearch(SearchScene(views, cameras, rods, motor_rad, settings))
     if len(views) == 1:
-        return SeenBar(_alone(views[0], clear[0], rods, motor_rad, settings), {})
-    wires = {
-        view.camera.name: resting_lines(view.camera, rods.wire, np.linspace(*span, _WIRES))
-        for view in views
-    }
+        return SeenBar(search.axis_of_one_camera(views[0]), {})
+    by_all = search.best_by_all_cameras()
+    sees_all = len(by_all.seen_by) == len(views)
+    if sees_all and widest_angle_rad(cameras, by_all.axis) > _NARROW_RAD:
+        return by_all
+    return search.measured_finely(search.best_with_single_cameras(by_all))
 
-    def by_lines(axis: BarAxis, lines: Mapping[str, BarLineEstimate]) -> BarAxis:
+
+class BarSearch:
+    """The search for a straight bar in one scene, stage by stage, see the module's introduction."""
+
+    def __init__(self, scene: SearchScene):
+        """Compute the edge map of every camera."""
+        self.scene = scene
+        self.edge_maps: dict[str, EdgeMap] = {}
+        for view in scene.views:
+            self.edge_maps[view.camera.name] = compute_edge_map(
+                view.camera,
+                still_picture(view),
+                view.background[::HALF, ::HALF],
+                scene.rods,
+                scene.mid_motor_rad,
+            )
+
+    def best_by_all_cameras(self) -> SeenBar:
+        """Find the bar by the edges in all cameras: that with the highest detection score."""
+        scene = self.scene
+        axes = find_bars(list(self.edge_maps.values()), scene.rods, scene.motor_range_rad)
+        best = self._most_probable([self._measured(axis) for axis in axes])
+        # A bar whose rims are dark was found by its highlight: its lines lie farther away.
+        farther = find_lines_farther(best.lines)
+        there = SeenBar(self._axis_through(best.axis, farther), farther)
+        best = max(best, there, key=_detection_score)
+        return best if best.converged else self._measured(best.axis)
+
+    def best_with_single_cameras(self, by_all: SeenBar) -> SeenBar:
+        """Return the bar by all cameras, or by a single one where that scores clearly higher.
+
+        Where all cameras stand on one side of the bar, the single cameras come first: they alone
+        know how far away it is. Raises Refused where no camera sees a bar.
+        """
+        found = [by_all] if by_all.seen_by else []
+        for view in self.scene.views:
+            with suppress(Refused):
+                alone = self._measured(self.axis_of_one_camera(view))
+                if view.camera.name in alone.seen_by:
+                    found.append(alone)
+        if not found:
+            raise Refused(_NO_BAR.format(2.0 * self.scene.radius_mm), code="no_bar_seen")
+        if len(found) > 1 and seen_from_one_side(self.scene.cameras, found[1].axis):
+            found = found[1:]
+        first = found[0]
+        clearest = max(found, key=_detection_score)
+        is_clearer = clearest.detection_score > first.detection_score + _CLEARER
+        return clearest if is_clearer else first
+
+    def axis_of_one_camera(self, view: View) -> BarAxis:
+        """Compute the axis by one camera alone.
+
+        Raises Refused where its edges do not say how far away it is.
+        """
+        scene = self.scene
+        edges = self.edge_maps[view.camera.name]
+        first = find_bars_alone(edges, scene.rods, float(np.mean(scene.motor_rad)))[0]
+        wire = scene.rods.wire
+        return see_bar_alone(first, view, wire, scene.radius_mm, scene.motor_rad, scene.settings)
+
+    def measured_finely(self, bar: SeenBar) -> SeenBar:
+        """Return the bar with its axis through finely measured lines.
+
+        A quick measurement may turn the axis about the line of sight.
+        """
+        scene = self.scene
+        lines = measure_bars(scene.views, bar.axis, scene.radius_mm, scene.wires_px, scene.settings)
+        return replace(bar, axis=self._axis_through(bar.axis, lines))
+
+    def _measured(self, axis: BarAxis) -> SeenBar:
+        """Measure the lines about an axis quickly, and return the axis through them."""
+        scene = self.scene
+        lines = find_lines(scene.views, axis, scene.radius_mm, scene.wires_px, scene.settings)
+        return SeenBar(self._axis_through(axis, lines), lines)
+
+    def _axis_through(self, axis: BarAxis, lines: Mapping[str, BarLineEstimate]) -> BarAxis:
+        """Return the axis through those lines that are a bar's.
+
+        lines: by camera, measured about the axis given.
+        """
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
-        return settle_axis(axis, cameras, bars, rods.bar.radius_mm)
+        return settle_axis(axis, self.scene.cameras, bars, self.scene.radius_mm)
 
-    def settled(axis: BarAxis) -> SeenBar:
-        lines = find_lines(views, axis, rods.bar.radius_mm, wires, settings)
-        return SeenBar(by_lines(axis, lines), lines)
+    def _most_probable(self, bars: Sequence[SeenBar]) -> SeenBar:
+        """Return the bar with the highest detection score after a second measurement.
 
-    likely = _likeliest((settled(axis) for axis in find_bars(clear, rods, span)), settled)
-    lines = find_lines_farther(likely.lines)  # a bar whose rims are dark, found by its highlight
-    best = max(likely, SeenBar(by_lines(likely.axis, lines), lines), key=lambda one: one.clearness)
-    best = best if best.stood else settled(best.axis)
-    if len(best.seen_by) == len(views) and widest_angle_rad(cameras, best.axis) > _NARROW_RAD:
+        Bars that have converged are not measured again, nor those that would score lower than the
+        best so far even if all cameras saw their edges.
+        """
+        best = None
+        for bar in sorted(bars, key=lambda one: one.highest_score, reverse=True):
+            if best is not None and bar.highest_score <= best.detection_score:
+                continue
+            again = bar if bar.converged else self._measured(bar.axis)
+            if best is None or again.detection_score > best.detection_score:
+                best = again
         return best
-    found = [best] if best.seen_by else []
-    for view, one in zip(views, clear):
-        with suppress(Refused):
-            seen = settled(_alone(view, one, rods, motor_rad, settings))
-            found += [seen] if view.camera.name in seen.seen_by else []
-    if not found:
-        raise Refused(_NO_BAR.format(2.0 * rods.bar.radius_mm), code="no_bar_seen")
-    if len(found) > 1 and seen_from_one_side(cameras, found[1].axis):
-        found = found[1:]
-    clearer = max(found, key=lambda one: one.clearness)
-    chosen = clearer if clearer.clearness > found[0].clearness + _CLEARER else found[0]
-    lines = measure_bars(
-        views, chosen.axis, rods.bar.radius_mm, wires, settings
-    )  # a quick look turns the one sight
-    return replace(chosen, axis=by_lines(chosen.axis, lines))
 
 
-def _likeliest(found: Iterable[SeenBar], settled: Callable[[BarAxis], SeenBar]) -> SeenBar:
-    """The clearest when settled once more, where its lines lay elsewhere; what was less clear before, its edges taken
-    for seen, is not asked again."""
-    best = None
-    for one in sorted(found, key=lambda one: one.at_best, reverse=True):
-        if best is None or one.at_best > best.clearness:
-            again = one if one.stood else settled(one.axis)
-            best = max(filter(None, [best, again]), key=lambda one: one.clearness)
-    return best
-
-
-def _alone(view: View, clear: Clear, rods: Rods, motor_rad, settings: VisionSettings) -> BarAxis:
-    """The axis as one camera alone sees it. Raises Refused where it sees none, or not how far away it is."""
-    first = find_bars_alone(clear, rods, float(np.mean(motor_rad)))[0]
-    return see_bar_alone(first, view, rods.wire, rods.bar.radius_mm, motor_rad, settings)
-
-
-def _median_picture(view: View) -> np.ndarray:
-    """Median of some frames at every HALF-th pixel: a wire that moves vanishes. Where rods are known, a mean without
-    these: one that rests on the bar vanishes, too."""
-    median = median_of(
-        [np.ascontiguousarray(picture[::HALF, ::HALF]) for picture in view.some(_MEDIAN_OF)]
-    )
-    if view.itself is None:
-        return median
-    mean = view.mean[::HALF, ::HALF]
-    return np.where(np.isnan(mean), median, mean)
+def _detection_score(bar: SeenBar) -> float:
+    """Return a bar's detection score, as a key to compare bars by."""
+    return bar.detection_score

@@ -19,8 +19,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.find import clear_edges, climb
-from vision.touched.find import edges_px as edges_of
+from vision.touched.edge_map import compute_edge_map, edge_strength_tensor
+from vision.touched.grid_search import climb
 from vision.touched.one_view import find_bars_alone
 from vision.touched.search import see_bar
 
@@ -32,7 +32,7 @@ def test_squares_of_the_board_in_a_soft_shadow_are_no_edges(rng):
     shadow = 1.0 - 0.5 / (1.0 + np.exp((x - 60.0) / 12.0))
     seen = np.where(np.abs(x - 140.0) < 8.0, 100.0, board * shadow)
     noisy = [picture + rng.standard_normal(board.shape) for picture in (seen, board)]
-    edges = edges_of(*noisy, 1.0)
+    edges = edge_strength_tensor(*noisy, 1.0)
     across = edges[20:-20, :, 0]
     assert np.mean(np.max(across[:, 131:135], axis=1)) > 0.5
     assert np.mean(across[:, [24, 25, 49, 50, 74, 75, 99, 100]]) < 0.1
@@ -50,10 +50,10 @@ def test_a_polished_bar_over_squares_is_found_by_one_camera(rng):
         np.column_stack([np.eye(3), [-50.0, 0.0, AWAY_MM]]),
     )
     rods = Rods(Wire("cylinder", 100.0, 0.5), Bar(2.0 * RADIUS_MM))
-    clear = clear_edges(
+    edge_map = compute_edge_map(
         camera, view.mean[::HALF, ::HALF], view.background[::HALF, ::HALF], rods, 0.0
     )
-    found = find_bars_alone(clear, rods, 0.0)[0]
+    found = find_bars_alone(edge_map, rods, 0.0)[0]
     px = camera.project(found.point_mm + np.array([-8.0, 8.0])[:, None] * found.direction)
     off = (px - CENTRE) @ [-np.sin(angle), np.cos(angle)] - np.mean(edges_px(across_mm))
     assert np.max(np.abs(off)) < 4.0

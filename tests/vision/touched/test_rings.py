@@ -12,11 +12,12 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.rounded_search import placed, see_rounded
+from vision.touched.rounded_places import touched_first
+from vision.touched.rounded_search import see_rounded
 
 FORM, RADIUS_MM = Form("ring", ring_diameter_mm=60.0), 3.0
 RODS, MOTOR_RAD = Rods(WIRE, Bar(2.0 * RADIUS_MM, 0.0, FORM)), np.radians(np.linspace(0.5, 4.5, 5))
-STANDS = placed(
+STANDS = touched_first(
     FORM,
     RODS,
     np.array([[57.3, np.radians(2.2), np.radians(23.0), np.radians(3.0), np.radians(-7.0)]]),

@@ -1,0 +1,140 @@
+"""Coarse-to-fine search for the most probable of many hypotheses about where an object is.
+
+A hypothesis is a row of k numbers, such as a distance along the whisker, a motor angle and a slope.
+First all hypotheses of a regular grid are scored on blurred measurements, so that the true object
+scores at a grid point half a step away from it. Non-maximum suppression keeps the best of them that
+are no neighbours of a better one. Then a few passes follow, each on sharper measurements: every
+hypothesis climbs to the best of its neighbours by ever smaller steps, and those that arrive at the
+same place are suppressed. What is left is at most a handful of hypotheses, the best first. Bars,
+rings, spheres and cones are all found this way: they differ in what the numbers mean and in the
+score.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# [steps] Most steps of a climb; it ends earlier. Study: bar_scenes.py.
+_MOST_CLIMBS = 20
+# [halvings] Of a climb's first step: a quarter of it is less than the lines of a bar correct.
+# Study: bar_scenes.py.
+_HALVINGS = 2
+# [1] A step that gains no more than this score is no gain. Set by eye. Study: bar_scenes.py.
+_LEAST_GAIN = 1e-3
+# [values] Of the motor angle: fewer are no grid. Stated.
+_FEWEST_ANGLES = 3
+
+Score = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class SearchPass:
+    """One pass of `coarse_to_fine`.
+
+    score: function of hypotheses (n, k) that returns their scores (n,), the higher the better.
+    step_share: a climb's first step over the step of the search. separation_share: hypotheses that
+    end nearer to each other than this many steps of the search count as one. kept: number of
+    hypotheses that go on to the next pass.
+    """
+
+    score: Score
+    step_share: float
+    separation_share: float
+    kept: int
+
+
+def coarse_to_fine(
+    values: Sequence[np.ndarray],
+    steps: np.ndarray,
+    passes: Sequence[SearchPass],
+    separation: float,
+    starts: int,
+) -> np.ndarray:
+    """Return the best hypotheses (n, k) after the last pass, the best first.
+
+    values: k arrays, the grid's values of each number. steps (k,): the step of the search in each
+    number; 0 holds a number at its grid values. separation: least distance between two hypotheses
+    of the grid that go on, in steps. starts: number of hypotheses of the grid that go on.
+    """
+    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    best = suppress_neighbours(grid, passes[0].score(grid), separation * steps, starts)
+    for one in passes:
+        tops, scores = climb(best, steps * one.step_share, one.score)
+        best = suppress_neighbours(tops, scores, one.separation_share * steps, one.kept)
+    return best
+
+
+def half_steps(values: Sequence[np.ndarray]) -> np.ndarray:
+    """Return half the distance (k,) between neighbours of each of k regular grids of values."""
+    spacing = [grid[1] - grid[0] for grid in values]
+    return 0.5 * np.array(spacing)
+
+
+def touch_angles(motor_rad: tuple[float, float], length_mm: float, step_mm: float) -> np.ndarray:
+    """Return motor angles (n,) from the lowest to the highest.
+
+    step_mm: their distance on the arc of the whisker's middle.
+    """
+    arc_mm = np.ptp(motor_rad) * 0.5 * length_mm
+    count = int(np.ceil(arc_mm / step_mm))
+    return np.linspace(*motor_rad, max(_FEWEST_ANGLES, count))
+
+
+def suppress_neighbours(
+    hypotheses: np.ndarray, scores: np.ndarray, separation: np.ndarray, most: int
+) -> np.ndarray:
+    """Return the best hypotheses without neighbours of better ones (non-maximum suppression).
+
+    At most so many are returned. hypotheses (n, k), scores (n,). Two are neighbours where no number
+    differs by more than its separation (k,).
+    """
+    remaining = hypotheses[np.argsort(scores)[::-1]]
+    chosen = []
+    while len(remaining) and len(chosen) < most:
+        best = remaining[0]
+        chosen.append(best)
+        is_apart = np.any(np.abs(remaining - best) > separation, axis=1)
+        remaining = remaining[is_apart]
+    return np.array(chosen)
+
+
+def climb(
+    starts: np.ndarray, first_step: np.ndarray, score: Score
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the local maxima (n, k) that hypotheses (n, k) climb to, and their scores (n,).
+
+    A neighbour differs by one step in two numbers at most. Where no neighbour is better, the step
+    is halved, from first_step (k,) on.
+    """
+    k = len(first_step)
+    signs = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * k, indexing="ij"), axis=-1).reshape(-1, k)
+    is_near = np.sum(signs != 0.0, axis=1) <= 2
+    steps = first_step * signs[is_near]  # (neighbours, k), the hypothesis itself among them
+    best = starts.copy()
+    highest = np.full(len(starts), -np.inf)
+    step_share = np.ones(len(starts))
+    for _ in range(_MOST_CLIMBS):
+        going = np.flatnonzero(step_share >= 0.5**_HALVINGS)
+        if not len(going):
+            break
+        around = best[going, None] + step_share[going, None, None] * steps  # (going, neighbours, k)
+        scores = score(around.reshape(-1, k)).reshape(len(going), -1)
+        rows = np.arange(len(going))
+        chosen = np.argmax(scores, axis=1)
+        reached = scores[rows, chosen]
+        has_gained = reached > highest[going] + _LEAST_GAIN
+        step_share[going] = np.where(has_gained, step_share[going], 0.5 * step_share[going])
+        best[going] = around[rows, chosen]
+        highest[going] = reached
+    return best, highest
+
+
+def score_in_batches(score: Score, hypotheses: np.ndarray, batch: int) -> np.ndarray:
+    """Return the scores (n,) of hypotheses (n, k), evaluated so many at a time.
+
+    A batch's arrays fit the processor's cache.
+    """
+    batches = np.array_split(hypotheses, -(-len(hypotheses) // batch))
+    scores = [score(some) for some in batches]
+    return np.concatenate(scores)

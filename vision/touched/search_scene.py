@@ -1,0 +1,72 @@
+"""The pictures of one whisk, its cameras and rods: all that a search for the object needs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import resting_lines
+from vision.geometry.rods import Rods
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.change import HALF
+from vision.pictures.view import View, median_of
+
+# [lines] Of the straight wire over the stroke: where pieces of the object may show the wire, too.
+# Set by eye. Study: bar_scenes.py.
+_WIRES = 8
+# [frames] More would not make the object clearer; a wire that moves vanishes. Study: bar_scenes.py.
+_MEDIAN_OF = 11
+
+
+@dataclass(frozen=True)
+class SearchScene:
+    """The pictures of one whisk before any wire is known.
+
+    motor_rad (n,): motor angles of all frames.
+    """
+
+    views: Sequence[View]
+    cameras: Cameras
+    rods: Rods
+    motor_rad: np.ndarray
+    settings: VisionSettings
+
+    @property
+    def motor_range_rad(self) -> tuple[float, float]:
+        """Return the lowest and the highest motor angle, rad."""
+        return float(np.min(self.motor_rad)), float(np.max(self.motor_rad))
+
+    @property
+    def mid_motor_rad(self) -> float:
+        """Return the middle of the stroke, rad."""
+        return sum(self.motor_range_rad) / 2
+
+    @property
+    def radius_mm(self) -> float:
+        """Return the radius of the touched object, mm."""
+        return self.rods.bar.radius_mm
+
+    @cached_property
+    def wires_px(self) -> Mapping[str, Sequence[np.ndarray]]:
+        """Return by camera the lines (m, 2) px where the straight wire lies over the stroke."""
+        angles_rad = np.linspace(*self.motor_range_rad, _WIRES)
+        return {
+            view.camera.name: resting_lines(view.camera, self.rods.wire, angles_rad)
+            for view in self.views
+        }
+
+
+def still_picture(view: View) -> np.ndarray:
+    """Return the picture (h, w) of what stands still, at every HALF-th pixel.
+
+    It is the median of some frames. A wire that moves vanishes. Where rods are known it is the mean
+    without these, so that a wire that rests on the bar vanishes, too.
+    """
+    frames = [np.ascontiguousarray(frame[::HALF, ::HALF]) for frame in view.some(_MEDIAN_OF)]
+    median = median_of(frames)
+    if view.itself is None:
+        return median
+    mean = view.mean[::HALF, ::HALF]
+    return np.where(np.isnan(mean), median, mean)
