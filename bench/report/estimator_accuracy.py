@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtr
 
 from bench.base.drawing import label_of
 from bench.records.trial_result import TrialResult, whisks
@@ -103,7 +103,9 @@ class Accuracy:
     @property
     def is_covered(self) -> bool:
         """Return whether as many 95 % intervals hold the truth as chance lets one expect."""
-        chance = binom.cdf(self.intervals_holding, self.intervals, INTERVAL_SHARE)
+        chance = bdtr(
+            self.intervals_holding, self.intervals, INTERVAL_SHARE
+        )  # of no more than these
         return self.intervals > 0 and bool(chance >= LEAST_CHANCE)
 
     def is_worse_than(self, other: "Accuracy") -> bool:
