@@ -1,4 +1,4 @@
-"""The bar in every camera: searched for, its line and edges measured, its axis in space.
+"""The touched object: searched for in all cameras, its silhouette measured in each, its place in space.
 
-May import geometry, pictures, lines.
+May import geometry, pictures, wire.
 """

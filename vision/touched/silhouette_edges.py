@@ -32,7 +32,7 @@ from vision.wire.points import LinePoints
 # [segments] Of each side of an outline, some 60 px long each: as many as a bar has in 72 mm, and
 # two. Set by eye. Study: rounded_seen.py.
 SEGMENTS_OF_SIDE = 8
-# [px] Of the object, read inside an edge: as of a thick bar, and one. Stated.
+# [px] Depth inside an edge that is read: that of a thick bar, and one pixel more. Stated.
 _INSIDE_PX = 9.0
 # [px] Least half width: what is thinner has both edges in one. Stated.
 _LEAST_HALF_PX = 5.0

@@ -180,8 +180,8 @@ class Pieces:
 def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
     """Cut bands into segments of length_px steps; what is left over at a band's end is not used.
 
-    Bands with another background, as all have or none, are for a pass that fits no shading: the
-    slopes and curvatures of their segments are 0.
+    Either all bands have a second background (`still`) or none has. Where they have, the pass fits no
+    shading, and slopes and curvatures are 0.
     """
     counts = [len(band.place) // length_px for band in bands]
     if not any(counts):

@@ -5,8 +5,9 @@ wire is; all segments of a curve together do. So no segment decides. Each spread
 rod may be, and of all smooth curves the one with most votes is taken (the Hough transform; for
 targets in noise, "track before detect").
 
-A pixel is no rod's where either of two pictures explains it: the one without rods, which has no
-shadow of hub and bar, or what stands still in the trial, which a moving wire is not in.
+A pixel does not show the rod where one of two pictures explains it. The picture without rods lacks
+the shadows of hub and bar. The picture of what stands still in the trial has these shadows, and not
+the wire, which moves.
 """
 
 from collections.abc import Sequence

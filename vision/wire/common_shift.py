@@ -36,9 +36,9 @@ _MOST_STRENGTH = 1.0
 _ROUNDS = 12
 # [rounds] After which shifts without a chance are dropped. Study: wire_scenes.py.
 _FIRST_ROUNDS = 2
-# [1] Twice the log of how much less probable a dropped shift is after the first rounds: in seven
-# scenes none that ended within 80 of the best, where its weight is e⁻²⁰, was more than 125 above it
-# then. Not measured by a script.
+# [1] A shift is dropped where after the first rounds minus twice its log evidence exceeds the best
+# by this. In seven scenes every shift that ended within 80 of the best (a weight of e⁻²⁰) was at most
+# 125 above it at that stage. Not measured by a script.
 NO_CHANCE = 200.0
 # [1] Of the evidence: strengths are fitted to the pixels that they explain, and what the model
 # lacks is alike in all segments. In 65 views of 30 path-traced scenes the log probability of the

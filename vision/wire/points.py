@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# [causes] Of errors that the segments of a camera share, so many are handed on: 93 to 100 % of that
-# variance before an even background. Study: starts.py.
+# [causes] Number of shared causes of error that line points carry. Before an even background these
+# hold 93 to 100 % of the variance that segments share; the rest goes into sigma_px. Study: starts.py.
 SHARED = 4
 
 
