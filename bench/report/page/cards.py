@@ -4,24 +4,16 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from markupsafe import Markup
-
 from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
 from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
-from bench.report.page.plane import (
-    force_angle_over_stroke,
-    moments_over_stroke,
-    sensing_plane,
-    slip_over_stroke,
-)
 from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
+from bench.report.planes import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
-from bench.session.whisker import Whisker
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
 
@@ -40,21 +32,20 @@ class Cell:
 
 @dataclass(frozen=True)
 class Card:
-    """A whisk's card. numbers: (name, value with sigma); estimates: rows of the table of estimators; pictures: alt text
-    and source; plots: drawings; doubts: (what, cure)."""
+    """A whisk's card. numbers: (name, value with sigma); estimates: rows of the table of estimators; pictures: (alt text,
+    source) of each; doubts: (what, cure)."""
 
     key: str
     title: str
     subtitle: str
     numbers: tuple[tuple[str, str], ...]
     estimates: tuple[tuple[str, ...], ...]
-    picture: tuple[str, str] | None
-    plots: tuple[Markup, ...]
+    pictures: tuple[tuple[str, str], ...]
     doubts: tuple[tuple[str, str], ...]
 
 
-def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
-    """The card of one whisk. whisks: of the whole session."""
+def card(row: Row, out: Path, whisks: int) -> Card:
+    """Return the card of one whisk. whisks: how many the whole session has."""
     trial, seen = row.result.trial, row.seen
     said = [
         trial.surface,
@@ -63,18 +54,6 @@ def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
     ]
     rests_on = counted(seen.cameras, "camera"), counted(seen.frames_used, "frame")
     subtitle = ", ".join([*filter(None, said), *rests_on])
-    source = (
-        picture_source(out, f"overlays/{row.trial}_{seen.whisk}.png", whisks)
-        if seen.overlay
-        else ""
-    )
-    alt = f"{row.name}: wire, bar and contact as found, drawn on the frames at touch and at θ of every camera"
-    plots = (
-        sensing_plane(row),
-        slip_over_stroke(row),
-        force_angle_over_stroke(row),
-        moments_over_stroke(row, whisker),
-    )
     status = status_of(seen, row.felt)
     return Card(
         row.key,
@@ -82,10 +61,23 @@ def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
         subtitle,
         tuple(numbers(row)),
         tuple(_estimate(row, answer) for answer in row.felt.estimates),
-        (alt, source) if source else None,
-        tuple(filter(None, plots)),
+        _pictures(row, out, whisks),
         tuple((said, cure_of([code])) for code, said in status.parts if code not in SILENT),
     )
+
+
+def _pictures(row: Row, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
+    """Return (alt text, source) of the pictures of a whisk that are in the results' folder."""
+    which = f"{row.trial}_{row.seen.whisk}.png"
+    found = []
+    if row.seen.overlay:
+        alt = (
+            "wire, bar and contact as found, drawn on the frames at touch and at θ of every camera"
+        )
+        found.append((alt, picture_source(out, f"overlays/{which}", whisks)))
+    alt = "sensing plane, and slip, force angle and moments over the pushing angle"
+    found.append((alt, picture_source(out, plane_name(row.trial, row.seen.whisk), whisks)))
+    return tuple((f"{row.name}: {alt}", source) for alt, source in found if source)
 
 
 def numbers(row: Row) -> list[tuple[str, str]]:
