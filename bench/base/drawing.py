@@ -1,11 +1,14 @@
 """What all figures share: look, colours, and files that are written whole with the hash of what they show."""
 
+import io
+import re
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 import cv2
 import numpy as np
@@ -14,6 +17,7 @@ from PIL import Image
 from bench.base.atomic import whole_file, write_whole
 
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn: tables and names go without
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = {
@@ -111,6 +115,43 @@ def label_of(estimator: str) -> str:
     return LABELS.get(estimator, estimator.partition(":")[2] or estimator)
 
 
+def whisk_url(trial: str, whisk: int) -> str:
+    """Return the link that a drawn point of a whisk carries; the page leads it to the whisk's card."""
+    return f"whisk:{quote(trial, safe='')}/{whisk}"
+
+
+def draw_whisks(
+    axes: "Axes",
+    x: Sequence[float],
+    y: Sequence[float],
+    sigma: Sequence[float],
+    urls: Iterable[str],
+    *,
+    marker: str,
+    colour: str,
+    is_filled: bool = True,
+    size_points: float = 5.0,
+    label: str | None = None,
+) -> None:
+    """Draw a point with its error bar for each whisk; each point links to its whisk.
+
+    x, y, sigma (n,): in the units of the axes. urls (n,): see `whisk_url`.
+    """
+    axes.errorbar(x, y, sigma, fmt="none", ecolor=colour, elinewidth=1.0, capsize=2.5)
+    points = axes.scatter(
+        x,
+        y,
+        s=size_points**2,
+        marker=marker,
+        facecolors=colour if is_filled else "white",
+        edgecolors=colour,
+        linewidths=0.8,
+        label=label,
+        zorder=3,
+    )
+    points.set_urls(list(urls))
+
+
 def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
     """Write a PNG whole, with the hash of what it shows."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -155,6 +196,21 @@ def publish(
             with whole_file(path) as temporary:
                 figure.savefig(temporary, dpi=dpi, metadata=_UNDATED[name])
     return paths
+
+
+def svg_of(figure: "Figure", name: str) -> str:
+    """Return a figure as an SVG element that may stand in a page beside others.
+
+    name: unique in the page; all ids begin with it. The same figure gives the same text.
+    """
+    _lay_out(figure)
+    buffer = io.StringIO()
+    with _context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata=_UNDATED["svg"])
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text)
 
 
 def is_drawn(path: Path, stamp: str) -> bool:

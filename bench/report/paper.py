@@ -1,9 +1,9 @@
 """The session's figures as Matplotlib has them, and at the width of a journal's column (`--figure-format`)."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
 from bench.analyses.against_theta import against_theta, figure
@@ -14,9 +14,13 @@ from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.drawing import paper_style, publish
 from bench.base.settings import Settings
 from bench.records.trial_result import TrialResult
-from bench.report.figures import error_against_slope
+from bench.report.figures import (
+    error_against_friction,
+    error_against_slope,
+    friction_of_errors,
+    measured,
+)
 from bench.session.whisker import Whisker
-from bench.trials.estimate_errors import judge
 
 FOLDER = "figures"
 # IEEE's journals: one column is 3.5 in wide, both are 7.16 in.
@@ -35,11 +39,11 @@ def session_figures(
     fitted, figures = [f.surface for f in friction], {}
     if fitted:
         figures["fig8"] = figure_8(fitted)
-    judged = [
-        j for j in judge(results) if j.purpose == "measure" and math.isfinite(j.error_percent)
-    ]
+    judged = measured(results)
     if judged:
         figures["error_against_slope"] = error_against_slope(judged, fitted, settings)
+    if friction_of_errors(results):
+        figures["error_against_friction"] = error_against_friction(results)
     rows = list(explained_rows(results, whisker))
     if rows:
         figures["explained"] = draw_explained([*rows, mean_row(rows)])
@@ -69,11 +73,20 @@ def write_paper_figures(
         for name, figure in (
             session_figures(results, friction, whisker, settings).items() if formats else ()
         ):
+            _remove_links(figure)
             width, height = figure.get_size_inches()
             wide = _BOTH_IN if _columns(figure) >= _BESIDE else _COLUMN_IN
             figure.set_size_inches(wide, wide * max(height / width, 0.45))
             paths += publish(figure, out / FOLDER / name, list(dict.fromkeys(formats)), _DPI)
     return paths
+
+
+def _remove_links(figure: Figure) -> None:
+    """Remove the links to whisks, which lead nowhere outside the report."""
+    for artist in figure.findobj():
+        artist.set_url(None)
+        if isinstance(artist, Collection):
+            artist.set_urls(None)
 
 
 def _columns(figure: Figure) -> int:

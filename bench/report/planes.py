@@ -1,5 +1,7 @@
-"""The sensing plane of a trial as in Fig. 4, in mm: bar, contact from P0 to P, virtual point, angles, friction cone."""
+"""One whisk in lines: its sensing plane as in Fig. 4, and slip, force angle and moments over its stroke."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,60 +10,139 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon, Wedge
 
 from bench.base.drawing import is_drawn, save
-from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult
-from bench.report.page.plane import contact_path
+from bench.gauges.gauge_readings import reference_from_pictures
+from bench.records.trial_result import FeltWhisk, SeenTrial, SeenWhisk, TrialResult, whisks
+from bench.session.whisker import Whisker
 
 _WIRE, _BAR, _FORCE, _CONE, _PATH = "#2166ac", "#bdbdbd", "#b2182b", "#fddbc7", "#1b7837"
+_CHANNELS = ("#b2182b", "#2166ac")  # m_y, m_z
 _MARGIN_MM = 2.2
-_PANEL_IN, _AROUND_IN = (6.4, 5.6), (0.55, 0.1, 0.95, 0.3)  # left, right, below and above the axes
+# [in] A layout: the plane at the left, three curves at the right of it. Found by
+# `constrained_layout`, the places of the axes would cost as much again as their drawing.
+_SIZE_IN = (10.4, 5.8)
+_PLANE = (0.055, 0.17, 0.535, 0.77)  # left, bottom, width, height, of the figure
+_CURVES = ((0.68, 0.72, 0.305, 0.225), (0.68, 0.41, 0.305, 0.225), (0.68, 0.10, 0.305, 0.225))
+# [rad] Below this pushing angle the direction of the deflection is noise. Set by eye.
+_LEAST_THETA_RAD = np.radians(0.3)
 _LEAST_DEG, _ROOM_DEG = 3.0, 25.0  # of an angle that is drawn, and of one that its name fits into
 _LABEL_MM = 0.4  # of room that a name takes
 _LEG = {"fontsize": 9, "color": "0.25"}
 
 
+@dataclass(frozen=True)
+class Curve:
+    """A quantity over the pushing angle, and where it was felt: (θ, value, sigma) at one angle."""
+
+    theta_deg: np.ndarray  # (n,)
+    values: np.ndarray  # (n,)
+    sigmas: np.ndarray  # (n,)
+    colour: str
+    label: str
+    felt: tuple[float, float, float] | None = None
+
+
+def plane_name(trial: str, whisk: int) -> str:
+    """Return the name of a whisk's figure in the results' folder."""
+    return f"planes/{trial}_{whisk}.png"
+
+
 def draw_planes(
-    result: TrialResult, friction: tuple[float, str], out: Path, stamp: str
+    result: TrialResult, whisker: Whisker, friction: tuple[float, str], out: Path, stamp: str
 ) -> list[str]:
-    """planes/<trial>.png, a panel for each whisk that was seen to be pushed; nothing where there is none."""
-    whisks = [w for w in result.seen.whisks if w.has_truth and np.isfinite(w.at.d_y_mm.value)]
-    if not whisks:
+    """Draw planes/<trial>_<whisk>.png of each whisk that was seen to be pushed; return their names."""
+    names = []
+    for _, seen, felt in whisks([result]):
+        if not (seen.has_truth and np.isfinite(seen.at.d_y_mm.value)):
+            continue
+        name = plane_name(result.trial.name, seen.whisk)
+        names.append(name)
+        if not is_drawn(out / name, stamp):
+            save(whisk_figure(result, seen, felt, whisker, friction), out / name, stamp, dpi=120)
+    return names
+
+
+def whisk_figure(
+    result: TrialResult,
+    seen: SeenWhisk,
+    felt: FeltWhisk,
+    whisker: Whisker,
+    friction: tuple[float, str],
+) -> Figure:
+    """Draw one whisk: its sensing plane, and slip, force angle and moments over the pushing angle."""
+    figure = Figure(figsize=_SIZE_IN)
+    sensing_plane(figure.add_axes(_PLANE), result, seen, friction)
+    slip, angle, moments = (figure.add_axes(place) for place in _CURVES)
+    _draw_curves(slip, "slip σ  [mm]", slip_over_stroke(seen))
+    _draw_curves(angle, "force angle φ  [°]", force_angle_over_stroke(seen))
+    _draw_curves(moments, "moment  [N·mm]", moments_over_stroke(result, seen, felt, whisker))
+    moments.set_xlabel("pushing angle θ  [°]")
+    return figure
+
+
+def slip_over_stroke(seen: SeenWhisk) -> list[Curve]:
+    """Return the slip in each touching frame."""
+    frames = seen.frames
+    if frames is None:
         return []
-    name = f"planes/{result.trial.name}.png"
-    if not is_drawn(out / name, stamp):
-        columns = min(len(whisks), 3)
-        rows = -(-len(whisks) // columns)
-        figure = Figure(figsize=(_PANEL_IN[0] * columns, _PANEL_IN[1] * rows))
-        grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw=_room(columns, rows))
-        for axes in grid.flat[len(whisks) :]:
-            axes.set_visible(False)
-        for axes, whisk in zip(grid.flat, whisks):
-            sensing_plane(axes, result, whisk, friction)
-        save(figure, out / name, stamp, dpi=130)
-    return [name]
+    touching = np.asarray(frames.touching, dtype=bool)
+    theta_deg = np.degrees(frames.theta_rad.value[touching])
+    slip = frames.slip_mm
+    return [Curve(theta_deg, slip.value[touching], slip.sigma[touching], _WIRE, "seen")]
 
 
-def _room(columns: int, rows: int) -> dict[str, float]:
-    """Where the axes stand: found by `constrained_layout`, each panel would cost as much again as its drawing."""
-    (wide, high), (left, right, bottom, top) = _PANEL_IN, _AROUND_IN
-    inner = wide - left - right, high - bottom - top
-    return {
-        **{
-            "left": left / wide / columns,
-            "right": 1.0 - right / wide / columns,
-            "wspace": (left + right) / inner[0],
-        },
-        **{
-            "bottom": bottom / high / rows,
-            "top": 1.0 - top / high / rows,
-            "hspace": (bottom + top) / inner[1],
-        },
-    }
+def force_angle_over_stroke(seen: SeenWhisk) -> list[Curve]:
+    """Return the direction of the deflection in each touching frame, deg."""
+    frames = seen.frames
+    if frames is None:
+        return []
+    known = np.asarray(frames.touching, dtype=bool) & (frames.theta_rad.value > _LEAST_THETA_RAD)
+    theta_deg = np.degrees(frames.theta_rad.value[known])
+    phi_deg = np.degrees(frames.phi_rad.value[known])
+    sigma_deg = np.degrees(frames.phi_rad.sigma[known])
+    return [Curve(theta_deg, phi_deg, sigma_deg, _WIRE, "seen")]
+
+
+def moments_over_stroke(
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, whisker: Whisker
+) -> list[Curve]:
+    """Return m_y and m_z at the base: of the seen shape over the stroke, and felt at θ."""
+    if seen.deflection is None:
+        return []
+    reference = reference_from_pictures(seen, whisker)
+    if reference is None:
+        return []
+    theta_deg = np.degrees(reference.theta_rad)
+    sigmas = np.sqrt(np.diag(reference.covariance)).reshape(-1, 2)
+    curves = []
+    for channel, (name, value) in enumerate((("m$_y$", felt.m_y_Nmm), ("m$_z$", felt.m_z_Nmm))):
+        at = (result.theta_deg, float(value.value), float(value.sigma))
+        moments = reference.moments[:, channel]
+        curves.append(
+            Curve(theta_deg, moments, sigmas[:, channel], _CHANNELS[channel], name, felt=at)
+        )
+    return curves
+
+
+def _draw_curves(axes: Axes, label: str, curves: Sequence[Curve]) -> None:
+    """Draw curves with a band of one sigma, and as points what was felt."""
+    axes.set_ylabel(label)
+    axes.axhline(0.0, color="0.7", lw=0.7)
+    for curve in curves:
+        low = curve.values - curve.sigmas
+        high = curve.values + curve.sigmas
+        axes.fill_between(curve.theta_deg, low, high, color=curve.colour, alpha=0.22, lw=0)
+        axes.plot(curve.theta_deg, curve.values, color=curve.colour, lw=1.3, label=curve.label)
+        if curve.felt is not None:
+            theta_deg, value, sigma = curve.felt
+            axes.errorbar(theta_deg, value, sigma, fmt="D", ms=4, color=curve.colour, capsize=2.5)
+    if len(curves) > 1:
+        axes.legend(loc="upper left", ncols=2, title="lines seen, points felt", title_fontsize=7)
 
 
 def sensing_plane(
     axes: Axes, result: TrialResult, whisk: SeenWhisk, friction: tuple[float, str]
 ) -> None:
-    """One whisk: y to the right, z up, both in the contact frame from P0 on."""
+    """Draw the sensing plane of one whisk: y to the right, z up, in the contact frame from P0 on."""
     path = contact_path(whisk)
     beta, at = whisk.beta_rad.value, whisk.at
     along, normal = np.array([np.sin(beta), np.cos(beta)]), np.array([-np.cos(beta), np.sin(beta)])
@@ -261,3 +342,12 @@ def _values(whisk: SeenWhisk) -> str:
         f"{name} = {scale * of.value:.{digits}f} ± {scale * of.sigma:.{digits}f} {unit}"
         for name, of, scale, unit, digits in lines
     )
+
+
+def contact_path(whisk: SeenWhisk) -> np.ndarray:
+    """Return the contact (n, 2) y, z in the touching frames, in the contact frame, from P0, mm."""
+    points = whisk.frames.point_mm.value[whisk.frames.touching]
+    cos = np.cos(whisk.touch_rad.value)
+    sin = np.sin(whisk.touch_rad.value)
+    to_contact_frame = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return ((points - whisk.point_mm.value) @ to_contact_frame)[:, 1:]

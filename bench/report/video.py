@@ -13,7 +13,6 @@ import numpy as np
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
 from bench.records.trial_result import SeenWhisk, TrialResult
-from bench.report.page.svg import limits, ticks
 from bench.report.painting import as_8_bit, polyline
 from bench.report.pooled import read_run
 from bench.report.record import SESSION, read_record
@@ -39,6 +38,8 @@ _INK, _GREY, _PAPER = (30, 30, 30), (170, 170, 170), (255, 255, 255)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _AT_ONCE = 32  # frames
 _HALF_BAR_MM = 45.0
+# [1] A layout: of the reach of a curve, on either side.
+_MARGIN = 0.06
 
 
 @dataclass(frozen=True)
@@ -256,15 +257,16 @@ def _plot(panel: np.ndarray, theta: np.ndarray, curve: Curve, k: int) -> None:
     """Draw one curve into its panel (h, w, 3)."""
     height, width = panel.shape[:2]
     left, right, top, bottom = 56, width - 14, 30, height - 26
-    x_limits, y_limits = limits(theta), limits(curve.values[np.isfinite(curve.values)], (0.0, 0.0))
-    x = left + (right - left) * (theta - x_limits[0]) / (x_limits[1] - x_limits[0])
-    y = bottom - (bottom - top) * (curve.values - y_limits[0]) / (y_limits[1] - y_limits[0])
-    for value in ticks(*y_limits, about=3):
-        row = round(bottom - (bottom - top) * (value - y_limits[0]) / (y_limits[1] - y_limits[0]))
+    theta_limits = _limits(theta)
+    limits = _limits(np.append(curve.values[np.isfinite(curve.values)], 0.0))
+    x = np.interp(theta, theta_limits, (left, right))
+    y = np.interp(curve.values, limits, (bottom, top))
+    for value in _ticks(limits, 3):
+        row = round(float(np.interp(value, limits, (bottom, top))))
         cv2.line(panel, (left, row), (right, row), (225, 225, 225), 1)
         _text(panel, f"{value:g}", (6, row + 4), _INK)
-    for value in ticks(*x_limits):
-        column = round(left + (right - left) * (value - x_limits[0]) / (x_limits[1] - x_limits[0]))
+    for value in _ticks(theta_limits, 5):
+        column = round(float(np.interp(value, theta_limits, (left, right))))
         _text(panel, f"{value:g}", (column - 6, height - 8), _INK)
     points = np.stack([x, y], axis=1)
     polyline(panel, points, _GREY)
@@ -272,6 +274,22 @@ def _plot(panel: np.ndarray, theta: np.ndarray, curve: Curve, k: int) -> None:
     cv2.line(panel, (round(x[k]), top), (round(x[k]), bottom), _CONTACT, 1)
     now = f" = {curve.values[k]:.3f}" if np.isfinite(curve.values[k]) else ""
     _text(panel, f"{curve.name}{now}  at theta = {theta[k]:.2f} deg", (left, 18), _INK)
+
+
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    """Return limits that hold all values, with a margin on either side."""
+    low = float(values.min())
+    high = float(values.max())
+    margin = _MARGIN * ((high - low) or abs(high) or 1.0)
+    return low - margin, high + margin
+
+
+def _ticks(limits: tuple[float, float], most: int) -> list[float]:
+    """Return round values within limits."""
+    from matplotlib.ticker import MaxNLocator  # with all of matplotlib
+
+    found = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(*limits)
+    return [value for value in found if limits[0] <= value <= limits[1]]
 
 
 def _text(picture: np.ndarray, text: str, place: tuple[int, int], colour) -> None:

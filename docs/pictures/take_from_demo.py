@@ -9,7 +9,7 @@ from PIL import Image
 
 HERE = Path(__file__).parent
 DEMO = HERE.parents[1] / "demo-out"
-PICTURES = {"overlays/b30_3_0.png": "overlay.jpg", "planes/b60_4.png": "plane.png"}
+PICTURES = {"overlays/b30_3_0.png": "overlay.jpg", "planes/b60_4_0.png": "plane.png"}
 WIDTH_PX = 1200
 
 for source, name in PICTURES.items():

@@ -1,10 +1,8 @@
-"""A whisk's card: its picture, plane, curves and numbers; and its row of the table."""
+"""A whisk's card: its pictures and numbers; and its row of the table."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-
-from markupsafe import Markup
 
 from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
@@ -12,18 +10,13 @@ from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
-from bench.report.page.plane import (
-    force_angle_over_stroke,
-    moments_over_stroke,
-    sensing_plane,
-    slip_over_stroke,
-)
 from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, Row, number, told, with_sigma
+from bench.report.planes import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
-from bench.session.whisker import Whisker
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
+from vision.truth.value import UNKNOWN
 
 SOUND = "sound"
 _DEGREES = math.degrees(1.0)
@@ -31,7 +24,10 @@ _DEGREES = math.degrees(1.0)
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands in the table: text, a number to sort by (None: by the text), and whether narrow pages show it."""
+    """A cell of the table.
+
+    value: a number to sort by; None: the text is sorted by. wide: only wide pages have it.
+    """
 
     text: str
     value: float | None = None
@@ -40,57 +36,70 @@ class Cell:
 
 @dataclass(frozen=True)
 class Card:
-    """A whisk's card. numbers: (name, value with sigma); estimates: rows of the table of estimators; pictures: alt text
-    and source; plots: drawings; doubts: (what, cure)."""
+    """A whisk's card.
+
+    numbers: (name, value with sigma). estimates: rows of the table of estimators. pictures: (alt
+    text, source) of each. doubts: (what is doubtful, cure).
+    """
 
     key: str
     title: str
     subtitle: str
     numbers: tuple[tuple[str, str], ...]
     estimates: tuple[tuple[str, ...], ...]
-    picture: tuple[str, str] | None
-    plots: tuple[Markup, ...]
+    pictures: tuple[tuple[str, str], ...]
     doubts: tuple[tuple[str, str], ...]
 
 
-def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
-    """The card of one whisk. whisks: of the whole session."""
-    trial, seen = row.result.trial, row.seen
-    said = [
-        trial.surface,
-        "" if trial.speed_deg_s is None else f"{trial.speed_deg_s:g}°/s",
-        trial.purpose,
-    ]
-    rests_on = counted(seen.cameras, "camera"), counted(seen.frames_used, "frame")
-    subtitle = ", ".join([*filter(None, said), *rests_on])
-    source = (
-        picture_source(out, f"overlays/{row.trial}_{seen.whisk}.png", whisks)
-        if seen.overlay
-        else ""
-    )
-    alt = f"{row.name}: wire, bar and contact as found, drawn on the frames at touch and at θ of every camera"
-    plots = (
-        sensing_plane(row),
-        slip_over_stroke(row),
-        force_angle_over_stroke(row),
-        moments_over_stroke(row, whisker),
-    )
-    status = status_of(seen, row.felt)
+def card(row: Row, out: Path, whisks: int) -> Card:
+    """Return the card of one whisk. whisks: how many the whole session has."""
+    warnings = []
+    for code, sentence in status_of(row.seen, row.felt).parts:
+        if code not in SILENT:
+            warnings.append((sentence, cure_of([code])))
     return Card(
         row.key,
         row.name,
-        subtitle,
+        _subtitle(row),
         tuple(numbers(row)),
-        tuple(_estimate(row, answer) for answer in row.felt.estimates),
-        (alt, source) if source else None,
-        tuple(filter(None, plots)),
-        tuple((said, cure_of([code])) for code, said in status.parts if code not in SILENT),
+        tuple(_estimate(row, estimate) for estimate in row.felt.estimates),
+        _pictures(row, out, whisks),
+        tuple(warnings),
     )
 
 
+def _subtitle(row: Row) -> str:
+    """Return surface, speed, purpose and what the truth rests on, as far as they are known."""
+    trial = row.result.trial
+    parts = [trial.surface] if trial.surface else []
+    if trial.speed_deg_s is not None:
+        parts.append(f"{trial.speed_deg_s:g}°/s")
+    parts += [
+        trial.purpose,
+        counted(row.seen.cameras, "camera"),
+        counted(row.seen.frames_used, "frame"),
+    ]
+    return ", ".join(parts)
+
+
+def _pictures(row: Row, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
+    """Return (alt text, source) of the pictures of a whisk that are in the results' folder."""
+    which = f"{row.trial}_{row.seen.whisk}.png"
+    found = []
+    if row.seen.overlay:
+        alt = (
+            "wire, bar and contact as found, drawn on the frames at touch and at θ of every camera"
+        )
+        found.append((alt, picture_source(out, f"overlays/{which}", whisks)))
+    alt = "sensing plane, and slip, force angle and moments over the pushing angle"
+    found.append((alt, picture_source(out, plane_name(row.trial, row.seen.whisk), whisks)))
+    return tuple((f"{row.name}: {alt}", source) for alt, source in found if source)
+
+
 def numbers(row: Row) -> list[tuple[str, str]]:
-    """Each quantity with one sigma, what is not known left out."""
-    seen, felt, at = row.seen, row.felt, row.seen.at
+    """Return each quantity with one sigma; what is not known is left out."""
+    seen = row.seen
+    felt = row.felt
     found = [
         ("d_x", told(seen.d_x_mm), "mm"),
         ("touch seen", told(seen.touch_rad, degrees=True), "°"),
@@ -98,65 +107,64 @@ def numbers(row: Row) -> list[tuple[str, str]]:
         ("slope β", told(seen.beta_rad, degrees=True), "°"),
         ("tilt ψ", told(seen.psi_rad, degrees=True), "°"),
     ]
-    if at is not None:
+    if seen.at is not None:
         found += [
-            ("slip σ at θ", told(at.slip_mm), "mm"),
-            ("slip along the whisker", told(at.longitudinal_slip_mm), "mm"),
-            ("deflection d_y", told(at.d_y_mm), "mm"),
-            ("deflection d_z", told(at.d_z_mm), "mm"),
-            ("force angle φ seen", told(at.phi_rad, degrees=True), "°"),
-            ("friction angle α seen", told(at.alpha_rad, degrees=True), "°"),
+            ("slip σ at θ", told(seen.at.slip_mm), "mm"),
+            ("slip along the whisker", told(seen.at.longitudinal_slip_mm), "mm"),
+            ("deflection d_y", told(seen.at.d_y_mm), "mm"),
+            ("deflection d_z", told(seen.at.d_z_mm), "mm"),
+            ("force angle φ seen", told(seen.at.phi_rad, degrees=True), "°"),
+            ("friction angle α seen", told(seen.at.alpha_rad, degrees=True), "°"),
         ]
     found += [
         ("moment m_y felt", told(felt.m_y_Nmm), "N·mm"),
         ("moment m_z felt", told(felt.m_z_Nmm), "N·mm"),
         ("force angle φ felt", told(felt.phi_felt_rad, degrees=True), "°"),
     ]
-    found += [] if seen.beam is None else _beam_numbers(seen.beam)
+    if seen.beam is not None:
+        found += _beam_numbers(seen.beam)
     return [(name, f"{text} {unit}") for name, text, unit in found if text != MISSING]
 
 
 def _beam_numbers(beam: BeamCheck) -> list[tuple[str, str, str]]:
-    """By how much a curve left free moves what the beam with a point load gives."""
+    """Return by how much a curve left free moves what the beam with a point load gives."""
     compared = (
         ("d_x", beam.d_x, 1.0, "mm"),
         ("touch", beam.touch, _DEGREES, "°"),
         ("slip", beam.slip, 1.0, "mm"),
     )
-    return [
-        (
-            f"{name} by a spline, less by the beam",
-            with_sigma(scale * (found.spline - found.beam), scale * found.difference_sigma),
-            unit,
-        )
-        for name, found, scale, unit in compared
-    ] + [("chance that a beam departs so far", number(100.0 * beam.chance, 1), "%")]
+    numbers_found = []
+    for name, found, scale, unit in compared:
+        text = with_sigma(scale * (found.spline - found.beam), scale * found.difference_sigma)
+        numbers_found.append((f"{name} by a spline, less by the beam", text, unit))
+    chance = number(100.0 * beam.chance, 1)
+    return [*numbers_found, ("chance that a beam departs so far", chance, "%")]
 
 
-def _estimate(row: Row, answer: EstimateRow) -> tuple[str, ...]:
-    """Estimator, distance, 95 % interval, error in mm, in per cent, status."""
-    truth, d_x = row.seen.d_x_mm, answer.d_x_est_mm
-    sigma = math.hypot(d_x.sigma, truth.sigma)
-    low, high = answer.d_x_est_low_mm, answer.d_x_est_high_mm
-    interval = (
-        f"{number(low, 1)} to {number(high, 1)}"
-        if math.isfinite(low) and math.isfinite(high)
-        else MISSING
-    )
+def _estimate(row: Row, estimate: EstimateRow) -> tuple[str, ...]:
+    """Return estimator, distance, 95 % interval, error in mm, in per cent, status."""
+    truth = row.seen.d_x_mm
+    d_x = estimate.d_x_est_mm
+    low = estimate.d_x_est_low_mm
+    high = estimate.d_x_est_high_mm
+    interval = MISSING
+    if math.isfinite(low) and math.isfinite(high):
+        interval = f"{number(low, 1)} to {number(high, 1)}"
     error = d_x.value - truth.value
+    sigma = math.hypot(d_x.sigma, truth.sigma)
     percent = 100.0 / truth.value
     return (
-        label_of(answer.estimator),
+        label_of(estimate.estimator),
         told(d_x),
         interval,
         with_sigma(error, sigma, sign=True),
         with_sigma(percent * error, percent * sigma, sign=True),
-        answer.status,
+        estimate.status,
     )
 
 
 def columns(estimators: list[str]) -> list[Cell]:
-    """The table's head."""
+    """Return the table's head."""
     fixed = [
         Cell("trial"),
         Cell("surface", wide=True),
@@ -171,16 +179,18 @@ def columns(estimators: list[str]) -> list[Cell]:
 
 
 def _head(text: str, *, wide: bool = False) -> Cell:
-    """Of a column of numbers."""
+    """Return the head of a column of numbers."""
     return Cell(text, math.nan, wide)
 
 
 def cells(row: Row, estimators: list[str]) -> list[Cell]:
-    """The row of a whisk, in the columns' order, the trial's name apart."""
-    seen, trial = row.seen, row.result.trial
-    late, (alpha, alpha_sigma) = lateness(seen, row.felt), seen_friction(seen)
+    """Return the row of a whisk, in the columns' order, the trial's name apart."""
+    seen = row.seen
+    trial = row.result.trial
+    late = lateness(seen, row.felt)
+    alpha, alpha_sigma = seen_friction(seen)
     speed = math.nan if trial.speed_deg_s is None else trial.speed_deg_s
-    slip = seen.at.slip_mm if seen.at is not None else replace(seen.d_x_mm, value=math.nan)
+    slip = seen.at.slip_mm if seen.at is not None else UNKNOWN
     fixed = [
         Cell(trial.surface, wide=True),
         Cell(f"{speed:g}" if math.isfinite(speed) else MISSING, speed, wide=True),
@@ -190,11 +200,8 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
         _cell(told(late, degrees=True), _DEGREES * late.value, wide=True),
         _cell(with_sigma(_DEGREES * alpha, _DEGREES * alpha_sigma), _DEGREES * alpha, wide=True),
     ]
-    return [
-        *fixed,
-        *(_error(row, name) for name in estimators),
-        Cell(status_of(seen, row.felt) or SOUND),
-    ]
+    errors = [_error(row, name) for name in estimators]
+    return [*fixed, *errors, Cell(status_of(seen, row.felt) or SOUND)]
 
 
 def is_flagged(row: Row) -> bool:
@@ -203,17 +210,18 @@ def is_flagged(row: Row) -> bool:
 
 
 def _error(row: Row, estimator: str) -> Cell:
-    answer = next((a for a in row.felt.estimates if a.estimator == estimator), None)
+    """Return the error of one estimator, per cent of the true distance."""
     truth = row.seen.d_x_mm
-    if answer is None or not math.isfinite(answer.d_x_est_mm.value - truth.value):
-        return Cell(MISSING, math.nan)
-    percent = 100.0 / truth.value
-    error = percent * (answer.d_x_est_mm.value - truth.value)
-    return Cell(
-        with_sigma(error, percent * math.hypot(answer.d_x_est_mm.sigma, truth.sigma), sign=True),
-        error,
-    )
+    for estimate in row.felt.estimates:
+        d_x = estimate.d_x_est_mm
+        if estimate.estimator == estimator and math.isfinite(d_x.value - truth.value):
+            percent = 100.0 / truth.value
+            error = percent * (d_x.value - truth.value)
+            sigma = percent * math.hypot(d_x.sigma, truth.sigma)
+            return Cell(with_sigma(error, sigma, sign=True), error)
+    return Cell(MISSING, math.nan)
 
 
 def _cell(text: str, value: float, *, wide: bool = False) -> Cell:
+    """Return the cell of a number."""
     return Cell(text, float(value), wide)

@@ -24,7 +24,7 @@ _PAPER = """@article{solomon2008artificial,
 
 
 def bibliography(record: RunRecord) -> str:
-    """BibTeX of the program and of the paper whose method it measures."""
+    """Return BibTeX of the program and of the paper whose method it measures."""
     version = record.versions.get("whisker-bench", "unknown")
     program = (
         "@software{whiskerbench,\n"
@@ -38,103 +38,117 @@ def bibliography(record: RunRecord) -> str:
 def methods(
     record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
 ) -> str:
-    """Two paragraphs and two tables, Markdown."""
+    """Return two paragraphs and two tables, as Markdown."""
     accuracy_of_all = accuracies(results)
-    return "\n".join(
-        [
-            f"# Methods: {_plain(record.session)}",
-            "",
-            " ".join(_truth(record, results)),
-            "",
-            " ".join(_estimates(record, results, accuracy_of_all)),
-            "",
-            *_accuracy_table(accuracy_of_all),
-            *_friction_table(friction),
-            "References: results.bib (solomon2008artificial, whiskerbench).",
-            "",
-        ]
-    )
+    lines = [
+        f"# Methods: {_escaped(record.session)}",
+        "",
+        " ".join(_truth(record, results)),
+        "",
+        " ".join(_estimates(record, accuracy_of_all)),
+        "",
+        *_accuracy_table(accuracy_of_all),
+        *_friction_table(friction),
+        "References: results.bib (solomon2008artificial, whiskerbench).",
+        "",
+    ]
+    return "\n".join(lines)
 
 
 def _truth(record: RunRecord, results: Sequence[TrialResult]) -> Iterator[str]:
-    whisker, sure = record.whisker, truth_uncertainty(results)
-    made = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]
+    """Yield the sentences on the whisker, the cameras, and how well the truth is known."""
+    whisker = record.whisker
+    truth = truth_uncertainty(results)
+    form = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]
+    trials = {result.trial.name for result in results if result.trial.purpose == "measure"}
     yield (
-        f"A {made} whisker of {whisker.diameter_mm:g} mm base diameter and {whisker.length_mm:g} mm length "
-        f"(C = 3EI = {whisker.C_Nmm2:.0f} N·mm²) was pushed against a bar in {sure.measured} measured whisks of "
-        f"{len({r.trial.name for r in results if r.trial.purpose == 'measure'})} trials."
+        f"A {form} whisker of {whisker.diameter_mm:g} mm base diameter and {whisker.length_mm:g} mm length "
+        f"(C = 3EI = {whisker.C_Nmm2:.0f} N·mm²) was pushed against a bar in {truth.measured} measured whisks of "
+        f"{len(trials)} trials."
     )
     if not record.cameras:
         yield "No pictures were recorded, so that no truth stands beside the estimates."
         return
-    rms = ", ".join(f"{c.name} {c.rms_px:.3f} px" for c in record.cameras)
-    sizes = sorted({f"{c.size_px[0]} × {c.size_px[1]} px" for c in record.cameras})
+    rms = ", ".join(f"{camera.name} {camera.rms_px:.3f} px" for camera in record.cameras)
+    sizes = {f"{camera.size_px[0]} × {camera.size_px[1]} px" for camera in record.cameras}
     yield (
-        f"{len(record.cameras)} calibrated cameras ({', '.join(sizes)}; RMS reprojection error: {rms}) saw wire and "
-        "bar; their centrelines were fitted together over all frames and cameras, and gave first touch, contact, slope "
-        "of the bar and slip without any use of the gauges."
+        f"{len(record.cameras)} calibrated cameras ({', '.join(sorted(sizes))}; RMS reprojection error: {rms}) saw "
+        "wire and bar; their centrelines were fitted together over all frames and cameras, and gave first touch, "
+        "contact, slope of the bar and slip without any use of the gauges."
     )
     yield (
-        f"The true radial distance d_x is known for {sure.known} of {sure.measured} whisks, with a median standard "
-        f"uncertainty of {number(sure.d_x_mm, 4)} mm (touch {number(sure.touch_deg, 4)}°, slope "
-        f"{number(sure.beta_deg, 3)}°, slip {number(sure.slip_mm, 4)} mm)."
+        f"The true radial distance d_x is known for {truth.known} of {truth.measured} whisks, with a median standard "
+        f"uncertainty of {number(truth.d_x_mm, 4)} mm (touch {number(truth.touch_deg, 4)}°, slope "
+        f"{number(truth.beta_deg, 3)}°, slip {number(truth.slip_mm, 4)} mm)."
     )
 
 
-def _estimates(
-    record: RunRecord, results: Sequence[TrialResult], accuracy_of_all: Sequence[Accuracy]
-) -> Iterator[str]:
+def _estimates(record: RunRecord, accuracy_of_all: Sequence[Accuracy]) -> Iterator[str]:
+    """Yield the sentences on how distances were estimated, and on each estimator's error."""
     settings = record.settings
     yield (
         f"Estimates were taken at a pushing angle of {settings.theta_deg:g}° from the moments at the whisker's base "
         "and the touch angle that these show; equation (10) of Solomon and Hartmann (2008) assumed a friction angle "
         f"of {settings.alpha_est_deg:g}°."
     )
-    gauges = record.lines("Gauges")
-    if gauges:
-        yield f"Gauge coefficients are from {gauges[0].split(';')[0].removeprefix('from ')}."
-    for s in accuracy_of_all:
-        if s.judged:
-            held = (
-                f"; {s.intervals_holding} of {s.intervals} of its 95 % intervals hold the truth"
-                if s.intervals
-                else ""
-            )
-            yield (
-                f"{s.label}: error of d_x {number(s.bias_percent, 2)} % in the mean and "
-                f"{number(s.rms_percent, 2)} % RMS over {len(s.judged)} whisks{held}."
-            )
+    if record.gauges is not None:
+        yield f"Gauge coefficients are from {record.gauges.source}."
+    for accuracy in accuracy_of_all:
+        if not accuracy.judged:
+            continue
+        held = ""
+        if accuracy.intervals:
+            held = f"; {_intervals(accuracy)} of its 95 % intervals hold the truth"
+        yield (
+            f"{accuracy.label}: error of d_x {number(accuracy.bias_percent)} % in the mean and "
+            f"{number(accuracy.rms_percent)} % RMS over {len(accuracy.judged)} whisks{held}."
+        )
     versions = ", ".join(f"{name} {version}" for name, version in record.versions.items())
     yield f"Computed with {versions}."
 
 
+def _intervals(accuracy: Accuracy) -> str:
+    """Return how many of an estimator's 95 % intervals hold the truth."""
+    if not accuracy.intervals:
+        return MISSING
+    return f"{accuracy.intervals_holding} of {accuracy.intervals}"
+
+
 def _accuracy_table(accuracy_of_all: Sequence[Accuracy]) -> Iterator[str]:
+    """Yield the table of estimators, line by line."""
     if not accuracy_of_all:
         return
     yield "| estimator | whisks | mean error / % | RMS error / % | largest / % | 95 % intervals that hold |"
     yield "|---|---|---|---|---|---|"
-    for s in accuracy_of_all:
-        numbers = (number(v, 2) for v in (s.bias_percent, s.rms_percent, s.worst_percent))
-        held = f"{s.intervals_holding} of {s.intervals}" if s.intervals else MISSING
-        yield f"| {_plain(s.label)} | {len(s.judged)} of {s.with_truth} | {' | '.join(numbers)} | {held} |"
+    for accuracy in accuracy_of_all:
+        cells = (
+            _escaped(accuracy.label),
+            f"{len(accuracy.judged)} of {accuracy.with_truth}",
+            number(accuracy.bias_percent),
+            number(accuracy.rms_percent),
+            number(accuracy.worst_percent),
+            _intervals(accuracy),
+        )
+        yield f"| {' | '.join(cells)} |"
     yield ""
 
 
 def _friction_table(friction: Sequence[SurfaceFriction]) -> Iterator[str]:
+    """Yield the table of friction angles, line by line."""
     if not friction:
         return
     yield "| surface and speed | whisks | α seen / ° | α felt / ° | α of Fig. 8 / ° |"
     yield "|---|---|---|---|---|"
-    for of in friction:
-        angles = (
-            with_sigma(*np.degrees(of.alpha(name)).tolist())
-            for name in ("seen", "felt", "least_squares")
-        )
-        yield f"| {_plain(of.surface.title)} | {len(of.surface.felt)} | {' | '.join(angles)} |"
+    for of_surface in friction:
+        cells = [_escaped(of_surface.surface.title), str(len(of_surface.surface.felt))]
+        for way in ("seen", "felt", "least_squares"):
+            alpha_deg, sigma_deg = np.degrees(of_surface.alpha(way)).tolist()
+            cells.append(with_sigma(alpha_deg, sigma_deg))
+        yield f"| {' | '.join(cells)} |"
     yield ""
 
 
-def _plain(text: str) -> str:
-    """A name that cannot break a table or a line of Markdown, nor bring HTML into it."""
+def _escaped(text: str) -> str:
+    """Return a name that cannot break a table or a line of Markdown, nor bring HTML into it."""
     kept = "".join(" " if not c.isprintable() else c for c in text)
     return kept.replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")

@@ -35,7 +35,7 @@
       row.hidden = !words.every((word) => text.includes(word));
       if (row.hidden) off.add(row.dataset.w);
     }
-    for (const mark of document.querySelectorAll(".mark, .bar-row")) mark.classList.toggle("off", off.has(mark.dataset.w));
+    for (const mark of document.querySelectorAll(".mark")) mark.classList.toggle("off", off.has(mark.dataset.w));
     count.textContent = `${rows.length - off.size} of ${rows.length} whisks`;
   }
   search.addEventListener("input", filter);

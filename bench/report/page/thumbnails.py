@@ -8,7 +8,8 @@ from urllib.parse import quote
 from PIL import Image
 
 MOST_INSIDE = 200  # whisks; beyond, the page would be larger than a browser likes to open
-MOST_BYTES = 56_000  # of one picture: 50 of them, in base64, are 3.7 MB of the 5 that a page of 50 whisks may have
+# [bytes] Of one picture: 100 of them, two a whisk, are 4.9 MB in base64, as a page of 50 whisks may have.
+MOST_BYTES = 36_000
 _WIDTHS_PX = (1100, 900, 700, 500, 350, 250)
 _QUALITY = 62
 

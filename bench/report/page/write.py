@@ -1,14 +1,13 @@
 """The page put together and written, with methods.md and results.bib beside it."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from bench.analyses.explained import SHARES
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
@@ -19,24 +18,16 @@ from bench.report.estimator_accuracy import accuracies, truth_uncertainty
 from bench.report.evaluation import finished
 from bench.report.page.cards import card, cells, columns, is_flagged
 from bench.report.page.combined_whisks import together
-from bench.report.page.gauge_card import gauge_part
+from bench.report.page.drawings import Drawings, draw
+from bench.report.page.gauge_tables import gauge_part
 from bench.report.page.methods import bibliography, methods
-from bench.report.page.plots import Bar, budget_bars, explained_bars, figures
 from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
 from bench.report.page.words import number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import CameraFacts, RunRecord
-from vision.fit.covariance import CAUSES
 
 REPORT, METHODS, BIBLIOGRAPHY = "report.html", "methods.md", "results.bib"
-_PARTS = {
-    "by_touch_mm": "touch felt → seen",
-    "by_moments_mm": "moments felt → seen",
-    "by_alpha_mm": "α_est → α seen",
-    "remainder_mm": "beam theory, slip along",
-}
-_MOST_BARS = 60  # whisks; of more, those with the largest sum of shares are drawn
 _IN_FIGURES = (
     "Truth",
     "Error of d_x",
@@ -94,6 +85,9 @@ def page(
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
     accuracy = accuracies(results)
     drawn = scene(record, rows)
+    drawings = Drawings()
+    if record.settings.figures:
+        drawings = draw(record, rows, results, friction)
     at = {(row.trial, row.seen.whisk): row for row in rows}
     return (
         _environment()
@@ -102,15 +96,13 @@ def page(
             record=record,
             rows=[(row, cells(row, estimators), is_flagged(row)) for row in rows],
             columns=columns(estimators),
-            cards=[card(row, record.whisker, out, len(rows)) for row in rows],
+            cards=[card(row, out, len(rows)) for row in rows],
             accuracies=[(one, at.get(one.worst_at)) for one in accuracy],
             truth=truth_uncertainty(results),
             doubts=[
                 (line, cure_of(codes)) for line, codes in zip(record.doubts, record.doubt_codes)
             ],
-            figures=list(figures(record, rows, friction)),
-            explained=_stack(explained_bars(record, rows), SHARES, _PARTS),
-            budget=_stack(budget_bars(rows), CAUSES, {cause: cause for cause in CAUSES}),
+            drawings=drawings,
             together=together(out),
             scene=as_script(drawn),
             scene_known=bool(drawn["cameras"] or drawn["whisks"]),
@@ -127,44 +119,6 @@ def page(
         )
         + "\n"
     )
-
-
-def _stack(bars: Sequence[Bar], causes: Sequence[str], labels: dict[str, str]) -> dict:
-    """Stacked bars on one scale: each cause's label, and the bars with their segments to either side of zero."""
-    chosen = sorted(bars, key=lambda bar: -_extent(bar))[:_MOST_BARS]
-    drawn = [bar for bar in bars if bar in chosen]
-    low = min((_reach(bar, -1) for bar in drawn), default=0.0)
-    high = max((_reach(bar, 1) for bar in drawn), default=0.0)
-    scale = 100.0 / ((high - low) or 1.0)
-    return {
-        "labels": [labels[cause] for cause in causes],
-        "bars": [(bar, list(_segments(bar, causes, low, scale))) for bar in drawn],
-        "zero": -low * scale,
-        "left_out": len(bars) - len(drawn),
-    }
-
-
-def _segments(
-    bar: Bar, causes: Sequence[str], low: float, scale: float
-) -> Iterator[tuple[int, str, str, float]]:
-    """(number of the cause, left and width in per cent of the track, share)."""
-    ends = {True: 0.0, False: 0.0}
-    for n, cause in enumerate(causes):
-        share = bar.shares.get(cause, 0.0)
-        start = ends[share > 0]
-        ends[share > 0] = start + share
-        left, width = scale * (min(start, start + share) - low), scale * abs(share)
-        if width > 0.05:
-            yield n, f"{left:.2f}", f"{width:.2f}", share
-
-
-def _reach(bar: Bar, side: int) -> float:
-    """How far the bar goes to one side of zero."""
-    return side * sum(max(0.0, side * share) for share in bar.shares.values())
-
-
-def _extent(bar: Bar) -> float:
-    return sum(map(abs, bar.shares.values()))
 
 
 def _setting(value: object) -> str:

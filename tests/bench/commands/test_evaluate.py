@@ -119,8 +119,8 @@ def test_the_figures_are_there(steel):
     assert {
         "fig8.png",
         "error_against_slope.png",
-        "planes/b60_4.png",
-        "planes/gauge_roll0.png",
+        "planes/b60_4_0.png",
+        "planes/gauge_roll0_0.png",
     } <= names
 
 

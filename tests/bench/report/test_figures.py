@@ -22,8 +22,7 @@ from bench.records.trial_result import (
     WhiskerFacts,
 )
 from bench.report.figures import error_against_slope
-from bench.report.page.plane import contact_path
-from bench.report.planes import sensing_plane
+from bench.report.planes import contact_path, sensing_plane
 from bench.session.session import load_session
 from bench.trials.estimate_errors import Judged
 from estimator import slip
