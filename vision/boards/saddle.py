@@ -62,15 +62,17 @@ LAGS = 3
 # [px] Keeps a step of the fit within twice the limits above. Derived.
 _BLUR_SEARCH_PX = (0.1, 20.0)
 
-# Columns of the parameters. Directions and the logarithms of the blurs are of both edges; the grey
-# depends linearly on the last four.
-PLACE = slice(0, 2)  # [columns] A layout, no threshold.
-TURN = slice(2, 4)  # [columns] A layout, no threshold.
-BLUR = slice(4, 6)  # [columns] A layout, no threshold.
-CONTRAST = 6  # [column] A layout, no threshold.
-LEVEL = 7  # [column] A layout, no threshold.
-SLOPE = slice(8, 10)  # [columns] A layout, no threshold.
-LINEAR = slice(6, 10)  # [columns] A layout, no threshold.
+# [columns] Of the parameters: the corner. A layout, no threshold.
+PLACE = slice(0, 2)
+# [columns] Directions of both edges. A layout, no threshold.
+TURN = slice(2, 4)
+# [columns] Logarithms of both edges' blurs. A layout, no threshold.
+BLUR = slice(4, 6)
+# [columns] What the grey depends on linearly: contrast, level and slope. A layout, no threshold.
+LINEAR = slice(6, 10)
+# [columns] The light's slope along x and y. A layout, no threshold.
+SLOPE = slice(8, 10)
+CONTRAST, LEVEL = range(6, 8)
 
 
 @dataclass(frozen=True, eq=False)
