@@ -16,20 +16,8 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.special import erf
 
-# [px] Reach along the edges. A lens bends an edge by k1 x t²/f over the distance t, which moves
-# the corner by a third of that at the arm's end: at 24 px 0.003 px for k1 = −0.1, f = 2000 px, x
-# = 0.3, and 0.03 px in the corners of a webcam with k1 = −0.33. Shorter is noisier: drawn corners
-# err by 0.024, 0.019 and 0.016 px at 16, 24 and 32. Study: thresholds.py boards.saddle REACH_PX
-# ….
-REACH_PX = 24
-# [squares] Half a square, so that no two corners share a pixel's noise. Derived.
-_ARM_SQUARES = 0.5
-# [px] Pixels nearer to a marker hold its blur. Rig corners err by 0.035 px at 0.75, by 0.034 from
-# 1.0 to 3.0. Study: thresholds.py boards.saddle _CLEAR_OF_MARKER_PX ….
-_CLEAR_OF_MARKER_PX = 1.5
-# [px] Pixels farther from an edge say nothing of it: drawn corners err by 0.026 px at 3, 0.019 at
-# 6, 0.017 at 8 and 12. Study: thresholds.py boards.saddle _BAND_PX ….
-_BAND_PX = 6.0
+from vision.boards.edge_pixels import Windows, cut_windows
+
 # [px] A fit that runs farther than this from OpenCV's corner found another. moves nothing on the
 # fixtures between 2 and 8. Study: thresholds.py boards.saddle _MAX_SHIFT_PX ….
 _MAX_SHIFT_PX = 4.0
@@ -91,24 +79,6 @@ class Saddles:
     converged: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class _Windows:
-    """The pixels along each corner's edges, padded to k of them with weight 0.
-
-    anchor (n, 2): whole px. offset (n, 2, k): whole px from the anchor, x and y. grey (n, k).
-    weight (n, k): 0 or 1.
-    """
-
-    anchor: np.ndarray
-    offset: np.ndarray
-    grey: np.ndarray
-    weight: np.ndarray
-
-    def select(self, rows: np.ndarray) -> "_Windows":
-        """Return the windows of some corners, by their indices."""
-        return _Windows(self.anchor[rows], self.offset[rows], self.grey[rows], self.weight[rows])
-
-
 def fit_saddles(
     grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
 ) -> Saddles:
@@ -118,7 +88,7 @@ def fit_saddles(
     board x and y in the picture at the corner. border: clear rim between a square's edge and its
     marker, in squares.
     """
-    windows = _cut_windows(grey, px_guess, frames, border)
+    windows = cut_windows(grey, px_guess, frames, border)
     start = _start_parameters(windows, px_guess, frames)
     parameters, converged = _levenberg_marquardt(windows, start)
     saddles = _report(windows, parameters, converged)
@@ -127,44 +97,7 @@ def fit_saddles(
     return replace(saddles, converged=plausible & has_pixels)
 
 
-def _cut_windows(
-    grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
-) -> _Windows:
-    """Cut out the pixels that show the two edges of each corner."""
-    longest_px = np.linalg.norm(frames, axis=1).max()
-    reach = int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px)))
-    span = np.arange(-reach, reach + 1)
-    grid = np.stack(np.meshgrid(span, span)).reshape(2, -1)  # (2, cells) px, x and y
-    grid = grid[:, np.sum(grid**2, axis=0) <= reach**2]
-    anchor = np.round(px_guess).astype(int)
-    place = anchor[:, :, None] + grid  # (n, 2, cells) px
-    last = np.array(grey.shape[::-1])[:, None] - 1
-    is_inside = np.all((place >= 0) & (place <= last), axis=1)
-    is_used = is_inside & _shows_edges(place - px_guess[:, :, None], frames, border)
-
-    # The used pixels first, and no more columns than the corner with most of them needs.
-    count = max(int(is_used.sum(axis=1).max()), 1)
-    order = np.argsort(~is_used, axis=1, kind="stable")[:, :count]
-    column, row = np.take_along_axis(np.clip(place, 0, last), order[:, None], axis=2).swapaxes(0, 1)
-    weight = np.take_along_axis(is_used, order, axis=1).astype(float)
-    return _Windows(anchor, grid[:, order].swapaxes(0, 1), grey[row, column].astype(float), weight)
-
-
-def _shows_edges(offset: np.ndarray, frames: np.ndarray, border: float) -> np.ndarray:
-    """Return which pixels show the two edges and no marker, (n, k) bool.
-
-    offset (n, 2, k): px from the guess.
-    """
-    in_squares = np.abs(np.linalg.solve(frames, offset))
-    across_px = np.linalg.norm(frames[:, :, ::-1], axis=1)
-    px_per_square = np.abs(np.linalg.det(frames))[:, None] / across_px
-    clear_px = border * px_per_square - _CLEAR_OF_MARKER_PX
-    band_px = np.clip(clear_px, _CLEAR_OF_MARKER_PX, _BAND_PX)
-    is_near_edge = in_squares * px_per_square[:, :, None] < band_px[:, :, None]
-    return is_near_edge.any(axis=1) & np.all(in_squares < _ARM_SQUARES, axis=1)
-
-
-def _start_parameters(windows: _Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def _start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Return the parameters (n, 10) that the fit starts from.
 
     Edges as the homography has them; contrast, level and slope by least squares.
@@ -183,7 +116,7 @@ def _start_parameters(windows: _Windows, px_guess: np.ndarray, frames: np.ndarra
     return p
 
 
-def _model(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _model(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the grey (n, k) that the parameters p (n, 10) predict, and its Jacobian (n, 10, k)."""
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
     cosine = np.cos(p[:, TURN])
@@ -229,7 +162,7 @@ def _solve(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.
     return np.linalg.solve(raised, gradient[:, :, None])[:, :, 0]
 
 
-def _levenberg_marquardt(windows: _Windows, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _levenberg_marquardt(windows: Windows, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit all corners side by side: return their parameters (n, 10) and which converged (n,).
 
     Corners leave the iteration as they converge. SciPy fits one corner at a time.
@@ -258,7 +191,7 @@ def _levenberg_marquardt(windows: _Windows, start: np.ndarray) -> tuple[np.ndarr
     return p, converged
 
 
-def _evaluate(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _evaluate(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the cost (n,), JᵀWJ and JᵀWr at the parameters p (n, 10)."""
     grey, J = _model(windows, p)
     residual = windows.grey - grey
@@ -266,7 +199,7 @@ def _evaluate(windows: _Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     return np.sum(windows.weight * residual**2, axis=1), normal, gradient
 
 
-def _report(windows: _Windows, p: np.ndarray, converged: np.ndarray) -> Saddles:
+def _report(windows: Windows, p: np.ndarray, converged: np.ndarray) -> Saddles:
     """Return the corners of the parameters p (n, 10), with their sigmas."""
     grey, J = _model(windows, p)
     residual = (windows.grey - grey) * windows.weight
@@ -295,7 +228,7 @@ def _is_plausible(saddles: Saddles, px_guess: np.ndarray, frames: np.ndarray) ->
     return plausible & (saddles.blur_px > least_blur_px) & (saddles.blur_px < most_blur_px)
 
 
-def _sigma_per_grey(windows: _Windows, J: np.ndarray, unit_residual: np.ndarray) -> np.ndarray:
+def _sigma_per_grey(windows: Windows, J: np.ndarray, unit_residual: np.ndarray) -> np.ndarray:
     """Return a corner's sigma per axis for pixel noise of one grey level, (n,).
 
     Noise of neighbouring pixels is correlated (demosaicing, compression, a soft lens before a noisy
@@ -306,27 +239,13 @@ def _sigma_per_grey(windows: _Windows, J: np.ndarray, unit_residual: np.ndarray)
     normal, _ = _normal_equations(J, unit_residual, windows.weight)
     inverse = np.linalg.pinv(normal, hermitian=True)
     influence = inverse[:, PLACE] @ (J * windows.weight[:, None, :])
-    residual = _on_grid(windows, unit_residual[:, None])
-    a = _on_grid(windows, influence)
+    residual = windows.on_grid(unit_residual[:, None])
+    a = windows.on_grid(influence)
     Ca = a
     for axis in (3, 2):
         Ca = convolve1d(Ca, _correlation(residual, axis), axis=axis, mode="constant")
     variance = np.mean(np.sum(a * Ca, axis=(2, 3)), axis=1)  # of both axes
     return np.sqrt(np.maximum(variance, 0.0))
-
-
-def _on_grid(windows: _Windows, values: np.ndarray) -> np.ndarray:
-    """Return values (n, m, k) of the windows' pixels on square grids (n, m, side, side).
-
-    Cells whose pixel is not used are 0, as the values of padding are.
-    """
-    reach = int(np.abs(windows.offset).max())
-    side = 2 * reach + 1
-    column, row = np.moveaxis(windows.offset + reach, 1, 0)
-    cell = np.broadcast_to((row * side + column)[:, None], values.shape)
-    grid = np.zeros((*values.shape[:2], side * side))
-    np.put_along_axis(grid, cell, values, axis=2)
-    return grid.reshape(*values.shape[:2], side, side)
 
 
 def _correlation(residual: np.ndarray, axis: int) -> np.ndarray:

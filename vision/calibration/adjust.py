@@ -1,34 +1,19 @@
 """The adjustment: Levenberg–Marquardt with pictures' instants and board poses eliminated.
 
-A picture's instant touches only that picture, and a view's pose only the cameras that saw it. So the
-normal equations are formed picture by picture, the instant is eliminated there, then the six of each
-view (Schur complement). The work grows linearly with views; what is left to solve is as small as the
-cameras are few, and its inverse is the covariance of what is kept, everything eliminated being
-marginalised.
-
-Shapes: s pictures ("shots"), G = 16 C + 3 global parameters, V views, p = 25 or 37 parameters that a
-picture depends on: 19 of them global, the rest poses of its view and that view's neighbours.
+A view's pose touches only the cameras that saw it, so that all poses are eliminated from the normal
+equations (Schur complement) after the pictures' instants. The work grows linearly with views; what
+is left to solve is as small as the cameras are few, and its inverse is the covariance of what is
+kept, everything eliminated being marginalised.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from vision.calibration.bundle import (
-    CLOCK,
-    N_BOARD,
-    N_CAMERA,
-    N_VIEW,
-    BundleState,
-    Priors,
-    Sightings,
-    predict,
-)
-from vision.geometry.rotation import pose_difference
+from vision.calibration.bundle import N_CAMERA, N_VIEW, BundleState, Priors, Sightings
+from vision.calibration.normal_equations import Equations, Normal, normal_equations
 
-_GLOBAL = N_CAMERA + N_BOARD
 # [1] Keeps a view whose few corners fix no pose solvable; of what is fixed it changes the tenth
 # digit. Study: thresholds.py calibration.adjust _RIDGE ….
 _RIDGE = 1e-10
@@ -79,14 +64,14 @@ def adjust_bundle(
     corners_mm (m, 3): of the board. width: of Cauchy's loss in sigmas, inf for least squares.
     tolerance: relative fall of the cost at which the iteration ends.
     """
-    normal = _normal_equations(state, seen, corners_mm, priors, width)
+    normal = normal_equations(state, seen, corners_mm, priors, width)
     damping = _DAMPED
     converged = False
     fall = np.inf
     for _ in range(_MOST_STEPS if np.isfinite(normal.cost) else 0):
         steps = _solve_step(normal, priors.free, damping)
         trial_state = state.stepped(*steps)
-        trial = _normal_equations(trial_state, seen, corners_mm, priors, width)
+        trial = normal_equations(trial_state, seen, corners_mm, priors, width)
         if trial.cost <= normal.cost * (1 + 1e-13):
             fall = (normal.cost - trial.cost) / (1e-12 + normal.cost)
             converged = fall <= tolerance
@@ -103,196 +88,8 @@ def adjust_bundle(
     return Solution(state, normal.residual_px, covariance, normal.cost, converged)
 
 
-class _Shots(NamedTuple):
-    """Pictures, a row each: camera and view (s,), and where their p parameters stand.
-
-    columns (s, 19): among the globals. poses (s, 6 or 18): among all views' (6 V).
-    """
-
-    camera: np.ndarray
-    view: np.ndarray
-    columns: np.ndarray
-    poses: np.ndarray
-
-
-class _Instants(NamedTuple):
-    """The eliminated equation of each picture's instant.
-
-    precision, gradient (s,). coupling (s, p): to the picture's other parameters.
-    """
-
-    precision: np.ndarray
-    gradient: np.ndarray
-    coupling: np.ndarray
-
-
-class _Equations(NamedTuple):
-    """Normal equations: A (G, G), a (G,) of the globals; B (G, 6 V); C, c (6 V,) of the views.
-
-    C is kept as its lower band (b, 6 V), C[i − j, j] being row i, column j: views touch only their
-    neighbours in time.
-    """
-
-    A: np.ndarray
-    a: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    c: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _Normal:
-    """The cost at a state and, where it is finite, its normal equations."""
-
-    cost: float
-    residual_px: np.ndarray
-    shots: _Shots | None = None
-    instants: _Instants | None = None
-    equations: _Equations | None = None
-
-
-def _normal_equations(
-    state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors, width: float
-) -> _Normal:
-    """Return the cost and the normal equations at a state."""
-    px, J = predict(state, seen, corners_mm)
-    residual_px = seen.px - px
-    squared = np.sum(residual_px**2, axis=1) / seen.sigma_px**2
-    if not np.all(np.isfinite(squared)):
-        return _Normal(np.inf, residual_px)
-    loss, weight = _cauchy(squared, width)
-    root = np.sqrt(weight) / seen.sigma_px
-    rows = np.concatenate([J, residual_px[:, :, None]], axis=2) * root[:, None, None]
-    shots = _shots(state, seen)
-    blocks = _shot_blocks(rows, seen.shot_starts())
-    instants, instants_cost = _eliminate_instants(blocks, shots, state, priors)
-    equations = _assemble(blocks, shots, state)
-    priors_cost = _add_priors(equations, state, priors)
-    _hold(equations, np.repeat(~priors.view_free, N_VIEW))
-    cost = float(np.sum(loss) + instants_cost + priors_cost)
-    return _Normal(cost, residual_px, shots, instants, equations)
-
-
-def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return Cauchy's loss, width² log(1 + u²/width²), and its weight, of squared residuals u² (n,).
-
-    For infinite width they are u² and 1.
-    """
-    if np.isinf(width):
-        return squared, np.ones_like(squared)
-    ratio = squared / width**2
-    return width**2 * np.log1p(ratio), 1.0 / (1.0 + ratio)
-
-
-def _shots(state: BundleState, seen: Sightings) -> _Shots:
-    """Return the pictures of the sightings, and where their parameters stand."""
-    starts = seen.shot_starts()
-    camera = seen.camera[starts]
-    view = seen.view[starts]
-    of_camera = N_CAMERA * camera[:, None] + np.arange(N_CAMERA)
-    of_board = N_CAMERA * len(state.lens) + np.arange(N_BOARD)
-    columns = np.hstack([of_camera, np.tile(of_board, (len(starts), 1))])
-    views = view[:, None]
-    if state.trajectory is not None:
-        views = np.hstack([views, state.trajectory.neighbours[view]])
-    poses = N_VIEW * views[:, :, None] + np.arange(N_VIEW)
-    return _Shots(camera, view, columns, poses.reshape(len(starts), -1))
-
-
-def _shot_blocks(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Return JᵀJ and Jᵀr of each picture, (s, p, p + 1), from weighted rows (n, 2, p + 1).
-
-    Pictures are filled up with zeros to one length: one product for all is ten times as fast as one
-    a corner.
-    """
-    count = np.diff(np.append(starts, len(rows)))
-    shot = np.repeat(np.arange(len(starts)), count)
-    padded = np.zeros((len(starts), count.max(), *rows.shape[1:]))
-    padded[shot, np.arange(len(rows)) - starts[shot]] = rows
-    padded = padded.reshape(len(starts), -1, rows.shape[2])
-    return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
-
-
-def _eliminate_instants(
-    blocks: np.ndarray, shots: _Shots, state: BundleState, priors: Priors
-) -> tuple[_Instants, float]:
-    """Eliminate each picture's instant from its block (s, p, p + 1), in place.
-
-    Returns the eliminated equations, and the cost of the instants' priors. A picture that gives its
-    view its time has no instant of its own.
-    """
-    precision = np.ones(len(blocks))
-    late_s = np.zeros(len(blocks))
-    is_free = np.zeros(len(blocks), dtype=bool)
-    if state.trajectory is not None and priors.late_sigma_s is not None:
-        precision = priors.late_sigma_s[shots.camera] ** -2.0
-        late_s = state.instants[shots.view, shots.camera]
-        is_free = ~state.trajectory.is_reference(shots.view, shots.camera)
-    gradient = (blocks[:, CLOCK, -1] - precision * late_s) * is_free
-    coupling = blocks[:, :, CLOCK] * is_free[:, None]
-    cost = float(np.sum(precision * late_s**2))
-    precision = precision + blocks[:, CLOCK, CLOCK]
-    row = np.column_stack([coupling, gradient])
-    blocks -= coupling[:, :, None] * row[:, None] / precision[:, None, None]
-    return _Instants(precision, gradient, coupling), cost
-
-
-def _assemble(blocks: np.ndarray, shots: _Shots, state: BundleState) -> _Equations:
-    """Add up the blocks (s, p, p + 1) of all pictures where their parameters stand."""
-    columns = shots.columns
-    poses = shots.poses
-    size = N_CAMERA * len(state.lens) + N_BOARD
-    size_views = N_VIEW * len(state.T_world_board)
-    A = np.zeros((size, size))
-    a = np.zeros(size)
-    B = np.zeros((size, size_views))
-    c = np.zeros(size_views)
-    np.add.at(A, (columns[:, :, None], columns[:, None]), blocks[:, :_GLOBAL, :_GLOBAL])
-    np.add.at(a, columns, blocks[:, :_GLOBAL, -1])
-    np.add.at(B, (columns[:, :, None], poses[:, None]), blocks[:, :_GLOBAL, _GLOBAL:-1])
-    np.add.at(c, poses, blocks[:, _GLOBAL:, -1])
-
-    below = poses[:, :, None] - poses[:, None]  # rows below the diagonal
-    column = np.broadcast_to(poses[:, None], below.shape)
-    is_lower = below >= 0
-    C = np.zeros((below.max() + 1, size_views))
-    views = blocks[:, _GLOBAL:, _GLOBAL:-1]
-    np.add.at(C, (below[is_lower], column[is_lower]), views[is_lower])
-    return _Equations(A, a, B, C, c)
-
-
-def _add_priors(equations: _Equations, state: BundleState, priors: Priors) -> float:
-    """Add the observations besides the pictures, in place; return their cost."""
-    precision = 1.0 / priors.sigma**2
-    residual = np.where(precision == 0, 0.0, priors.mean - state.globals())
-    equations.A[np.diag_indices(len(residual))] += precision
-    equations.a[:] += precision * residual
-    cost = np.sum(precision * residual**2)
-    view = priors.pose_view
-    if view is not None and priors.view_free[view]:
-        rows = slice(N_VIEW * view, N_VIEW * (view + 1))
-        precision = 1.0 / priors.pose_sigma**2
-        residual = -pose_difference(priors.pose_T, state.T_world_board[view])
-        equations.C[0, rows] += precision
-        equations.c[rows] += precision * residual
-        cost += np.sum(precision * residual**2)
-    return float(cost)
-
-
-def _hold(equations: _Equations, held: np.ndarray) -> None:
-    """Give the held parameters (6 V,) of the views, and those that nothing depends on, no step."""
-    C = equations.C
-    held = held | (C[0] == 0)
-    equations.B[:, held] = 0.0
-    equations.c[held] = 0.0
-    C[:, held] = 0.0
-    for offset in range(1, len(C)):
-        C[offset, :-offset][held[offset:]] = 0.0
-    C[0, held] = 1.0
-
-
 def _solve_step(
-    normal: _Normal, free: np.ndarray, damping: float
+    normal: Normal, free: np.ndarray, damping: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C)."""
     reduced, gradient, CB, Cc = _eliminate_views(normal.equations, free, damping)
@@ -311,7 +108,7 @@ def _solve_step(
 
 
 def _eliminate_views(
-    equations: _Equations, free: np.ndarray, damping: float = 0.0
+    equations: Equations, free: np.ndarray, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Eliminate the views' poses by the Schur complement.
 
@@ -343,7 +140,7 @@ def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return scale * np.linalg.lstsq(unit, scale * vector, rcond=1e-14)[0]
 
 
-def _covariance(normal: _Normal, free: np.ndarray) -> np.ndarray:
+def _covariance(normal: Normal, free: np.ndarray) -> np.ndarray:
     """Return the covariance (G, G) of the globals, all poses and instants being marginalised."""
     covariance = np.zeros((len(free), len(free)))
     if normal.equations is not None and free.any():

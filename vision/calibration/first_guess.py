@@ -24,61 +24,20 @@ def first_lens(
 ) -> np.ndarray:
     """Return nine lens parameters to begin with: one focal length, the principal point in the
     middle, no distortion.
+
+    The focal length is OpenCV's from the homographies of plane views (Zhang 2000); the picture's
+    width where they give none that a camera can have.
     """
-    focal_px = _focal_length_px(views, corners_mm, size_px)
-    x, y = _middle_px(size_px)
-    return np.array([focal_px, focal_px, x, y, 0, 0, 0, 0, 0])
-
-
-def _middle_px(size_px: tuple[int, int]) -> np.ndarray:
-    """Return the middle of a picture, (2,) px."""
-    return 0.5 * (np.array(size_px) - 1)
-
-
-def _focal_length_px(
-    views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
-) -> float:
-    """Return the focal length from the homographies of plane views (Zhang 2000).
-
-    The principal point is taken as the middle. Each view gives equations left · (width/f)² = right;
-    their solution is the weighted median over all views, so that one wrong view cannot move it far.
-    The picture's width is returned where no view is tilted enough to determine it.
-    """
-    width = size_px[0]
-    equations = []
-    for view in views:
-        normalised = (view.px - _middle_px(size_px)) / width
-        equations += _focal_equations(corners_mm[view.ids, :2], normalised)
-    left, right = np.array(equations).reshape(-1, 2).T
-    usable = left != 0
-    if not usable.any():
-        return float(width)
-    inverse_square = _weighted_median(right[usable] / left[usable], left[usable] ** 2)
-    focal = 1.0 / np.sqrt(inverse_square) if inverse_square > 0 else np.inf
+    width, height = size_px
+    focal_px = np.nan
+    if views:
+        points_mm = [corners_mm[view.ids].astype(np.float32) for view in views]
+        px = [view.px.astype(np.float32) for view in views]
+        focal_px = cv2.initCameraMatrix2D(points_mm, px, size_px)[0, 0]
     least, most = _FOCAL_LIMITS
-    return float(focal * width) if least < focal < most else float(width)
-
-
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    """Return the value (of n) that half of the weight lies on either side of."""
-    order = np.argsort(values)
-    reached = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(reached, 0.5 * reached[-1])])
-
-
-def _focal_equations(points: np.ndarray, normalised: np.ndarray) -> list[tuple[float, float]]:
-    """Return the equations (left, right) of one view: left · (width/f)² = right.
-
-    points (n, 2): on the board. normalised (n, 2): in the picture, in its widths from its middle.
-    With h1, h2 the first columns of K⁻¹H: h1 · h2 = 0 and |h1| = |h2|, both linear in 1/f².
-    """
-    H, _ = cv2.findHomography(points, normalised, 0)
-    if H is None:
-        return []
-    h1, h2 = H[:, :2].T / np.linalg.norm(H[:, :2])
-    across = h1[:2] @ h2[:2]
-    length = h1[:2] @ h1[:2] - h2[:2] @ h2[:2]
-    return [(across, -h1[2] * h2[2]), (length, h2[2] ** 2 - h1[2] ** 2)]
+    if not least < focal_px / width < most:
+        focal_px = width
+    return np.array([focal_px, focal_px, 0.5 * (width - 1), 0.5 * (height - 1), 0, 0, 0, 0, 0])
 
 
 def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.ndarray:
