@@ -64,13 +64,20 @@ def cut_windows(
     last = np.array(grey.shape[::-1])[:, None] - 1
     is_inside = np.all((place >= 0) & (place <= last), axis=1)
     is_used = is_inside & _shows_edges(place - px_guess[:, :, None], frames, border)
-
-    # The used pixels first, and no more columns than the corner with most of them needs.
-    count = max(int(is_used.sum(axis=1).max()), 1)
-    order = np.argsort(~is_used, axis=1, kind="stable")[:, :count]
-    column, row = np.take_along_axis(np.clip(place, 0, last), order[:, None], axis=2).swapaxes(0, 1)
+    order = _used_first(is_used)
     weight = np.take_along_axis(is_used, order, axis=1).astype(float)
-    return Windows(anchor, grid[:, order].swapaxes(0, 1), grey[row, column].astype(float), weight)
+    offset = np.swapaxes(grid[:, order], 0, 1)
+    column, row = np.clip(anchor[:, :, None] + offset, 0, last).swapaxes(0, 1)
+    return Windows(anchor, offset, grey[row, column].astype(float), weight)
+
+
+def _used_first(is_used: np.ndarray) -> np.ndarray:
+    """Return the indices (n, k) of each corner's used cells, from masks (n, cells), then of others.
+
+    k is the largest number of used cells.
+    """
+    count = max(int(is_used.sum(axis=1).max()), 1)
+    return np.argsort(~is_used, axis=1, kind="stable")[:, :count]
 
 
 def _shows_edges(offset: np.ndarray, frames: np.ndarray, border: float) -> np.ndarray:

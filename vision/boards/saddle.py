@@ -11,6 +11,7 @@ edges and away from the markers.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import convolve1d
@@ -119,27 +120,42 @@ def _start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray
 def _model(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the grey (n, k) that the parameters p (n, 10) predict, and its Jacobian (n, 10, k)."""
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
-    cosine = np.cos(p[:, TURN])
-    sine = np.sin(p[:, TURN])
-    across = np.stack([cosine, sine], axis=2)  # (n, edges, 2) unit vectors
-    along = np.stack([-sine, cosine], axis=2)
-    # A copy, because NumPy 1.26 takes a strided column's exp otherwise, by 1e-16, where its result
-    # happens to lie right behind in memory.
-    blur = np.exp(p[:, BLUR].copy())[:, :, None]
-    distance = across @ offset / blur  # (n, edges, k), in blurs
-    edges = erf(distance / np.sqrt(2.0))
-    slope = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * distance**2) / blur  # per px
-    by_distance = p[:, CONTRAST, None, None] * slope * edges[:, ::-1]
+    edges, by_edge = _blurred_edges(offset, p[:, TURN, None], p[:, BLUR, None])
+    contrast = p[:, CONTRAST, None, None, None]
+    by_edge = contrast * by_edge * edges[:, ::-1, None]  # each edge is multiplied by the other
 
     J = np.empty((len(p), 10, offset.shape[2]))
-    J[:, PLACE] = -np.swapaxes(across, 1, 2) @ by_distance - p[:, SLOPE, None]
-    J[:, TURN] = by_distance * (along @ offset)
-    J[:, BLUR] = -by_distance * distance * blur
-    J[:, CONTRAST] = edges[:, 0] * edges[:, 1]
+    J[:, PLACE] = by_edge[:, :, :2].sum(axis=1) - p[:, SLOPE, None]
+    J[:, TURN] = by_edge[:, :, 2]
+    J[:, BLUR] = by_edge[:, :, 3]
+    J[:, CONTRAST] = edges.prod(axis=1)
     J[:, LEVEL] = 1.0
     J[:, SLOPE] = offset
     grey = p[:, None, LINEAR] @ J[:, LINEAR]
     return grey[:, 0], J
+
+
+def _blurred_edges(
+    offset: np.ndarray, turn: np.ndarray, log_blur: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return both edges erf(e / (√2 s)), −1 to 1, (n, 2, k), and their derivatives (n, 2, 4, k).
+
+    offset (n, 2, k): px from the corner. turn, log_blur (n, 2, 1). The derivatives are by the
+    corner's x and y, the turn and log s.
+    """
+    dx = offset[:, None, 0]
+    dy = offset[:, None, 1]
+    cosine = np.cos(turn)
+    sine = np.sin(turn)
+    # A copy, because NumPy 1.26 takes a strided column's exp otherwise, by 1e-16, where its result
+    # happens to lie right behind in memory.
+    blur = np.exp(log_blur.copy())
+    t = (cosine * dx + sine * dy) / blur
+    slope = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * t**2)
+    per_px = slope / blur
+    by_turn = per_px * (cosine * dy - sine * dx)
+    by_edge = np.stack([-per_px * cosine, -per_px * sine, by_turn, -slope * t], axis=2)
+    return erf(t / np.sqrt(2.0)), by_edge
 
 
 def _normal_equations(
@@ -167,36 +183,42 @@ def _levenberg_marquardt(windows: Windows, start: np.ndarray) -> tuple[np.ndarra
 
     Corners leave the iteration as they converge. SciPy fits one corner at a time.
     """
-    p = start.copy()
-    cost, normal, gradient = _evaluate(windows, p)
-    damping = np.full(len(p), 1e-3)
-    active = np.arange(len(p))
+    fit = _evaluate(windows, start.copy())
+    damping = np.full(len(start), 1e-3)
+    active = np.arange(len(start))
     for _ in range(_ITERATIONS):
-        step = _solve(normal[active], gradient[active], damping[active])
-        trial = p[active] + step
-        trial[:, BLUR] = np.clip(trial[:, BLUR], *np.log(_BLUR_SEARCH_PX))
-        trial_cost, trial_normal, trial_gradient = _evaluate(windows.select(active), trial)
-        is_better = trial_cost <= cost[active]
-        better = active[is_better]
-        p[better] = trial[is_better]
-        cost[better] = trial_cost[is_better]
-        normal[better] = trial_normal[is_better]
-        gradient[better] = trial_gradient[is_better]
+        step = _solve(fit.normal[active], fit.gradient[active], damping[active])
+        trial_p = fit.p[active] + step
+        trial_p[:, BLUR] = np.clip(trial_p[:, BLUR], *np.log(_BLUR_SEARCH_PX))
+        trial = _evaluate(windows.select(active), trial_p)
+        is_better = trial.cost <= fit.cost[active]
+        for values, trial_values in zip(fit, trial):
+            values[active[is_better]] = trial_values[is_better]
         damping[active] *= np.where(is_better, 0.2, 10.0)
         active = active[np.linalg.norm(step[:, PLACE], axis=1) >= _CONVERGED_PX]
         if not len(active):
             break
-    converged = np.ones(len(p), dtype=bool)
+    converged = np.ones(len(start), dtype=bool)
     converged[active] = False
-    return p, converged
+    return fit.p, converged
 
 
-def _evaluate(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the cost (n,), JᵀWJ and JᵀWr at the parameters p (n, 10)."""
+class _Fit(NamedTuple):
+    """A state of the fit: parameters p (n, 10), cost (n,), JᵀWJ (n, 10, 10) and JᵀWr (n, 10)."""
+
+    p: np.ndarray
+    cost: np.ndarray
+    normal: np.ndarray
+    gradient: np.ndarray
+
+
+def _evaluate(windows: Windows, p: np.ndarray) -> _Fit:
+    """Return the state of the fit at the parameters p (n, 10)."""
     grey, J = _model(windows, p)
     residual = windows.grey - grey
+    cost = np.sum(windows.weight * residual**2, axis=1)
     normal, gradient = _normal_equations(J, residual, windows.weight)
-    return np.sum(windows.weight * residual**2, axis=1), normal, gradient
+    return _Fit(p, cost, normal, gradient)
 
 
 def _report(windows: Windows, p: np.ndarray, converged: np.ndarray) -> Saddles:

@@ -77,25 +77,27 @@ def camera_moved(
     J = by_camera[:, :, 9:]  # (n, 2, 6) by the camera's pose
     residual = corners.px - px
     sigma_px = np.hypot(corners.sigma_px, np.nan_to_num(camera.rms_px) / np.sqrt(2))
-    kept = np.ones(len(residual), dtype=bool)
-    for _ in range(3):
-        motion, covariance = _fit_motion(J[kept], residual[kept], sigma_px[kept])
-        misfit = np.linalg.norm(residual - J @ motion, axis=1) / sigma_px
-        kept = misfit < max(_DISTURBED_SIGMA, _DISTURBED_MEDIANS * np.median(misfit))
-    shift_squared = np.sum((J @ motion) ** 2, axis=1)
+    motion, covariance = _fit_motion(J, residual, sigma_px)
+    shift_px = np.linalg.norm(J @ motion, axis=1)
     variance = np.einsum("nij,jk,nik->n", J, covariance, J)
-    return float(np.sqrt(np.mean(shift_squared))), float(np.sqrt(np.mean(variance)))
+    return float(np.sqrt(np.mean(shift_px**2))), float(np.sqrt(np.mean(variance)))
 
 
 def _fit_motion(
     J: np.ndarray, residual: np.ndarray, sigma_px: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the camera's motion (6,) by least squares; return it with its covariance (6, 6).
+    """Fit the camera's motion (6,) without disturbed corners; return it with its covariance (6, 6).
 
     J (n, 2, 6), residual (n, 2) px, sigma_px (n,).
     """
-    design = (J / sigma_px[:, None, None]).reshape(-1, J.shape[2])
-    scale = np.linalg.norm(design, axis=0)  # of rad and mm
-    unit = np.linalg.pinv((design / scale).T @ (design / scale), hermitian=True)
-    covariance = unit / np.outer(scale, scale)
-    return covariance @ (design.T @ (residual / sigma_px[:, None]).ravel()), covariance
+    scale = np.linalg.norm(J, axis=(0, 1))  # of rad and mm
+    design = J / scale / sigma_px[:, None, None]
+    target = residual / sigma_px[:, None]
+    kept = np.ones(len(J), dtype=bool)
+    for _ in range(3):
+        rows = design[kept].reshape(-1, J.shape[2])
+        covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
+        motion = covariance @ (rows.T @ target[kept].ravel())
+        misfit = np.linalg.norm(target - design @ motion, axis=1)
+        kept = misfit < max(_DISTURBED_SIGMA, _DISTURBED_MEDIANS * np.median(misfit))
+    return motion / scale, covariance / np.outer(scale, scale)

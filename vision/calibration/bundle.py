@@ -229,14 +229,19 @@ class _Motion(NamedTuple):
     turn_by_poses: np.ndarray
     shift_by_poses: np.ndarray
 
+    @staticmethod
+    def none(count: int) -> "_Motion":
+        """Return that of a board that stands still."""
+        still = np.zeros((count, 3))
+        eye = np.broadcast_to(np.eye(3), (count, 3, 3))
+        return _Motion(eye, still, still, still, eye[:, None], np.ones((count, 1)))
+
 
 def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
     """Return how the board moved from the time of each sighting's view to that of its picture."""
-    view = seen.view
     if state.trajectory is None:
-        still = np.zeros((len(seen), 3))
-        eye = np.broadcast_to(np.eye(3), (len(seen), 3, 3))
-        return _Motion(eye, still, still, still, eye[:, None], np.ones((len(seen), 1)))
+        return _Motion.none(len(seen))
+    view = seen.view
     paths = state.trajectory.paths(state.T_world_board)  # (V, 2, 6)
     inverse = np.linalg.inv(left_jacobian(paths[:, :, :3]))  # (V, 2, 3, 3)
     elapsed_s = seen.time_s + state.instants[view, seen.camera] + state.clock[seen.camera]

@@ -143,20 +143,19 @@ def _eliminate_instants(
     Returns the eliminated equations, and the cost of the instants' priors. A picture that gives its
     view its time has no instant of its own.
     """
-    precision = np.ones(len(blocks))
-    late_s = np.zeros(len(blocks))
     is_free = np.zeros(len(blocks), dtype=bool)
+    late_s = np.zeros(len(blocks))
+    prior = np.ones(len(blocks))  # precision, 1/s²
     if state.trajectory is not None and priors.late_sigma_s is not None:
-        precision = priors.late_sigma_s[shots.camera] ** -2.0
-        late_s = state.instants[shots.view, shots.camera]
         is_free = ~state.trajectory.is_reference(shots.view, shots.camera)
-    gradient = (blocks[:, CLOCK, -1] - precision * late_s) * is_free
-    coupling = blocks[:, :, CLOCK] * is_free[:, None]
-    cost = float(np.sum(precision * late_s**2))
-    precision = precision + blocks[:, CLOCK, CLOCK]
+        late_s = state.instants[shots.view, shots.camera]
+        prior = priors.late_sigma_s[shots.camera] ** -2.0
+    precision = blocks[:, CLOCK, CLOCK] + prior
+    gradient = is_free * (blocks[:, CLOCK, -1] - prior * late_s)
+    coupling = is_free[:, None] * blocks[:, :, CLOCK]
     row = np.column_stack([coupling, gradient])
     blocks -= coupling[:, :, None] * row[:, None] / precision[:, None, None]
-    return Instants(precision, gradient, coupling), cost
+    return Instants(precision, gradient, coupling), float(np.sum(prior * late_s**2))
 
 
 def _assemble(blocks: np.ndarray, shots: Shots, state: BundleState) -> Equations:
@@ -173,14 +172,18 @@ def _assemble(blocks: np.ndarray, shots: Shots, state: BundleState) -> Equations
     np.add.at(a, columns, blocks[:, :_GLOBAL, -1])
     np.add.at(B, (columns[:, :, None], poses[:, None]), blocks[:, :_GLOBAL, _GLOBAL:-1])
     np.add.at(c, poses, blocks[:, _GLOBAL:, -1])
+    C = _lower_band(blocks[:, _GLOBAL:, _GLOBAL:-1], poses, size_views)
+    return Equations(A, a, B, C, c)
 
+
+def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
+    """Add up blocks (s, q, q) at rows and columns `poses` (s, q) to a lower band (b, size)."""
     below = poses[:, :, None] - poses[:, None]  # rows below the diagonal
     column = np.broadcast_to(poses[:, None], below.shape)
     is_lower = below >= 0
-    C = np.zeros((below.max() + 1, size_views))
-    views = blocks[:, _GLOBAL:, _GLOBAL:-1]
-    np.add.at(C, (below[is_lower], column[is_lower]), views[is_lower])
-    return Equations(A, a, B, C, c)
+    band = np.zeros((below.max() + 1, size))
+    np.add.at(band, (below[is_lower], column[is_lower]), blocks[is_lower])
+    return band
 
 
 def _add_priors(equations: Equations, state: BundleState, priors: Priors) -> float:
