@@ -1,8 +1,8 @@
 """ChArUco corners to a few hundredths of a pixel, each with its sigma.
 
 OpenCV finds the board and names its corners; their places come from a fit of two crossing blurred
-edges to the picture itself (`vision.boards.saddle`), because OpenCV's own scatter by 0.12 to 0.28 px
-where the picture is noisy or soft.
+edges to the picture itself (`vision.boards.saddle`), because OpenCV's own scatter by 0.12 to
+0.28 px where the picture is noisy or soft.
 """
 
 from collections.abc import Sequence

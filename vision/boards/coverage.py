@@ -39,7 +39,7 @@ def check_work(
 
 
 def _check_coverage(camera: Camera, corners_px: np.ndarray, work_px: np.ndarray) -> None:
-    """Raise Refused where too many of the pixels (n, 2) of whisker and bar lie beyond all corners."""
+    """Raise Refused where too many pixels (n, 2) of whisker and bar lie beyond all corners."""
     if not len(work_px):
         raise Refused(
             f"camera {camera.name}: neither whisker nor bar will be in its picture, by "

@@ -1,4 +1,4 @@
-"""A board that is not found: which setting would find it, for the user to enter; none is used by itself."""
+"""A board that is not found: which setting would find it, for the user to enter."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -7,8 +7,8 @@ import numpy as np
 # [px] Reach along the edges. A lens bends an edge by k1 x t²/f over the distance t, which moves
 # the corner by a third of that at the arm's end: at 24 px 0.003 px for k1 = −0.1, f = 2000 px, x
 # = 0.3, and 0.03 px in the corners of a webcam with k1 = −0.33. Shorter is noisier: drawn corners
-# err by 0.024, 0.019 and 0.016 px at 16, 24 and 32. Study: thresholds.py boards.edge_pixels REACH_PX
-# ….
+# err by 0.024, 0.019 and 0.016 px at 16, 24 and 32. Study: thresholds.py boards.edge_pixels
+# REACH_PX ….
 REACH_PX = 24
 # [squares] Half a square, so that no two corners share a pixel's noise. Derived.
 _ARM_SQUARES = 0.5
@@ -53,7 +53,7 @@ class Windows:
 def cut_windows(
     grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
 ) -> Windows:
-    """Cut out the pixels that show the two edges of each corner."""
+    """Return the pixels that show the two edges of each corner; arguments as of `fit_saddles`."""
     longest_px = np.linalg.norm(frames, axis=1).max()
     reach = int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px)))
     span = np.arange(-reach, reach + 1)

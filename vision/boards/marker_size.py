@@ -24,7 +24,7 @@ _RIM_PX = 2.0
 
 
 def check_marker_size(greys: Sequence[np.ndarray], board: Board) -> None:
-    """Raise Refused where marker_mm and square_mm contradict the markers in pictures of the board."""
+    """Raise Refused where marker_mm and square_mm contradict the markers in pictures."""
     sides = []
     for grey in greys:
         sides += _marker_sides(grey, board)
@@ -35,9 +35,10 @@ def check_marker_size(greys: Sequence[np.ndarray], board: Board) -> None:
     slack = _TOLERANCE + _RIM_PX / side_px
     if abs(seen / entered - 1) > slack:
         raise Refused(
-            f"the markers are {seen:.3f} times as wide as the squares, but marker_mm = {board.marker_mm:g} and "
-            f"square_mm = {board.square_mm:g} make it {entered:.3f} ({entered * (1 - slack):.2f} to "
-            f"{entered * (1 + slack):.2f} may be seen): measure both on the printed board and enter them"
+            f"the markers are {seen:.3f} times as wide as the squares, but marker_mm = "
+            f"{board.marker_mm:g} and square_mm = {board.square_mm:g} make it {entered:.3f} "
+            f"({entered * (1 - slack):.2f} to {entered * (1 + slack):.2f} may be seen): measure "
+            "both on the printed board and enter them"
         )
 
 

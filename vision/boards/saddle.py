@@ -118,7 +118,7 @@ def _start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray
 
 
 def _model(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the grey (n, k) that the parameters p (n, 10) predict, and its Jacobian (n, 10, k)."""
+    """Predict the grey (n, k) by the parameters p (n, 10), with its Jacobian (n, 10, k)."""
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
     edges, by_edge = _blurred_edges(offset, p[:, TURN, None], p[:, BLUR, None])
     contrast = p[:, CONTRAST, None, None, None]

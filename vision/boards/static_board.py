@@ -1,4 +1,4 @@
-"""The board that stands on the rig: one view a camera from its picture and all frames of the trials.
+"""The board on the rig: one view a camera from its picture and all frames of the trials.
 
 In the frames the bar, the hub and the wire hide some corners and lie close to others. A corner near
 something dark is pulled by it, always the same way while that thing stays, so averaging does not

@@ -26,8 +26,8 @@ _LEAST_STRENGTH = 0.05
 _STRAY_SHARE = 0.04
 # [px] Or by less than this. Study: tests/vision/calibration/test_calibrate.py.
 _STRAY_PX = 3.0
-# [deg] Below, the foreshortening that separates focal length from distance, 1 − cos, is under 1.5 %.
-# Derived.
+# [deg] Below, the foreshortening that separates focal length from distance, 1 − cos, is under
+# 1.5 %. Derived.
 _LEAST_TILT_DEG = 10.0
 # [1] Farthest over nearest corner. Origin not known; the lab's views have 1.76 and 1.86. Study:
 # calibrate cameras, its notes.
@@ -221,13 +221,13 @@ def _largest_magnification(distortion: np.ndarray, radius: float) -> float:
 
 
 def _reach(camera: Camera, px: np.ndarray) -> float:
-    """Return the largest distance of pixels (n, 2) from the principal point, px over focal length."""
+    """Return how far pixels (n, 2) lie from the principal point at most, px over focal length."""
     normalised = (px - camera.lens[2:4]) / camera.lens[:2]
     return float(np.linalg.norm(normalised, axis=1).max())
 
 
 def depth_ratio(poses: Sequence[np.ndarray], views: Sequence[Corners], board: Board) -> float:
-    """Return the distance of the farthest corner over that of the nearest, along the optical axis."""
+    """Return the depth of the farthest corner over that of the nearest, on the optical axis."""
     depths = []
     for T_camera_board, view in zip(poses, views):
         depths.append(apply(T_camera_board, board.corners_mm[view.ids])[:, 2])

@@ -132,7 +132,7 @@ def _unit_scale(matrix: np.ndarray) -> np.ndarray:
 
 
 def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Solve with rows and columns scaled to a unit diagonal."""
+    """Solve matrix · x = vector, with rows and columns scaled to a unit diagonal."""
     if not len(vector):
         return vector
     scale = _unit_scale(matrix)

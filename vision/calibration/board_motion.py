@@ -1,10 +1,10 @@
 """How a board held by hand moves between views, for pictures that were taken late.
 
 Cameras started by software take "the same" frame tens of milliseconds apart, and a camera that
-buffers is late by whole frames now and then. A board at 0.5 m/s is by then elsewhere by many pixels,
-so that no one pose fits all cameras. The board's poses in the neighbouring views say where it was:
-through a view's pose and those before and after goes a parabola (turn as a rotation vector about the
-view's own pose).
+buffers is late by whole frames now and then. A board at 0.5 m/s is by then elsewhere by many
+pixels, so that no one pose fits all cameras. The board's poses in the neighbouring views say where
+it was: through a view's pose and those before and after goes a parabola (turn as a rotation vector
+about the view's own pose).
 """
 
 from dataclasses import dataclass

@@ -137,8 +137,8 @@ class Priors:
 
     free (16 C + 3,): bool. mean, sigma (16 C + 3,): of independent observations of the global
     parameters, sigma inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
-    pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w rad
-    and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
+    pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
+    rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
     strays from its time; None: not at all.
     """
 
@@ -231,7 +231,7 @@ class _Motion(NamedTuple):
 
     @staticmethod
     def none(count: int) -> "_Motion":
-        """Return that of a board that stands still."""
+        """Return the motion of a board that stands still, for `count` corners."""
         still = np.zeros((count, 3))
         eye = np.broadcast_to(np.eye(3), (count, 3, 3))
         return _Motion(eye, still, still, still, eye[:, None], np.ones((count, 1)))

@@ -1,5 +1,4 @@
-"""Where the adjustment starts: focal length from homographies, board poses by one camera, cameras by
-shared views.
+"""Where the adjustment starts: focal length, board poses by one camera, cameras by shared views.
 
 Good to a few percent, which suffices: the adjustment (`vision.calibration.adjust`) forgets where it
 began.

@@ -1,4 +1,4 @@
-"""Which camera saw the board where and when: views laid out for one adjustment, and where it starts.
+"""Which camera saw the board where and when: views laid out for one adjustment, and its start.
 
 Board views are each camera's own, or shared where all cameras saw the board at one instant. The
 board standing on the rig, where there is one, is view 0 and shared by all.
@@ -39,8 +39,8 @@ _MIN_SHARED = 5
 class Alone:
     """One camera by itself.
 
-    lens (9,). error_px: model error. views, poses: by view index its usable views and T_camera_board
-    (3, 4).
+    lens (9,). error_px: model error. views, poses: by view index its usable views and
+    T_camera_board (3, 4).
     """
 
     lens: np.ndarray
@@ -112,12 +112,12 @@ def lay_out(
     together: bool,
     times_s: Mapping[str, Sequence[float]] | None = None,
 ) -> Layout:
-    """Return one table of all corners, and the first state, for cameras at T_camera_world (C, 3, 4).
+    """Return a table of all corners, and the first state, for cameras at T_camera_world (C, 3, 4).
 
     standing: the board on the rig, where there is one. together: views of one index are of one
     instant, or of times_s[camera][index] where given.
     """
-    views = _group_shots(cameras, together, times_s)
+    views = _group_shots(cameras, together, times_s if together else None)
     if standing is not None:
         on_rig = [_Shot(c, -1, standing[name]) for c, name in enumerate(cameras)]
         views = [on_rig, *views]

@@ -96,7 +96,7 @@ def normal_equations(
 
 
 def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return Cauchy's loss, width² log(1 + u²/width²), and its weight, of squared residuals u² (n,).
+    """Return Cauchy's loss, width² log(1 + u²/width²), and weight, of squared residuals u² (n,).
 
     For infinite width they are u² and 1.
     """

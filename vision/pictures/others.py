@@ -1,4 +1,4 @@
-"""Rods in the pictures besides the one that is measured: the pixels where they may be are masked."""
+"""Rods in the pictures besides the one that is measured: pixels where they may be are masked."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

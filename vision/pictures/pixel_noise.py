@@ -24,7 +24,7 @@ class Noise:
         return Noise(self.floor * share, self.gain * share)
 
     def sigma(self, grey: np.ndarray) -> np.ndarray:
-        """Return the standard deviation at grey levels, never under a third of a level (rounding)."""
+        """Return the standard deviation at grey levels, a third of a level at least (rounding)."""
         return np.sqrt(np.maximum(self.floor + self.gain * np.maximum(grey, 0.0), 1.0 / 12.0))
 
 
