@@ -70,7 +70,7 @@ def adjust_bundle(
     fall = np.inf
     for _ in range(_MOST_STEPS if np.isfinite(normal.cost) else 0):
         steps = _solve_step(normal, priors.free, damping)
-        trial_state = state.stepped(*steps)
+        trial_state = state.move(*steps)
         trial = normal_equations(trial_state, seen, corners_mm, priors, width)
         if trial.cost <= normal.cost * (1 + 1e-13):
             fall = (normal.cost - trial.cost) / (1e-12 + normal.cost)

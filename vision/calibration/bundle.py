@@ -101,14 +101,14 @@ class BundleState:
         if self.instants is None:
             object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), cameras)))
 
-    def globals(self) -> np.ndarray:
+    def global_values(self) -> np.ndarray:
         """Return the values that priors constrain, (16 C + 3,); poses stand as 0."""
         per_camera = np.zeros((len(self.lens), N_CAMERA))
         per_camera[:, :9] = self.lens
         per_camera[:, CLOCK] = self.clock
         return np.concatenate([per_camera.ravel(), self.board])
 
-    def stepped(
+    def move(
         self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray
     ) -> "BundleState":
         """Return the state moved by steps (16 C + 3,), (V, 6) and (V, C)."""

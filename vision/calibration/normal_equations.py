@@ -189,7 +189,7 @@ def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
 def _add_priors(equations: Equations, state: BundleState, priors: Priors) -> float:
     """Add the observations besides the pictures, in place; return their cost."""
     precision = 1.0 / priors.sigma**2
-    residual = np.where(precision == 0, 0.0, priors.mean - state.globals())
+    residual = np.where(precision == 0, 0.0, priors.mean - state.global_values())
     equations.A[np.diag_indices(len(residual))] += precision
     equations.a[:] += precision * residual
     cost = np.sum(precision * residual**2)
