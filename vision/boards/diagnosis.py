@@ -44,10 +44,10 @@ def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
         shares = {candidate: _corner_share(greys, candidate) for candidate in candidates}
         best = max(shares, key=shares.get, default=board)
         if shares.get(best, 0.0) > max(_LEAST_SHARE, _CLEARLY_MORE * share):
-            changed = [line for line in _settings(best) if line not in settings]
+            difference = [line for line in _settings(best) if line not in settings]
             return (
                 f"the board as entered ({', '.join(settings)}) is not found, but one with "
-                f"{', '.join(changed)} is; if that is the board in the pictures, enter it"
+                f"{', '.join(difference)} is; if that is the board in the pictures, enter it"
             )
     return None if share > 0 else _describe_markers(greys, board)
 

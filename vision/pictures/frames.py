@@ -100,7 +100,7 @@ class Frames(ABC):
 
     def _check_size(self, index: int, grey: np.ndarray) -> None:
         """Raise Refused where a frame has another size than `size_px`."""
-        height, width = grey.shape
+        height, width = grey.shape[:2]
         if (width, height) != self.size_px:
             raise Refused(
                 f"frame {index} of {self.path.name} is {width} x {height} px, the others are "
