@@ -78,19 +78,19 @@ def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarr
         return ""
     shown = texture(picture)
     as_is = likeness(shown, texture(rig))
-    if as_is.seen and as_is.moved_px < _LEAST_MOVED_PX:
+    if as_is.is_same_scene and as_is.shift_length_px < _LEAST_MOVED_PX:
         return ""
-    said = [as_is_moved(as_is)] if as_is.seen else []
+    said = [as_is_moved(as_is)] if as_is.is_same_scene else []
     others = {
         turn: likeness(texture(change(picture)), texture(rig)) for turn, change in _TURNED.items()
     }
     for turn, found in others.items():
-        if found.seen and found.peak > _CLEARER * as_is.peak:
+        if found.is_same_scene and found.peak > _CLEARER * as_is.peak:
             said = [f"its frames are {turn}"]
     for other, scene in background.items():
         if other != name and scene is not None and scene.shape == picture.shape:
             found = likeness(shown, texture(scene))
-            if found.seen and found.peak > _CLEARER * as_is.peak:
+            if found.is_same_scene and found.peak > _CLEARER * as_is.peak:
                 said = [f"its frames are those of camera {other}"]
     return said[-1] if said else ""
 

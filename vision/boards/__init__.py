@@ -1,4 +1,4 @@
-"""ChArUco boards in pictures: corners with sigma, what is wrong with a board, whether its views suffice.
+"""ChArUco boards in pictures: corners with sigma, faults of a board, whether its views suffice.
 
 May import geometry, pictures.
 """

@@ -1,7 +1,8 @@
-"""A board that is not found: which setting would find it, for the user to enter. Nothing is gone on with by itself."""
+"""A board that is not found: which setting would find it, for the user to enter."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 
 import cv2
 import numpy as np
@@ -16,123 +17,123 @@ _LEAST_SHARE = 0.3
 # [1] And so many times what the setting entered finds. Set by eye, as above. Study:
 # tests/vision/boards/test_board_settings.py.
 _CLEARLY_MORE = 2.0
-# [1, markers] A dictionary may be the one entered wrongly where it shows so large a part of the
-# most markers, and more than so many. Set by eye.
-_NEARLY_MOST, _SEVERAL = 0.7, 2
+# [1] A dictionary may be the one entered wrongly where it shows so large a part of the most
+# markers. Set by eye.
+_NEARLY_MOST = 0.7
+# [markers] And that part is more than so many. Set by eye.
+_SEVERAL = 2
+# [dictionaries] As many are tried with all prints. Set by eye.
+_MOST_DICTIONARIES = 3
+# [px] A corner farther from the homography is another thing. Set by eye.
+_NEAR_PX = 3.0
 
 
 def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
-    """What is wrong with the board as entered, in a sentence naming the setting that works; None if it is well found.
+    """Return a sentence naming the setting that would find the board; None if it is found.
 
-    greys: a few pictures of the board (three to five are enough; 0.1 to 1 s a picture where nothing is found).
+    greys: a few pictures of the board (three to five are enough; 0.1 to 1 s a picture where nothing
+    is found).
     """
     if not greys:
         return "there is no picture of the board"
-    entered = corner_share(greys, board)
-    if entered > _LEAST_SHARE:
+    share = _corner_share(greys, board)
+    if share > _LEAST_SHARE:
         return None
-    for candidates in (_other_print(board), _other_dictionary(greys, board)):
-        best, share = _best(greys, candidates)
-        if share > max(_LEAST_SHARE, _CLEARLY_MORE * entered):
+    settings = _settings(board)
+    for candidates in (_other_prints(board), _boards_of_other_dictionaries(greys, board)):
+        shares = {candidate: _corner_share(greys, candidate) for candidate in candidates}
+        best = max(shares, key=shares.get, default=board)
+        if shares.get(best, 0.0) > max(_LEAST_SHARE, _CLEARLY_MORE * share):
+            difference = [line for line in _settings(best) if line not in settings]
             return (
-                f"the board as entered ({_named(board)}) is not found, but one with {_difference(board, best)} is; "
-                "if that is the board in the pictures, enter it"
+                f"the board as entered ({', '.join(settings)}) is not found, but one with "
+                f"{', '.join(difference)} is; if that is the board in the pictures, enter it"
             )
-    return None if entered > 0 else _what_is_there(greys, board)
+    return None if share > 0 else _describe_markers(greys, board)
 
 
-def corner_share(greys: Sequence[np.ndarray], board: Board) -> float:
-    """Mean share of the board's corners that OpenCV finds and that lie as on a plane."""
-    return float(np.mean([_plausible_count(grey, board) for grey in greys]) / len(board.corners_mm))
+def _corner_share(greys: Sequence[np.ndarray], board: Board) -> float:
+    """Return the mean share of the board's corners that OpenCV finds and that lie as on a plane."""
+    counts = [_count_corners(grey, board) for grey in greys]
+    return float(np.mean(counts) / len(board.corners_mm))
 
 
-def _plausible_count(grey: np.ndarray, board: Board) -> int:
-    """Corners on one homography: with a wrong layout some are found, at the wrong places."""
+def _count_corners(grey: np.ndarray, board: Board) -> int:
+    """Count the corners on one homography: a wrong layout finds some, at the wrong places."""
     ids, px = detect(grey, board)
     if len(ids) < MIN_CORNERS + 2:
         return 0
     squares = board.corners_mm[ids, :2] / board.square_mm
-    H, good = cv2.findHomography(squares, px, cv2.RANSAC, 3.0)
-    return 0 if H is None else int(good.sum())
+    H, is_near = cv2.findHomography(squares, px, cv2.RANSAC, _NEAR_PX)
+    return 0 if H is None else int(is_near.sum())
 
 
-def _best(greys: Sequence[np.ndarray], boards: Iterable[Board]) -> tuple[Board | None, float]:
-    shares = [(board, corner_share(greys, board)) for board in boards]
-    return max(shares, key=lambda candidate: candidate[1], default=(None, 0.0))
+def _other_prints(board: Board) -> list[Board]:
+    """Return the boards that people mix up first: inverted, legacy, columns for rows."""
+    prints = []
+    for inverted, legacy in product((False, True), repeat=2):
+        for squares in dict.fromkeys((board.squares, board.squares[::-1])):
+            prints.append(replace(board, inverted=inverted, legacy=legacy, squares=squares))
+    return [other for other in prints if other != board]
 
 
-def _other_print(board: Board) -> list[Board]:
-    """What people mix up first: inverted, legacy, columns for rows."""
-    turned = dict.fromkeys((board.squares, board.squares[::-1]))
-    variants = [
-        replace(board, inverted=inverted, legacy=legacy, squares=squares)
-        for inverted in (False, True)
-        for legacy in (False, True)
-        for squares in turned
-    ]
-    return [variant for variant in variants if variant != board]
+def _boards_of_other_dictionaries(greys: Sequence[np.ndarray], board: Board) -> Iterator[Board]:
+    """Yield the board in each other dictionary whose markers are seen, in all prints.
+
+    The dictionaries are those of which several markers are seen, the smallest of each kind that
+    holds the board's markers.
+    """
+    counts = {}
+    for name in sorted(dir(cv2.aruco)):
+        if name.startswith("DICT_") and "APRILTAG" not in name and name != board.dictionary:
+            counts[name] = _count_markers(greys, name)
+    least = _NEARLY_MOST * max(counts.values(), default=0)
+    if least <= _SEVERAL:
+        return
+    sizes = {}
+    for name, count in counts.items():
+        size = len(_opencv_dictionary(name).bytesList)
+        if count > least and size >= board.marker_count:
+            sizes[name] = size
+    for name in sorted(sizes, key=sizes.get)[:_MOST_DICTIONARIES]:
+        entered = replace(board, dictionary=name)
+        yield entered
+        yield from _other_prints(entered)
 
 
-def _other_dictionary(greys: Sequence[np.ndarray], board: Board) -> Iterable[Board]:
-    """The dictionaries whose markers are seen, with the print as entered and otherwise."""
-    for dictionary in _dictionaries_seen(greys, board):
-        entered = replace(board, dictionary=dictionary)
-        yield from (entered, *_other_print(entered))
+def _opencv_dictionary(name: str) -> cv2.aruco.Dictionary:
+    """Return OpenCV's dictionary of this name."""
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
 
 
-def _dictionaries_seen(greys: Sequence[np.ndarray], board: Board) -> list[str]:
-    """Dictionaries of which several markers are seen, the smallest of each kind that holds the board's markers."""
-    counts = {
-        name: _marker_count(greys, name) for name in _dictionaries() if name != board.dictionary
-    }
-    most = max(counts.values(), default=0)
-    plain = [name for name, count in counts.items() if count > _NEARLY_MOST * most > _SEVERAL]
-    return sorted((name for name in plain if _size(name) >= board.marker_count), key=_size)[:3]
-
-
-def _dictionaries() -> list[str]:
-    return sorted(n for n in dir(cv2.aruco) if n.startswith("DICT_") and "APRILTAG" not in n)
-
-
-def _size(dictionary: str) -> int:
-    return len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)).bytesList)
-
-
-def _marker_count(greys: Sequence[np.ndarray], dictionary: str) -> float:
+def _count_markers(greys: Sequence[np.ndarray], dictionary: str) -> float:
+    """Return how many markers of a dictionary are seen in a picture, on average."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.detectInvertedMarker = True
-    predefined = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
-    detector = cv2.aruco.ArucoDetector(predefined, parameters)
-    ids = [detector.detectMarkers(to_8_bit(grey))[1] for grey in greys]
-    return float(np.mean([0 if i is None else len(i) for i in ids]))
+    detector = cv2.aruco.ArucoDetector(_opencv_dictionary(dictionary), parameters)
+    return float(np.mean([len(detector.detectMarkers(to_8_bit(grey))[0]) for grey in greys]))
 
 
-def _what_is_there(greys: Sequence[np.ndarray], board: Board) -> str:
-    count = _marker_count(greys, board.dictionary)
+def _describe_markers(greys: Sequence[np.ndarray], board: Board) -> str:
+    """Return a sentence on what is seen of the board's dictionary where no setting finds it."""
+    count = _count_markers(greys, board.dictionary)
     if count < 1:
-        return f"no marker of {board.dictionary} is seen, nor of another dictionary in that number: is this the board?"
+        return (
+            f"no marker of {board.dictionary} is seen, nor of another dictionary in that number: "
+            "is this the board?"
+        )
     return (
-        f"{count:.0f} markers of {board.dictionary} are seen a picture, but not laid out as on a board of "
-        f"{board.squares[0]} x {board.squares[1]} squares: check squares, legacy and the printed board"
+        f"{count:.0f} markers of {board.dictionary} are seen a picture, but not laid out as on a "
+        f"board of {board.squares[0]} x {board.squares[1]} squares: check squares, legacy and the "
+        "printed board"
     )
 
 
-def _named(board: Board) -> str:
-    return ", ".join(f"{key} = {value}" for key, value in _settings(board).items())
-
-
-def _difference(entered: Board, other: Board) -> str:
-    before = _settings(entered)
-    return ", ".join(
-        f"{key} = {value}" for key, value in _settings(other).items() if before[key] != value
-    )
-
-
-def _settings(board: Board) -> dict[str, str]:
-    """As session.toml has them."""
-    return {
-        "squares": str(list(board.squares)),
-        "dictionary": f'"{board.dictionary}"',
-        "legacy": str(board.legacy).lower(),
-        "inverted": str(board.inverted).lower(),
-    }
+def _settings(board: Board) -> list[str]:
+    """Return the board's settings as lines of session.toml."""
+    return [
+        f"squares = {list(board.squares)}",
+        f'dictionary = "{board.dictionary}"',
+        f"legacy = {str(board.legacy).lower()}",
+        f"inverted = {str(board.inverted).lower()}",
+    ]

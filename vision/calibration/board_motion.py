@@ -1,9 +1,10 @@
-"""How a board held by hand moves between views: what a picture taken late has seen.
+"""How a board held by hand moves between views, for pictures that were taken late.
 
-Cameras started by software take "the same" frame tens of milliseconds apart, and a camera that buffers is late by whole
-frames now and then. A board at 0.5 m/s is by then elsewhere by many pixels, so that no one pose fits all cameras. The
-board's poses in the neighbouring views say where it was: through a view's pose and those before and after goes a
-parabola (turn as a rotation vector about the view's own pose).
+Cameras started by software take "the same" frame tens of milliseconds apart, and a camera that
+buffers is late by whole frames now and then. A board at 0.5 m/s is by then elsewhere by many
+pixels, so that no one pose fits all cameras. The board's poses in the neighbouring views say where
+it was: through a view's pose and those before and after goes a parabola (turn as a rotation vector
+about the view's own pose).
 """
 
 from dataclasses import dataclass
@@ -20,10 +21,12 @@ _REACH_INTERVALS = 2.6
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Views in time. time_s (V,): NaN for a view that is not on the trajectory (the board on the rig).
+    """Views in time.
 
-    camera_rank (C,): in each view the picture of the camera that ranks first has the view's time; by the others'
-    instants it is told how late they are. (A view all of whose pictures were late would be the same view elsewhere.)
+    time_s (V,): NaN for a view that is not on the trajectory (the board on the rig). camera_rank
+    (C,): in each view the picture of the camera that ranks first has the view's time; the instants
+    of the others say how late they are. (A view all of whose pictures were late would be the same
+    view elsewhere.)
     """
 
     time_s: np.ndarray
@@ -31,43 +34,56 @@ class Trajectory:
 
     @property
     def interval_s(self) -> float:
-        """Median time between views that follow each other."""
+        """Return the median time between views that follow each other; NaN with one view."""
         taken_s = np.sort(self.time_s[np.isfinite(self.time_s)])
         return float(np.median(np.diff(taken_s))) if len(taken_s) > 1 else np.nan
 
     def is_reference(self, view: np.ndarray, camera: np.ndarray) -> np.ndarray:
-        """Of pictures (view, camera) (s,), which give their view its time. (s,) bool."""
-        best = np.full(len(self.time_s), len(self.camera_rank))
-        np.minimum.at(best, view, self.camera_rank[camera])
-        return self.camera_rank[camera] == best[view]
+        """Return which pictures (view, camera), (s,) each, give their view its time: (s,) bool."""
+        rank = self.camera_rank[camera]
+        first = np.full(len(self.time_s), len(self.camera_rank))
+        np.minimum.at(first, view, rank)
+        return rank == first[view]
 
     @cached_property
     def neighbours(self) -> np.ndarray:
-        """The view before and the view after each, (V, 2); the view itself where there is none near enough."""
-        pair = np.tile(np.arange(len(self.time_s))[:, None], 2)
+        """Return the view before and the view after each, (V, 2).
+
+        It is the view itself where there is none near enough.
+        """
         order = np.argsort(self.time_s)[: np.isfinite(self.time_s).sum()]
-        near = np.diff(self.time_s[order]) < _REACH_INTERVALS * self.interval_s
-        pair[order[1:][near], 0] = order[:-1][near]
-        pair[order[:-1][near], 1] = order[1:][near]
+        is_near = np.diff(self.time_s[order]) < _REACH_INTERVALS * self.interval_s
+        earlier = order[:-1][is_near]
+        later = order[1:][is_near]
+        pair = np.tile(np.arange(len(self.time_s))[:, None], 2)
+        pair[later, 0] = earlier
+        pair[earlier, 1] = later
         return pair
 
     def paths(self, T_world_board: np.ndarray) -> np.ndarray:
-        """From each view's pose to the pose before and after: rotation vector rad and shift mm, (V, 2, 6)."""
-        there, here = T_world_board[self.neighbours], T_world_board[:, None]
-        turn = log_rotation(there[..., :3] @ np.swapaxes(here[..., :3], -1, -2))
-        return np.concatenate([turn, there[..., 3] - here[..., 3]], axis=-1)
+        """Return how each view's pose differs from the pose before and after, (V, 2, 6).
+
+        T_world_board (V, 3, 4). Rotation vector, rad, and shift, mm.
+        """
+        own = T_world_board[:, None]
+        neighbour = T_world_board[self.neighbours]
+        turn = log_rotation(neighbour[..., :3] @ own[..., :3].swapaxes(-1, -2))
+        return np.concatenate([turn, neighbour[..., 3] - own[..., 3]], axis=-1)
 
     def shares(self, view: np.ndarray, elapsed_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How much of the path to the pose before and after the board has gone at elapsed_s (n,) from view (n,).
+        """Return how much of the path to the pose before and after the board has gone.
 
-        Shares (n, 2) and their rates (n, 2), 1/s: the parabola that is 0 now and 1 at its own neighbour; a straight
-        line where there is one neighbour, nothing where there is none.
+        elapsed_s (n,): since the time of each view (n,). Returns shares (n, 2) and their rates
+        (n, 2), 1/s: the parabola that is 0 now and at the other neighbour, and 1 at its own; a
+        straight line where there is one neighbour, nothing where there is none.
         """
-        apart = self.time_s[self.neighbours[view]] - self.time_s[view][:, None]
-        there, e = np.nan_to_num(apart) != 0, elapsed_s[:, None]
-        own, other = np.where(there, apart, 1.0), np.where(there, apart, 0.0)[:, ::-1]
-        curved = there & there[:, ::-1]
-        below = np.where(curved, own - other, 1.0)
-        share = e / own * np.where(curved, (e - other) / below, 1.0)
-        rate = np.where(curved, (2 * e - other) / below, 1.0) / own
-        return np.where(there, share, 0.0), np.where(there, rate, 0.0)
+        elapsed = elapsed_s[:, None]
+        interval = self.time_s[self.neighbours[view]] - self.time_s[view][:, None]  # (n, 2) s
+        exists = np.nan_to_num(interval) != 0
+        own = np.where(exists, interval, 1.0)
+        other = np.where(exists, interval, 0.0)[:, ::-1]
+        curved = exists & exists[:, ::-1]
+        span = np.where(curved, own - other, 1.0)
+        share = elapsed / own * np.where(curved, (elapsed - other) / span, 1.0)
+        rate = np.where(curved, (2 * elapsed - other) / span, 1.0) / own
+        return np.where(exists, share, 0.0), np.where(exists, rate, 0.0)

@@ -1,5 +1,5 @@
-"""What an adjustment of cameras is about: what was seen, the parameters, and how the pictures follow from
-them.
+"""The model of an adjustment of cameras: what was seen, the parameters, and how the pictures follow
+from them.
 
 Every observation is a corner of the board, seen by one camera in one view. Parameters:
 
@@ -12,6 +12,7 @@ Poses move as T ← (Exp(w) R, t + v). `vision.calibration.adjust` finds the par
 """
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,10 @@ CAMERA_COLUMNS = (
     "clock_offset_s",
 )
 BOARD_COLUMNS = ("scale", "warp_x_mm", "warp_y_mm")
+N_CAMERA = len(CAMERA_COLUMNS)
+N_BOARD = len(BOARD_COLUMNS)
 # [parameters] A layout, no threshold.
-N_CAMERA, N_BOARD, N_VIEW = len(CAMERA_COLUMNS), len(BOARD_COLUMNS), 6
+N_VIEW = 6
 # [columns] A layout, no threshold.
 POSE = slice(9, 15)
 # [column] A layout, no threshold.
@@ -40,10 +43,10 @@ CLOCK = 15
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """What was seen, a row a corner: camera, view, corner (n,) int, px (n, 2), sigma_px (n,), time_s (n,).
+    """The corners that were seen, a row each, sorted by view and camera.
 
-    time_s is the picture's time after the view's own time: 0 where cameras are triggered together or a view
-    has one camera. Rows are kept sorted by view and camera.
+    camera, view, corner (n,): indices. px (n, 2). sigma_px (n,). time_s (n,): of the picture after
+    the view's own time, 0 where cameras are triggered together or a view has one camera.
     """
 
     camera: np.ndarray
@@ -57,21 +60,30 @@ class Sightings:
         return len(self.camera)
 
     def chosen(self, which: np.ndarray) -> "Sightings":
-        """The rows that the mask or index array names, in their order."""
-        return Sightings(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        """Return the rows of a mask or an index array, in their order."""
+        return Sightings(
+            self.camera[which],
+            self.view[which],
+            self.corner[which],
+            self.px[which],
+            self.sigma_px[which],
+            self.time_s[which],
+        )
 
     def shot_starts(self) -> np.ndarray:
-        """First row of each shot, a shot being one camera's picture of one view."""
-        change = (np.diff(self.view) != 0) | (np.diff(self.camera) != 0)
-        return np.concatenate([[0], np.flatnonzero(change) + 1])
+        """Return the first row of each shot, a shot being one camera's picture of one view."""
+        is_new = (np.diff(self.view) != 0) | (np.diff(self.camera) != 0)
+        return np.concatenate([[0], np.flatnonzero(is_new) + 1])
 
 
 @dataclass(frozen=True, eq=False)
 class BundleState:
-    """All parameters. lens (C, 9); T_camera_world (C, 3, 4); T_world_board (V, 3, 4); board (3,):
-    BOARD_COLUMNS; clock (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
-    trajectory: the views in time, along which the board moves between pictures of one view; None where cameras are
-    triggered together.
+    """All parameters.
+
+    lens (C, 9). T_camera_world (C, 3, 4). T_world_board (V, 3, 4). board (3,): BOARD_COLUMNS. clock
+    (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
+    trajectory: the views in time, along which the board moves between pictures of one view; None
+    where cameras are triggered together.
     """
 
     lens: np.ndarray
@@ -83,49 +95,51 @@ class BundleState:
     trajectory: Trajectory | None = None
 
     def __post_init__(self):
+        cameras = len(self.lens)
         if self.clock is None:
-            object.__setattr__(self, "clock", np.zeros(len(self.lens)))
+            object.__setattr__(self, "clock", np.zeros(cameras))
         if self.instants is None:
-            object.__setattr__(
-                self, "instants", np.zeros((len(self.T_world_board), len(self.lens)))
-            )
+            object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), cameras)))
 
-    def globals(self) -> np.ndarray:
-        """The values that priors speak of, (16 C + 3,); poses stand as 0."""
+    def global_values(self) -> np.ndarray:
+        """Return the values that priors constrain, (16 C + 3,); poses stand as 0."""
         per_camera = np.zeros((len(self.lens), N_CAMERA))
-        per_camera[:, :9], per_camera[:, CLOCK] = self.lens, self.clock
+        per_camera[:, :9] = self.lens
+        per_camera[:, CLOCK] = self.clock
         return np.concatenate([per_camera.ravel(), self.board])
 
-    def stepped(
+    def move(
         self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray
     ) -> "BundleState":
-        """Moved by (16 C + 3,), (V, 6) and (V, C)."""
+        """Return the state moved by steps (16 C + 3,), (V, 6) and (V, C)."""
         cameras = global_step[:-N_BOARD].reshape(-1, N_CAMERA)
         return replace(
             self,
             lens=self.lens + cameras[:, :9],
-            T_camera_world=_moved(self.T_camera_world, cameras[:, POSE]),
-            T_world_board=_moved(self.T_world_board, view_steps),
+            T_camera_world=_move_poses(self.T_camera_world, cameras[:, POSE]),
+            T_world_board=_move_poses(self.T_world_board, view_steps),
             board=self.board + global_step[-N_BOARD:],
             clock=self.clock + cameras[:, CLOCK],
             instants=self.instants + instant_steps,
         )
 
 
-def _moved(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def _move_poses(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return poses (n, 3, 4) moved by steps (n, 6), w rad and v mm."""
     R = exp_rotation(steps[:, :3]) @ T[:, :, :3]
-    return np.concatenate([R, (T[:, :, 3] + steps[:, 3:])[:, :, None]], axis=2)
+    t = T[:, :, 3] + steps[:, 3:]
+    return np.concatenate([R, t[:, :, None]], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
 class Priors:
-    """What is known beside the pictures, and what is held.
+    """What is known besides the pictures, and what is held.
 
-    free: (16 C + 3,) bool. mean, sigma: (16 C + 3,) of independent observations of the global parameters,
-    sigma inf where there is none (poses: always inf). view_free: (V,) bool. pose_view, pose_T (3, 4),
-    pose_sigma (6,): one view whose pose was measured (the board on the rig), in w rad and v mm; pose_view
-    is None where there is none. late_sigma_s (C,): how far a picture's instant strays from its time; 0: not
-    at all.
+    free (16 C + 3,): bool. mean, sigma (16 C + 3,): of independent observations of the global
+    parameters, sigma inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
+    pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
+    rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
+    strays from its time; None: not at all.
     """
 
     free: np.ndarray
@@ -141,119 +155,109 @@ class Priors:
 def predict(
     state: BundleState, seen: Sightings, corners_mm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels (n, 2) and their Jacobian (n, 2, 25 or 37).
+    """Predict the pixels (n, 2) of all sightings, and their Jacobian (n, 2, 25 or 37).
 
-    Its columns: the seeing camera's 16, the board's 3, the view's 6; with a trajectory also the 6 of the view before
-    and the 6 of the view after.
+    Its columns: the camera's 16, the board's 3, the view's 6; with a trajectory also the 6 of
+    the view before and the 6 of the view after.
     """
-    width = N_CAMERA + N_BOARD + N_VIEW * (1 if state.trajectory is None else 3)
-    px, J = np.empty((len(seen), 2)), np.empty((len(seen), 2, width))
-    points, by_board = _printed(state, seen, corners_mm)
-    paths = _Paths.of(state)
-    for camera in np.unique(seen.camera):
-        rows = np.flatnonzero(seen.camera == camera)
-        px[rows], J[rows] = _predict_one(
-            state, camera, seen.chosen(rows), points[rows], by_board[rows], paths
-        )
-    return px, J
+    points_mm, by_board = _printed_board(state.board, corners_mm)
+    motion = _board_motion(state, seen)
+    R_board = state.T_world_board[seen.view, :, :3]
+    R_camera = state.T_camera_world[seen.camera, :, :3]
+    in_view = np.einsum("nij,nj->ni", R_board, points_mm[seen.corner])
+    turned = np.einsum("nij,nj->ni", motion.turn, in_view)
+    world = turned + state.T_world_board[seen.view, :, 3] + motion.shift_mm
+    in_camera = np.einsum("nij,nj->ni", R_camera, world)
+    px, by_x, by_lens = _project(state, seen.camera, in_camera)
+
+    by_world = by_x @ R_camera
+    by_turn = -by_world @ skew(turned)  # Exp(w) y = y + w × y to first order
+    by_time = by_turn @ motion.turn_rate[:, :, None] + by_world @ motion.shift_rate_mm_s[:, :, None]
+    by_print = by_world @ motion.turn @ R_board @ by_board[seen.corner]
+    columns = [by_lens, -by_x @ skew(in_camera), by_x, by_time, by_print]
+    for pose in range(motion.shift_by_poses.shape[1]):
+        columns.append(by_turn @ motion.turn_by_poses[:, pose])
+        columns.append(by_world * motion.shift_by_poses[:, pose, None, None])
+    return px, np.concatenate(columns, axis=2)
 
 
-def _printed(
-    state: BundleState, seen: Sightings, corners_mm: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Board points (n, 3) in the board frame and d point / d (scale, warp_x, warp_y) (n, 3, 3).
+def _printed_board(board: np.ndarray, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners as printed (m, 3), mm, and their derivatives by BOARD_COLUMNS (m, 3, 3).
 
     Warp after mrcal: z = warp_x (1 − x²) + warp_y (1 − y²), x and y from −1 to 1 over the corners.
     """
-    half = np.maximum(np.ptp(corners_mm[:, :2], axis=0) / 2, 1e-9)
-    unit = (corners_mm[:, :2] - corners_mm[:, :2].mean(axis=0)) / half
+    flat = corners_mm[:, :2]
+    half = np.maximum(np.ptp(flat, axis=0) / 2, 1e-9)
+    unit = (flat - flat.mean(axis=0)) / half
     by_board = np.zeros((len(corners_mm), 3, N_BOARD))
     by_board[:, :, 0] = corners_mm
     by_board[:, 2, 1:] = 1.0 - unit**2
-    points = corners_mm + by_board @ state.board
-    return points[seen.corner], by_board[seen.corner]
+    return corners_mm + by_board @ board, by_board
 
 
-def _predict_one(state: BundleState, camera: int, seen: Sightings, points, by_board, paths):
-    T_board, T_camera = state.T_world_board[seen.view], state.T_camera_world[camera]
-    turned = np.einsum("nij,nj->ni", T_board[:, :, :3], points)
-    motion = _motion(state, camera, seen, paths)
-    moved = np.einsum("nij,nj->ni", motion.turn, turned)
-    R = T_camera[:, :3]
-    in_camera = (moved + T_board[:, :, 3] + motion.shift_mm) @ R.T
-    px, by_x, by_lens = lens_model.project_with_jacobians(
-        in_camera + T_camera[:, 3], state.lens[camera]
-    )
-    by_world = by_x @ R
-    by_turn = -by_world @ skew(moved)
-    columns = [by_lens, -by_x @ skew(in_camera), by_x]
-    columns.append(
-        by_turn @ motion.turn_rate[:, :, None] + by_world @ motion.shift_rate_mm_s[:, :, None]
-    )
-    columns.append(by_world @ motion.turn @ T_board[:, :, :3] @ by_board)
-    columns += [by_turn @ w for w in motion.turn_by_poses] + [
-        by_world * v for v in motion.shift_by_poses
-    ]
-    order = [*range(5), *(5 + k + side for k in range(motion.poses) for side in (0, motion.poses))]
-    return px, np.concatenate([columns[k] for k in order], axis=2)
+def _project(
+    state: BundleState, camera: np.ndarray, turned: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Project points (n, 3), turned to the axes of their cameras (n,), through the cameras' lenses.
+
+    Returns px (n, 2), and their derivatives by the points (n, 2, 3) and by the lens (n, 2, 9).
+    """
+    px = np.empty((len(camera), 2))
+    by_x = np.empty((len(camera), 2, 3))
+    by_lens = np.empty((len(camera), 2, 9))
+    for c in np.unique(camera):
+        rows = camera == c
+        x_camera = turned[rows] + state.T_camera_world[c, :, 3]
+        projected = lens_model.project_with_jacobians(x_camera, state.lens[c])
+        px[rows], by_x[rows], by_lens[rows] = projected
+    return px, by_x, by_lens
 
 
-@dataclass(frozen=True, eq=False)
-class _Motion:
+class _Motion(NamedTuple):
     """How the board moved from the view's own time to the instant of a picture, a row a corner.
 
-    turn (n, 3, 3) about the board's origin and shift_mm (n, 3); their rates, rad/s and mm/s (n, 3); and how turn (as a
-    small rotation) and shift follow the w and v of the view's own pose and of those before and after: a list of
-    (n, 3, 3) and of (n, 1, 1).
+    turn (n, 3, 3): about the board's origin. shift_mm (n, 3). turn_rate, shift_rate_mm_s (n, 3):
+    rad/s and mm/s. turn_by_poses (n, p, 3, 3), shift_by_poses (n, p): derivatives of the turn (as a
+    small rotation) by w, and of the shift by v, of p poses: the view's own and, with a trajectory,
+    those before and after.
     """
 
     turn: np.ndarray
     shift_mm: np.ndarray
     turn_rate: np.ndarray
     shift_rate_mm_s: np.ndarray
-    turn_by_poses: list[np.ndarray]
-    shift_by_poses: list[np.ndarray]
-
-    @property
-    def poses(self) -> int:
-        return len(self.turn_by_poses)
-
-
-@dataclass(frozen=True, eq=False)
-class _Paths:
-    """From each view's pose to those before and after: paths (V, 2, 6), and of their turns' left Jacobians the inverse
-    (V, 2, 3, 3)."""
-
-    paths: np.ndarray
-    inverse: np.ndarray
+    turn_by_poses: np.ndarray
+    shift_by_poses: np.ndarray
 
     @staticmethod
-    def of(state: BundleState) -> "_Paths | None":
-        if state.trajectory is None:
-            return None
-        paths = state.trajectory.paths(state.T_world_board)
-        return _Paths(paths, np.linalg.inv(left_jacobian(paths[:, :, :3])))
+    def none(count: int) -> "_Motion":
+        """Return the motion of a board that stands still, for `count` corners."""
+        still = np.zeros((count, 3))
+        eye = np.broadcast_to(np.eye(3), (count, 3, 3))
+        return _Motion(eye, still, still, still, eye[:, None], np.ones((count, 1)))
 
 
-def _motion(state: BundleState, camera: int, seen: Sightings, board: _Paths | None) -> _Motion:
-    n = len(seen)
-    if board is None:
-        still, eye = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))
-        return _Motion(eye, still, still, still, [eye], [np.ones((n, 1, 1))])
-    elapsed = seen.time_s + state.instants[seen.view, camera] + state.clock[camera]
-    shares, rates = state.trajectory.shares(seen.view, elapsed)
-    path, rate = (np.einsum("nk,nki->ni", s, board.paths[seen.view]) for s in (shares, rates))
-    turn, J = exp_rotation(path[:, :3]), left_jacobian(path[:, :3])
+def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
+    """Return how the board moved from the time of each sighting's view to that of its picture."""
+    if state.trajectory is None:
+        return _Motion.none(len(seen))
+    view = seen.view
+    paths = state.trajectory.paths(state.T_world_board)  # (V, 2, 6)
+    inverse = np.linalg.inv(left_jacobian(paths[:, :, :3]))  # (V, 2, 3, 3)
+    elapsed_s = seen.time_s + state.instants[view, seen.camera] + state.clock[seen.camera]
+    shares, rates = state.trajectory.shares(view, elapsed_s)  # (n, 2)
+    path = np.einsum("nk,nki->ni", shares, paths[view])
+    rate = np.einsum("nk,nki->ni", rates, paths[view])
+    turn = exp_rotation(path[:, :3])
+    J = left_jacobian(path[:, :3])
     # log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
-    inverse = board.inverse[seen.view] * shares[:, :, None, None]
-    by_neighbours = [J @ inverse[:, k] for k in (0, 1)]
-    by_own = turn - J @ np.swapaxes(inverse.sum(axis=1), 1, 2)
-    parts = [1.0 - shares.sum(axis=1), shares[:, 0], shares[:, 1]]
+    by_path = inverse[view] * shares[:, :, None, None]
+    by_own = turn - J @ by_path.sum(axis=1).swapaxes(1, 2)
     return _Motion(
-        turn,
-        path[:, 3:],
-        np.einsum("nij,nj->ni", J, rate[:, :3]),
-        rate[:, 3:],
-        [by_own, *by_neighbours],
-        [part[:, None, None] for part in parts],
+        turn=turn,
+        shift_mm=path[:, 3:],
+        turn_rate=np.einsum("nij,nj->ni", J, rate[:, :3]),
+        shift_rate_mm_s=rate[:, 3:],
+        turn_by_poses=np.concatenate([by_own[:, None], J[:, None] @ by_path], axis=1),
+        shift_by_poses=np.column_stack([1.0 - shares.sum(axis=1), shares]),
     )

@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.boards.corners import Corners
+from vision.boards.coverage import check_work, coverage
 from vision.boards.static_board import camera_moved, mean_view
 from vision.boards.sufficiency import (
     check_errors,
     check_lenses,
     check_rig_view,
     check_views,
-    check_work,
-    coverage,
     depth_ratio,
     fixes_pose,
     tilt_deg,

@@ -1,7 +1,6 @@
-"""Where the adjustment starts: focal length from homographies, board poses by one camera, cameras by shared
-views.
+"""Where the adjustment starts: focal length, board poses by one camera, cameras by shared views.
 
-Good to a few percent, which is all that is asked of it: the adjustment (`vision.calibration.bundle`) forgets where it
+Good to a few percent, which suffices: the adjustment (`vision.calibration.adjust`) forgets where it
 began.
 """
 
@@ -13,120 +12,106 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.geometry import lens as lens_model
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform, log_rotation
+from vision.geometry.rotation import apply, compose, invert_transform, log_rotation
 
 # [picture widths] 150° to 3° across: where a camera on a bench lies. Derived.
 _FOCAL_LIMITS = (0.15, 20.0)
 
 
-def focal_length_px(
-    views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
-) -> float:
-    """Focal length from the homographies of plane views (Zhang 2000), the principal point taken as the
-    middle.
-
-    With h1, h2 the first columns of K⁻¹H: h1 · h2 = 0 and |h1| = |h2|, both linear in 1/f². The picture's
-    width where no view is tilted enough to say.
-    """
-    equations = [_focal_equations(view, corners_mm, size_px) for view in views]
-    left, right = np.concatenate(equations).T if equations else np.zeros((2, 1))
-    inverse_square = _weighted_median(right / np.where(left == 0, np.inf, left), left**2)
-    focal = size_px[0] / np.sqrt(inverse_square) if inverse_square > 0 else np.inf
-    low, high = (limit * size_px[0] for limit in _FOCAL_LIMITS)
-    return float(focal) if low < focal < high else float(size_px[0])
-
-
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    """Half of the weight lies on either side; one view gone wrong cannot carry it off."""
-    order = np.argsort(values)
-    reached = np.cumsum(weights[order])
-    return (
-        float(values[order][np.searchsorted(reached, 0.5 * reached[-1])])
-        if reached[-1] > 0
-        else 0.0
-    )
-
-
-def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
-    """Rows (left, right) of left · (width/f)² = right, two a view; the picture in widths from its middle."""
-    picture = (view.px - 0.5 * (np.array(size_px) - 1)) / size_px[0]
-    H, _ = cv2.findHomography(corners_mm[view.ids, :2], picture, 0)
-    if H is None:
-        return np.zeros((0, 2))
-    H = H / np.sqrt(np.sum(H[:, :2] ** 2))
-    (a, b), (c, d), (e, f) = H[0, :2], H[1, :2], H[2, :2]
-    return np.array([[a * b + c * d, -e * f], [a * a + c * c - b * b - d * d, f * f - e * e]])
-
-
 def first_lens(
     views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
 ) -> np.ndarray:
-    """Nine lens parameters to begin with: one focal length, principal point in the middle, no distortion."""
-    focal = focal_length_px(views, corners_mm, size_px)
-    return np.array([focal, focal, 0.5 * (size_px[0] - 1), 0.5 * (size_px[1] - 1), 0, 0, 0, 0, 0])
+    """Return nine lens parameters to begin with: one focal length, the principal point in the
+    middle, no distortion.
+
+    The focal length is OpenCV's from the homographies of plane views (Zhang 2000); the picture's
+    width where they give none that a camera can have.
+    """
+    width, height = size_px
+    focal_px = np.nan
+    if views:
+        points_mm = [corners_mm[view.ids].astype(np.float32) for view in views]
+        px = [view.px.astype(np.float32) for view in views]
+        focal_px = cv2.initCameraMatrix2D(points_mm, px, size_px)[0, 0]
+    least, most = _FOCAL_LIMITS
+    if not least < focal_px / width < most:
+        focal_px = width
+    return np.array([focal_px, focal_px, 0.5 * (width - 1), 0.5 * (height - 1), 0, 0, 0, 0, 0])
 
 
 def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """T_camera_board (3, 4) of one view, the better of a plane's two mirrored poses (IPPE). Raises Refused where its
-    corners give none."""
+    """Return T_camera_board (3, 4) of one view, the better of a plane's two mirrored poses (IPPE).
+
+    Raises Refused where its corners give none.
+    """
     ab = lens_model.unproject(view.px, lens)
-    seen = np.all(np.isfinite(ab), axis=1)
-    points = corners_mm[view.ids[seen]]
+    is_known = np.all(np.isfinite(ab), axis=1)
+    points_mm = corners_mm[view.ids[is_known]]
     solved, turns, shifts, _ = cv2.solvePnPGeneric(
-        points, ab[seen][:, None], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+        points_mm, ab[is_known][:, None], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )
-    if not solved or np.any(points @ cv2.Rodrigues(turns[0])[0][2] + shifts[0][2] <= 0):
-        raise Refused(
-            f"a view of {len(view)} corners gives no board pose: corners along one line, or a wrong board"
-        )
-    return np.column_stack([cv2.Rodrigues(turns[0])[0], shifts[0].ravel()])
+    if solved:
+        T = np.column_stack([cv2.Rodrigues(turns[0])[0], shifts[0]])
+        if not np.any(apply(T, points_mm)[:, 2] <= 0):
+            return T
+    raise Refused(
+        f"a view of {len(view)} corners gives no board pose: corners along one line, or a wrong "
+        "board"
+    )
 
 
 def has_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> bool:
-    """Does `board_pose` find one?"""
+    """Return whether a view has a board pose."""
     try:
         return bool(np.isfinite(board_pose(view, corners_mm, lens)).all())
     except Refused:
         return False
 
 
-def chain_cameras(poses: Mapping[str, Sequence[np.ndarray | None]]) -> dict[str, np.ndarray]:
-    """T_camera_world of every camera, the world being the first camera's frame, from boards seen at once.
+def chain_cameras(poses: Mapping[str, Mapping[int, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return T_camera_world of every camera, the world being the first camera's frame.
 
-    poses[camera][k]: T_camera_board of view k, None where not seen. Raises Refused where cameras share no
-    view.
+    Cameras are added one by one, each by the boards that it saw together with one of those before.
+    poses[camera][k]: T_camera_board of view k. Raises Refused where cameras share no view.
     """
-    names = list(poses)
-    placed = {names[0]: np.eye(3, 4)}
-    while len(placed) < len(names):
-        a, b = max(
-            ((a, b) for a in placed for b in names if b not in placed),
-            key=lambda pair: len(_shared(poses[pair[0]], poses[pair[1]])),
-        )
-        relative = _shared(poses[a], poses[b])
+    first = next(iter(poses))
+    T_camera_world = {first: np.eye(3, 4)}
+    while len(T_camera_world) < len(poses):
+        relative: list[np.ndarray] = []
+        for a in T_camera_world:
+            for b in poses:
+                shared = [] if b in T_camera_world else relative_poses(poses[a], poses[b])
+                if len(shared) > len(relative):
+                    relative = shared
+                    known = a
+                    added = b
         if not relative:
+            added = next(name for name in poses if name not in T_camera_world)
             raise Refused(
-                f"camera {b} never sees the board at the same time as another: record such views"
+                f"camera {added} never sees the board at the same time as another: record such "
+                "views"
             )
-        placed[b] = compose(most_central(relative), placed[a])
-    return placed
+        T_camera_world[added] = compose(most_central(relative), T_camera_world[known])
+    return T_camera_world
 
 
-def _shared(
-    poses_a: Sequence[np.ndarray | None], poses_b: Sequence[np.ndarray | None]
+def relative_poses(
+    poses_a: Mapping[int, np.ndarray], poses_b: Mapping[int, np.ndarray]
 ) -> list[np.ndarray]:
-    """T_b_a from each view that both cameras have."""
-    return [
-        compose(b, invert_transform(a))
-        for a, b in zip(poses_a, poses_b)
-        if a is not None and b is not None
-    ]
+    """Return T_b_a (3, 4) by each view that both cameras have, from their T_camera_board."""
+    shared = sorted(poses_a.keys() & poses_b.keys())
+    return [compose(poses_b[k], invert_transform(poses_a[k])) for k in shared]
 
 
 def most_central(transforms: Sequence[np.ndarray]) -> np.ndarray:
-    """The transform whose turn is nearest to the others': a mirrored pose is far from all of them."""
-    turns, shifts = np.array(transforms)[:, :, :3], np.array(transforms)[:, :, 3]
-    apart = np.linalg.norm(log_rotation(turns[:, None] @ np.swapaxes(turns, 1, 2)[None]), axis=2)
-    size = np.median(np.linalg.norm(shifts, axis=1))
-    apart += np.linalg.norm(shifts[:, None] - shifts[None], axis=2) / max(size, 1e-9)
-    return transforms[int(np.argmin(np.median(apart, axis=1)))]
+    """Return the transform that is nearest to the others: a mirrored pose is far from all of them.
+
+    Distances are angles, and shifts over the median distance.
+    """
+    stacked = np.array(transforms)  # (n, 3, 4)
+    turns = stacked[:, :, :3]
+    shifts = stacked[:, :, 3]
+    angle = np.linalg.norm(log_rotation(turns[:, None] @ turns.swapaxes(1, 2)), axis=2)
+    size = max(np.median(np.linalg.norm(shifts, axis=1)), 1e-9)
+    distance = angle + np.linalg.norm(shifts[:, None] - shifts, axis=2) / size
+    return transforms[int(np.argmin(np.median(distance, axis=1)))]

@@ -17,13 +17,13 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import invert_transform, nearest_rotation
-from vision.pictures.change import HALF, changed
+from vision.pictures.change import HALF, change_confidence
 from vision.pictures.pixel_noise import measure_noise
 
 # [share of the stroke, frames] A frame is compared with such as are farther away: there the
 # whisker stands elsewhere. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
 _ELSEWHERE, _MOST_OTHERS = 0.25, 4
-# [1] Of `change.changed`: 4.8 noise levels after smoothing. Derived.
+# [1] Of `change.change_confidence`: 4.8 noise levels after smoothing. Derived.
 _SURE = 0.3
 # [pixels] Fewer are no line; more cost time alone. Set by eye. Study:
 # tests/bench/trials/test_placing_pictures.py.
@@ -111,7 +111,7 @@ def _planes(
         chosen = (
             np.unique(np.linspace(0, len(others) - 1, _MOST_OTHERS).astype(int)) if others else ()
         )
-        moves = [changed(grey, small[others[k]], noise) for k in chosen]
+        moves = [change_confidence(grey, small[others[k]], noise) for k in chosen]
         plane = _plane(camera, np.min(moves, axis=0)) if moves else None
         planes |= {} if plane is None else {f: plane}
     return planes

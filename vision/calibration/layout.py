@@ -1,18 +1,25 @@
-"""Which camera saw the board where and when: views laid out for one adjustment, and where it starts.
+"""Which camera saw the board where and when: views laid out for one adjustment, and its start.
 
-Board views are each camera's own, or shared where all cameras looked at the board at once. The board standing on the
-rig, where there is one, is view 0 and shared by all.
+Board views are each camera's own, or shared where all cameras saw the board at one instant. The
+board standing on the rig, where there is one, is view 0 and shared by all.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from vision.boards.corners import Corners
 from vision.calibration.board_motion import Trajectory
 from vision.calibration.bundle import BundleState, Sightings
-from vision.calibration.first_guess import board_pose, chain_cameras, most_central
+from vision.calibration.first_guess import (
+    board_pose,
+    chain_cameras,
+    most_central,
+    relative_poses,
+)
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation
@@ -24,13 +31,17 @@ _SAME_TURN_RAD = np.radians(10.0)
 _SAME_SHIFT = 0.1
 # [1] Most views of one index must agree. Origin not known beyond *most*. Study: cameras.py.
 _SAME_SHARE = 0.6
-# [views] Fewer views of one index tell no share. Origin not known. Study: cameras.py.
+# [views] Fewer views of one index give no share. Origin not known. Study: cameras.py.
 _MIN_SHARED = 5
 
 
 @dataclass(frozen=True, eq=False)
 class Alone:
-    """One camera by itself: its lens (9,), model error px, and by view index its usable views and board poses."""
+    """One camera by itself.
+
+    lens (9,). error_px: model error. views, poses: by view index its usable views and
+    T_camera_board (3, 4).
+    """
 
     lens: np.ndarray
     error_px: float
@@ -40,8 +51,12 @@ class Alone:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """seen: all corners. first: the state to start from. trajectory: the views in time; None where views are not
-    shared. index (V,): of each view in its camera's series, -1 for the board on the rig."""
+    """All views of all cameras, for one adjustment.
+
+    seen: all corners. first: the state to start from. trajectory: the views in time; None where
+    views are not shared. index (V,): of each view in its camera's series, -1 for the board on the
+    rig.
+    """
 
     seen: Sightings
     first: BundleState
@@ -49,24 +64,43 @@ class Layout:
     index: np.ndarray
 
 
+class _Shot(NamedTuple):
+    """A camera's picture of the board: the camera's number, the view's index in its series.
+
+    On the rig, where pose and time are given otherwise, index is -1.
+    """
+
+    camera: int
+    index: int
+    corners: Corners
+    T_camera_board: np.ndarray | None = None
+    time_s: float = np.nan
+
+
 def looked_at_once(cameras: Mapping[str, Alone]) -> bool:
-    """Are views of one index of one instant (to within a hand's motion), rather than each camera's own series?"""
-    alone = list(cameras.values())
-    pairs = [_agreement(a, b) for k, a in enumerate(alone) for b in alone[k + 1 :]]
-    judged = [share for share, count in pairs if count >= _MIN_SHARED]
-    return bool(judged) and float(np.median(judged)) >= _SAME_SHARE
+    """Return whether views of one index are of one instant, to within a hand's motion.
+
+    Else they are each camera's own series.
+    """
+    shares = []
+    for a, b in combinations(cameras.values(), 2):
+        relative = relative_poses(a.poses, b.poses)
+        if len(relative) >= _MIN_SHARED:
+            distances = [T[:, 3] for T in (*a.poses.values(), *b.poses.values())]
+            distance_mm = float(np.median(np.linalg.norm(distances, axis=1)))
+            shares.append(_share_in_agreement(np.array(relative), distance_mm))
+    return bool(shares) and float(np.median(shares)) >= _SAME_SHARE
 
 
-def _agreement(a: Alone, b: Alone) -> tuple[float, int]:
-    """Share of the views of both cameras that agree on T_b_a, and how many views there are."""
-    shared = [compose(b.poses[k], invert_transform(a.poses[k])) for k in a.poses if k in b.poses]
-    if not shared:
-        return 0.0, 0
-    centre = most_central(shared)
-    far = np.median([np.linalg.norm(T[:, 3]) for T in [*a.poses.values(), *b.poses.values()]])
-    turn = np.linalg.norm(log_rotation(np.array(shared)[:, :, :3] @ centre[:, :3].T), axis=1)
-    shift = np.linalg.norm(np.array(shared)[:, :, 3] - centre[:, 3], axis=1)
-    return float(np.mean((turn < _SAME_TURN_RAD) & (shift < _SAME_SHIFT * far))), len(shared)
+def _share_in_agreement(relative: np.ndarray, distance_mm: float) -> float:
+    """Return the share of the transforms (n, 3, 4) that agree with the most central one.
+
+    distance_mm: of the boards, to which shifts are compared.
+    """
+    centre = most_central(relative)
+    turn = np.linalg.norm(log_rotation(relative[:, :, :3] @ centre[:, :3].T), axis=1)
+    shift_mm = np.linalg.norm(relative[:, :, 3] - centre[:, 3], axis=1)
+    return float(np.mean((turn < _SAME_TURN_RAD) & (shift_mm < _SAME_SHIFT * distance_mm)))
 
 
 def lay_out(
@@ -78,60 +112,71 @@ def lay_out(
     together: bool,
     times_s: Mapping[str, Sequence[float]] | None = None,
 ) -> Layout:
-    """One table of everything seen, and the first state, for cameras placed at T_camera_world (C, 3, 4).
+    """Return a table of all corners, and the first state, for cameras at T_camera_world (C, 3, 4).
 
-    standing: the board on the rig, where there is one. together: views of one index are of one instant, or of
-    times_s[camera][index] where given.
+    standing: the board on the rig, where there is one. together: views of one index are of one
+    instant, or of times_s[camera][index] where given.
     """
-    groups = _shared_groups(cameras) if together else _own_groups(cameras)
-    boards = [] if standing is None else [T_rig_board]
-    shots = [] if standing is None else [(c, 0, standing[name]) for c, name in enumerate(cameras)]
-    blank = [np.nan] * len(boards)
-    for group in groups:
-        best = max(group, key=lambda seen: len(seen[2]))
-        boards.append(compose(invert_transform(T_camera_world[best[0]]), best[3]))
-        shots += [(c, len(boards) - 1, view) for c, _, view, _ in group]
+    views = _group_shots(cameras, together, times_s if together else None)
+    if standing is not None:
+        on_rig = [_Shot(c, -1, standing[name]) for c, name in enumerate(cameras)]
+        views = [on_rig, *views]
+    shots = []
+    T_world_board = []
+    for view, group in enumerate(views):
+        shots += [(shot.camera, view, shot.corners) for shot in group]
+        is_on_rig = group[0].index < 0
+        T_world_board.append(T_rig_board if is_on_rig else _world_pose(group, T_camera_world))
     lenses = np.array([alone.lens for alone in cameras.values()])
-    state = BundleState(lenses, np.asarray(T_camera_world), np.array(boards))
-    index = np.array([-1] * len(blank) + [group[0][1] for group in groups])
+    state = BundleState(lenses, np.asarray(T_camera_world), np.array(T_world_board))
+    index = np.array([group[0].index for group in views])
     if not together:
         return Layout(gather(shots), state, None, index)
-    rank = np.argsort(np.argsort([-len(a.views) for a in cameras.values()], kind="stable"))
-    times = _times(groups, list(cameras), times_s, rank)
-    since = [0.0] * len(cameras) * len(blank) + [t - now for now, ts in times for t in ts]
-    trajectory = Trajectory(np.array(blank + [now for now, _ in times]), rank)
-    return Layout(gather(shots, since), state, trajectory, index)
+    counts = [-len(alone.views) for alone in cameras.values()]
+    rank = np.argsort(np.argsort(counts, kind="stable"))
+    trajectory, elapsed_s = _in_time(views, rank)
+    return Layout(gather(shots, elapsed_s), state, trajectory, index)
 
 
-def _own_groups(cameras: Mapping[str, Alone]) -> list[list[tuple]]:
-    """A group a view: (camera, index, corners, pose) of the one camera that has it."""
-    return [
-        [(c, k, view, a.poses[k])]
-        for c, a in enumerate(cameras.values())
-        for k, view in a.views.items()
-    ]
+def _group_shots(
+    cameras: Mapping[str, Alone],
+    together: bool,
+    times_s: Mapping[str, Sequence[float]] | None,
+) -> list[list[_Shot]]:
+    """Group the shots of all cameras to views: one an index, or each its own.
 
-
-def _shared_groups(cameras: Mapping[str, Alone]) -> list[list[tuple]]:
-    """A group an index: (camera, index, corners, pose) of every camera that has it."""
-    indices = sorted(set().union(*(a.views for a in cameras.values())))
-    return [
-        [(c, k, a.views[k], a.poses[k]) for c, a in enumerate(cameras.values()) if k in a.views]
-        for k in indices
-    ]
-
-
-def _times(groups, names: list[str], times_s, rank: np.ndarray) -> list[tuple[float, list[float]]]:
-    """(the view's own time, each picture's) for each group; indices stand for times where none are given.
-
-    A view's own time is that of the picture whose camera ranks first: it sees the board where the view has it.
+    Indices stand for times where none are given.
     """
-    each = [
-        [float(times_s[names[c]][k]) if times_s else float(k) for c, k, _, _ in group]
-        for group in groups
-    ]
-    firsts = [int(np.argmin([rank[c] for c, *_ in group])) for group in groups]
-    return [(times[first], times) for first, times in zip(firsts, each)]
+    groups: dict[tuple[int, ...], list[_Shot]] = {}
+    for c, (name, alone) in enumerate(cameras.items()):
+        for k, corners in alone.views.items():
+            time_s = float(times_s[name][k] if times_s else k)
+            shot = _Shot(c, k, corners, alone.poses[k], time_s)
+            groups.setdefault((k,) if together else (c, k), []).append(shot)
+    return [groups[key] for key in sorted(groups)]
+
+
+def _world_pose(group: Sequence[_Shot], T_camera_world: np.ndarray) -> np.ndarray:
+    """Return T_world_board (3, 4) of a view, by the shot with most corners."""
+    best = max(group, key=lambda shot: len(shot.corners))
+    return compose(invert_transform(T_camera_world[best.camera]), best.T_camera_board)
+
+
+def _in_time(
+    views: Sequence[Sequence[_Shot]], camera_rank: np.ndarray
+) -> tuple[Trajectory, list[float]]:
+    """Return the views in time, and of each shot its time after its view's own time, s.
+
+    A view's own time is that of the picture whose camera ranks first.
+    """
+    view_time_s = []
+    elapsed_s = []
+    for group in views:
+        reference = min(group, key=lambda shot: camera_rank[shot.camera])
+        view_time_s.append(reference.time_s)
+        for shot in group:
+            elapsed_s.append(0.0 if shot.index < 0 else shot.time_s - reference.time_s)
+    return Trajectory(np.array(view_time_s), camera_rank), elapsed_s
 
 
 def place_cameras(
@@ -142,40 +187,44 @@ def place_cameras(
     *,
     together: bool,
 ) -> np.ndarray:
-    """T_camera_world (C, 3, 4) to begin with; the world is the rig frame, or the first camera's.
+    """Return T_camera_world (C, 3, 4) to begin with.
 
-    Raises Refused where cameras cannot be placed relative to each other.
+    The world is the rig frame, or the first camera's without a board on the rig. Raises Refused
+    where cameras cannot be placed relative to each other.
     """
     if standing is not None:
         T_board_rig = invert_transform(T_rig_board)
-        poses = {
-            name: board_pose(standing[name], board.corners_mm, alone.lens)
-            for name, alone in cameras.items()
-        }
-        return np.array([compose(poses[name], T_board_rig) for name in cameras])
-    if len(cameras) == 1:
-        return np.eye(3, 4)[None]
-    if not together:
+        T_camera_rig = []
+        for name, alone in cameras.items():
+            T_camera_board = board_pose(standing[name], board.corners_mm, alone.lens)
+            T_camera_rig.append(compose(T_camera_board, T_board_rig))
+        return np.array(T_camera_rig)
+    if len(cameras) > 1 and not together:
         raise Refused(
-            "there is no picture of the board on the rig, so the cameras cannot be placed in one frame"
+            "there is no picture of the board on the rig, so the cameras cannot be placed in one "
+            "frame"
         )
-    last = max(max(a.poses) for a in cameras.values())
-    chained = chain_cameras(
-        {n: [a.poses.get(k) for k in range(last + 1)] for n, a in cameras.items()}
-    )
+    chained = chain_cameras({name: alone.poses for name, alone in cameras.items()})
     return np.array([chained[name] for name in cameras])
 
 
-def gather(shots: Sequence[tuple], times_s: Sequence[float] | None = None) -> Sightings:
-    """Sightings of shots (camera, view, Corners), each with its picture's time after the view's own."""
-    times_s = np.zeros(len(shots)) if times_s is None else times_s
-    order = sorted(range(len(shots)), key=lambda k: shots[k][1::-1])
-    count = [len(shots[k][2]) for k in order]
+def gather(
+    shots: Sequence[tuple[int, int, Corners]], times_s: Sequence[float] | None = None
+) -> Sightings:
+    """Return the sightings of shots (camera, view, corners).
+
+    times_s: of each shot, after its view's own time; None for 0.
+    """
+    if times_s is None:
+        times_s = np.zeros(len(shots))
+    order = sorted(range(len(shots)), key=lambda k: (shots[k][1], shots[k][0]))
+    cameras, views, corners = zip(*(shots[k] for k in order))
+    count = [len(view) for view in corners]
     return Sightings(
-        np.repeat([shots[k][0] for k in order], count),
-        np.repeat([shots[k][1] for k in order], count),
-        np.concatenate([shots[k][2].ids for k in order]),
-        np.concatenate([shots[k][2].px for k in order]),
-        np.concatenate([shots[k][2].sigma_px for k in order]),
-        np.repeat([times_s[k] for k in order], count),
+        camera=np.repeat(cameras, count),
+        view=np.repeat(views, count),
+        corner=np.concatenate([view.ids for view in corners]),
+        px=np.concatenate([view.px for view in corners]),
+        sigma_px=np.concatenate([view.sigma_px for view in corners]),
+        time_s=np.repeat(np.asarray(times_s)[order], count),
     )

@@ -1,4 +1,4 @@
-"""Where a picture differs from the one without rods, and how surely."""
+"""Where a picture differs from the one without rods, and with what confidence."""
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -6,20 +6,23 @@ from scipy.ndimage import uniform_filter
 from vision.geometry.robust import robust_sigma
 from vision.pictures.pixel_noise import Noise
 
-# [px] Every second pixel: a coarse look needs no more. Stated.
+# [px] Every second pixel: a coarse search needs no more. Stated.
 HALF = 2
-# [sigmas] A difference up to here is no change, and by so much more it is a sure one. Set by eye.
-_NOISE_SIGMAS, _SURE_SIGMAS = 3.0, 6.0
+# [sigmas] A difference up to here is no change. Set by eye.
+_NOISE_SIGMAS = 3.0
+# [sigmas] By so much more it is a certain one. Set by eye.
+_SURE_SIGMAS = 6.0
 
 
-def changed(grey: np.ndarray, background: np.ndarray, noise: Noise) -> np.ndarray:
-    """How surely each pixel (h, w) differs from the background, from 0 to 1, smoothed over 3 × 3 pixels.
+def change_confidence(grey: np.ndarray, background: np.ndarray, noise: Noise) -> np.ndarray:
+    """Return the confidence, from 0 to 1, that each pixel (h, w) differs from the background.
 
-    Both pictures are given at every HALF-th pixel. The outermost pixels are 0.
-
-    The scale is the median of the differences themselves: most of the picture has not changed, and a picture of
-    the background may be noisier than the frames.
+    Both pictures are given at every HALF-th pixel, and smoothed over 3 × 3 of them. The outermost
+    pixels are 0. The scale is the median of the differences themselves: most of the picture has not
+    changed, and a picture of the background may be noisier than the frames.
     """
-    difference = uniform_filter(grey - background, 3) / noise.sigma(0.5 * (grey + background))
+    sigma = noise.sigma(0.5 * (grey + background))
+    difference = uniform_filter(grey - background, 3) / sigma
     z = np.abs(difference) / max(robust_sigma(difference), 1e-6)
-    return np.pad(np.clip((z - _NOISE_SIGMAS) / _SURE_SIGMAS, 0.0, 1.0)[1:-1, 1:-1], 1)
+    confidence = np.clip((z - _NOISE_SIGMAS) / _SURE_SIGMAS, 0.0, 1.0)
+    return np.pad(confidence[1:-1, 1:-1], 1)

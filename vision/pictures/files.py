@@ -1,4 +1,4 @@
-"""Pictures in files: grey at full depth as the camera stored it, sizes by their headers, names in their order.
+"""Pictures in files: grey at full depth as the camera stored it, sizes by headers, names in order.
 
 A picture that is damaged, cut short, or of a size that no camera has is None.
 """
@@ -43,31 +43,34 @@ MOST_PIXELS = 2 * Image.MAX_IMAGE_PIXELS
 # Pillow takes for sound. Stated.
 _MOST_BYTES = 1 << 30
 
-_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_JPEG_START = b"\xff\xd8"
+_JPEG_END = b"\xff\xd9"
 # [bytes] Cameras pad the file after the end marker. Stated.
 _JPEG_TAIL_BYTES = 1024
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The folder's pictures in natural order, without hidden files."""
-    files = (
-        f for f in folder.iterdir() if f.suffix.lower() in PICTURE_SUFFIXES and f.name[0] != "."
-    )
+    """Return the folder's pictures in natural order, without hidden files."""
+    files = []
+    for path in folder.iterdir():
+        if path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith("."):
+            files.append(path)
     return sorted(files, key=natural_order)
 
 
 def natural_order(path: Path) -> list[tuple[int, int | str]]:
-    """Sort key under which `img_2` comes before `img_10`."""
-    return [
-        (0, int(part)) if part.isdigit() else (1, part)
-        for part in re.split(r"([0-9]+)", path.name)
-        if part
-    ]
+    """Return a sort key under which `img_2` comes before `img_10`."""
+    key = []
+    for part in re.findall(r"[0-9]+|[^0-9]+", path.name):
+        key.append((0, int(part)) if part.isdigit() else (1, part))
+    return key
 
 
 def read_picture(path: Path) -> np.ndarray | None:
-    """One picture as grey, (height, width), uint8 or uint16; None where it is damaged or cut short, no regular file, or
-    of a size that no camera has."""
+    """Read a picture as grey (height, width), uint8 or uint16.
+
+    None where it is damaged or cut short, no regular file, or of a size that no camera has.
+    """
     if not path.is_file() or not 0 < path.stat().st_size <= _MOST_BYTES:
         return None
     data = np.fromfile(path, dtype=np.uint8)
@@ -82,12 +85,12 @@ def read_picture(path: Path) -> np.ndarray | None:
 
 
 def page_count(path: Path) -> int:
-    """How many pictures a file holds; 0 where it is damaged or no TIFF."""
+    """Return how many pictures a file holds; 0 where it is damaged or no TIFF."""
     return len(page_sizes(path))
 
 
 def page_sizes(path: Path) -> list[tuple[int, int]]:
-    """(width, height) of each page by its header; none where it is no regular TIFF file."""
+    """Return (width, height) of each page by its header; none where it is no regular TIFF file."""
     sizes = []
     try:
         if path.is_file():
@@ -101,7 +104,9 @@ def page_sizes(path: Path) -> list[tuple[int, int]]:
 
 
 def picture_size(path: Path) -> tuple[int, int] | None:
-    """(width, height) from the header alone; None where it cannot be read, or is no camera's."""
+    """Return (width, height) from the header alone; None where it cannot be read, or is no
+    camera's.
+    """
     try:
         if not path.is_file():  # a pipe would be waited for
             return None
@@ -112,7 +117,10 @@ def picture_size(path: Path) -> tuple[int, int] | None:
 
 
 def _is_too_large(data: np.ndarray) -> bool:
-    """Whether the header tells of more pixels than Pillow takes for sound: to decode them would fill the memory."""
+    """Return whether the header states more pixels than Pillow takes for sound.
+
+    To decode them would fill the memory.
+    """
     try:
         Image.open(BytesIO(data)).close()
     except Image.DecompressionBombError:
@@ -123,13 +131,19 @@ def _is_too_large(data: np.ndarray) -> bool:
 
 
 def _is_cut_jpeg(data: np.ndarray) -> bool:
-    """A JPEG without its end marker: OpenCV decodes it and fills the lost part with grey."""
-    return data[:2].tobytes() == _JPEG_START and _JPEG_END not in data[-_JPEG_TAIL_BYTES:].tobytes()
+    """Return whether data is a JPEG without its end marker.
+
+    OpenCV decodes it and fills the lost part with grey.
+    """
+    tail = data[-_JPEG_TAIL_BYTES:].tobytes()
+    return data[:2].tobytes() == _JPEG_START and _JPEG_END not in tail
 
 
 @contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """OpenCV warns once a frame that it hands over the Y plane, which is what was asked for."""
+    """Run a block without OpenCV's warnings: one a frame says that it hands over the Y plane, as it
+    should.
+    """
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:

@@ -1,14 +1,14 @@
-"""Frames of one camera in order, from a folder of pictures, a video or a TIFF stack; read forward, every index kept.
+"""Frames of one camera in order, from a folder of pictures, a video or a TIFF stack.
 
-A frame that cannot be read stays in its place as None, so that a series is never shortened and its times
-never shift. Grey is what the file holds at full depth; of a colour video it is the Y plane as stored (16 to
-235 for most codecs), because the other ways from H.264 to grey differ from it, and from each other, by up to
-16 levels.
+A frame that cannot be read stays in its place as None, so that a series is never shortened and its
+times never shift. Grey is what the file holds at full depth; of a colour video it is the Y plane as
+stored (16 to 235 for most codecs), because the other ways from H.264 to grey differ from it, and
+from each other, by up to 16 levels.
 """
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -30,7 +30,8 @@ from vision.pictures.files import (
 # FFmpeg would write about a truncated file to stderr; the caller says it in one line of its own.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
-# Pixel formats whose first plane is the grey picture, as OpenCV names them when asked not to convert.
+# Pixel formats whose first plane is the grey picture, as OpenCV names them if it
+# does not convert.
 _PLANAR_GREY = frozenset(
     {b"I420", b"Y800", b"GREY", b"NV12", b"NV21", b"Y42B", b"444P", b"Y1\x00\x10"}
 )
@@ -39,9 +40,9 @@ _PLANAR_GREY = frozenset(
 class Frames(ABC):
     """The frames of one camera, from 0. Made by `Frames.open`.
 
-    path: the folder or the file. count: how many frames there are (a video: how many its header declares).
-    size_px: (width, height). times_s: the container's times, shape (count,), or None for pictures.
-    rate_Hz: frames a second as the header states it; 0 where it does not.
+    path: the folder or the file. count: how many frames there are (a video: how many its header
+    declares). size_px: (width, height). times_s (count,): the container's times, or None for
+    pictures. rate_Hz: frames a second as the header states it; 0 where it does not.
     """
 
     path: Path
@@ -52,7 +53,7 @@ class Frames(ABC):
 
     @staticmethod
     def open(path: Path | str) -> "Frames":
-        """The frames in a folder of pictures, in a video file or in a TIFF stack.
+        """Open the frames in a folder of pictures, in a video file or in a TIFF stack.
 
         Raises Refused where there is no picture that can be read, or the file cannot be opened.
         """
@@ -63,37 +64,48 @@ class Frames(ABC):
 
     @property
     def decoded_count(self) -> int:
-        """How many frames there really are."""
+        """Return how many frames there really are."""
         return self.count
 
     @abstractmethod
     def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
-        """Frames first to last − 1 as stored."""
+        """Yield (index, grey) of frames first to last − 1 as stored."""
 
     def read(
         self, first: int = 0, last: int | None = None
     ) -> Iterator[tuple[int, np.ndarray | None]]:
-        """(index, grey) for frames first to last − 1 in order; grey is (height, width), uint8 or uint16.
+        """Yield (index, grey) of frames first to last − 1 in order; grey (height, width), uint8 or
+        uint16.
 
-        A damaged frame gives (index, None). Raises Refused where a frame has another size than `size_px`.
+        A damaged frame gives (index, None). Raises Refused where a frame has another size than
+        `size_px`.
         """
-        for index, grey in self._read(first, self.count if last is None else min(last, self.count)):
+        last = self.count if last is None else min(last, self.count)
+        for index, grey in self._read(first, last):
             if grey is not None:
                 self._check_size(index, grey)
             yield index, grey
 
     def pick(self, wanted: Iterable[int]) -> Iterator[tuple[int, np.ndarray | None]]:
-        """The same of these frames alone, in order. Of a video all up to the last are decoded."""
-        chosen = set(wanted)
-        span = self.read(min(chosen), max(chosen) + 1) if chosen else ()
-        yield from ((index, grey) for index, grey in span if index in chosen)
+        """Yield (index, grey) of these frames alone, in order.
+
+        Of a video all frames up to the last of them are decoded.
+        """
+        indices = set(wanted)
+        if not indices:
+            return
+        for index, grey in self.read(min(indices), max(indices) + 1):
+            if index in indices:
+                yield index, grey
 
     def _check_size(self, index: int, grey: np.ndarray) -> None:
-        size = (grey.shape[1], grey.shape[0])
-        if size != self.size_px:
+        """Raise Refused where a frame has another size than `size_px`."""
+        height, width = grey.shape[:2]
+        if (width, height) != self.size_px:
             raise Refused(
-                f"frame {index} of {self.path.name} is {_size(size)}, the others are {_size(self.size_px)}: "
-                "one camera gives one size; pictures are never rescaled",
+                f"frame {index} of {self.path.name} is {width} x {height} px, the others are "
+                f"{self.size_px[0]} x {self.size_px[1]} px: one camera gives one size; pictures "
+                "are never rescaled",
                 code="picture_size_differs",
             )
 
@@ -102,7 +114,7 @@ class _OneByOne(Frames):
     """Frames each of which is decoded by itself."""
 
     def pick(self, wanted: Iterable[int]) -> Iterator[tuple[int, np.ndarray | None]]:
-        """These frames alone, and no other is decoded."""
+        """Yield (index, grey) of these frames alone, in order; no other is decoded."""
         for index in sorted(set(wanted)):
             yield from self.read(index, index + 1)
 
@@ -117,6 +129,7 @@ class PictureFolder(_OneByOne):
         self.size_px = self._first_size()
 
     def _first_size(self) -> tuple[int, int]:
+        """Return (width, height) of the first picture that can be read."""
         for file in self.files:
             grey = read_picture(file)
             if grey is not None:
@@ -136,13 +149,15 @@ class TiffStack(_OneByOne):
         self._sizes = page_sizes(path)
         if not self._sizes:
             raise Refused(f"{path.name} cannot be opened as a TIFF stack: truncated, or no TIFF")
-        self.count, self.size_px = len(self._sizes), self._sizes[0]
+        self.count = len(self._sizes)
+        self.size_px = self._sizes[0]
 
     def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
         for index in range(first, last):
             yield index, self._page(index)
 
     def _page(self, index: int) -> np.ndarray | None:
+        """Read one page as grey; None where it is damaged or of a size that no camera has."""
         width, height = self._sizes[index]
         if width * height > MOST_PIXELS:
             return None
@@ -157,20 +172,21 @@ class TiffStack(_OneByOne):
 class Video(Frames):
     """A video, decoded forward: seeking by frame number is wrong on clips with dropped frames.
 
-    Frames that the header declares and the stream does not hold (a truncated file) are damaged frames.
+    Frames that the header declares and the stream does not hold (a truncated file) are damaged
+    frames.
     """
 
     def __init__(self, path: Path):
         self.path = path
-        with self._opened() as capture:
-            self.size_px = (
-                _whole(capture, cv2.CAP_PROP_FRAME_WIDTH),
-                _whole(capture, cv2.CAP_PROP_FRAME_HEIGHT),
-            )
-            self.count = max(0, _whole(capture, cv2.CAP_PROP_FRAME_COUNT))
+        with self._open_capture() as capture:
+            width = _read_property(capture, cv2.CAP_PROP_FRAME_WIDTH)
+            height = _read_property(capture, cv2.CAP_PROP_FRAME_HEIGHT)
+            self.size_px = (width, height)
+            self.count = max(0, _read_property(capture, cv2.CAP_PROP_FRAME_COUNT))
 
     @contextmanager
-    def _opened(self) -> Iterator[cv2.VideoCapture]:
+    def _open_capture(self) -> Iterator[cv2.VideoCapture]:
+        """Open the stream at its first frame; release it at the end of the block."""
         if not self.path.is_file():
             raise Refused(f"{self.path.name} is no regular file")
         with quiet_opencv():
@@ -186,56 +202,60 @@ class Video(Frames):
 
     @cached_property
     def rate_Hz(self) -> float:
-        """Frames a second as the header states it; 0 where it does not."""
-        with self._opened() as capture:
+        """Return the frames a second as the header states it; 0 where it does not."""
+        with self._open_capture() as capture:
             return max(0.0, float(capture.get(cv2.CAP_PROP_FPS)))
 
     @cached_property
     def times_s(self) -> np.ndarray:
-        """The container's times of the frames that decode, s; as many as `decoded_count`."""
+        """Return the container's times of the frames that decode, s (decoded_count,)."""
         times_ms = []
-        with self._opened() as capture:
+        with self._open_capture() as capture:
             while capture.grab():
                 times_ms.append(capture.get(cv2.CAP_PROP_POS_MSEC))
         return np.array(times_ms) / 1000.0
 
     @property
     def decoded_count(self) -> int:
-        """How many frames the stream really holds: decodes it whole, once."""
+        """Return how many frames the stream really holds: decodes it whole, once."""
         return len(self.times_s)
 
     def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
-        with self._opened() as capture:
-            to_grey = _grey_reader(capture)
-            whole = all(capture.grab() for _ in range(first))
+        with self._open_capture() as capture:
+            read_grey = _grey_reader(capture)
+            is_whole = all(capture.grab() for _ in range(first))
             for index in range(first, last):
-                whole = whole and capture.grab()
-                yield index, to_grey(capture) if whole else None
+                is_whole = is_whole and capture.grab()
+                yield index, read_grey(capture) if is_whole else None
 
 
-def _grey_reader(capture: cv2.VideoCapture):
-    """How to fetch the grabbed frame as grey: its first plane where that is grey, else from colour."""
-    pixel_format = _whole(capture, cv2.CAP_PROP_CODEC_PIXEL_FORMAT).to_bytes(
-        4, "little", signed=True
-    )
-    planar = pixel_format in _PLANAR_GREY
-    capture.set(cv2.CAP_PROP_CONVERT_RGB, 0 if planar else 1)
-    return _retrieve if planar else _retrieve_colour
+def _grey_reader(
+    capture: cv2.VideoCapture,
+) -> Callable[[cv2.VideoCapture], np.ndarray | None]:
+    """Return the function that reads the grabbed frame as grey.
+
+    It takes the stream's first plane where that is grey, else it converts from colour.
+    """
+    code = _read_property(capture, cv2.CAP_PROP_CODEC_PIXEL_FORMAT)
+    is_planar = code.to_bytes(4, "little", signed=True) in _PLANAR_GREY
+    capture.set(cv2.CAP_PROP_CONVERT_RGB, 0 if is_planar else 1)
+    return _retrieve if is_planar else _retrieve_colour
 
 
 def _retrieve(capture: cv2.VideoCapture) -> np.ndarray | None:
+    """Return the grabbed frame as the stream has it; None where it does not decode."""
     decoded, frame = capture.retrieve()
     return frame if decoded else None
 
 
 def _retrieve_colour(capture: cv2.VideoCapture) -> np.ndarray | None:
+    """Convert the grabbed frame from colour to grey; None where it does not decode."""
     frame = _retrieve(capture)
-    return frame if frame is None or frame.ndim == 2 else cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+    if frame is None or frame.ndim == 2:
+        return frame
+    return cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
 
 
-def _whole(capture: cv2.VideoCapture, prop: int) -> int:
-    return int(round(capture.get(prop)))
-
-
-def _size(size_px: tuple[int, int]) -> str:
-    return f"{size_px[0]} x {size_px[1]} px"
+def _read_property(capture: cv2.VideoCapture, name: int) -> int:
+    """Return a property of the stream as a whole number."""
+    return round(capture.get(name))

@@ -1,4 +1,4 @@
-"""Rods in the pictures that are not the one looked for: where one of them may be, nothing is learnt of this one."""
+"""Rods in the pictures besides the one that is measured: pixels where they may be are masked."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,24 +8,28 @@ import numpy as np
 
 from vision.pictures.pyramid import shrunk_px
 
-# [px] Beside another whisker's wire no pixel counts: the last of the first looks is off by 2 px
+# [px] Near another whisker's wire no pixel counts: the last of the coarse passes is off by 2 px
 # at most (six wires of a 2 × 3 array), and three of a lens blur of a pixel. With 4 or 9 a base
 # line moves by less than its sigma. Study: arrays_seen.py.
 BESIDE_ROD_PX = 5.0
-# [parts of a pixel, bits] A layout: how OpenCV takes fractions of a pixel. Derived.
-_PARTS, _PARTS_AS_SHIFT = 16, 4
+# [bits] A layout: how OpenCV takes fractions of a pixel. Derived.
+_FRACTION_BITS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class RodLines:
-    """A rod in some of a camera's frames (f,): the middle (f, m, 2) of its picture and half its width (f,), px."""
+    """A rod in some of a camera's frames.
+
+    frames (f,): their indices. middle_px (f, m, 2): the middle of its picture. half_px (f,): half
+    its width.
+    """
 
     frames: np.ndarray
     middle_px: np.ndarray
     half_px: np.ndarray
 
     def shrunk(self, scale: int) -> "RodLines":
-        """The same in shrunk pictures."""
+        """Return the rod in pictures shrunk by `scale`."""
         if scale == 1:
             return self
         return replace(
@@ -33,23 +37,26 @@ class RodLines:
         )
 
     def within(self, frame: int) -> np.ndarray:
-        """Which rows (f,) are of a frame."""
+        """Return which rows (f,) are of a frame."""
         return self.frames == frame
 
 
 Others = Mapping[str, RodLines]  # by name
 
 
-def covered(others: Others, frame: int, shape: tuple[int, int]) -> np.ndarray | None:
-    """Pixels (h, w), bool, of a frame that show another rod or lie so near one that they may; None without any."""
+def mask_rods(others: Others, frame: int, shape: tuple[int, int]) -> np.ndarray | None:
+    """Return which pixels (h, w) of a frame show another rod or lie so near one that they may.
+
+    None where there is no other rod.
+    """
     if not others:
         return None
     mask = np.zeros(shape, dtype=np.uint8)
     for lines in others.values():
-        there = lines.within(frame)
-        for middle, half in zip(lines.middle_px[there], lines.half_px[there]):
-            if np.all(np.isfinite(middle)):
-                nodes = np.round(middle * _PARTS).astype(np.int32)[:, None]
-                wide = int(np.ceil(2.0 * (half + BESIDE_ROD_PX)))
-                cv2.polylines(mask, [nodes], False, 1, thickness=wide, shift=_PARTS_AS_SHIFT)
+        rows = lines.within(frame)
+        for middle_px, half_px in zip(lines.middle_px[rows], lines.half_px[rows]):
+            if np.all(np.isfinite(middle_px)):
+                nodes = np.round(middle_px * 2**_FRACTION_BITS).astype(np.int32)
+                width = int(np.ceil(2.0 * (half_px + BESIDE_ROD_PX)))
+                cv2.polylines(mask, [nodes], False, 1, thickness=width, shift=_FRACTION_BITS)
     return mask.astype(bool)

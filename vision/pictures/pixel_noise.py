@@ -1,4 +1,4 @@
-"""How noisy a pixel is at its grey level, measured on pictures of one scene."""
+"""The noise of a pixel at its grey level, measured on pictures of one scene."""
 
 from dataclasses import dataclass
 
@@ -14,48 +14,48 @@ _LEAST_VARIANCE = 0.1
 
 @dataclass(frozen=True)
 class Noise:
-    """Variance of a pixel at grey level g: floor + gain · g (grey levels squared)."""
+    """The variance of a pixel at grey level g: floor + gain · g, grey levels squared."""
 
     floor: float
     gain: float
 
     def times(self, share: float) -> "Noise":
-        """Noise of so many times the variance."""
+        """Return noise of `share` times the variance."""
         return Noise(self.floor * share, self.gain * share)
 
     def sigma(self, grey: np.ndarray) -> np.ndarray:
-        """Standard deviation at the grey level, never under a third of a level (rounding)."""
+        """Return the standard deviation at grey levels, a third of a level at least (rounding)."""
         return np.sqrt(np.maximum(self.floor + self.gain * np.maximum(grey, 0.0), 1.0 / 12.0))
 
 
 def measure_noise(first: np.ndarray, second: np.ndarray) -> Noise:
-    """Noise from two pictures of the same scene: median absolute difference in classes of equal grey.
+    """Measure the noise by two pictures (h, w) of the same scene.
 
-    Medians leave out what moved between the two. Every third pixel of every third row is plenty.
+    A line is fitted to the median absolute differences in classes of equal grey; medians leave out
+    what moved between the two. Every third pixel of every third row is plenty.
     """
-    first, second = first[::3, ::3], second[::3, ::3]
-    mean = 0.5 * (first.astype(float) + second)
-    return noise_by_level(mean, np.abs(first.astype(float) - second) / np.sqrt(2.0))
-
-
-def noise_by_level(level: np.ndarray, deviation: np.ndarray) -> Noise:
-    """Noise from absolute deviations at grey levels (both of any one shape), by medians in classes of equal grey."""
-    edges = np.unique(np.quantile(level, np.linspace(0, 1, _CLASSES + 1)))
-    classes = np.digitize(level, edges[1:-1])
-    rows = [
-        (
-            np.median(level[classes == k]),
-            robust_sigma(deviation[classes == k]) ** 2,
-            np.sum(classes == k),
-        )
-        for k in range(max(len(edges) - 1, 1))
-        if np.any(classes == k)
-    ]
-    middle, variance, count = np.array(rows).T
-    if len(middle) > 1 and np.ptp(middle) >= 1.0:
-        gain, floor = np.polyfit(
-            middle, variance, 1, w=np.sqrt(count) / np.maximum(variance, _LEAST_VARIANCE)
-        )
+    first = first[::3, ::3].astype(float)
+    second = second[::3, ::3].astype(float)
+    level = 0.5 * (first + second)
+    deviation = np.abs(first - second) / np.sqrt(2.0)
+    middle, variance, count = _medians_by_level(level, deviation)
+    if np.ptp(middle) >= 1.0:
+        weight = np.sqrt(count) / np.maximum(variance, _LEAST_VARIANCE)
+        gain, floor = np.polyfit(middle, variance, 1, w=weight)
         if gain > 0:
             return Noise(max(float(floor), _LEAST_VARIANCE), float(gain))
     return Noise(max(float(np.average(variance, weights=count)), _LEAST_VARIANCE), 0.0)
+
+
+def _medians_by_level(level: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """Return median level, variance of the deviation and number of pixels by class of level, (3,
+    classes).
+    """
+    edges = np.unique(np.quantile(level, np.linspace(0, 1, _CLASSES + 1)))
+    classes = np.digitize(level, edges[1:-1])
+    rows = []
+    for k in np.unique(classes):
+        members = classes == k
+        variance = robust_sigma(deviation[members]) ** 2
+        rows.append((np.median(level[members]), variance, np.sum(members)))
+    return np.array(rows).T

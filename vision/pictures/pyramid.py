@@ -1,4 +1,4 @@
-"""Pictures and cameras at a coarser scale: cheaper to look at, and less is seen."""
+"""Pictures and cameras at a coarser scale: cheaper to evaluate, and less precise."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,28 +13,35 @@ _IN_PX = 4
 
 
 def shrunk_picture(picture: np.ndarray, scale: int) -> np.ndarray:
-    """Means (h // scale, w // scale) of squares of `scale` pixels; what is left over at right and below is cut off."""
+    """Average squares of `scale` pixels, (h // scale, w // scale).
+
+    What is left over at right and below is cut off.
+    """
     if scale == 1:
         return picture
-    height, width = (size // scale for size in picture.shape)
+    height = picture.shape[0] // scale
+    width = picture.shape[1] // scale
     whole = np.ascontiguousarray(picture[: height * scale, : width * scale])
     return cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
 
 
 def shrunk_cameras(cameras: Cameras, scale: int) -> Cameras:
-    """The cameras of shrunk pictures, with their covariance. A pixel's middle is where it was: (u + 1/2) / scale."""
+    """Return the cameras of shrunk pictures, with their covariance.
+
+    A pixel's middle is where it was: (u + 1/2) / scale.
+    """
     if scale == 1:
         return cameras
     by_px = np.ones(N_PARAMETERS)
     by_px[:_IN_PX] = 1.0 / scale
     all_by_px = np.tile(by_px, len(cameras))
     covariance = cameras.covariance * np.outer(all_by_px, all_by_px)
-    return Cameras(
-        tuple(_shrunk(camera, scale) for camera in cameras), covariance, cameras.placement
-    )
+    shrunk = tuple(_shrunk_camera(camera, scale) for camera in cameras)
+    return Cameras(shrunk, covariance, cameras.placement)
 
 
-def _shrunk(camera: Camera, scale: int) -> Camera:
+def _shrunk_camera(camera: Camera, scale: int) -> Camera:
+    """Return the camera of shrunk pictures."""
     matrix = camera.matrix / scale
     matrix[:2, 2] = shrunk_px(camera.matrix[:2, 2], scale)
     matrix[2, 2] = 1.0
@@ -48,20 +55,20 @@ def _shrunk(camera: Camera, scale: int) -> Camera:
 
 
 def shrunk_px(px: np.ndarray, scale: int) -> np.ndarray:
-    """Where a place of the full picture, px, is in the shrunk one."""
+    """Convert places of the full picture to those in the shrunk one, px."""
     return (px + 0.5) / scale - 0.5
 
 
 def full_px(px: np.ndarray, scale: int) -> np.ndarray:
-    """Where a place of the shrunk picture, px, is in the full one."""
+    """Convert places of the shrunk picture to those in the full one, px."""
     return (px + 0.5) * scale - 0.5
 
 
 def shrunk_frames(
     frames: Mapping[str, Mapping[int, np.ndarray]], scale: int
 ) -> dict[str, dict[int, np.ndarray]]:
-    """Shrunk pictures by camera and frame index."""
-    return {
-        name: {index: shrunk_picture(picture, scale) for index, picture in pictures.items()}
-        for name, pictures in frames.items()
-    }
+    """Shrink pictures by camera and frame index."""
+    shrunk = {}
+    for name, pictures in frames.items():
+        shrunk[name] = {index: shrunk_picture(grey, scale) for index, grey in pictures.items()}
+    return shrunk

@@ -1,4 +1,4 @@
-"""One camera's pictures of a whisk, beside the picture without rods."""
+"""One camera's pictures of a whisk, with the picture without rods."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from vision.geometry.camera import Camera
-from vision.pictures.others import Others, RodLines, covered
+from vision.pictures.others import Others, RodLines, mask_rods
 from vision.pictures.pixel_noise import Noise
 
-# [frames] Whose brightest pixel tells how many bits the sensor has: what is saturated is so in
+# [frames] Whose brightest pixel shows how many bits the sensor has: what is saturated is so in
 # all of them. Stated.
 _SCALE_OF = 3
 # [1] Of full scale: above, the sensor cut off and what it saw is not known. Five levels of 255
@@ -26,8 +26,12 @@ _LEAST_CLEAR = 2
 
 @dataclass(frozen=True)
 class View:
-    """One camera's pictures of a whisk: frames {index: grey}, the picture without rods, and the noise. others: rods in
-    them that are not looked for; itself: the wire that is, where its place is known to a pixel or two."""
+    """One camera's pictures of a whisk.
+
+    frames: grey (h, w) by index. background: the picture without rods. noise: of a pixel. others:
+    rods besides the one that is measured. itself: that one, where its place is known to a pixel or
+    two.
+    """
 
     camera: Camera
     frames: Mapping[int, np.ndarray]
@@ -36,30 +40,40 @@ class View:
     others: Others = field(default_factory=dict)
     itself: RodLines | None = None
 
+    def sample_frames(self, most: int) -> list[int]:
+        """Return the indices of at most so many frames, spread over all of them."""
+        frames = list(self.frames)
+        positions = np.linspace(0, len(frames) - 1, most).round().astype(int)
+        return [frames[k] for k in np.unique(positions)]
+
     def some(self, most: int) -> list[np.ndarray]:
-        """At most so many of the pictures, spread over all of them."""
-        pictures = list(self.frames.values())
-        return [
-            pictures[int(k)] for k in np.unique(np.linspace(0, len(pictures) - 1, most).round())
-        ]
+        """Return at most so many of the pictures, spread over all of them."""
+        return [self.frames[frame] for frame in self.sample_frames(most)]
 
     @cached_property
     def full_scale(self) -> float:
-        """The brightest that the sensor can say, grey levels: of 8 bit, or of as many as the pictures show."""
+        """Return the sensor's brightest grey level, of 8 bit or of as many as the pictures show."""
         brightest = max(float(np.max(picture)) for picture in self.some(_SCALE_OF))
-        return 2.0 ** max(8, int(np.ceil(np.log2(brightest + 1.0)))) - 1.0
+        bits = max(8, int(np.ceil(np.log2(brightest + 1.0))))
+        return 2.0**bits - 1.0
 
     @property
     def mean_share(self) -> float:
-        """What part of one picture's variance the mean has; where rods are known, the pixel with most has."""
+        """Return the variance of the mean over one picture's.
+
+        Where rods are known, it is that of the pixel with most.
+        """
         if self.itself is not None:
             return 1.0 / _LEAST_CLEAR
         return 1.0 / min(len(self.frames), MEAN_OF)
 
     @cached_property
     def mean(self) -> np.ndarray:
-        """Mean (h, w) of the pictures, of MEAN_OF at most; where rods are known, of those in which none covers a pixel,
-        NaN where one does in nearly all."""
+        """Return the mean (h, w) of MEAN_OF pictures at most.
+
+        Where rods are known, it is that of the pictures in which none covers a pixel, NaN where one
+        does in nearly all.
+        """
         if self.itself is not None:
             return self._mean_of_clear({"": self.itself, **self.others})
         pictures = self.some(MEAN_OF)
@@ -69,31 +83,35 @@ class View:
         return total / len(pictures)
 
     def _mean_of_clear(self, rods: Others) -> np.ndarray:
-        """Of pixels that a rod passes the median of clear frames, for where a rod is may be wrong in one of them."""
-        frames = list(self.frames)
-        chosen = [
-            frames[k]
-            for k in np.unique(np.linspace(0, len(frames) - 1, MEAN_OF).round().astype(int))
-        ]
-        hidden = np.stack([covered(rods, frame, self.frames[frame].shape) for frame in chosen])
+        """Average the frames; pixels that a rod passes have the median of their clear frames.
+
+        The median, because the place of a rod may be wrong in one of them.
+        """
+        frames = self.sample_frames(MEAN_OF)
+        pictures = np.stack([self.frames[frame] for frame in frames])  # (frames, h, w)
+        hidden = np.stack([mask_rods(rods, frame, pictures[0].shape) for frame in frames])
         passed = np.any(hidden, axis=0)
-        mean = np.mean([self.frames[frame] for frame in chosen], axis=0, dtype=np.float32)
-        values = np.stack([self.frames[frame][passed] for frame in chosen]).astype(np.float32)
-        values[hidden[:, passed]] = np.nan
-        few = np.sum(~hidden[:, passed], axis=0) < _LEAST_CLEAR
-        values[0, few] = 0.0  # of none at all there is no median
-        mean[passed] = np.where(few, np.nan, np.nanmedian(values, axis=0))
+        clear = ~hidden[:, passed]  # (frames, pixels)
+        mean = np.mean(pictures, axis=0, dtype=np.float32)
+        values = np.where(clear, pictures[:, passed].astype(np.float32), np.float32(np.nan))
+        is_seen = np.sum(clear, axis=0) >= _LEAST_CLEAR
+        medians = np.full(len(is_seen), np.nan, dtype=np.float32)
+        medians[is_seen] = np.nanmedian(values[:, is_seen], axis=0)
+        mean[passed] = medians
         return mean
 
 
 def median_of(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Median (h, w) of pictures (h, w) of any kind of number, of an even number the upper one: what moves vanishes.
+    """Return the median (h, w) of pictures, of an even number the upper one: what moves vanishes.
 
-    Each pass carries the largest of the rest to its end, whole pictures at a time: no sort of single pixels is as fast.
+    Each pass carries the largest of the rest to its end, whole pictures at a time: no sort of
+    single pixels is as fast.
     """
     pictures = list(pictures)
-    for last in range(len(pictures) - 1, len(pictures) // 2 - 1, -1):
+    middle = len(pictures) // 2
+    for last in range(len(pictures) - 1, middle - 1, -1):
         for k in range(last):
             lower = np.minimum(pictures[k], pictures[k + 1])
-            pictures[k], pictures[k + 1] = lower, np.maximum(pictures[k], pictures[k + 1])
-    return pictures[len(pictures) // 2]
+            pictures[k + 1] = np.maximum(pictures[k], pictures[k + 1])
+            pictures[k] = lower
+    return pictures[middle]

@@ -19,7 +19,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.rods import Rods
 from vision.geometry.rounded import Rounded
-from vision.pictures.change import HALF, changed
+from vision.pictures.change import HALF, change_confidence
 from vision.pictures.view import View
 from vision.touched.grid_search import (
     SearchPass,
@@ -87,7 +87,7 @@ class ChangeMap:
         """
         background = view.background[::HALF, ::HALF]
         noise = view.noise.times(view.mean_share)
-        field = changed(still.astype(float), background, noise).astype(np.float32)
+        field = change_confidence(still.astype(float), background, noise).astype(np.float32)
         square = np.ones((_CLOSED_PX, _CLOSED_PX))
         return cls(view.camera, cv2.morphologyEx(field, cv2.MORPH_CLOSE, square))
 

@@ -13,7 +13,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.rods import Wire
 from vision.geometry.silhouette import edges, normals
-from vision.pictures.others import RodLines, covered
+from vision.pictures.others import RodLines, mask_rods
 from vision.pictures.view import View
 from vision.wire.bands import Pieces, cut_pieces, read_band
 from vision.wire.binned import binned, without
@@ -80,7 +80,7 @@ def lines_of(camera: Camera, wire: Wire, curves: Mapping[int, Curves]) -> RodLin
 
 def _hidden(view: View, frame: int) -> np.ndarray | None:
     """Return the pixels (h, w) bool of a frame that other rods may cover; None where there are none."""
-    return covered(view.others, frame, view.frames[frame].shape)
+    return mask_rods(view.others, frame, view.frames[frame].shape)
 
 
 def _outlines(

@@ -1,6 +1,6 @@
 """What a threshold of boards and calibration moves, for each of some values.
 
-    python tests/studies/accuracy/thresholds.py boards.saddle _BAND_PX 3 4 6 8 12
+    python tests/studies/accuracy/thresholds.py boards.edge_pixels _BAND_PX 3 4 6 8 12
     python tests/studies/accuracy/thresholds.py calibration.corner_noise REJECT_SIGMA 3.5 6
 
 A line a value, the present one marked. Of boards: corners kept in the twenty board views of fixtures/small-session; the

@@ -55,8 +55,8 @@ def all_sightings():
 
 def differences(state, seen, globals_step, view_step):
     none = np.zeros((VIEWS, CAMERAS))
-    up = predict(state.stepped(globals_step, view_step, none), seen, CORNERS)[0]
-    return up - predict(state.stepped(-globals_step, -view_step, none), seen, CORNERS)[0]
+    up = predict(state.move(globals_step, view_step, none), seen, CORNERS)[0]
+    return up - predict(state.move(-globals_step, -view_step, none), seen, CORNERS)[0]
 
 
 # Step of each parameter: central differences err by step² f‴/6, and by rounding of 1e-13 · 1e3 px / step.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.pictures.others import BESIDE_ROD_PX, RodLines, covered
+from vision.pictures.others import BESIDE_ROD_PX, RodLines, mask_rods
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import cut_pieces, read_band
 
@@ -16,7 +16,7 @@ RODS = {
 
 def test_what_lies_near_a_line_is_covered_and_no_more():
     """OpenCV rounds a width to whole pixels, and a line's ends are round: half a pixel, and one, to either side."""
-    mask = covered(RODS, 2, (100, 110))
+    mask = mask_rods(RODS, 2, (100, 110))
     rows, columns = np.nonzero(np.ones_like(mask))
     start, step = LINE[0] + [0.0, 30.0], LINE[-1] - LINE[0]
     px = np.stack([columns, rows], axis=1) - start
@@ -27,14 +27,14 @@ def test_what_lies_near_a_line_is_covered_and_no_more():
 
 
 def test_frames_without_another_rod_are_covered_nowhere():
-    assert covered({}, 0, (10, 10)) is None
-    assert not covered(RODS, 1, (100, 110)).any()
+    assert mask_rods({}, 0, (10, 10)) is None
+    assert not mask_rods(RODS, 1, (100, 110)).any()
 
 
 def test_a_line_of_unknown_place_covers_nothing():
     """One that passes behind a camera has no picture."""
     lost = {"other": RodLines(np.array([0]), np.full((1, 3, 2), np.nan), np.array([2.0]))}
-    assert not covered(lost, 0, (20, 20)).any()
+    assert not mask_rods(lost, 0, (20, 20)).any()
 
 
 def test_shrunk_lines_lie_where_shrunk_pictures_have_them():

@@ -25,7 +25,7 @@ def test_a_shift_of_any_size_is_told(rng, shift):
     x, y = shift
     rig, frame = wide[120:360, 160:480], wide[120 - y : 360 - y, 160 - x : 480 - x]
     found = likeness(texture(noisy(frame, rng)), texture(noisy(rig, rng)))
-    assert found.seen
+    assert found.is_same_scene
     np.testing.assert_allclose(found.shift_px, shift, atol=1.0)
 
 
@@ -34,8 +34,8 @@ def test_other_light_and_a_moving_rod_are_the_same_scene(rng):
     frame = np.clip(0.6 * rig + np.linspace(0, 60, 320), 0, 255).astype(np.uint8)
     frame[:, 100:112] = 20
     found = likeness(texture(noisy(frame, rng)), texture(rig))
-    assert found.seen
-    assert found.moved_px == 0.0
+    assert found.is_same_scene
+    assert found.shift_length_px == 0.0
 
 
 @pytest.mark.parametrize(
@@ -43,13 +43,13 @@ def test_other_light_and_a_moving_rod_are_the_same_scene(rng):
 )
 def test_a_mirrored_scene_is_another(rng, change):
     rig = bench(rng)
-    assert not likeness(texture(noisy(change(rig), rng)), texture(rig)).seen
+    assert not likeness(texture(noisy(change(rig), rng)), texture(rig)).is_same_scene
 
 
 def test_scenes_that_have_only_noise_are_not_told(rng):
     flat = np.full((240, 320), 90, dtype=np.uint8)
-    assert not likeness(texture(noisy(flat, rng)), texture(noisy(flat, rng))).seen
-    assert not likeness(texture(flat), texture(flat)).seen
+    assert not likeness(texture(noisy(flat, rng)), texture(noisy(flat, rng))).is_same_scene
+    assert not likeness(texture(flat), texture(flat)).is_same_scene
 
 
 def test_blank(rng):
