@@ -18,24 +18,59 @@ from vision.geometry.rotation import apply, compose, invert_transform, log_rotat
 _FOCAL_LIMITS = (0.15, 20.0)
 
 
+def focal_length_px(
+    views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
+) -> float:
+    """Return the focal length from the homographies of plane views (Zhang 2000).
+
+    The principal point is taken as the middle of the picture. With h1, h2 the first columns of
+    K⁻¹H: h1 · h2 = 0 and |h1| = |h2|, both linear in (width/f)²; their weighted median is not
+    carried off by a view gone wrong, as OpenCV's least squares is. Returns the picture's width
+    where no view is tilted enough.
+    """
+    width = size_px[0]
+    equations = [_focal_equations(view, corners_mm, size_px) for view in views]
+    coefficients, constants = np.concatenate([np.zeros((0, 2)), *equations]).T
+    is_determined = coefficients != 0.0
+    if not np.any(is_determined):
+        return float(width)
+    coefficients = coefficients[is_determined]
+    inverse_squares = constants[is_determined] / coefficients
+    inverse_square = _weighted_median(inverse_squares, coefficients**2)
+    least, most = _FOCAL_LIMITS
+    if not most**-2 < inverse_square < least**-2:
+        return float(width)
+    return float(width / np.sqrt(inverse_square))
+
+
+def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    """Return the value with half of the weight on either side."""
+    order = np.argsort(values)
+    cumulated = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(cumulated, 0.5 * cumulated[-1])])
+
+
+def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
+    """Return rows (2, 2): coefficient · (width/f)² = constant, of one view; none without homography."""
+    width = size_px[0]
+    picture = (view.px - 0.5 * (np.array(size_px) - 1)) / width  # in widths, from the middle
+    H, _ = cv2.findHomography(corners_mm[view.ids, :2], picture, 0)
+    if H is None:
+        return np.zeros((0, 2))
+    h1, h2 = (H / np.sqrt(np.sum(H[:, :2] ** 2)))[:, :2].T
+    at_right_angles = [h1[:2] @ h2[:2], -h1[2] * h2[2]]
+    of_equal_length = [h1[:2] @ h1[:2] - h2[:2] @ h2[:2], h2[2] ** 2 - h1[2] ** 2]
+    return np.array([at_right_angles, of_equal_length])
+
+
 def first_lens(
     views: Sequence[Corners], corners_mm: np.ndarray, size_px: tuple[int, int]
 ) -> np.ndarray:
     """Return nine lens parameters to begin with: one focal length, the principal point in the
     middle, no distortion.
-
-    The focal length is OpenCV's from the homographies of plane views (Zhang 2000); the picture's
-    width where they give none that a camera can have.
     """
     width, height = size_px
-    focal_px = np.nan
-    if views:
-        points_mm = [corners_mm[view.ids].astype(np.float32) for view in views]
-        px = [view.px.astype(np.float32) for view in views]
-        focal_px = cv2.initCameraMatrix2D(points_mm, px, size_px)[0, 0]
-    least, most = _FOCAL_LIMITS
-    if not least < focal_px / width < most:
-        focal_px = width
+    focal_px = focal_length_px(views, corners_mm, size_px)
     return np.array([focal_px, focal_px, 0.5 * (width - 1), 0.5 * (height - 1), 0, 0, 0, 0, 0])
 
 
