@@ -189,9 +189,7 @@ def worst_percent(design: Design, region: Region, equipment: Equipment) -> float
 
 def largest_percent(design: Design, region: Region, equipment: Equipment) -> float:
     """Return the largest |bias| + 1.96 sigma over the region, %."""
-    return float(
-        expected_error(design, region, equipment, region.points()).bound_percent.max()
-    )
+    return float(expected_error(design, region, equipment, region.points()).bound_percent.max())
 
 
 def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, float]:

@@ -151,7 +151,7 @@ def test_outlines_are_where_rays_graze(name):
     thing, window = THINGS[name], Window.whole(CAMERA, 3, 0.2, 4)
     layer = Solid(thing, Material(1.0)).layer(window, EVEN)
     cover = np.zeros(window.shape)
-    cover[layer.at] = layer.cover
+    cover[layer.index] = layer.cover
     columns = np.flatnonzero((cover.sum(0) > 12) & (cover[[0, -1]].max(0) < 1e-6))
     for column in np.linspace(columns[0] + 9, columns[-1] - 9, 4).astype(int):
         long, middle = amount(thing, window.u_px[column], 0.2)
@@ -165,9 +165,9 @@ def test_what_is_seen_is_what_sights_meet_first(name):
     thing, window = THINGS[name], Window.whole(CAMERA, 1, 0.3)
     layer = Solid(thing, Material(1.0)).layer(window, EVEN)
     inner = np.zeros(window.shape, np.uint8)
-    inner[layer.at] = layer.cover > 1 - 1e-9
-    whole = np.flatnonzero(cv2.erode(inner, np.ones((5, 5)))[layer.at])[::97]
-    ways = rays(window.u_px[layer.at[1][whole]], window.v_px[layer.at[0][whole]])
+    inner[layer.index] = layer.cover > 1 - 1e-9
+    whole = np.flatnonzero(cv2.erode(inner, np.ones((5, 5)))[layer.index])[::97]
+    ways = rays(window.u_px[layer.index[1][whole]], window.v_px[layer.index[0][whole]])
     seen = layer.depth_mm[whole]
     before, behind = (
         within(thing, CAMERA.centre_mm + (seen + step)[:, None] * ways) for step in (-0.02, 0.02)
@@ -185,7 +185,7 @@ def test_a_large_ring_looks_like_a_straight_bar():
     window = Window.whole(CAMERA, 3, 0.2, 4)
     bent, straight = (np.full(window.shape, 0.3, np.float32) for _ in range(2))
     layer = Solid(Ring.bent(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
-    bent[layer.at] += (layer.cover * (layer.tone - bent[layer.at])).astype(np.float32)
+    bent[layer.index] += (layer.cover * (layer.tone - bent[layer.index])).astype(np.float32)
     foot = bar.foot_mm(TOUCHED)
     Tube.straight(foot - 120 * bar.axis, foot + 120 * bar.axis, 3.0, METAL).draw(
         window, straight, LAMP
@@ -203,7 +203,7 @@ def test_a_wire_is_seen_before_an_object_and_not_behind_it():
         CAMERA.centre_mm - thing.point_mm
     )
     still = np.full(window.shape, 0.3, np.float32)
-    still[layer.at] += (layer.cover * (layer.tone - still[layer.at])).astype(np.float32)
+    still[layer.index] += (layer.cover * (layer.tone - still[layer.index])).astype(np.float32)
     part = window.crop(np.array([[60.0, 60.0], [260.0, 200.0]]), 3)
     for away_mm, is_seen in ((30.0, True), (-30.0, False)):
         middle = thing.point_mm + away_mm * towards
