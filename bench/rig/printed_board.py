@@ -39,9 +39,12 @@ class Board:
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
         """Return the board as OpenCV has it."""
+        return self._charuco(self.square_mm, self.marker_mm)
+
+    def _charuco(self, square, marker):
+        """Return OpenCV's board with squares and markers of these sizes."""
         dictionary = _dictionary(self.dictionary)
-        squares = tuple(self.squares)
-        board = cv2.aruco.CharucoBoard(squares, self.square_mm, self.marker_mm, dictionary)
+        board = cv2.aruco.CharucoBoard(tuple(self.squares), square, marker, dictionary)
         board.setLegacyPattern(self.legacy)
         return board
 
@@ -57,24 +60,19 @@ class Board:
 
     def to_print(self, ink: Ink, margin_mm: float) -> Print:
         """Print the board within a white margin; the print's coordinates are the board frame's."""
-        board = self.opencv()
-        cells = _dictionary(self.dictionary).markerSize + 4  # of a square with a marker, each way
+        modules = _dictionary(self.dictionary).markerSize + 2
+        cells = modules + 2  # of a square, each way: a marker's modules, and a gap on either side
+        size = self.squares[0] * cells, self.squares[1] * cells
+        is_white = self._charuco(cells, modules).generateImage(size) > 0
         gap = (self.square_mm - self.marker_mm) / 2
-        steps = gap + self.marker_mm / (cells - 2) * np.arange(cells - 1)
-        x, y = (self._edges(count, np.append(0, steps)) for count in self.squares)
-        is_dark = np.ones((len(y) - 1, len(x) - 1), bool)
-        for number, corners in zip(board.getIds().ravel(), board.getObjPoints()):
-            i, j, _ = (np.mean(corners, axis=0) // self.square_mm).astype(int)
-            square = is_dark[j * cells : (j + 1) * cells, i * cells : (i + 1) * cells]
-            square[:] = False
-            square[1:-1, 1:-1] = _is_black(self.dictionary, int(number))
+        marker = gap + self.marker_mm / modules * np.arange(modules + 1)
+        edges = []
+        for count in self.squares:
+            starts = self.square_mm * np.arange(count)
+            cell_starts = np.add.outer(starts, np.append(0, marker))
+            edges.append(np.append(cell_starts, count * self.square_mm))
         paper, printed = (ink.black, ink.white) if self.inverted else (ink.white, ink.black)
-        return Print(np.where(is_dark, printed, paper), x, y).frame(margin_mm, paper)
-
-    def _edges(self, squares, steps):
-        """Return the edges of all cells of a row of squares, mm; steps (n,): within a square."""
-        starts = np.arange(squares) * self.square_mm
-        return np.append(np.add.outer(starts, steps), squares * self.square_mm)
+        return Print(np.where(is_white, paper, printed), *edges).frame(margin_mm, paper)
 
 
 def marker_print(dictionary: str, number: int, side_mm: float, ink: Ink) -> Print:

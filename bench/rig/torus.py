@@ -10,7 +10,7 @@ from bench.rig.rays import Hits, Rays, circle_points, perpendicular_axes, sine_b
 from bench.rig.round_objects import Ring
 
 _STATIONS = 64  # of a circle, of which those nearest to a ray are found first
-_STATION_RAD = 2 * np.pi / _STATIONS
+_STATION_RAD = 2 * np.pi / _STATIONS  # from one to the next
 _NEWTON_STEPS = 6  # from a station to the nearest point
 _COARSE = 8  # samples: only every eighth is tried first, whether the ring is near it
 _NEAR_MM, _MOST_STEPS = 1e-4, 100  # of marching along a ray
