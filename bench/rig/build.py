@@ -107,7 +107,7 @@ def scene(protocol: Protocol) -> Scene:
     """The scene of a protocol: its light and what things look like in it."""
     table = protocol.light
     towards = np.array(table.towards) / np.linalg.norm(table.towards)
-    looks = Appearance(
+    appearance = Appearance(
         Light(towards, table.lamp, table.soft),
         Ink(table.paper, table.ink),
         Material(table.wire_matt, table.wire_shiny, table.wire_gloss, table.wire_rim),
@@ -116,7 +116,7 @@ def scene(protocol: Protocol) -> Scene:
         table.floor,
         table.wall,
     )
-    return Scene(board(protocol), T_rig_board(protocol), looks, _stands(protocol))
+    return Scene(board(protocol), T_rig_board(protocol), appearance, _stands(protocol))
 
 
 def _stands(protocol: Protocol) -> tuple[Stand, ...]:

@@ -2,9 +2,10 @@
 They are drawn far to near."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from bench.rig.bar import Bar, turned
 from bench.rig.box import Box
@@ -241,19 +242,9 @@ def block_corners_mm(bar: Bar, middle_mm: np.ndarray) -> np.ndarray:
 
 
 def draw_floor_and_wall(window: Window, appearance: Appearance) -> np.ndarray:
-    """Draw a grey floor that darkens away from the rig, and the wall behind it; return the radiance.
-
-    Both are computed once a pixel, (rows, columns) float32 of samples.
-    """
-    coarse = Window(window.camera, window.left, window.top, window.right, window.bottom, 1, 1.0)
-    ray_x, ray_y = coarse.rays()
-    rays = np.stack([ray_x, ray_y, np.ones_like(ray_x)], -1)
-    rays = rays @ window.camera.rotation.astype(np.float32)
-    centre = window.camera.centre_mm
-    to_floor = (appearance.floor_z_mm - centre[2]) / np.minimum(rays[..., 2], -1e-3)
-    to_wall = (appearance.wall_y_mm - centre[1]) / np.maximum(rays[..., 1], 1e-3)
-    floor_share = 1 / (1 + np.exp(np.clip((to_floor - to_wall) / _CREASE_MM, -50, 50)))
-    point = rays * np.minimum(to_floor, to_wall)[..., None] + centre
+    """Draw a grey floor that darkens away from the rig, and the wall behind it; return the radiance
+    (rows, columns) of the window's samples, the same for all of a pixel."""
+    point, floor_share = _floor_and_wall_points(window, appearance)
     x, y, z = np.moveaxis(point, -1, 0)
     brightness = 1 / (1 + (x - _LIT_X_MM) ** 2 / _SHADE_MM2 + y**2 / _SHADE_MM2)
     grain = 1 + _GRAIN * np.sin(0.11 * x + 0.3) * np.sin(0.13 * y + 0.7 * z)
@@ -261,3 +252,15 @@ def draw_floor_and_wall(window: Window, appearance: Appearance) -> np.ndarray:
     wall = appearance.wall * appearance.light.shade_flat([0, -1.0, 0])
     tone = (floor * floor_share + wall * (1 - floor_share)) * brightness * grain
     return tone.astype(np.float32).repeat(window.fine, 0).repeat(window.fine, 1)
+
+
+def _floor_and_wall_points(window, appearance):
+    """Return the points (rows, columns, 3) of floor or wall that the window's pixels show, mm, and
+    the share (rows, columns) of the floor."""
+    x, y = replace(window, fine=1).rays()
+    rays = np.stack([x, y, np.ones_like(x)], -1) @ window.camera.rotation.astype(np.float32)
+    centre = window.camera.centre_mm
+    to_floor = (appearance.floor_z_mm - centre[2]) / np.minimum(rays[..., 2], -1e-3)
+    to_wall = (appearance.wall_y_mm - centre[1]) / np.maximum(rays[..., 1], 1e-3)
+    floor_share = expit((to_wall - to_floor) / _CREASE_MM)
+    return rays * np.minimum(to_floor, to_wall)[..., None] + centre, floor_share

@@ -155,18 +155,22 @@ def _tone(print_, across, down):
     for j, row_weight in enumerate(row.weights):
         for i, column_weight in enumerate(column.weights):
             tone += column_weight * row_weight * reflectance[first + (j * width + i)]
-    # Towards a corner the two edges' blurs are correlated: the leading terms of the bivariate
-    # normal integral.
     corner = first + row.is_last_nearer * width + column.is_last_nearer
     saddle = reflectance[corner] - reflectance[corner + 1]
     saddle += reflectance[corner + width + 1] - reflectance[corner + width]
-    x = column.edge_distance
-    y = row.edge_distance
+    return tone + saddle * _corner_share(across, down, column.edge_distance, row.edge_distance)
+
+
+def _corner_share(across, down, x, y):
+    """Return the share of each spot in two opposite cells at a corner that its correlation adds.
+
+    x, y: distances from the corner, in sigmas. The leading terms of the bivariate normal integral.
+    """
     density = np.exp(-0.5 * (x**2 + y**2)) / _ROOT_2PI**2
     covariance = across.by_x * down.by_x + across.by_y * down.by_y
     correlation = covariance / (across.soft_mm * down.soft_mm)
     third = correlation**2 / 6 * (x**2 - 1) * (y**2 - 1)
-    return tone + saddle * density * correlation * (1 + 0.5 * correlation * x * y + third)
+    return density * correlation * (1 + 0.5 * correlation * x * y + third)
 
 
 @dataclass(frozen=True, eq=False)

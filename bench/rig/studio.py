@@ -15,7 +15,8 @@ from bench.rig.sensor import Sensor
 from bench.rig.tube import Tube
 from bench.rig.window import Window
 
-# Samples a pixel each way, px of blur while drawing; tests/bench/rig/test_rig_pictures.py compares with 12 and 0.05.
+# Samples a pixel each way, px of blur while drawing; tests/bench/rig/test_rig_pictures.py compares
+# with 12 and 0.05.
 _FINE, _SOFT_PX = 3, 0.2
 _PIXEL_BLUR_PX = math.sqrt(1 / 12)  # px: standard deviation of a pixel's own width
 

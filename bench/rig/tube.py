@@ -70,14 +70,8 @@ class Tube:
         strip = _Strip.from_edges(edges)
         index = strip.find_samples(part, 4.5 * window.soft_px + 1)
         along, side = strip.from_px(np.stack([part.u_px[index[1]], part.v_px[index[0]]], -1))
-        low, cos_low = strip.edge(0, along)
-        high, cos_high = strip.edge(1, along)
-        sharpness = np.sign(high - low) / window.soft_px
-        cover = ndtr((side - low) * cos_low * sharpness)
-        cover -= ndtr((side - high) * cos_high * sharpness)
-        cover *= strip.cover_ends(along, window.soft_px)
-        position = np.clip(2 * (side - low) / (high - low) - 1, -1, 1)
-        sample = 2 / np.abs(high - low) / window.fine
+        cover, position, per_px = strip.cover(along, side, window.soft_px)
+        sample = per_px / window.fine
         tone = self._shade(window.camera, light, strip, along, position, sample)
         distance = np.linalg.norm(self.axis_mm - window.camera.centre_mm, axis=1)
         depth = strip.interpolate(along, distance)
@@ -164,10 +158,18 @@ class _Strip:
         slope = np.interp(along, x, np.gradient(y, x))
         return _extrapolate(along, x, y), 1 / np.sqrt(1 + slope**2)
 
-    def cover_ends(self, along, soft_px):
-        """Return how much of a sample lies between the tube's ends, by its place along the strip."""
+    def cover(self, along, side, soft_px):
+        """Return, of samples at places along the strip and to its side, (n,) each: how much of each
+        the tube covers, its position from −1 on one silhouette to 1 on the other, and that by px."""
+        low, cos_low = self.edge(0, along)
+        high, cos_high = self.edge(1, along)
+        sharpness = np.sign(high - low) / soft_px
+        cover = ndtr((side - low) * cos_low * sharpness)
+        cover -= ndtr((side - high) * cos_high * sharpness)
         start, end = self.along.mean(0)[[0, -1]]
-        return ndtr((along - start) / soft_px) * ndtr((end - along) / soft_px)
+        cover *= ndtr((along - start) / soft_px) * ndtr((end - along) / soft_px)
+        position = np.clip(2 * (side - low) / (high - low) - 1, -1, 1)
+        return cover, position, 2 / np.abs(high - low)
 
     def find_samples(self, window, margin):
         """Find the samples of a window within a margin, px, of the tube; return rows and columns."""

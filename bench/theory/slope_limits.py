@@ -43,18 +43,21 @@ PRINTED_POINTS = {
 class Curve:
     """One line of a panel.
 
-    row: of panels; the form of Appendix B in figure 6. parameters: columns of the CSV file, by
-    name. x, beta_thresh_deg (n,): NaN where the error is never reached.
+    parameters: columns of the CSV file, by name. x, beta_thresh_deg (n,): NaN where the error is never reached.
     """
 
     panel: str
-    row: str
     parameters: dict[str, float | str]
     x: np.ndarray
     beta_thresh_deg: np.ndarray
     colour: str
     is_dashed: bool
     label: str
+
+    @property
+    def form(self) -> str:
+        """Return the form of Appendix B that it is by: "printed" or "exact"; empty in figure 5."""
+        return self.parameters.get("form", "")
 
 
 def write_figure(number: int, out: Path) -> list[Path]:
@@ -86,7 +89,6 @@ def figure_5() -> Iterator[Curve]:
                 beta = slope_threshold(error / 100, alpha, alpha_est, equation=equation)
                 yield Curve(
                     panel,
-                    "",
                     {"alpha_est_deg": alpha_est_deg, "error_percent": error, "equation": name},
                     ALPHA_DEG,
                     np.degrees(beta),
@@ -109,7 +111,6 @@ def figure_6() -> Iterator[Curve]:
                     beta = _curved_threshold(error, alpha_deg, theta_deg, form == "printed")
                     yield Curve(
                         panel,
-                        form,
                         {
                             "form": form,
                             "error_percent": error,
@@ -147,12 +148,12 @@ def _table(number, curves) -> str:
 
 def _draw(number, curves):
     """Draw all panels of a figure."""
-    rows = sorted({curve.row for curve in curves}, reverse=True)
-    figure = Figure(figsize=(11, 3.8 * len(rows)), layout="constrained")
-    grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
-    for axes, row in zip(grid, rows):
+    forms = sorted({curve.form for curve in curves}, reverse=True)
+    figure = Figure(figsize=(11, 3.8 * len(forms)), layout="constrained")
+    grid = figure.subplots(len(forms), 3, sharex=True, sharey=True, squeeze=False)
+    for axes, form in zip(grid, forms):
         for ax, panel in zip(axes, "abc"):
-            _draw_panel(ax, number, [c for c in curves if (c.panel, c.row) == (panel, row)])
+            _draw_panel(ax, number, [c for c in curves if (c.panel, c.form) == (panel, form)])
     entries = {}
     for ax, letter in zip(grid.flat, "abcdef"):
         ax.set_title(f"({letter}) {ax.get_title()}")
@@ -178,7 +179,7 @@ def _draw_panel(ax, number, curves) -> None:
         line = "--" if curve.is_dashed else "-"
         ax.plot(curve.x, beta, line, color=curve.colour, lw=1.2, label=curve.label)
     points = np.array(PRINTED_POINTS[number].get(curves[0].panel, ()))
-    if points.size and curves[0].row != "exact":
+    if points.size and curves[0].form != "exact":
         ax.plot(*points.T, "ko", ms=4, mfc="none", label="printed in the text")
     ax.set(ylim=(0, _TOP_DEG), yticks=range(0, 91, 15), title=_title(number, curves[0]))
     ax.grid(alpha=0.3)
@@ -190,5 +191,5 @@ def _title(number, curve) -> str:
     """Return the title of a panel by one of its curves."""
     if number == 5:
         return rf"$\alpha_\mathrm{{est}}$ = {curve.parameters['alpha_est_deg']:g}°"
-    form = "as printed" if curve.row == "printed" else "exact slip angle"
+    form = "as printed" if curve.form == "printed" else "exact slip angle"
     return f"{curve.parameters['error_percent']:g} % error, {form}"
