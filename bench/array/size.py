@@ -198,10 +198,10 @@ class _Fit:
         columns = []
         for axis in np.eye(self.count):
 
-            def moved(step, axis=axis):
+            def distances_after(step, axis=axis):
                 return np.array(self.distances(self.surface_at(parameters + step * axis), arcs))
 
-            outside, cosine = _derivative(moved)
+            outside, cosine = _derivative(distances_after)
             columns.append(np.stack([outside, cosine / cosine_by_arc], -1).ravel())
         return np.stack(columns, -1)
 

@@ -6,7 +6,7 @@ own formulas, from the noise of one sample by the weights with which touch and m
 is the largest |bias| + 1.96 sigma over the region.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -224,14 +224,11 @@ def best_design(
 
     design = Design(**{name: low for name, (low, _) in ranges.items()})
     free = [name for name in NAMES if ranges[name][0] < ranges[name][1]]
-
-    def with_values(values) -> Design:
-        return replace(design, **dict(zip(free, map(float, values))))
-
-    def worst(values) -> float:
-        return worst_percent(with_values(values), region, equipment)
-
     if free:
+
+        def worst(values: np.ndarray) -> float:
+            return worst_percent(_with_values(design, free, values), region, equipment)
+
         bounds = Bounds(*np.array([ranges[name] for name in free]).T)
         found = differential_evolution(
             worst,
@@ -243,9 +240,15 @@ def best_design(
             polish=False,
         )
         refined = minimize(worst, found.x, method="Nelder-Mead", bounds=bounds)
-        design = with_values(refined.x if refined.fun < found.fun else found.x)
+        best = refined if refined.fun < found.fun else found
+        design = _with_values(design, free, best.x)
     _require_design(design, region, equipment)
     return design, largest_percent(design, region, equipment)
+
+
+def _with_values(design: Design, names: Sequence[str], values: np.ndarray) -> Design:
+    """Return a design with other values of the named choices."""
+    return replace(design, **dict(zip(names, map(float, values))))
 
 
 def _require_design(design: Design, region: Region, equipment: Equipment) -> None:
