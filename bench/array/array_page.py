@@ -1,4 +1,4 @@
-"""The array's own page: its verdict, and the way to each whisker's report."""
+"""The array's own page: its verdict, and links to each whisker's report."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,8 +18,13 @@ def write_page(
     runs: Sequence[tuple[str, RunRecord]],
     figures: Sequence[str],
 ) -> None:
-    """report.html of the array, whole. runs: name and record of each whisker; figures: names of pictures in `out`."""
-    rooms = ChoiceLoader([PackageLoader("bench.array", ""), PackageLoader("bench.report", "page")])
-    environment = Environment(loader=rooms, autoescape=True, undefined=StrictUndefined)
-    told = {"session": session, "summary": summary, "runs": runs, "figures": figures}
-    write_whole(out / REPORT, environment.get_template("array.html.j2").render(told) + "\n")
+    """Write report.html of the array, whole.
+
+    runs: name and record of each whisker. figures: names of pictures in `out`.
+    """
+    folders = [PackageLoader("bench.array", ""), PackageLoader("bench.report", "page")]
+    loader = ChoiceLoader(folders)
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    template = environment.get_template("array.html.j2")
+    page = template.render(session=session, summary=summary, runs=runs, figures=figures)
+    write_whole(out / REPORT, page + "\n")

@@ -1,4 +1,5 @@
-"""What the whiskers of an array tell together: tables, figure, summary and page, from their runs' folders alone."""
+"""The results of an array's whiskers put together: tables, figure, summary and page, from their runs'
+folders alone."""
 
 import json
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from bench.array.shape_verdict import (
     surface_verdict,
     write_surface,
 )
-from bench.array.size import SIZE, felt_sizes, size_lines, write_sizes
+from bench.array.size import SIZE, FeltSize, fit_sizes, size_lines, write_sizes
 from bench.array.surface import Surface, seen_surface, stated_surface
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
@@ -41,9 +42,12 @@ TABLES = {table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE
 
 @dataclass(frozen=True, eq=False)
 class ArrayRecord:
-    """What is known of an array beside its whiskers' runs. doubts: of the session as a whole; scores: of all whiskers
-    against the truth files of a synthetic session; surfaces: objects as the manifests state them, by trial; verdict,
-    doubtful: as the summary has them, once it is made."""
+    """All that array.json holds of an array, beside its whiskers' runs.
+
+    doubts: of the session as a whole. scores: of all whiskers against the truth files of a
+    synthetic session. surfaces: objects as the manifests state them, by trial. verdict, doubtful:
+    as the summary has them, once it is made.
+    """
 
     session: str
     bases: tuple[Base, ...]
@@ -56,50 +60,58 @@ class ArrayRecord:
 
 @dataclass(frozen=True, eq=False)
 class WhiskerRun:
-    """One whisker of the array: where it stands, and its run."""
+    """One whisker of the array: its base, and its run."""
 
     base: Base
     record: RunRecord
-    whole: Finished
+    finished: Finished
+
+    @classmethod
+    def read(cls, base: Base, folder: Path) -> "WhiskerRun":
+        """Read a whisker's run from its folder. Raises BadInput where there is none."""
+        record = read_record(folder)
+        return cls(base, record, finished(read_run(folder), record.whisker, record.settings))
+
+    @property
+    def results(self) -> Sequence[TrialResult]:
+        """Return the results of its trials."""
+        return self.finished.results
 
     @property
     def mount(self) -> Mount:
-        """What places its contacts."""
+        """Return the base, wire and friction angle that place its contacts."""
         settings = self.record.settings
-        sigma = alpha_est_sigma([f.surface for f in self.whole.friction], settings)
+        surfaces = [friction.surface for friction in self.finished.friction]
+        sigma = alpha_est_sigma(surfaces, settings)
         return Mount(self.base, self.record.whisker.wire, settings.alpha_est_rad, sigma)
 
 
 def folder_of(out: Path, whisker: str) -> Path:
-    """Where a whisker's run stands in the array's OUT."""
+    """Return the folder of a whisker's run in the array's OUT."""
     return out / RUNS / whisker
 
 
 def array_record(
     views: Sequence[Session], doubts: Sequence[str], scores: Sequence[str]
 ) -> ArrayRecord:
-    """The record of an array's views, one a whisker."""
-    stated = {trial.name: stated_surface(trial) for trial in views[0].trials}
-    surfaces = {name: surface for name, surface in stated.items() if surface is not None}
-    return ArrayRecord(
-        views[0].whole_name,
-        tuple(view.base for view in views),
-        tuple(doubts),
-        tuple(scores),
-        surfaces,
-    )
+    """Return the record of an array's views, one a whisker."""
+    surfaces = {}
+    for trial in views[0].trials:
+        surface = stated_surface(trial)
+        if surface is not None:
+            surfaces[trial.name] = surface
+    bases = tuple(view.base for view in views)
+    return ArrayRecord(views[0].whole_name, bases, tuple(doubts), tuple(scores), surfaces)
 
 
 def write_array_record(out: Path, record: ArrayRecord) -> None:
-    """array.json, whole."""
-    write_whole(
-        out / ARRAY,
-        json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1) + "\n",
-    )
+    """Write array.json, whole."""
+    text = json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1)
+    write_whole(out / ARRAY, text + "\n")
 
 
 def read_array_record(out: Path) -> ArrayRecord:
-    """The array of a folder. Raises BadInput where it is none, or of another version."""
+    """Read the array of a folder. Raises BadInput where it is none, or of another version."""
     try:
         return from_plain(ArrayRecord, json.loads((out / ARRAY).read_text(encoding="utf-8")))
     except FileNotFoundError:
@@ -111,58 +123,54 @@ def read_array_record(out: Path) -> ArrayRecord:
 
 
 def is_array(out: Path) -> bool:
-    """Whether a folder holds the runs of several whiskers."""
+    """Return whether a folder holds the runs of several whiskers."""
     return (out / ARRAY).is_file()
 
 
 def write_array(out: Path) -> Summary:
-    """Tables, figures, report.html and summary.txt of an array's runs, each whole. Raises BadInput as reading does."""
+    """Write tables, figures, report.html and summary.txt of an array's runs, each whole.
+
+    Raises BadInput where a run cannot be read.
+    """
     record = read_array_record(out)
-    runs = [_read(base, folder_of(out, base.name)) for base in record.bases]
+    runs = [WhiskerRun.read(base, folder_of(out, base.name)) for base in record.bases]
     _write_tables(out, runs)
-    cloud = [
-        contact
-        for run in runs
-        for contact in contacts(run.mount, run.whole.results, record.surfaces)
-    ]
+    cloud = []
+    for run in runs:
+        cloud += contacts(run.mount, run.results, record.surfaces)
     write_surface(out, cloud)
-    sizes = felt_sizes(cloud, record.surfaces)
+    sizes = fit_sizes(cloud, record.surfaces)
     write_sizes(out, sizes)
-    summary = _summary(record, runs, cloud, sizes)
+    summary = _summarise(record, runs, cloud, sizes)
     figures = []
     if runs[0].record.settings.figures:
         from bench.array.figure import write_figures  # with all of matplotlib
 
-        figures = write_figures(out, cloud, _seen(runs) | record.surfaces)
+        figures = write_figures(out, cloud, _seen_surfaces(runs) | record.surfaces)
     write_page(out, record.session, summary, [(run.base.name, run.record) for run in runs], figures)
     write_whole(out / "summary.txt", summary.text)
     write_array_record(out, replace(record, verdict=summary.verdict, doubtful=summary.doubtful))
     return summary
 
 
-def _read(base: Base, folder: Path) -> WhiskerRun:
-    record = read_record(folder)
-    return WhiskerRun(base, record, finished(read_run(folder), record.whisker, record.settings))
-
-
-def _seen(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
-    """The bar of each trial, as the first whisk that shows it has it."""
-    found = {}
+def _seen_surfaces(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
+    """Return the bar of each trial, from the first whisk that shows it."""
+    surfaces = {}
     for run in runs:
-        for result, seen, _ in whisks(run.whole.results):
+        for result, seen, _ in whisks(run.results):
             surface = seen_surface(seen, result.seen.bar_radius_mm, run.mount.wire, run.base)
             if surface is not None:
-                found.setdefault(result.trial.name, surface)
-    return found
+                surfaces.setdefault(result.trial.name, surface)
+    return surfaces
 
 
 def _write_tables(out: Path, runs: Sequence[WhiskerRun]) -> None:
     """Write whisks.csv and estimates.csv of all whiskers, each row with its whisker."""
-    for table, rows in ((ARRAY_WHISKS, whisk_rows), (ARRAY_ESTIMATES, estimate_rows)):
-        named = (
-            {"whisker": run.base.name} | row for run in runs for row in rows(run.whole.results)
-        )
-        table.write(out, named)
+    for table, rows_of in ((ARRAY_WHISKS, whisk_rows), (ARRAY_ESTIMATES, estimate_rows)):
+        rows = []
+        for run in runs:
+            rows += [{"whisker": run.base.name} | row for row in rows_of(run.results)]
+        table.write(out, rows)
 
 
 def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
@@ -171,37 +179,33 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
     return replace(result, trial=trial)
 
 
-def _summary(
-    record: ArrayRecord, runs: Sequence[WhiskerRun], cloud: Sequence[Contact], sizes
+def _summarise(
+    record: ArrayRecord,
+    runs: Sequence[WhiskerRun],
+    cloud: Sequence[Contact],
+    sizes: Sequence[FeltSize],
 ) -> Summary:
-    swapped = exchanged({run.base.name: run.whole.results for run in runs})
-    doubtful = [
-        *record.doubts,
-        *swapped,
-        *(f"{run.base.name}: {line}" for run in runs for line in run.record.doubts),
-    ]
-    results = [_named_by_whisker(result, run) for run in runs for result in run.whole.results]
-    pictures = any(run.record.has_pictures for run in runs)
-    said = verdict(
-        f"{record.session}, {counted(len(runs), 'whisker')}",
-        pictures,
-        results,
-        runs[0].record.settings,
-        len(doubtful),
-    )
-    sections = (
-        Section("Whiskers", tuple(f"{run.base.name}: {run.record.verdict[0]}" for run in runs)),
-        Section("Surface: contacts from the object, mm (surface.csv)", tuple(surface_lines(cloud))),
-        Section("Size of the object by (10), its place free (size.csv)", tuple(size_lines(sizes))),
-        Section(DOUBTFUL, tuple(doubtful)),
-        Section(
-            "Score against the truth files of this synthetic session (no result knows them)",
-            record.scores,
-        ),
-        Section(
-            "Files",
-            (f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/",),
-        ),
-    )
-    spoken = (*surface_verdict(cloud), *said)
-    return Summary(spoken, tuple(doubtful), tuple(section for section in sections if section.lines))
+    """Return verdict and sections of the array's summary; sections without lines are left out."""
+    doubtful = [*record.doubts, *exchanged({run.base.name: run.results for run in runs})]
+    results = []
+    first_lines = []
+    for run in runs:
+        doubtful += [f"{run.base.name}: {line}" for line in run.record.doubts]
+        results += [_named_by_whisker(result, run) for result in run.results]
+        first_lines.append(f"{run.base.name}: {run.record.verdict[0]}")
+    title = f"{record.session}, {counted(len(runs), 'whisker')}"
+    has_pictures = any(run.record.has_pictures for run in runs)
+    settings = runs[0].record.settings
+    general = verdict(title, has_pictures, results, settings, len(doubtful))
+    files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
+    lines_by_title = {
+        "Whiskers": first_lines,
+        "Surface: contacts from the object, mm (surface.csv)": surface_lines(cloud),
+        "Size of the object by (10), its place free (size.csv)": size_lines(sizes),
+        DOUBTFUL: doubtful,
+        "Score against the truth files of this synthetic session (no result knows them)": record.scores,
+        "Files": [files],
+    }
+    sections = [Section(name, tuple(lines)) for name, lines in lines_by_title.items()]
+    kept = tuple(section for section in sections if section.lines)
+    return Summary((*surface_verdict(cloud), *general), tuple(doubtful), kept)

@@ -1,5 +1,5 @@
-"""Contacts of all whiskers of an array as points of one cloud in the rig frame, each with its covariance: felt, as an
-estimator has it, and seen."""
+"""Contacts of all whiskers of an array as points of one cloud in the rig frame, each with its
+covariance: felt, by each estimator, and seen."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -20,17 +20,18 @@ from vision.truth.value import NAN, UNKNOWN, Value
 SEEN = "seen"  # in the place of an estimator's name
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Contact:
-    """A contact at first touch: the point (3,) of the whisker's centreline, rig frame, mm, and its covariance (3, 3).
+    """A contact at first touch: a point of the whisker's centreline in the rig frame.
 
-    normal (3,): of the surface, towards the whisker, as felt; NaN where the estimator gives no slope. normal_sigma_rad:
-    of it, in the plane across the whisker. base_mm (3,), wire: of the whisker; by_alpha_mm: how far one sigma of the
-    friction angle that is assumed, which is one for all, moves the point along the whisker; has_touch: nothing is
-    doubtful of the angle of touch, whatever the status says of the distance. distance_mm: from the
-    object's surface to the whisker's, positive outside; along_mm: how far beyond the place where this whisker comes
-    nearest to the object, along the whisker; normal_off_rad: between the normal and the object's own there. All three
-    NaN where the object is not known. source: of it.
+    point_mm (3,), covariance_mm2 (3, 3). normal (3,): of the surface, towards the whisker, as felt;
+    NaN where the estimator gives no slope. normal_sigma_rad: of it, in the plane across the whisker.
+    base_mm (3,), wire: of the whisker. by_alpha_mm: move of the point along the whisker by one sigma
+    of the assumed friction angle, which is one for all. has_touch: the angle of touch is sound,
+    whatever the status says of the distance.
+    Against the object, NaN where that is not known: distance_mm from its surface to the whisker's,
+    positive outside; along_mm along the whisker, from the place where it comes nearest to the
+    object; normal_off_rad between the normal and the object's own there. source: of the object.
     """
 
     whisker: str
@@ -53,18 +54,18 @@ class Contact:
 
     @property
     def arc_mm(self) -> float:
-        """From the base."""
+        """Return the distance from the base."""
         return float(np.linalg.norm(self.point_mm - self.base_mm))
 
     @property
-    def towards(self) -> np.ndarray:
-        """Along the whisker, straight at first touch: (3,), unit."""
+    def direction(self) -> np.ndarray:
+        """Return the unit direction (3,) of the whisker, straight at first touch."""
         return (self.point_mm - self.base_mm) / self.arc_mm
 
 
 @dataclass(frozen=True)
 class Mount:
-    """What places a whisker's contacts: its base, itself, and one sigma of the friction angle that is assumed."""
+    """One whisker's base and wire, and the friction angle that is assumed with its sigma."""
 
     base: Base
     wire: Wire
@@ -75,104 +76,135 @@ class Mount:
 def contacts(
     mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, Surface]
 ) -> Iterator[Contact]:
-    """Every whisk's contact, as seen where it is and by each estimator that gives a distance.
+    """Yield every whisk's contact, as seen where it is and by each estimator that gives a distance.
 
-    surfaces: by trial, as stated. Where none is, a contact felt is beside the bar as this whisker's own cameras see it:
-    what its base is off by moves both alike. A contact seen lies on that bar by its making, and is beside none.
+    surfaces: by trial, as stated. Where none is, a felt contact is compared with the bar as this
+    whisker's own cameras see it: an error of its base moves both alike. A seen contact lies on that
+    bar by construction and is compared with none.
     """
     for result, seen, felt in whisks(results):
-        if result.trial.purpose != "measure":
+        trial = result.trial
+        if trial.purpose != "measure":
             continue
-        stated = surfaces.get(result.trial.name)
+        stated = surfaces.get(trial.name)
+        if seen.has_truth and seen.point_covariance_mm2 is not None:
+            contact = _to_rig(_seen_contact(mount, trial.name, seen), mount.base)
+            yield _compare(contact, stated) if stated else contact
         surface = stated or seen_surface(seen, result.seen.bar_radius_mm, mount.wire, mount.base)
-        for contact in _of_whisk(mount, result.trial.name, seen, felt):
-            alone = surface is None or (stated is None and contact.estimator == SEEN)
-            yield contact if alone else _beside(contact, surface)
+        for estimate in (*felt.estimates, *felt.sensors):
+            is_known = math.isfinite(felt.touch_felt_rad.value)
+            if is_known and math.isfinite(estimate.d_x_est_mm.value):
+                contact = _felt_contact(mount, trial.name, seen.whisk, felt, estimate)
+                contact = _to_rig(contact, mount.base)
+                yield _compare(contact, surface) if surface else contact
 
 
-def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Iterator[Contact]:
-    of_whisk, whisker = (
-        (mount.base.name, trial, seen.whisk),
-        (mount.base.T_rig_base[:, 3], mount.wire),
+def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> Contact:
+    """Return the contact that the cameras see, in the base frame."""
+    return Contact(
+        whisker=mount.base.name,
+        trial=trial,
+        whisk=seen.whisk,
+        estimator=SEEN,
+        point_mm=seen.point_mm.value,
+        covariance_mm2=seen.point_covariance_mm2,
+        normal=_normal(seen.touch_rad.value, seen.beta_rad.value),
+        normal_sigma_rad=seen.beta_rad.sigma,
+        status=seen.status,
+        base_mm=np.zeros(3),
+        wire=mount.wire,
     )
-    if seen.has_truth and seen.point_covariance_mm2 is not None:
-        normal = _normal(seen.touch_rad.value, seen.beta_rad.value)
-        placed = _placed(mount.base, seen.point_mm.value, seen.point_covariance_mm2, normal)
-        yield Contact(*of_whisk, SEEN, *placed, seen.beta_rad.sigma, seen.status, *whisker)
-    for answer in (*felt.estimates, *felt.sensors):
-        if math.isfinite(answer.d_x_est_mm.value) and math.isfinite(felt.touch_felt_rad.value):
-            status = in_one_status(felt.status, answer.status)
-            found = (
-                *_felt(mount, felt, answer),
-                status,
-                *whisker,
-                _by_alpha_mm(answer),
-                not felt.status,
-            )
-            yield Contact(*of_whisk, answer.estimator, *found)
 
 
-def _by_alpha_mm(answer: EstimateRow) -> float:
-    """Of the distance, by one sigma of the friction angle that is assumed: a larger one brings it nearer."""
-    own = answer.d_x_est_sigma_alpha_exact_mm
-    return -math.sqrt(max(answer.d_x_est_mm.sigma**2 - own**2, 0.0)) if math.isfinite(own) else 0.0
-
-
-def _felt(
-    mount: Mount, felt: FeltWhisk, answer: EstimateRow
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Point, covariance and normal of the contact (r_c, θ_c, z_c) that an estimator gives, and the normal's sigma."""
-    touch, r_c = felt.touch_felt_rad, answer.d_x_est_mm
-    point = np.array(cartesian(*contact_point(r_c.value, touch.value, Z_C_MM.value)))
-    both = answer.touch_covariance_mm_rad
-    both = both if math.isfinite(both) else 0.0
-    polar = np.array(
-        [[r_c.sigma**2, both, 0.0], [both, touch.sigma**2, 0.0], [0.0, 0.0, Z_C_MM.sigma**2]]
-    )
-    cos, sin = math.cos(touch.value), math.sin(touch.value)
-    by_polar = np.array(
+def _felt_contact(
+    mount: Mount, trial: str, whisk: int, felt: FeltWhisk, estimate: EstimateRow
+) -> Contact:
+    """Return the contact (r_c, θ_c, z_c) that an estimator gives, in the base frame."""
+    touch = felt.touch_felt_rad
+    r_c = estimate.d_x_est_mm
+    covariance = np.diag([r_c.sigma**2, touch.sigma**2, Z_C_MM.sigma**2])
+    if math.isfinite(estimate.touch_covariance_mm_rad):
+        covariance[[0, 1], [1, 0]] = estimate.touch_covariance_mm_rad
+    cos = math.cos(touch.value)
+    sin = math.sin(touch.value)
+    jacobian = np.array(
         [[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]]
     )
-    assumed = answer.alpha_est_rad == mount.alpha_est_rad
-    sigma = math.hypot(felt.phi_felt_rad.sigma, mount.alpha_est_sigma_rad) if assumed else NAN
-    normal = _normal(touch.value, answer.beta_est_rad)
-    return *_placed(mount.base, point, by_polar @ polar @ by_polar.T, normal), sigma
+    normal_sigma = NAN
+    if estimate.alpha_est_rad == mount.alpha_est_rad:
+        normal_sigma = math.hypot(felt.phi_felt_rad.sigma, mount.alpha_est_sigma_rad)
+    polar = contact_point(r_c.value, touch.value, Z_C_MM.value)
+    return Contact(
+        whisker=mount.base.name,
+        trial=trial,
+        whisk=whisk,
+        estimator=estimate.estimator,
+        point_mm=np.array(cartesian(*polar)),
+        covariance_mm2=jacobian @ covariance @ jacobian.T,
+        normal=_normal(touch.value, estimate.beta_est_rad),
+        normal_sigma_rad=normal_sigma,
+        status=in_one_status(felt.status, estimate.status),
+        base_mm=np.zeros(3),
+        wire=mount.wire,
+        by_alpha_mm=_by_alpha_mm(estimate),
+        has_touch=not felt.status,
+    )
+
+
+def _by_alpha_mm(estimate: EstimateRow) -> float:
+    """Return the change of the distance by one sigma of the assumed friction angle: a larger angle
+    brings it nearer."""
+    without_alpha = estimate.d_x_est_sigma_alpha_exact_mm
+    if not math.isfinite(without_alpha):
+        return 0.0
+    return -math.sqrt(max(estimate.d_x_est_mm.sigma**2 - without_alpha**2, 0.0))
 
 
 def _normal(touch_rad: float, beta_rad: float) -> np.ndarray:
-    """(3,): of a surface of slope β, towards the whisker, in the base frame: it stands across the whisker."""
-    cos, sin = math.cos(touch_rad), math.sin(touch_rad)
+    """Return the normal (3,) of a surface of slope β in the base frame, towards the whisker and
+    across it."""
     across = -math.cos(beta_rad)
-    return np.array([-sin * across, cos * across, math.sin(beta_rad)])
+    return np.array(
+        [-math.sin(touch_rad) * across, math.cos(touch_rad) * across, math.sin(beta_rad)]
+    )
 
 
-def _placed(base: Base, point, covariance, normal) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """From the base frame to the rig's; the covariance with that of the base's place."""
-    turn, arm = base.T_rig_base[:, :3], base.T_rig_base[:, :3] @ point
+def _to_rig(contact: Contact, base: Base) -> Contact:
+    """Convert a contact from the base frame to the rig's, and add the covariance of the base's place."""
+    turn = base.T_rig_base[:, :3]
+    origin = base.T_rig_base[:, 3]
+    arm = turn @ contact.point_mm
     lever = skew(arm)
     of_base = base.sigma_mm**2 * np.eye(3) + base.sigma_rad**2 * lever @ lever.T
-    return arm + base.T_rig_base[:, 3], turn @ covariance @ turn.T + of_base, turn @ normal
+    return replace(
+        contact,
+        point_mm=arm + origin,
+        covariance_mm2=turn @ contact.covariance_mm2 @ turn.T + of_base,
+        normal=turn @ contact.normal,
+        base_mm=origin,
+    )
 
 
-def _beside(contact: Contact, surface: Surface) -> Contact:
-    """The contact with its distance from the object, across and along the whisker, and the angle of the normals.
+def _compare(contact: Contact, surface: Surface) -> Contact:
+    """Return a contact with its distance from the object, across and along the whisker, and the angle
+    between the normals.
 
     Across, an error of d_x hardly counts: at first touch the whisker lies along the surface.
     """
-    start, arc, towards, wire = contact.base_mm, contact.arc_mm, contact.towards, contact.wire
-    nearest = surface.nearest_arc_mm(start, towards, wire.length_mm)
-    (outside, _), (normal, own) = surface.distance_mm(
-        np.array([contact.point_mm, start + nearest * towards])
-    )
-    across, along = (
-        float(np.sqrt(way @ (contact.covariance_mm2 + surface.covariance_mm2) @ way))
-        for way in (normal, towards)
-    )
-    cosine = np.clip(contact.normal @ own, -1.0, 1.0)
+    direction = contact.direction
+    wire = contact.wire
+    nearest = surface.nearest_arc_mm(contact.base_mm, direction, wire.length_mm)
+    points = np.array([contact.point_mm, contact.base_mm + nearest * direction])
+    (outside, _), (normal, normal_at_nearest) = surface.distance_mm(points)
+    covariance = contact.covariance_mm2 + surface.covariance_mm2
+    across_sigma = float(np.sqrt(normal @ covariance @ normal))
+    along_sigma = float(np.sqrt(direction @ covariance @ direction))
+    cosine = np.clip(contact.normal @ normal_at_nearest, -1.0, 1.0)
+    distance = float(outside - wire.radius_mm(contact.arc_mm))
     return replace(
         contact,
-        distance_mm=Value(float(outside - wire.radius_mm(arc)), across),
-        along_mm=Value(arc - nearest, along),
+        distance_mm=Value(distance, across_sigma),
+        along_mm=Value(contact.arc_mm - nearest, along_sigma),
         normal_off_rad=float(np.arccos(cosine)),
         source=surface.source,
     )

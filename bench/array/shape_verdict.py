@@ -1,4 +1,4 @@
-"""What an array's cloud of contacts says of the object's shape: table and lines."""
+"""The object's shape by an array's cloud of contacts: table and lines."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -94,60 +94,66 @@ def _row(contact: Contact) -> dict:
     }
 
 
-def _judged(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
-    """Contacts beside a known surface, by one estimator; nothing doubtful is said of them."""
-    mine = (c for c in cloud if c.estimator == estimator and not c.status)
-    return [c for c in mine if math.isfinite(c.distance_mm.value)]
+def _sound_contacts(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
+    """Return one estimator's contacts beside a known surface that carry no status."""
+    sound = []
+    for contact in cloud:
+        is_known = math.isfinite(contact.distance_mm.value)
+        if contact.estimator == estimator and not contact.status and is_known:
+            sound.append(contact)
+    return sound
 
 
 def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
-    """The array's verdict in a sentence; nothing where no object is known."""
-    known = _judged(cloud, FELT)
-    if not known:
+    """Yield the array's verdict in a sentence; nothing where no object is known."""
+    sound = _sound_contacts(cloud, FELT)
+    if not sound:
         return
-    across, along = (
-        _rms([c.distance_mm.value for c in known]),
-        _rms([c.along_mm.value for c in known]),
-    )
-    worst = max(known, key=lambda c: abs(c.along_mm.value))
-    whiskers, source = (
-        len({c.whisker for c in known}),
-        " and ".join(sorted({c.source for c in known})),
-    )
-    most = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm ({worst.whisker}, {worst.trial})"
+    across = _rms([contact.distance_mm.value for contact in sound])
+    along = _rms([contact.along_mm.value for contact in sound])
+    worst = max(sound, key=lambda contact: abs(contact.along_mm.value))
+    largest = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm"
+    whiskers = counted(len({contact.whisker for contact in sound}), "whisker")
+    sources = " and ".join(sorted({contact.source for contact in sound}))
+    normals_deg = _normals_rms_deg(sound)
+    normals = f"; normals are {normals_deg:.1f}° RMS off" if math.isfinite(normals_deg) else ""
     yield (
-        f"Surface by {label_of(FELT)}: {counted(len(known), 'contact')} felt by {counted(whiskers, 'whisker')} lie "
-        f"{across:.2f} mm RMS off the object ({source}) and {along:.2f} mm along the whisker, most {most}"
-        f"{_normals(known)}."
+        f"Surface by {label_of(FELT)}: {counted(len(sound), 'contact')} felt by {whiskers} lie "
+        f"{across:.2f} mm RMS off the object ({sources}) and {along:.2f} mm along the whisker, most "
+        f"{largest} ({worst.whisker}, {worst.trial}){normals}."
     )
 
 
 def _rms(values: Sequence[float]) -> float:
-    """Of those that are known; NaN without any."""
-    known = [value for value in values if math.isfinite(value)]
-    return math.sqrt(sum(value**2 for value in known) / len(known)) if known else math.nan
+    """Return the RMS of the values that are finite; NaN without any."""
+    finite = [value for value in values if math.isfinite(value)]
+    return math.sqrt(sum(value**2 for value in finite) / len(finite)) if finite else math.nan
 
 
-def _normals(known: Sequence[Contact]) -> str:
-    off_deg = math.degrees(_rms([c.normal_off_rad for c in known]))
-    return f"; normals are {off_deg:.1f}° RMS off" if math.isfinite(off_deg) else ""
+def _normals_rms_deg(contacts: Iterable[Contact]) -> float:
+    """Return the RMS angle between felt normals and the object's."""
+    return math.degrees(_rms([contact.normal_off_rad for contact in contacts]))
 
 
 def surface_lines(cloud: Sequence[Contact]) -> Iterator[str]:
-    """A line an estimator, and one on what is seen."""
-    names = dict.fromkeys(contact.estimator for contact in cloud)
-    rows = [(name, _judged(cloud, name)) for name in names]
-    if any(known for _, known in rows):
+    """Yield a line an estimator, and one on the seen contacts, below a head line."""
+    lines = []
+    for name in dict.fromkeys(contact.estimator for contact in cloud):
+        sound = _sound_contacts(cloud, name)
+        if sound:
+            label = "seen" if name == SEEN else label_of(name)
+            across = _statistics([contact.distance_mm for contact in sound])
+            along = _statistics([contact.along_mm for contact in sound])
+            normals_deg = _normals_rms_deg(sound)
+            normals = f"{normals_deg:8.1f}°" if math.isfinite(normals_deg) else f"{'-':>8}"
+            lines.append(f"{label:<24}{len(sound):>4}     {across}     {along}    {normals}")
+    if lines:
         yield f"{'':<24}{'n':>4}   off it: mean     RMS  in 95 %   along: mean     RMS  in 95 %   normals RMS"
-    for name, known in rows:
-        if known:
-            off_deg = math.degrees(_rms([c.normal_off_rad for c in known]))
-            numbers = f"{_numbers(c.distance_mm for c in known)}     {_numbers(c.along_mm for c in known)}"
-            normals = f"{off_deg:8.1f}°" if math.isfinite(off_deg) else f"{'-':>8}"
-            yield f"{'seen' if name == SEEN else label_of(name):<24}{len(known):>4}     {numbers}    {normals}"
+    yield from lines
 
 
-def _numbers(values: Iterable[Value]) -> str:
+def _statistics(values: Iterable[Value]) -> str:
+    """Return mean, RMS and the share within the 95 % interval about 0 as text."""
     errors, sigmas = np.array([(one.value, one.sigma) for one in values]).T
-    held = 100.0 * np.mean(np.abs(errors) <= Z_95 * sigmas)
-    return f"{errors.mean():>+9.2f}{_rms(errors):>8.2f}{held:>6.0f} %"
+    covered = 100.0 * np.mean(np.abs(errors) <= Z_95 * sigmas)
+    return f"{errors.mean():>+9.2f}{_rms(errors):>8.2f}{covered:>6.0f} %"

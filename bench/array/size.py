@@ -1,10 +1,10 @@
-"""How large the object is by the contacts felt alone: the size that its shape leaves open, its place being free.
+"""The size of the object by the felt contacts alone: of its shape the size is open, and its place free.
 
-At first touch each whisker is a straight line that just touches the surface: how far the line passes off it is known by
-the angle of touch, to hundredths of a millimetre, and where along it by the distance felt. Shape, direction of the axis
-and a ring's thickness are taken from the manifest; place and size are fitted to both, weighted by their covariance, in
-which the error of the friction angle that is assumed is one for all. Where a distance is doubtful the touch counts
-alone.
+At first touch each whisker is a straight line that just touches the surface: its gap to the surface
+is known by the angle of touch, to hundredths of a millimetre, and the place along it by the felt
+distance. Shape, direction of the axis and a ring's thickness are those of the manifest; place and
+size are fitted to both, weighted by their covariance, in which the error of the assumed friction
+angle is one for all. Where a distance is doubtful the touch counts alone.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from bench.array.cloud import Contact
@@ -49,12 +50,15 @@ _SIZES = {
 _STEP = 1e-3  # mm, rad: of differences
 # that contacts on such a surface lie as far off it: one sound object in a thousand
 _LEAST_CHANCE = 1e-3
+_MOST_CONDITION = 1e12  # of the information: beyond it some direction is not determined
 
 
 @dataclass(frozen=True)
-class Felt:
-    """The size felt of one trial's object, in the unit of the field of `Surface` that it is, `key`. contacts,
-    distances: how many touches served, and distances; chance: that contacts lie as far off such a surface.
+class FeltSize:
+    """The felt size of one trial's object, in the unit of its field of `Surface`.
+
+    contacts, distances: numbers of touches and of distances that were used. chance: probability
+    that contacts on such a surface lie as far off it.
     """
 
     trial: str
@@ -67,179 +71,197 @@ class Felt:
 
     @property
     def key(self) -> str:
-        """The field of `Surface`."""
+        """Return the name of the field of `Surface`."""
         return _SIZES[self.surface.shape]
 
     @property
     def stated(self) -> float:
-        """By the manifest."""
+        """Return the size by the manifest."""
         return getattr(self.surface, self.key)
 
+    @property
+    def column(self) -> str:
+        """Return the name of its column of SIZE; a ring's radius is its circle's."""
+        return "half_angle_deg" if self.surface.shape == "cone" else "radius_mm"
 
-def felt_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[Felt]:
-    """A size a trial whose object the manifest names, by the contacts of (10)."""
-    mine = [contact for contact in cloud if contact.estimator == FELT and contact.has_touch]
-    return [
-        felt_size(trial, [contact for contact in mine if contact.trial == trial], surface)
-        for trial, surface in surfaces.items()
-        if surface.source == STATED and any(contact.trial == trial for contact in mine)
-    ]
+    def in_unit_of_column(self, size: float) -> float:
+        """Convert a size to the unit of the column."""
+        return float(np.degrees(size)) if self.surface.shape == "cone" else size
 
 
-def felt_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> Felt:
-    """Gauss and Newton's method from where and how large the object is said to be."""
-    from scipy.optimize import (
-        least_squares,
-    )  # not before it is needed: it takes longer than an evaluation's tables
+def fit_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[FeltSize]:
+    """Fit a size to the contacts of (10) of each trial whose object the manifest names."""
+    by_trial = {}
+    for contact in cloud:
+        if contact.estimator == FELT and contact.has_touch:
+            by_trial.setdefault(contact.trial, []).append(contact)
+    sizes = []
+    for trial, surface in surfaces.items():
+        if surface.source == STATED and trial in by_trial:
+            sizes.append(fit_size(trial, by_trial[trial], surface))
+    return sizes
 
-    free, distances = _free(surface), sum(not contact.status for contact in contacts)
-    served = trial, surface, len(contacts), distances
-    freedom = len(contacts) + distances - len(free) - 1
+
+def fit_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> FeltSize:
+    """Fit place and size of an object, by Gauss and Newton's method from what is stated of it."""
+    from scipy.optimize import least_squares  # it takes longer than an evaluation's tables
+
+    distances = sum(not contact.status for contact in contacts)
+    unknown = FeltSize(trial, surface, len(contacts), distances)
+    fit = _Fit(contacts, surface)
+    freedom = len(contacts) + distances - fit.count
     if freedom < 1:
-        return Felt(*served, status=f"too few, of {counted(distances, 'sound distance')}")
-    root = np.linalg.cholesky(_covariance(contacts, surface))
-
-    def off(numbers: np.ndarray) -> np.ndarray:
-        return np.linalg.solve(root, _off(contacts, _placed(surface, free, numbers)))
-
-    def slopes(numbers: np.ndarray) -> np.ndarray:
-        return np.linalg.solve(root, _slopes(contacts, surface, free, numbers))
-
-    start = np.zeros(len(free) + 1)
-    found = least_squares(off, start, method="lm", jac=slopes)
-    information = found.jac.T @ found.jac
-    if not np.isfinite(information).all() or np.linalg.cond(information) > 1e12:
-        return Felt(*served, status="contacts leave the size open")
-    size = Value(
-        getattr(surface, _SIZES[surface.shape]) + float(found.x[-1]),
-        float(np.sqrt(np.linalg.inv(information)[-1, -1])),
+        return replace(unknown, status=f"too few, of {counted(distances, 'sound distance')}")
+    root = np.linalg.cholesky(fit.covariance())
+    found = least_squares(
+        lambda parameters: np.linalg.solve(root, fit.residuals(parameters)),
+        np.zeros(fit.count),
+        method="lm",
+        jac=lambda parameters: np.linalg.solve(root, fit.jacobian(parameters)),
     )
+    information = found.jac.T @ found.jac
+    if not np.isfinite(information).all() or np.linalg.cond(information) > _MOST_CONDITION:
+        return replace(unknown, status="contacts leave the size open")
+    sigma = float(np.sqrt(np.linalg.inv(information)[-1, -1]))
+    size = Value(unknown.stated + float(found.x[-1]), sigma)
     chance = float(chdtrc(freedom, 2 * found.cost))
-    return Felt(*served, size, chance, _status(size, chance))
+    return replace(unknown, size=size, chance=chance, status=_status(size, chance))
 
 
 def _status(size: Value, chance: float) -> str:
+    """Return what is doubtful of a fitted size."""
     if chance < _LEAST_CHANCE:
         return f"contacts lie farther off such a surface than their sigmas let them (chance {chance:.1g})"
     return "not told: the interval holds 0" if size.value < Z_95 * size.sigma else ""
 
 
-def _free(surface: Surface) -> np.ndarray:
-    """Directions (k, 3) in which the place is free: all, but for a bar those across it."""
-    if surface.shape != "bar":
-        return np.eye(3)
-    return np.linalg.svd(surface.axis[None])[2][1:]
+class _Fit:
+    """Whiskers, straight at first touch, against a surface whose place and size are free.
+
+    Parameters (count,): the place's shift along each of `free` (k, 3), mm, and the change of the
+    size. Residuals (2 n,), mm, by contact: the gap between whisker and surface, and the contact's
+    place along the whisker from where that comes nearest.
+    """
+
+    def __init__(self, contacts: Sequence[Contact], surface: Surface):
+        self.contacts = contacts
+        self.surface = surface
+        self.bases = np.array([contact.base_mm for contact in contacts])
+        self.directions = np.array([contact.direction for contact in contacts])
+        # A bar is free across its axis, others in all directions.
+        is_bar = surface.shape == "bar"
+        self.free = np.linalg.svd(surface.axis[None])[2][1:] if is_bar else np.eye(3)
+        self.count = len(self.free) + 1
+
+    def surface_at(self, parameters: np.ndarray) -> Surface:
+        """Return the surface with these parameters."""
+        point = self.surface.point_mm + parameters[:-1] @ self.free
+        key = _SIZES[self.surface.shape]
+        size = getattr(self.surface, key) + float(parameters[-1])
+        return replace(self.surface, point_mm=point, **{key: size})
+
+    def nearest_arcs(self, surface: Surface) -> np.ndarray:
+        """Return the arcs (n,), mm, at which each whisker comes nearest to a surface."""
+        arcs = []
+        for contact in self.contacts:
+            length = contact.wire.length_mm
+            arcs.append(surface.nearest_arc_mm(contact.base_mm, contact.direction, length))
+        return np.array(arcs)
+
+    def distances(self, surface: Surface, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return each whisker's distance from a surface at arcs (n,), mm, and the cosine between it
+        and the normal there."""
+        outside, normals = surface.distance_mm(self.bases + arcs[:, None] * self.directions)
+        return outside, np.sum(normals * self.directions, axis=1)
+
+    def residuals(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the residuals (2 n,)."""
+        surface = self.surface_at(parameters)
+        arcs = self.nearest_arcs(surface)
+        outside, _ = self.distances(surface, arcs)
+        gaps = []
+        along = []
+        for contact, distance, arc in zip(self.contacts, outside, arcs):
+            gaps.append(distance - contact.wire.radius_mm(arc))
+            along.append(contact.arc_mm - arc)
+        return np.stack([gaps, along], -1).ravel()
+
+    def jacobian(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the derivatives (2 n, count) of the residuals.
+
+        Where the whisker comes nearest its distance does not change along it, and that place moves
+        so that the normal stays across the whisker.
+        """
+        surface = self.surface_at(parameters)
+        arcs = self.nearest_arcs(surface)
+        cosine_by_arc = _derivative(lambda step: self.distances(surface, arcs + step)[1])
+        columns = []
+        for axis in np.eye(self.count):
+
+            def distances_after(step, axis=axis):
+                return np.array(self.distances(self.surface_at(parameters + step * axis), arcs))
+
+            outside, cosine = _derivative(distances_after)
+            columns.append(np.stack([outside, cosine / cosine_by_arc], -1).ravel())
+        return np.stack(columns, -1)
+
+    def covariance(self) -> np.ndarray:
+        """Return the covariance (2 n, 2 n), mm², of the residuals where the surface is as stated.
+
+        It has each contact's own, and the friction angle's, which is one for all.
+        """
+        arcs = self.nearest_arcs(self.surface)
+        _, normals = self.surface.distance_mm(self.bases + arcs[:, None] * self.directions)
+        blocks = []
+        shared = []
+        for contact, normal in zip(self.contacts, normals):
+            direction = contact.direction
+            axes = np.stack([normal, direction])
+            by_alpha = contact.by_alpha_mm * direction
+            own = contact.covariance_mm2 - np.outer(by_alpha, by_alpha)
+            if contact.status:  # its distance is any that the whisker has
+                own = own + contact.wire.length_mm**2 * np.outer(direction, direction)
+            blocks.append(axes @ own @ axes.T)
+            shared.append(axes @ by_alpha)
+        return block_diag(*blocks) + np.outer(shared, shared)
 
 
-def _placed(surface: Surface, free: np.ndarray, numbers: np.ndarray) -> Surface:
-    key = _SIZES[surface.shape]
-    point = surface.point_mm + numbers[:-1] @ free
-    return replace(surface, point_mm=point, **{key: getattr(surface, key) + float(numbers[-1])})
+def _derivative(function) -> np.ndarray:
+    """Return the derivative at 0 of a function of one step, by central differences."""
+    return (function(_STEP) - function(-_STEP)) / (2 * _STEP)
 
 
-def _off(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
-    """(2 n,) mm: of each contact how far the whisker passes off the surface, and how far it lies along from there."""
-    nearest = _nearest(contacts, surface)
-    outside, _ = _beside(contacts, surface, nearest)
-    radii = [contact.wire.radius_mm(arc) for contact, arc in zip(contacts, nearest)]
-    return np.stack(
-        [outside - radii, [contact.arc_mm for contact in contacts] - nearest], -1
-    ).ravel()
-
-
-def _slopes(
-    contacts: Sequence[Contact], surface: Surface, free: np.ndarray, numbers: np.ndarray
-) -> np.ndarray:
-    """(2 n, k): their derivatives. Where the whisker comes nearest its distance does not change along it, and the place
-    moves so that the normal stays across it."""
-    here = _placed(surface, free, numbers)
-    nearest = _nearest(contacts, here)
-    by_arc = _difference(lambda step: _beside(contacts, here, nearest + step)[1])
-    columns = []
-    for axis in np.eye(len(numbers)):
-        moved = (
-            _beside(contacts, _placed(surface, free, numbers + step * axis), nearest)
-            for step in (_STEP, -_STEP)
-        )
-        outside, leaning = (np.subtract(*pair) / (2 * _STEP) for pair in zip(*moved))
-        columns.append(np.stack([outside, leaning / by_arc], -1).ravel())
-    return np.stack(columns, -1)
-
-
-def _difference(at) -> np.ndarray:
-    return (at(_STEP) - at(-_STEP)) / (2 * _STEP)
-
-
-def _nearest(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
-    """Where each whisker, straight at first touch, comes nearest to the surface: arcs (n,), mm."""
-    lines = ((contact.base_mm, contact.towards, contact.wire.length_mm) for contact in contacts)
-    return np.array([surface.nearest_arc_mm(*line) for line in lines])
-
-
-def _beside(
-    contacts: Sequence[Contact], surface: Surface, arc_mm: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """How far each whisker is off the surface there (n,), mm, and the cosine (n,) between it and the normal."""
-    towards = np.array([contact.towards for contact in contacts])
-    points = np.array([contact.base_mm for contact in contacts]) + arc_mm[:, None] * towards
-    outside, normals = surface.distance_mm(points)
-    return outside, np.sum(normals * towards, axis=1)
-
-
-def _covariance(contacts: Sequence[Contact], surface: Surface) -> np.ndarray:
-    """(2 n, 2 n) mm² of what they are off by: each contact's own, and the friction angle's, which is one for all."""
-    towards = np.array([contact.towards for contact in contacts])
-    places = (
-        np.array([contact.base_mm for contact in contacts])
-        + _nearest(contacts, surface)[:, None] * towards
-    )
-    whole, shared = np.zeros((2 * len(contacts),) * 2), []
-    for number, (contact, normal) in enumerate(zip(contacts, surface.distance_mm(places)[1])):
-        axes, by_alpha = np.stack([normal, contact.towards]), contact.by_alpha_mm * contact.towards
-        own = contact.covariance_mm2 - np.outer(by_alpha, by_alpha)
-        if contact.status:  # its distance is any that the whisker has
-            own = own + contact.wire.length_mm**2 * np.outer(contact.towards, contact.towards)
-        both = slice(2 * number, 2 * number + 2)
-        whole[both, both] = axes @ own @ axes.T
-        shared += [*axes @ by_alpha]
-    return whole + np.outer(shared, shared)
-
-
-def write_sizes(out: Path, found: Iterable[Felt]) -> None:
+def write_sizes(out: Path, sizes: Iterable[FeltSize]) -> None:
     """Write size.csv into a folder: a row a trial."""
-    SIZE.write(out, map(_row, found))
+    SIZE.write(out, map(_row, sizes))
 
 
-def _row(felt: Felt) -> dict:
-    row = {"trial": felt.trial, "shape": felt.surface.shape, "chance": felt.chance}
-    row |= {"contacts": felt.contacts, "distances": felt.distances}
-    name, to_shown = _shown(felt)
-    sizes = {
-        name: felt.size.value,
-        sigma_name(name): felt.size.sigma,
-        f"stated_{name}": felt.stated,
+def _row(felt: FeltSize) -> dict:
+    """Return the row of a size."""
+    column = felt.column
+    return {
+        "trial": felt.trial,
+        "shape": felt.surface.shape,
+        "contacts": felt.contacts,
+        "distances": felt.distances,
+        column: felt.in_unit_of_column(felt.size.value),
+        sigma_name(column): felt.in_unit_of_column(felt.size.sigma),
+        f"stated_{column}": felt.in_unit_of_column(felt.stated),
+        "chance": felt.chance,
+        "status": felt.status,
     }
-    return row | {"status": felt.status} | {key: to_shown * value for key, value in sizes.items()}
 
 
-def _shown(felt: Felt) -> tuple[str, float]:
-    """Column and factor to its unit. A ring's radius is its circle's."""
-    return (
-        ("half_angle_deg", np.degrees(1.0)) if felt.surface.shape == "cone" else ("radius_mm", 1.0)
-    )
-
-
-def size_lines(found: Iterable[Felt]) -> Iterator[str]:
-    """A line a trial."""
-    for felt in found:
-        name, to_shown = _shown(felt)
-        unit = "mm" if name.endswith("mm") else "deg"
-        value, sigma, stated = (
-            to_shown * number for number in (felt.size.value, felt.size.sigma, felt.stated)
-        )
-        what = f"{felt.trial}: {felt.surface.shape}, {counted(felt.contacts, 'contact')}"
-        if not np.isfinite(value):
-            yield f"{what}: no size; {felt.status}"
+def size_lines(sizes: Iterable[FeltSize]) -> Iterator[str]:
+    """Yield a line a trial."""
+    for felt in sizes:
+        subject = f"{felt.trial}: {felt.surface.shape}, {counted(felt.contacts, 'contact')}"
+        if not np.isfinite(felt.size.value):
+            yield f"{subject}: no size; {felt.status}"
             continue
-        told = f"{name.rpartition('_')[0].replace('_', '-')} {value:.2f} ± {sigma:.2f} {unit}, stated {stated:.2f}"
-        yield in_one_status(f"{what}: {told}", felt.status)
+        name, _, unit = felt.column.rpartition("_")
+        value = felt.in_unit_of_column(felt.size.value)
+        sigma = felt.in_unit_of_column(felt.size.sigma)
+        stated = felt.in_unit_of_column(felt.stated)
+        size = f"{name.replace('_', '-')} {value:.2f} ± {sigma:.2f} {unit}, stated {stated:.2f}"
+        yield in_one_status(f"{subject}: {size}", felt.status)

@@ -11,17 +11,19 @@ from vision.geometry.rods import Wire
 from vision.touched.find import axis_from_angles
 
 STATED, SEEN = "manifest", "pictures"
-_ARC_MM = 1e-6  # mm: as near as an arc is looked for
+_ARC_MM = 1e-6  # mm: to which the nearest arc is found
+_ARCS = 21  # of each pass of that search
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """All points at one distance (radius_mm) from a centreline, in the rig frame: a straight one ("bar"), a circle
-    ("ring") or a point ("sphere"); or a cone, whose radius_mm is 0.
+    """All points at one distance (radius_mm) from a centreline, in the rig frame.
 
-    point_mm (3,): of the straight line, the centre, or the cone's tip; axis (3,), unit: the line's direction, the
-    normal of the circle's plane, or where the cone points; ring_radius_mm: of the circle, 0 of others; half_angle_rad:
-    of the cone. covariance_mm2 (3, 3): of where it is; source: STATED or SEEN.
+    shape: the centreline is straight ("bar"), a circle ("ring") or a point ("sphere"); or a cone
+    ("cone"), whose radius_mm is 0. point_mm (3,): of the straight line, the centre, or the cone's
+    tip. axis (3,), unit: the line's direction, the normal of the circle's plane, or where the cone
+    points. ring_radius_mm: of the circle, 0 of others. half_angle_rad: of the cone. covariance_mm2
+    (3, 3): of its place. source: STATED or SEEN.
     """
 
     shape: str
@@ -33,94 +35,108 @@ class Surface:
     source: str = STATED
     half_angle_rad: float = 0.0
 
-    def foot_mm(self, points_mm: np.ndarray) -> np.ndarray:
-        """The centreline's points (n, 3) that are nearest to points (n, 3), mm."""
-        apart = points_mm - self.point_mm
-        along = np.outer(apart @ self.axis, self.axis)
-        if self.shape == "bar":
-            return self.point_mm + along
-        if self.shape == "sphere":
-            return np.broadcast_to(self.point_mm, points_mm.shape)
-        flat = apart - along
-        return self.point_mm + self.ring_radius_mm * flat / np.linalg.norm(
-            flat, axis=1, keepdims=True
-        )
-
     def distance_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far points (n, 3) are outside of the surface, (n,), negative within; its normals there, (n, 3)."""
+        """Return the distances (n,) of points (n, 3) from the surface, negative within, and its
+        normals there, (n, 3)."""
+        from_point = points_mm - self.point_mm
+        height = from_point @ self.axis
+        along = np.outer(height, self.axis)
+        from_axis = from_point - along
         if self.shape == "cone":
-            return self._from_cone(points_mm)
-        apart = points_mm - self.foot_mm(points_mm)
-        length = np.linalg.norm(apart, axis=1)
-        return length - self.radius_mm, apart / length[:, None]
+            return self._distance_from_cone(from_point, height, from_axis)
+        if self.shape == "sphere":
+            apart = from_point
+        elif self.shape == "bar":
+            apart = from_axis
+        else:
+            apart = from_point - self.ring_radius_mm * _unit(from_axis)
+        return np.linalg.norm(apart, axis=1) - self.radius_mm, _unit(apart)
 
-    def _from_cone(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same of a cone: from its straight lines, or from its tip where none is nearer."""
-        sin, cos = np.sin(self.half_angle_rad), np.cos(self.half_angle_rad)
-        apart = points_mm - self.point_mm
-        high, from_tip = apart @ self.axis, np.linalg.norm(apart, axis=1)
-        flat = apart - np.outer(high, self.axis)
-        far = np.linalg.norm(flat, axis=1)
-        normals = cos * flat / far[:, None] + sin * self.axis
-        above = sin * far < cos * high
-        normals[above] = apart[above] / from_tip[above, None]
-        return np.where(above, from_tip, cos * far + sin * high), normals
+    def _distance_from_cone(self, from_tip, height, from_axis):
+        """Return distances and normals of a cone: from its straight lines, or from its tip where none
+        is nearer.
 
-    def nearest_arc_mm(self, base_mm: np.ndarray, towards: np.ndarray, length_mm: float) -> float:
-        """Where a straight whisker of this length comes nearest to the object: arc from its base (3,), mm.
-        towards (3,): its direction, unit."""
-        low, high = 0.0, length_mm
+        from_tip (n, 3): points from the tip; height (n,), from_axis (n, 3): along and off the axis.
+        """
+        sin = np.sin(self.half_angle_rad)
+        cos = np.cos(self.half_angle_rad)
+        radial = np.linalg.norm(from_axis, axis=1)
+        is_above = sin * radial < cos * height
+        side_normals = cos * _unit(from_axis) + sin * self.axis
+        normals = np.where(is_above[:, None], _unit(from_tip), side_normals)
+        to_tip = np.linalg.norm(from_tip, axis=1)
+        return np.where(is_above, to_tip, cos * radial + sin * height), normals
+
+    def nearest_arc_mm(self, base_mm: np.ndarray, direction: np.ndarray, length_mm: float) -> float:
+        """Find the arc, mm, at which a straight whisker comes nearest to the object.
+
+        base_mm (3,), direction (3,), unit: of the whisker.
+        """
+        low = 0.0
+        high = length_mm
         while high - low > _ARC_MM:
-            arcs = np.linspace(low, high, 21)
-            outside, _ = self.distance_mm(base_mm + np.outer(arcs, towards))
+            arcs = np.linspace(low, high, _ARCS)
+            outside, _ = self.distance_mm(base_mm + np.outer(arcs, direction))
             best = int(outside.argmin())
-            low, high = arcs[max(best - 1, 0)], arcs[min(best + 1, 20)]
+            low = arcs[max(best - 1, 0)]
+            high = arcs[min(best + 1, _ARCS - 1)]
         return 0.5 * (low + high)
 
 
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (n, 3) scaled to length 1."""
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
 def stated_surface(trial: Trial) -> Surface | None:
-    """The object as the manifest states it; None where it does not, or does not say how thick it is."""
-    given = trial.object
-    if (
-        given is None
-        or given.point_mm is None
-        or (trial.bar_diameter_mm is None and given.shape != "cone")
-    ):
+    """Return the object as the manifest states it; None where it does not, or does not say how thick
+    it is."""
+    stated = trial.object
+    if stated is None or stated.point_mm is None:
         return None
-    point, axis = np.array(given.point_mm, dtype=float), np.array(given.axis, dtype=float)
-    thick = 0.0 if given.shape == "cone" else trial.bar_diameter_mm
-    radii = 0.5 * thick, 0.5 * (given.ring_diameter_mm or 0.0)
-    angle = float(np.radians(given.half_angle_deg or 0.0))
-    told = {"covariance_mm2": given.point_sigma_mm**2 * np.eye(3), "half_angle_rad": angle}
-    return Surface(given.shape, point, axis / np.linalg.norm(axis), *radii, **told)
+    is_cone = stated.shape == "cone"
+    if trial.bar_diameter_mm is None and not is_cone:
+        return None
+    axis = np.array(stated.axis, dtype=float)
+    return Surface(
+        stated.shape,
+        np.array(stated.point_mm, dtype=float),
+        axis / np.linalg.norm(axis),
+        radius_mm=0.0 if is_cone else 0.5 * trial.bar_diameter_mm,
+        ring_radius_mm=0.5 * (stated.ring_diameter_mm or 0.0),
+        covariance_mm2=stated.point_sigma_mm**2 * np.eye(3),
+        half_angle_rad=float(np.radians(stated.half_angle_deg or 0.0)),
+    )
 
 
 def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:
-    """The object as a whisk shows it, in the rig frame, as well known as where it is touched; None where no touch is
-    seen.
+    """Return the object as the cameras show it in a whisk, in the rig frame.
 
-    A bar's axis is away from the contact by both radii, at right angles to whisker and axis.
+    It is as uncertain as the place where it is touched. None where no touch is seen. A bar's axis is
+    away from the contact by both radii, at right angles to whisker and axis.
     """
     if not seen.has_truth or seen.point_covariance_mm2 is None:
         return None
-    turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
-    if (there := seen.rounded) is not None:
-        place = (
-            turn @ there.point_mm + shift,
-            turn @ there.axis,
-            there.radius_mm,
-            there.ring_radius_mm,
+    turn = base.T_rig_base[:, :3]
+    origin = base.T_rig_base[:, 3]
+    covariance = turn @ seen.point_covariance_mm2 @ turn.T
+    rounded = seen.rounded
+    if rounded is not None:
+        return Surface(
+            rounded.shape,
+            turn @ rounded.point_mm + origin,
+            turn @ rounded.axis,
+            rounded.radius_mm,
+            rounded.ring_radius_mm,
+            covariance,
+            SEEN,
+            rounded.half_angle_rad,
         )
-        covariance = turn @ seen.point_covariance_mm2 @ turn.T
-        return Surface(there.shape, *place, covariance, SEEN, there.half_angle_rad)
     if not np.isfinite(bar_radius_mm):
         return None
     reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
     angles = seen.touch_rad.value, seen.beta_rad.value, seen.psi_rad.value
-    from_contact = axis_from_angles(0.0, *angles, reach_mm)
-    point, axis = (
-        turn @ (seen.point_mm.value + from_contact.point_mm) + shift,
-        turn @ from_contact.direction,
-    )
-    covariance = turn @ seen.point_covariance_mm2 @ turn.T
-    return Surface("bar", point, axis, bar_radius_mm, covariance_mm2=covariance, source=SEEN)
+    axis = axis_from_angles(0.0, *angles, reach_mm)
+    point = turn @ (seen.point_mm.value + axis.point_mm) + origin
+    direction = turn @ axis.direction
+    return Surface("bar", point, direction, bar_radius_mm, covariance_mm2=covariance, source=SEEN)

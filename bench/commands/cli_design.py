@@ -86,11 +86,11 @@ def _design(options: argparse.Namespace) -> int:
             raise BadInput(
                 f"{_option(name)} {getattr(options, name):g}: must be positive and finite"
             )
-    from bench.theory.design import Means, Region
-    from bench.theory.design_map import design_lines, designed, write_design
+    from bench.theory.design import Equipment, Region
+    from bench.theory.design_map import find_design, report_lines, write_design
 
     region = Region(**region_ends, bar_radius_mm=0.5 * options.bar_diameter_mm)
-    means = Means(
+    equipment = Equipment(
         options.youngs_modulus_GPa,
         options.most_strain_percent / 100,
         options.noise_Nmm,
@@ -98,8 +98,8 @@ def _design(options: argparse.Namespace) -> int:
         options.rate_Hz,
         options.speed_deg_s,
     )
-    made = designed(ranges, region, means)
-    print(*design_lines(made), *write_design(options.out, made), sep="\n")
+    report = find_design(ranges, region, equipment)
+    print(*report_lines(report), *write_design(options.out, report), sep="\n")
     return DONE
 
 

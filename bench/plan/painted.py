@@ -72,7 +72,7 @@ class Painter:
         """Two rig pictures a camera."""
         bright = [studio.rig_brightness() for studio in self.studios]
         return [
-            tuple(studio.sensor.exposed(one, self._stream(k, n)) for n in range(2))
+            tuple(studio.sensor.expose(one, self._stream(k, n)) for n in range(2))
             for k, (studio, one) in enumerate(zip(self.studios, bright))
         ]
 
@@ -83,7 +83,7 @@ class Painter:
     def _corner_px(self, number: int) -> float:
         studio, camera = self.studios[number], self.cameras[number]
         pose = boards.poses(build.board(self.protocol), studio.camera, 2, self._stream(number))[0]
-        picture = studio.sensor.exposed(studio.board_brightness(pose), self._stream(number, 2))
+        picture = studio.sensor.expose(studio.board_brightness(pose), self._stream(number, 2))
         px = camera.project(apply(pose, self.board.corners_mm))
         corners = refine_corners(picture, px, np.arange(len(px)), self.board)
         if len(corners) < _FEWEST_CORNERS:
@@ -104,7 +104,7 @@ class Painter:
             self.protocol, studio, recording, staged.whisk, float(staged.motor_rad[frame]), False
         )
         return self._as_written(
-            studio.sensor.exposed(setting.brightness(instants), self._stream(number, 3, frame))
+            studio.sensor.expose(setting.brightness(instants), self._stream(number, 3, frame))
         )
 
     def _as_written(self, picture: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ class Painter:
         axis, radius_mm = staged.axis, staged.rods.bar.radius_mm
         views, wires = [], {}
         for number, (camera, setting) in enumerate(zip(self.cameras, still)):
-            picture = self.studios[number].sensor.exposed(setting.empty, None)
+            picture = self.studios[number].sensor.expose(setting.empty, None)
             noise = measure_noise(*self.empty[number])
             views.append(
                 View(

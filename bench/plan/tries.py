@@ -180,7 +180,7 @@ def looking(camera: Camera, name: str, place_mm: np.ndarray, target_mm: np.ndarr
     """A camera with this one's lens somewhere else, the rig's z upwards in its picture."""
     fx, fy, cx, cy = camera.lens[:4]
     return seen_camera(
-        RigCamera.looking(
+        RigCamera.aim(
             name,
             size_px=camera.size_px,
             focal_px=fx,

@@ -9,7 +9,7 @@ import numpy as np
 from bench.rig.elastic_rod import Rest, Rod
 from bench.rig.force_sensor import LoadCell
 from bench.rig.light import Light, Material
-from bench.rig.painted_scene import Looks, Scene, Stand
+from bench.rig.painted_scene import Appearance, Scene, Stand
 from bench.rig.pinhole import Camera
 from bench.rig.printed_board import Board, Ink
 from bench.rig.protocol import ColumnTable, Protocol
@@ -63,7 +63,7 @@ def cameras(protocol: Protocol) -> list[Camera]:
     if nowhere:
         raise ValueError(f"camera {nowhere[0]} has no position_mm; `whisker-bench plan` finds one")
     return [
-        Camera.looking(
+        Camera.aim(
             c.name,
             size_px=c.size_px,
             focal_px=c.focal,
@@ -107,7 +107,7 @@ def scene(protocol: Protocol) -> Scene:
     """The scene of a protocol: its light and what things look like in it."""
     table = protocol.light
     towards = np.array(table.towards) / np.linalg.norm(table.towards)
-    looks = Looks(
+    appearance = Appearance(
         Light(towards, table.lamp, table.soft),
         Ink(table.paper, table.ink),
         Material(table.wire_matt, table.wire_shiny, table.wire_gloss, table.wire_rim),
@@ -116,7 +116,7 @@ def scene(protocol: Protocol) -> Scene:
         table.floor,
         table.wall,
     )
-    return Scene(board(protocol), T_rig_board(protocol), looks, _stands(protocol))
+    return Scene(board(protocol), T_rig_board(protocol), appearance, _stands(protocol))
 
 
 def _stands(protocol: Protocol) -> tuple[Stand, ...]:

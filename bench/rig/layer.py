@@ -1,7 +1,7 @@
 """Things drawn over each other in the samples of a window: the nearer over the farther."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,53 +10,67 @@ from bench.rig.window import Window
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """A thing in samples (n,) of a window: rows and columns, how much of each it covers, how bright it is there, and
-    how far it (a tube: its axis) is from the camera, mm."""
+    """One thing in n samples of a window.
 
-    at: tuple[np.ndarray, np.ndarray]
+    index: rows (n,) and columns (n,) of the samples. cover (n,): share of each that it covers. tone
+    (n,): its brightness there. depth_mm (n,): its distance (a tube: its axis') from the camera.
+    """
+
+    index: tuple[np.ndarray, np.ndarray]
     cover: np.ndarray
     tone: np.ndarray
     depth_mm: np.ndarray
 
 
 def draw_layers(layers: Sequence[Layer], radiance: np.ndarray) -> None:
-    """Over what is drawn: in each sample the nearer over the farther."""
+    """Draw layers over a window's samples (rows, columns), in each the nearer over the farther."""
     if not layers:
         return
-    rows, columns = (np.concatenate([layer.at[axis] for layer in layers]) for axis in (0, 1))
-    values = ([one.cover, one.tone, one.depth_mm] for one in layers)
-    cover, tone, depth = (np.concatenate(column) for column in zip(*values))
-    order = np.lexsort((-depth, columns, rows))
-    rows, columns, cover, tone = rows[order], columns[order], cover[order], tone[order]
-    first = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))
-    number = np.arange(len(rows))
-    rank = number - np.maximum.accumulate(
-        np.where(first, number, 0)
-    )  # of each sample's layers from afar
+    if len(layers) == 1:
+        _blend(radiance, layers[0].index, layers[0].cover, layers[0].tone)
+        return
+    index = np.concatenate([layer.index for layer in layers], axis=1)  # (2, n)
+    cover = np.concatenate([layer.cover for layer in layers])
+    tone = np.concatenate([layer.tone for layer in layers])
+    depth = np.concatenate([layer.depth_mm for layer in layers])
+    sample = np.ravel_multi_index(tuple(index), radiance.shape)
+    order = np.lexsort((-depth, sample))
+    number = np.arange(len(order))
+    is_farthest = np.diff(sample[order], prepend=-1) != 0
+    rank = number - np.maximum.accumulate(np.where(is_farthest, number, 0))  # in its sample
     for nearer in range(int(rank.max()) + 1):
-        now = rank == nearer
-        at = rows[now], columns[now]
-        radiance[at] += (cover[now] * (tone[now] - radiance[at])).astype(np.float32)
+        chosen = order[rank == nearer]
+        _blend(radiance, tuple(index[:, chosen]), cover[chosen], tone[chosen])
+
+
+def _blend(radiance, index, cover, tone):
+    """Draw one tone (n,) a sample over what is there, as far as it covers the sample."""
+    radiance[index] += (cover * (tone - radiance[index])).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
-class Front:
-    """A still object that may hide what moves: how much of each sample of a window it covers, and how far it is, mm."""
+class Occluder:
+    """A still object that may hide what moves.
+
+    cover, depth_mm (rows, columns): share of each sample of the window that it covers, and how far
+    it is from the camera there; infinitely far where it is not.
+    """
 
     window: Window
     cover: np.ndarray
     depth_mm: np.ndarray
 
     @classmethod
-    def of(cls, layer: Layer, window: Window) -> "Front":
-        """A layer as it stands in its window."""
-        cover, depth = np.zeros(window.shape, np.float32), np.full(window.shape, np.inf, np.float32)
-        cover[layer.at], depth[layer.at] = layer.cover, layer.depth_mm
+    def from_layer(cls, layer: Layer, window: Window) -> "Occluder":
+        """Make an occluder of a layer in its window."""
+        cover = np.zeros(window.shape, np.float32)
+        cover[layer.index] = layer.cover
+        depth = np.full(window.shape, np.inf, np.float32)
+        depth[layer.index] = layer.depth_mm
         return cls(window, cover, depth)
 
-    def left_of(self, layer: Layer, window: Window) -> Layer:
-        """What it leaves to see of a layer of a part of its window: nothing where it is nearer."""
-        rows, columns = window.within(self.window)
-        at = layer.at[0] + rows.start, layer.at[1] + columns.start
-        hidden = self.cover[at] * (self.depth_mm[at] < layer.depth_mm)
-        return Layer(layer.at, layer.cover * (1 - hidden), layer.tone, layer.depth_mm)
+    def hide(self, layer: Layer, window: Window) -> Layer:
+        """Return a layer of a part of this window, uncovered where the occluder is nearer."""
+        index = window.index_in(self.window, layer.index)
+        hidden = self.cover[index] * (self.depth_mm[index] < layer.depth_mm)
+        return replace(layer, cover=layer.cover * (1 - hidden))

@@ -35,7 +35,7 @@ def moments_of(
         recording.touch.point_mm,
     )
     return [
-        Moment.alone(m, _whisker(whisk, m, back, studio.scene.looks.wire))
+        Moment.alone(m, _whisker(whisk, m, back, studio.scene.appearance.wire))
         for m in (motor + turns).tolist()
     ]
 
@@ -58,7 +58,11 @@ def moments_of_array(
             tuple(stand.hub(motor[name] + turn) for name, stand in columns.items()),
             tuple(
                 _mounted(
-                    one, recording, whisk, motor[one.column.name] + turn, studio.scene.looks.wire
+                    one,
+                    recording,
+                    whisk,
+                    motor[one.column.name] + turn,
+                    studio.scene.appearance.wire,
                 )
                 for one in whiskers
             ),

@@ -1,17 +1,20 @@
-"""What stands in front of a camera: floor, board, post and hub, whisker, bar with its block. Drawn far to near."""
+"""The objects in front of a camera: floor, board, posts and hubs, whiskers, the bar with its block.
+They are drawn far to near."""
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from bench.rig.bar import Bar, turned
-from bench.rig.layer import Front, draw_layers
+from bench.rig.box import Box
+from bench.rig.layer import Occluder, draw_layers
 from bench.rig.light import Light, Material
 from bench.rig.pinhole import Camera
 from bench.rig.plate import Plate, Print
-from bench.rig.printed_board import Board, Ink, marker
+from bench.rig.printed_board import Board, Ink, marker_print
+from bench.rig.rays import unit
 from bench.rig.round_objects import Ring
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
@@ -20,18 +23,28 @@ from bench.rig.window import Window
 HUB_FRONT_MM = 5.0  # how far the hub reaches along the whisker
 # mm: corners of the hub's block, its own axes
 _HUB_LOW, _HUB_HIGH = np.array([-17.0, -9.0, -6.0]), np.array([HUB_FRONT_MM, 9.0, 7.0])
+_HUB_FRONT, _HUB_TOP, _BLOCK_FRONT = (0, 1), (2, 1), (1, 1)  # faces of boxes
 _SLIM_MM = 4.0  # half the width of a hub that has neighbours
 _SHAFT_X_MM = -6.0  # of the motor's shaft, in the hub's axes
 _BLOCK_HALF = np.array([9.0, 9.0, 7.0])  # mm: half the bar's block, each way
 _BLOCK_UP_MM = 52.0  # along the bar from where it is touched
+_BAR_DOWN_MM = 20.0, 75.0  # least and most of a bar below where it is touched
 _AWAY = np.array([0.0, 1.0, 0.0])  # (3,): from whiskers and cameras
 _ROD_MM, _ROD_RADIUS_MM = 150.0, 2.5  # that holds an object which is no bar, from behind
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
+_MARKER_MM = 10.0  # side of a marker on hub or block
+_SHADE_MM2 = 9e5  # the floor darkens by half at the root of this from _LIT_X_MM
+_LIT_X_MM = 40.0  # along the rig's x: where the floor is brightest
+_CREASE_MM = 1.5  # over which floor turns into wall
+_GRAIN = 0.02  # of the floor's tone
 
 
 @dataclass(frozen=True)
-class Looks:
-    """Light and surfaces of a scene, and where its floor and its wall are."""
+class Appearance:
+    """Light and surfaces of a scene, and where its floor and its wall are.
+
+    floor, wall: reflectances. margin_mm: of white paper round the board's squares.
+    """
 
     light: Light
     ink: Ink
@@ -42,56 +55,16 @@ class Looks:
     wall: float
     floor_z_mm: float = -95.0
     wall_y_mm: float = 420.0
-    margin_mm: float = 7.5  # of white paper round the board's squares
-
-
-@dataclass(frozen=True, eq=False)
-class Box:
-    """A block with plain faces and perhaps a marker on one. Axes (3, 3): its own x, y, z as columns, rig frame."""
-
-    low_mm: np.ndarray
-    high_mm: np.ndarray
-    axes: np.ndarray
-    origin_mm: np.ndarray
-    reflectance: float
-    marked: bool = False
-
-    def faces(self) -> Iterator[tuple[tuple[int, int], Plate]]:
-        """(name, plate) of the six faces, prints facing outwards."""
-        for axis in range(3):
-            for end, limit in ((-1, self.low_mm), (1, self.high_mm)):
-                yield (axis, end), self._face(axis, end, limit[axis])
-
-    def _face(self, axis, end, level):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        inward = -end * self.axes[:, axis]
-        first, second = self.axes[:, i], np.cross(inward, self.axes[:, i])
-        low, high = self.low_mm, self.high_mm
-        from_j = low[j] if second @ self.axes[:, j] > 0 else high[j]
-        corner = self.axes[:, axis] * level + first * low[i] + self.axes[:, j] * from_j
-        pose = np.column_stack([first, second, inward, self.origin_mm + corner])
-        return Plate(Print.plain(high[i] - low[i], high[j] - low[j], self.reflectance), pose)
-
-    def draw(
-        self,
-        window: Window,
-        radiance: np.ndarray,
-        light: Light,
-        print_: Print | None = None,
-        on: tuple[int, int] = (2, 1),
-    ) -> None:
-        """All faces, and a print centred on one of them."""
-        for name, plate in self.faces():
-            plate.draw(window, radiance, light)
-            if print_ is not None and name == on:
-                x, y = (0.5 * e[[0, -1]].sum() for e in (plate.print.x_mm, plate.print.y_mm))
-                Plate(print_.moved(x, y), plate.pose).draw(window, radiance, light)
+    margin_mm: float = 7.5
 
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """Where a hub turns: the pose (3, 4) of its base in the rig frame, the corners (3,) of its block in its own axes,
-    mm; whether it has a marker, and a post round its shaft."""
+    """The place where a hub turns.
+
+    pose (3, 4): of its base in the rig frame. low_mm, high_mm (3,): corners of its block on its own
+    axes. has_marker: whether it has a marker, and a post round its shaft.
+    """
 
     pose: np.ndarray
     low_mm: np.ndarray
@@ -100,190 +73,194 @@ class Stand:
 
     @classmethod
     def alone(cls) -> "Stand":
-        """The hub of one whisker at the rig's origin."""
+        """Return the stand of one whisker at the rig's origin."""
         return cls(np.eye(3, 4), _HUB_LOW, _HUB_HIGH, True)
 
     @classmethod
     def of_column(cls, pose: np.ndarray, heights_mm: Sequence[float]) -> "Stand":
-        """A slim hub that holds whiskers at these heights."""
-        low, high = (
-            [x, side * _SLIM_MM, z + height]
-            for (x, _, z), side, height in (
-                (_HUB_LOW, -1, min(heights_mm)),
-                (_HUB_HIGH, 1, max(heights_mm)),
-            )
-        )
-        return cls(pose, np.array(low), np.array(high))
+        """Return the stand of a slim hub that holds whiskers at these heights."""
+        low = np.array([_HUB_LOW[0], -_SLIM_MM, _HUB_LOW[2] + min(heights_mm)])
+        high = np.array([_HUB_HIGH[0], _SLIM_MM, _HUB_HIGH[2] + max(heights_mm)])
+        return cls(pose, low, high)
 
     def hub(self, motor_rad: float) -> Box:
-        """The hub at a motor angle."""
+        """Return the hub at a motor angle."""
         axes = self.pose[:, :3] @ turned(np.eye(3), motor_rad).T
         return Box(self.low_mm, self.high_mm, axes, self.pose[:, 3], 0.05, self.has_marker)
 
-    def posts(self, looks: Looks) -> Iterator[Tube]:
-        """Down to the floor."""
-        floor = looks.floor_z_mm - self.pose[2, 3]
-        if self.has_marker:
-            yield self._along_shaft(self.low_mm[2] - 12.0, floor, 11.0, looks)
-            floor = self.low_mm[2] - 13.0
-        yield self._along_shaft(self.low_mm[2] + 2.0, floor, 3.0, looks)
+    def posts(self, appearance: Appearance) -> list[Tube]:
+        """Return the shaft from the hub down to the floor, or to the post round it, and that post."""
+        floor = appearance.floor_z_mm - self.pose[2, 3]
+        under = self.low_mm[2]
+        if not self.has_marker:
+            return [self._upright(under + 2.0, floor, 3.0, appearance.dark)]
+        post = self._upright(under - 12.0, floor, 11.0, appearance.dark)
+        return [post, self._upright(under + 2.0, under - 13.0, 3.0, appearance.dark)]
 
-    def _along_shaft(self, from_mm, to_mm, radius_mm, looks):
-        ends = (
-            self.pose[:, :3] @ [_SHAFT_X_MM, 0.0, z] + self.pose[:, 3] for z in (from_mm, to_mm)
-        )
-        return Tube.straight(*ends, radius_mm, looks.dark)
+    def _upright(self, top_mm, bottom_mm, radius_mm, material):
+        """Return a tube along the motor's shaft between two heights in the hub's axes."""
+        top = self.pose @ [_SHAFT_X_MM, 0.0, top_mm, 1.0]
+        bottom = self.pose @ [_SHAFT_X_MM, 0.0, bottom_mm, 1.0]
+        return Tube.straight(top, bottom, radius_mm, material)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The rig that a board, a bar and whiskers on their stands make. `T_rig_board` (3, 4)."""
+    """The rig that a board, a bar and whiskers on their stands make. T_rig_board: (3, 4)."""
 
     board: Board
     T_rig_board: np.ndarray
-    looks: Looks
+    appearance: Appearance
     stands: tuple[Stand, ...]
 
-    def backdrop(self, window: Window) -> np.ndarray:
-        """Floor, wall and board: what the rig's board picture shows."""
-        radiance = floor_and_wall(window, self.looks)
-        self.print_board(window, radiance, self.T_rig_board)
+    def draw_backdrop(self, window: Window) -> np.ndarray:
+        """Draw floor, wall and board, as the rig's board picture shows them; return the radiance."""
+        radiance = draw_floor_and_wall(window, self.appearance)
+        self.draw_board(window, radiance, self.T_rig_board)
         return radiance
 
-    def print_board(self, window: Window, radiance: np.ndarray, T_rig_board: np.ndarray) -> None:
-        """The board anywhere, as the views for the lens show it."""
-        self._board_plate(T_rig_board).draw(window, radiance, self.looks.light)
+    def draw_board(self, window: Window, radiance: np.ndarray, T_rig_board: np.ndarray) -> None:
+        """Draw the board at any pose, as the views for the lens show it."""
+        self._board_plate(T_rig_board).draw(window, radiance, self.appearance.light)
 
     def _board_plate(self, T_rig_board):
-        return Plate(self.board.printed(self.looks.ink, self.looks.margin_mm), T_rig_board)
+        """Return the printed board at a pose (3, 4)."""
+        appearance = self.appearance
+        return Plate(self.board.to_print(appearance.ink, appearance.margin_mm), T_rig_board)
 
-    def stand_bar(
+    def draw_bar(
         self, window: Window, radiance: np.ndarray, bar: Bar, middle_mm: np.ndarray
     ) -> None:
-        """The posts under the hubs, and the bar (its middle where first touched) with a block at its upper end."""
-        looks = self.looks
-        self._stand_posts(window, radiance)
-        down, block = (
-            middle_mm - self._reach_down(bar, middle_mm) * bar.axis,
-            _block(bar, middle_mm),
-        )
-        Tube.straight(down, block.origin_mm, bar.radius_mm, looks.bar).draw(
-            window, radiance, looks.light
-        )
-        print_ = marker(self.board.dictionary, self._marker(_BLOCK_MARKER), 10.0, looks.ink)
-        block.draw(window, radiance, looks.light, print_, (1, 1))
+        """Draw the posts under the hubs, and a bar with a block at its upper end.
 
-    def stand_rounded(self, window: Window, radiance: np.ndarray, thing: Bar) -> Front | None:
-        """The posts under the hubs, and a ring, sphere or cone on a rod from behind; the object as it hides what is
-        behind it, None where it is not seen. What is below the board is hidden."""
-        looks = self.looks
-        self._stand_posts(window, radiance)
+        middle_mm (3,): of the bar, where it is first touched.
+        """
+        light = self.appearance.light
+        self._draw_posts(window, radiance)
+        bottom = middle_mm - self._reach_down_mm(bar, middle_mm) * bar.axis
+        block = _block(bar, middle_mm)
+        tube = Tube.straight(bottom, block.origin_mm, bar.radius_mm, self.appearance.bar)
+        tube.draw(window, radiance, light)
+        block.draw(window, radiance, light, self._marker(_BLOCK_MARKER), _BLOCK_FRONT)
+
+    def draw_round_object(
+        self, window: Window, radiance: np.ndarray, thing: Bar
+    ) -> Occluder | None:
+        """Draw the posts under the hubs, and a ring, sphere or cone on a rod from behind.
+
+        What is below the board is hidden. Return the object as it hides what is behind it; None
+        where it is not seen.
+        """
+        light = self.appearance.light
+        self._draw_posts(window, radiance)
         held = held_mm(thing)
-        rod = Tube.straight(held, held + _ROD_MM * _AWAY, _ROD_RADIUS_MM, looks.dark)
-        layers = [
-            rod.layer(window, looks.light),
-            Solid(thing, looks.bar).layer(window, looks.light),
-        ]
+        rod = Tube.straight(held, held + _ROD_MM * _AWAY, _ROD_RADIUS_MM, self.appearance.dark)
         board = self._board_plate(self.T_rig_board)
-        left = [
-            replace(layer, cover=layer.cover * (1 - board.hides(window, layer)))
-            for layer in layers
-            if layer
-        ]
-        draw_layers(left, radiance)
-        return Front.of(left[-1], window) if layers[-1] else None
+        layers = []
+        for layer in (
+            rod.layer(window, light),
+            Solid(thing, self.appearance.bar).layer(window, light),
+        ):
+            layers.append(layer and board.hide(layer, window))
+        draw_layers([layer for layer in layers if layer], radiance)
+        return layers[-1] and Occluder.from_layer(layers[-1], window)
 
-    def _stand_posts(self, window, radiance):
-        for post in (post for stand in self.stands for post in stand.posts(self.looks)):
-            post.draw(window, radiance, self.looks.light)
+    def _draw_posts(self, window, radiance):
+        """Draw the posts under all hubs."""
+        for stand in self.stands:
+            for post in stand.posts(self.appearance):
+                post.draw(window, radiance, self.appearance.light)
 
-    def _reach_down(self, bar, middle):
-        """To the board, but no further than a rod of this length would."""
-        below = self.T_rig_board[:, 2]
-        towards = -(bar.axis @ below)
-        to_board = (
-            (self.T_rig_board[:, 3] - middle) @ below / towards if abs(towards) > 1e-6 else math.inf
-        )
-        return float(np.clip(abs(to_board), 20, 75))
+    def _reach_down_mm(self, bar, middle_mm):
+        """Return how far a bar reaches down from its middle: to the board, within a rod's length."""
+        normal = self.T_rig_board[:, 2]
+        height = abs((self.T_rig_board[:, 3] - middle_mm) @ normal)
+        return float(np.clip(height / max(abs(bar.axis @ normal), 1e-6), *_BAR_DOWN_MM))
 
-    def _marker(self, from_end):
-        known = self.board.opencv().getDictionary()
-        return len(known.bytesList) + from_end
+    def _marker(self, from_end) -> Print:
+        """Return the print of a marker by its place from the end of the board's dictionary."""
+        number = len(self.board.opencv().getDictionary().bytesList) + from_end
+        return marker_print(self.board.dictionary, number, _MARKER_MM, self.appearance.ink)
 
-    def move(
+    def draw_moving(
         self,
         window: Window,
         radiance: np.ndarray,
         hubs: Sequence[Box],
         whiskers: Sequence[Tube],
-        front: Front | None = None,
+        occluder: Occluder | None = None,
     ) -> None:
-        """Hubs and whiskers: a hub whose front, out of which its whiskers stand, faces the camera is behind all
-        whiskers, another one before them. front: an object that may hide whiskers."""
+        """Draw hubs and whiskers.
+
+        A hub whose front, out of which its whiskers stand, faces the camera is behind all whiskers,
+        another one before them. occluder: an object that may hide whiskers.
+        """
         centre = window.camera.centre_mm
-        behind = [dict(hub.faces())[(0, 1)].faces(centre) for hub in hubs]
-        self._draw_hubs(
-            window, radiance, [hub for hub, is_behind in zip(hubs, behind) if is_behind]
-        )
-        draw_tubes(whiskers, window, radiance, self.looks.light, front)
-        self._draw_hubs(
-            window, radiance, [hub for hub, is_behind in zip(hubs, behind) if not is_behind]
-        )
+        behind = []
+        before = []
+        for hub in sorted(hubs, key=lambda hub: -np.linalg.norm(hub.origin_mm - centre)):
+            (behind if hub.face(_HUB_FRONT).faces(centre) else before).append(hub)
+        self._draw_hubs(window, radiance, behind)
+        draw_tubes(whiskers, window, radiance, self.appearance.light, occluder)
+        self._draw_hubs(window, radiance, before)
 
     def _draw_hubs(self, window, radiance, hubs):
-        centre = window.camera.centre_mm
-        for hub in sorted(hubs, key=lambda hub: -np.linalg.norm(hub.origin_mm - centre)):
-            print_ = marker(self.board.dictionary, self._marker(_HUB_MARKER), 10.0, self.looks.ink)
-            hub.draw(window, radiance, self.looks.light, print_ if hub.marked else None)
+        """Draw hubs in this order, with their markers."""
+        for hub in hubs:
+            marker = self._marker(_HUB_MARKER) if hub.is_marked else None
+            hub.draw(window, radiance, self.appearance.light, marker, _HUB_TOP)
 
     def moving_px(
         self, camera: Camera, hubs: Sequence[Box], whiskers: Sequence[Tube]
     ) -> np.ndarray:
-        """Pixels (n, 2) between which all that moves lies."""
-        corners = np.concatenate([plate.corners_mm() for hub in hubs for _, plate in hub.faces()])
-        return np.concatenate(
-            [camera.project(corners), *(px for one in whiskers for px in one.silhouette(camera))]
-        )
+        """Return pixels (n, 2) between which all that moves lies."""
+        px = [camera.project(hub.corners_mm()) for hub in hubs]
+        px += [whisker.silhouette(camera).reshape(-1, 2) for whisker in whiskers]
+        return np.concatenate(px)
 
 
 def held_mm(thing: Bar) -> np.ndarray:
-    """Where a rod holds it, (3,): a ring at its farthest from the base along the rig's y, others in their middle."""
+    """Return the point (3,) at which a rod holds an object.
+
+    It holds a ring at its farthest from the base along the rig's y, others in their middle.
+    """
     if not isinstance(thing, Ring):
         return thing.point_mm
-    way = _AWAY - thing.axis[1] * thing.axis
-    return thing.point_mm + thing.ring_radius_mm * way / np.linalg.norm(way)
+    return thing.point_mm + thing.ring_radius_mm * unit(_AWAY - thing.axis[1] * thing.axis)
 
 
 def _block(bar: Bar, middle_mm: np.ndarray) -> Box:
-    """The block that holds a bar at its upper end."""
-    front = np.array([0.0, -1.0, 0.0]) - bar.axis * -bar.axis[1]
-    front /= np.linalg.norm(front)
+    """Return the block that holds a bar at its upper end, its front towards the whiskers."""
+    front = unit(bar.axis * bar.axis[1] - _AWAY)
     axes = np.column_stack([np.cross(front, bar.axis), front, bar.axis])
     return Box(-_BLOCK_HALF, _BLOCK_HALF, axes, middle_mm + _BLOCK_UP_MM * bar.axis, 0.1)
 
 
 def block_corners_mm(bar: Bar, middle_mm: np.ndarray) -> np.ndarray:
-    """Corners (24, 3) of the block that holds a bar whose middle is near a point, face by face."""
-    return np.concatenate([plate.corners_mm() for _, plate in _block(bar, middle_mm).faces()])
+    """Return the corners (24, 3) of the block that holds a bar whose middle is near a point (3,)."""
+    return _block(bar, middle_mm).corners_mm()
 
 
-def floor_and_wall(window: Window, looks: Looks) -> np.ndarray:
-    """A grey floor that darkens away from the rig, and the wall behind it."""
-    coarse = Window(window.camera, window.left, window.top, window.right, window.bottom, 1, 1.0)
-    x, y = coarse.rays()
+def draw_floor_and_wall(window: Window, appearance: Appearance) -> np.ndarray:
+    """Draw a grey floor that darkens away from the rig, and the wall behind it; return the radiance
+    (rows, columns) of the window's samples, the same for all of a pixel."""
+    point, floor_share = _floor_and_wall_points(window, appearance)
+    x, y, z = np.moveaxis(point, -1, 0)
+    brightness = 1 / (1 + (x - _LIT_X_MM) ** 2 / _SHADE_MM2 + y**2 / _SHADE_MM2)
+    grain = 1 + _GRAIN * np.sin(0.11 * x + 0.3) * np.sin(0.13 * y + 0.7 * z)
+    floor = appearance.floor * appearance.light.shade_flat([0, 0, 1.0])
+    wall = appearance.wall * appearance.light.shade_flat([0, -1.0, 0])
+    tone = (floor * floor_share + wall * (1 - floor_share)) * brightness * grain
+    return tone.astype(np.float32).repeat(window.fine, 0).repeat(window.fine, 1)
+
+
+def _floor_and_wall_points(window, appearance):
+    """Return the points (rows, columns, 3) of floor or wall that the window's pixels show, mm, and
+    the share (rows, columns) of the floor."""
+    x, y = replace(window, fine=1).rays()
     rays = np.stack([x, y, np.ones_like(x)], -1) @ window.camera.rotation.astype(np.float32)
     centre = window.camera.centre_mm
-    down, back = np.minimum(rays[..., 2], -1e-3), np.maximum(rays[..., 1], 1e-3)
-    to_floor, to_wall = (looks.floor_z_mm - centre[2]) / down, (looks.wall_y_mm - centre[1]) / back
-    beyond = 1 / (1 + np.exp(np.clip((to_floor - to_wall) / 1.5, -50, 50)))
-    at = rays * np.minimum(to_floor, to_wall)[..., None] + centre
-    near = 1 / (1 + (at[..., 0] - 40) ** 2 / 9e5 + at[..., 1] ** 2 / 9e5)
-    grain = 1 + 0.02 * np.sin(0.11 * at[..., 0] + 0.3) * np.sin(
-        0.13 * at[..., 1] + 0.7 * at[..., 2]
-    )
-    light = looks.light
-    floor, wall = (
-        r * light.flat(n) for r, n in ((looks.floor, [0, 0, 1.0]), (looks.wall, [0, -1.0, 0]))
-    )
-    tone = ((floor * beyond + wall * (1 - beyond)) * near * grain).astype(np.float32)
-    return np.repeat(np.repeat(tone, window.fine, 0), window.fine, 1)
+    to_floor = (appearance.floor_z_mm - centre[2]) / np.minimum(rays[..., 2], -1e-3)
+    to_wall = (appearance.wall_y_mm - centre[1]) / np.maximum(rays[..., 1], 1e-3)
+    floor_share = expit((to_wall - to_floor) / _CREASE_MM)
+    return rays * np.minimum(to_floor, to_wall)[..., None] + centre, floor_share

@@ -85,7 +85,7 @@ def _studios(protocol_json):
 
 def _rig_views(job, _, folder):
     for i, studio in enumerate(job.studios):
-        picture = studio.sensor.exposed(studio.rig_brightness(), job.stream(_RIG, i))
+        picture = studio.sensor.expose(studio.rig_brightness(), job.stream(_RIG, i))
         write_picture(folder / f"{studio.camera.name}.png", picture)
 
 
@@ -95,7 +95,7 @@ def _board_views(job, number, folder):
         board, studio.camera, job.protocol.board.views, job.stream(_BOARDS, number)
     )
     for i, pose in enumerate(poses):
-        picture = studio.sensor.exposed(
+        picture = studio.sensor.expose(
             studio.board_brightness(pose), job.stream(_BOARDS, number, i + 1)
         )
         write_picture(folder / f"{i:02d}.{job.protocol.pictures.still}", picture)
@@ -162,7 +162,7 @@ def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterat
         if still is None or gave.any():
             moved = bar.moved_mm(motor) + gave
             setting = studio.setting(bar.at(motor).given(gave), middle + moved)
-        yield studio.sensor.exposed(
+        yield studio.sensor.expose(
             setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number)
         )
 
@@ -180,6 +180,6 @@ def array_frames_of(
     )
     for number, (time_s, whisk) in enumerate(times):
         moments = moments_of_array(job.protocol, studio, recording, job.whiskers, time_s, whisk)
-        yield studio.sensor.exposed(
+        yield studio.sensor.expose(
             setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number)
         )

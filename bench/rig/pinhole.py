@@ -10,11 +10,17 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 _DEGREE = 13  # of the Chebyshev series of the lens's inverse
+_SPAN = 1.2  # of that series, in halves of the picture: a tenth of it beyond either side
+_PASSES = 60  # of the correction by which a lens is inverted
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A camera in the rig: `rotation` (3, 3) and `translation_mm` (3,) take rig coordinates to camera coordinates."""
+    """A camera in the rig.
+
+    matrix (3, 3), distortion (n,): as OpenCV has them. rotation (3, 3), translation_mm (3,): from
+    rig coordinates to camera coordinates.
+    """
 
     name: str
     size_px: tuple[int, int]
@@ -24,7 +30,7 @@ class Camera:
     translation_mm: np.ndarray
 
     @classmethod
-    def looking(
+    def aim(
         cls,
         name: str,
         *,
@@ -37,82 +43,88 @@ class Camera:
         centre_px: Sequence[float] | None = None,
         aspect: float = 1.0,
     ) -> "Camera":
-        """A camera at a position looking at a point, the rig's z upwards in its picture up to `roll_rad`.
+        """Make a camera at a position that is aimed at a point, the rig's z upwards up to a roll.
 
-        Raises ValueError where it looks straight up or down (there is no upwards then) or stands on its target.
+        Raises ValueError where it is aimed straight up or down (there is no upwards then) or stands
+        on its target.
         """
-        centre_px = centre_px if centre_px is not None else (np.array(size_px) - 1) / 2
-        matrix = np.array(
-            [[focal_px, 0, centre_px[0]], [0, focal_px * aspect, centre_px[1]], [0, 0, 1.0]]
-        )
-        rotation = _looking(np.asarray(position_mm, float), np.asarray(target_mm, float), roll_rad)
-        return cls(
-            name,
-            tuple(size_px),
-            matrix,
-            np.asarray(distortion, float),
-            rotation,
-            -rotation @ position_mm,
-        )
+        if centre_px is None:
+            centre_px = (np.array(size_px) - 1) / 2
+        matrix = np.diag([focal_px, focal_px * aspect, 1.0])
+        matrix[:2, 2] = centre_px
+        rotation = _aim(np.asarray(position_mm, float), np.asarray(target_mm, float), roll_rad)
+        lens = np.asarray(distortion, float)
+        return cls(name, tuple(size_px), matrix, lens, rotation, -rotation @ position_mm)
 
     @property
     def centre_mm(self) -> np.ndarray:
-        """Where the camera is in the rig frame, (3,)."""
+        """Return where the camera is in the rig frame, (3,)."""
         return -self.rotation.T @ self.translation_mm
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
-        """Pixels (n, 2) of points (n, 3) in the rig frame."""
+        """Project points (n, 3) of the rig frame to pixels (n, 2)."""
         turn, _ = cv2.Rodrigues(self.rotation)
-        points = np.ascontiguousarray(np.asarray(points_mm, float).reshape(-1, 1, 3))
-        return cv2.projectPoints(points, turn, self.translation_mm, self.matrix, self.distortion)[
-            0
-        ][:, 0]
+        return self._project(np.asarray(points_mm, float), turn, self.translation_mm)
+
+    def _project(self, points, turn, shift):
+        """Project points (n, 3) that a rotation vector and a shift take to the camera's frame."""
+        points = np.ascontiguousarray(points.reshape(-1, 1, 3))
+        px, _ = cv2.projectPoints(points, turn, shift, self.matrix, self.distortion)
+        return px[:, 0]
 
     def in_camera(self, points_mm: np.ndarray) -> np.ndarray:
-        """Camera coordinates of points (..., 3)."""
+        """Convert points (..., 3) of the rig frame to camera coordinates."""
         return np.asarray(points_mm, float) @ self.rotation.T + self.translation_mm
 
     def rays(self, u_px: np.ndarray, v_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Undistorted x/z and y/z on the grid of columns `u_px` and rows `v_px`: two (rows, columns) float32 arrays.
+        """Return undistorted x/z and y/z on the grid of columns u_px and rows v_px.
 
-        From a polynomial in the pixel position that inverts the lens to 1e-5 px (tested), so that any grid costs two
-        matrix products.
+        Both are float32, (rows, columns). They come from a polynomial in the pixel position that
+        inverts the lens to 1e-5 px (tested), so that any grid costs two matrix products.
         """
-        columns, rows = self._basis(u_px, 0), self._basis(v_px, 1)
-        return tuple((rows @ c @ columns.T).astype(np.float32) for c in self._lens)
+        columns = self._chebyshev(u_px, 0)
+        rows = self._chebyshev(v_px, 1)
+        x, y = ((rows @ series @ columns.T).astype(np.float32) for series in self._inverse_lens)
+        return x, y
 
-    def _basis(self, px, side):
-        """Chebyshev values over the picture and a tenth of it on either side."""
+    def _chebyshev(self, px, side):
+        """Return the Chebyshev polynomials at positions (n,) along a side of the picture, (n, k)."""
         half = 0.5 * self.size_px[side]
-        return chebyshev.chebvander((np.asarray(px, float) - half) / (1.2 * half), _DEGREE)
+        return chebyshev.chebvander((np.asarray(px, float) - half) / (_SPAN * half), _DEGREE)
 
     @cached_property
-    def _lens(self):
+    def _inverse_lens(self):
+        """Return the Chebyshev coefficients (k, k) of x/z and of y/z by row and column."""
         nodes = np.cos(np.pi * (np.arange(2 * _DEGREE) + 0.5) / (2 * _DEGREE))
-        u, v = (0.5 * s * (1 + 1.2 * nodes) for s in self.size_px)
-        rays = self._undistorted(np.stack(np.meshgrid(u, v), -1))
-        columns, rows = np.linalg.pinv(self._basis(u, 0)), np.linalg.pinv(self._basis(v, 1))
-        return [rows @ rays[..., i] @ columns.T for i in (0, 1)]
+        u, v = (0.5 * side * (1 + _SPAN * nodes) for side in self.size_px)
+        rays = self._undistort(np.stack(np.meshgrid(u, v), -1).reshape(-1, 2))
+        columns = np.linalg.pinv(self._chebyshev(u, 0))
+        rows = np.linalg.pinv(self._chebyshev(v, 1))
+        grids = rays.T.reshape(2, len(v), len(u))
+        return [rows @ grid @ columns.T for grid in grids]
 
-    def _undistorted(self, px):
-        """x/z, y/z (..., 2) that OpenCV projects to pixels (..., 2): the pinhole's answer, corrected until it does."""
+    def _undistort(self, px):
+        """Return x/z and y/z (n, 2) that OpenCV projects to pixels (n, 2).
+
+        The pinhole's rays are corrected by what their projection is off by, until it is off by
+        nothing.
+        """
         focal = np.diag(self.matrix)[:2]
         rays = (px - self.matrix[:2, 2]) / focal
-        for _ in range(60):
-            points = np.concatenate([rays, np.ones_like(rays[..., :1])], -1).reshape(-1, 1, 3)
-            seen = cv2.projectPoints(
-                points, np.zeros(3), np.zeros(3), self.matrix, self.distortion
-            )[0]
-            rays = rays + (px - seen.reshape(px.shape)) / focal
+        for _ in range(_PASSES):
+            points = np.column_stack([rays, np.ones(len(rays))])
+            rays = rays + (px - self._project(points, np.zeros(3), np.zeros(3))) / focal
         return rays
 
 
-def _looking(position, target, roll):
+def _aim(position, target, roll):
+    """Return the rotation (3, 3) of a camera that is aimed from a position (3,) at a target (3,)."""
     ahead = (target - position) / np.linalg.norm(target - position)
     right = np.cross(ahead, [0, 0, 1.0])
     if not np.linalg.norm(right) > 1e-9:
         raise ValueError("a camera must not look straight up or down, nor stand on its target")
     right /= np.linalg.norm(right)
     down = np.cross(ahead, right)
-    cos, sin = math.cos(roll), math.sin(roll)
+    cos = math.cos(roll)
+    sin = math.sin(roll)
     return np.array([cos * right + sin * down, cos * down - sin * right, ahead])

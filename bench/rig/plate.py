@@ -1,8 +1,8 @@
-"""Flat printed rectangles: the board, markers, faces of boxes. Every edge of the print is integrated, none is
-sampled.
+"""Flat printed rectangles: the board, markers, faces of boxes. Every edge of the print is
+integrated, none is sampled.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -11,13 +11,16 @@ from bench.rig.layer import Layer
 from bench.rig.light import Light
 from bench.rig.window import Window
 
-_NEVER = 1e-5  # 1/mm
+_LEAST_INVERSE_DEPTH = np.float32(1e-5)  # 1/mm: of rays that miss the plane in front of the camera
 _ROOT_2PI = np.float32(np.sqrt(2 * np.pi))  # of the normal density, as wide as the samples
 
 
 @dataclass(frozen=True, eq=False)
 class Print:
-    """A pattern of rectangular cells: reflectances (rows, columns) between edges in mm (columns + 1; rows + 1)."""
+    """A pattern of rectangular cells.
+
+    reflectance (rows, columns). x_mm (columns + 1,), y_mm (rows + 1,): edges of the cells.
+    """
 
     reflectance: np.ndarray
     x_mm: np.ndarray
@@ -25,145 +28,176 @@ class Print:
 
     @classmethod
     def plain(cls, width_mm: float, height_mm: float, reflectance: float) -> "Print":
-        """A print of one grey."""
+        """Return a print of one grey."""
         return cls(np.array([[reflectance]]), np.array([0.0, width_mm]), np.array([0.0, height_mm]))
 
-    def moved(self, x_mm: float, y_mm: float) -> "Print":
-        """The same print with its coordinates shifted."""
+    def shift(self, x_mm: float, y_mm: float) -> "Print":
+        """Return the print with its coordinates shifted."""
         return Print(self.reflectance, self.x_mm + x_mm, self.y_mm + y_mm)
 
-    def framed(self, margin_mm: float, reflectance: float) -> "Print":
-        """With a margin of one tone all round."""
-        x, y = (
-            np.concatenate([[e[0] - margin_mm], e, [e[-1] + margin_mm]])
-            for e in (self.x_mm, self.y_mm)
-        )
-        return Print(np.pad(self.reflectance, 1, constant_values=reflectance), x, y)
+    def frame(self, margin_mm: float, reflectance: float) -> "Print":
+        """Return the print with a margin of one grey all round."""
+        edges = []
+        for inner in (self.x_mm, self.y_mm):
+            edges.append(np.concatenate([[inner[0] - margin_mm], inner, [inner[-1] + margin_mm]]))
+        return Print(np.pad(self.reflectance, 1, constant_values=reflectance), *edges)
 
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """A print in space. `pose` (3, 4), T_rig_plate: its x, y along the print, its z away from the viewer of the
-    print.
+    """A print in space.
+
+    pose (3, 4), T_rig_plate: its x and y run along the print, its z away from the print's viewer.
     """
 
     print: Print
     pose: np.ndarray
 
     def corners_mm(self) -> np.ndarray:
-        """(4, 3) in the rig frame."""
-        x, y = self.print.x_mm[[0, -1]], self.print.y_mm[[0, -1]]
-        flat = np.array([[x[0], y[0], 0], [x[1], y[0], 0], [x[1], y[1], 0], [x[0], y[1], 0]])
-        return flat @ self.pose[:, :3].T + self.pose[:, 3]
+        """Return the corners (4, 3) in the rig frame."""
+        left, right = self.print.x_mm[[0, -1]]
+        top, bottom = self.print.y_mm[[0, -1]]
+        corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+        return self._in_rig(corners)
+
+    def _in_rig(self, points_mm):
+        """Convert points (n, 2) of the print to the rig frame, (n, 3)."""
+        return points_mm @ self.pose[:, :2].T + self.pose[:, 3]
 
     def faces(self, point_mm: np.ndarray) -> bool:
-        """Whether the print is seen from a point."""
+        """Return whether the print is visible from a point (3,)."""
         return float((point_mm - self.pose[:, 3]) @ self.pose[:, 2]) < 0
 
     def draw(self, window: Window, radiance: np.ndarray, light: Light) -> None:
-        """Over what is drawn, where the camera is in front of the print."""
+        """Draw the print over what is there, where the camera is in front of it."""
         camera = window.camera
-        if (
-            not self.faces(camera.centre_mm)
-            or (camera.in_camera(self.corners_mm())[:, 2] <= 1).any()
-        ):
+        corners = self.corners_mm()
+        is_ahead = (camera.in_camera(corners)[:, 2] > 1).all()
+        if not is_ahead or not self.faces(camera.centre_mm):
             return
-        part = window.around(camera.project(self.corners_mm()), 4 * window.soft_px + 2)
+        part = window.crop(camera.project(corners), 4 * window.soft_px + 2)
         if part is None:
             return
-        cover, tone = _printed(
-            self.print, *_on_plane(camera, self.pose, *part.rays(), part.soft_px)
-        )
-        canvas = radiance[part.within(window)]
-        canvas += cover * (np.float32(light.flat(-self.pose[:, 2])) * tone - canvas)
+        across, down = self._footprints(part, *part.rays())
+        cover = _coverage(self.print, across, down)
+        tone = np.float32(light.shade_flat(-self.pose[:, 2])) * _tone(self.print, across, down)
+        canvas = radiance[part.slices_in(window)]
+        canvas += cover * (tone - canvas)
 
-    def hides(self, window: Window, layer: Layer) -> np.ndarray:
-        """How much (n,) of each sample of a layer in a window is behind it."""
+    def hide(self, layer: Layer, window: Window) -> Layer:
+        """Return a layer of a window, uncovered where the plate is before it."""
         camera = window.camera
         if not self.faces(camera.centre_mm):
-            return np.zeros(len(layer.cover))
-        x, y = (ray[layer.at] for ray in window.rays())
-        across, down, soft_across, soft_down, _ = _on_plane(camera, self.pose, x, y, window.soft_px)
-        cover = _inside(self.print.x_mm, across, soft_across) * _inside(
-            self.print.y_mm, down, soft_down
-        )
-        points = (
-            self.pose[:, 3]
-            + np.multiply.outer(across, self.pose[:, 0])
-            + np.multiply.outer(down, self.pose[:, 1])
-        )
-        return cover * (np.linalg.norm(points - camera.centre_mm, axis=1) < layer.depth_mm)
+            return layer
+        x, y = (ray[layer.index] for ray in window.rays())
+        across, down = self._footprints(window, x, y)
+        points = self._in_rig(np.column_stack([across.mm, down.mm]))
+        is_nearer = np.linalg.norm(points - camera.centre_mm, axis=1) < layer.depth_mm
+        hidden = _coverage(self.print, across, down) * is_nearer
+        return replace(layer, cover=layer.cover * (1 - hidden))
+
+    def _footprints(self, window, x, y):
+        """Return the footprints of a window's rays x, y on the print's two axes."""
+        camera = window.camera
+        to_camera = camera.rotation @ self.pose[:, :2]
+        origin = camera.in_camera(self.pose[:, 3])
+        # A ray (x, y, 1) times this is (across, down, 1) over the depth.
+        inverse = np.linalg.inv(np.column_stack([to_camera, origin])).astype(np.float32)
+        inverse_depth = inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2]
+        depth = 1 / np.maximum(inverse_depth, _LEAST_INVERSE_DEPTH)
+        soft = np.float32(window.soft_px) / np.diag(camera.matrix)[:2].astype(np.float32)  # of rays
+        axes = []
+        for row in inverse[:2]:
+            mm = (row[0] * x + row[1] * y + row[2]) * depth
+            by_x = (row[0] - mm * inverse[2, 0]) * depth * soft[0]
+            by_y = (row[1] - mm * inverse[2, 1]) * depth * soft[1]
+            axes.append(_Footprint(mm, by_x, by_y, np.sqrt(by_x**2 + by_y**2)))
+        return axes
 
 
-def _on_plane(camera, pose, x, y, soft_px):
-    """Where samples' rays meet the plane (mm), the two axes' blur (mm) there, and the correlation of the two."""
-    to_camera = camera.rotation @ pose[:, :2]
-    place = camera.rotation @ pose[:, 3] + camera.translation_mm
-    inverse = np.linalg.inv(np.column_stack([to_camera, place])).astype(np.float32)
-    # The third component is one over the depth; rays that miss the plane in front of the camera get one far away on it.
-    scale = 1 / np.maximum(
-        inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2], np.float32(_NEVER)
-    )
-    across, down = ((inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2]) * scale for i in (0, 1))
-    soft = np.float32(soft_px) / np.float32([camera.matrix[0, 0], camera.matrix[1, 1]])
-    (a0, a1), (d0, d1) = (
-        (
-            (inverse[i, 0] - p * inverse[2, 0]) * scale * soft[0],
-            (inverse[i, 1] - p * inverse[2, 1]) * scale * soft[1],
-        )
-        for i, p in ((0, across), (1, down))
-    )
-    soft_across, soft_down = np.sqrt(a0**2 + a1**2), np.sqrt(d0**2 + d1**2)
-    return across, down, soft_across, soft_down, (a0 * d0 + a1 * d1) / (soft_across * soft_down)
+@dataclass(frozen=True, eq=False)
+class _Footprint:
+    """The Gaussian spots that samples' blurs are on a plane, along one of its axes.
 
-
-def _printed(print_, x, y, soft_x, soft_y, correlation):
-    """Coverage and mean reflectance under a Gaussian of these widths: the cell of each sample and its eight
-    neighbours.
+    mm: their middles. by_x, by_y: mm by one sigma of the blur along the picture's x and y. soft_mm:
+    their sigmas. All have the samples' shape.
     """
-    cover = _inside(print_.x_mm, x, soft_x) * _inside(print_.y_mm, y, soft_y)
+
+    mm: np.ndarray
+    by_x: np.ndarray
+    by_y: np.ndarray
+    soft_mm: np.ndarray
+
+
+def _coverage(print_, across, down):
+    """Return how much of each spot is on a print."""
+    return _inside(print_.x_mm, across) * _inside(print_.y_mm, down)
+
+
+def _inside(edges, spot):
+    """Return how much of each spot lies between the first and the last of edges."""
+    beyond_first = ndtr((spot.mm - np.float32(edges[0])) / spot.soft_mm)
+    before_last = ndtr((np.float32(edges[-1]) - spot.mm) / spot.soft_mm)
+    return beyond_first * before_last
+
+
+def _tone(print_, across, down):
+    """Return the mean reflectance of a print under each spot: of its cell and the eight neighbours."""
     if print_.reflectance.size == 1:
-        return cover, np.float32(print_.reflectance[0, 0])
-    column, weights_x, corner_x, near_x = _cells(print_.x_mm, x, soft_x)
-    row, weights_y, corner_y, near_y = _cells(print_.y_mm, y, soft_y)
+        return np.float32(print_.reflectance[0, 0])
+    column = _Cells.find(print_.x_mm, across)
+    row = _Cells.find(print_.y_mm, down)
     table = np.pad(print_.reflectance, 2, mode="edge").astype(np.float32)
     width = table.shape[1]
-    flat, at = table.ravel(), (row + 1) * width + column + 1
-    tone = np.zeros_like(x)
-    for j, wy in enumerate(weights_y):
-        for i, wx in enumerate(weights_x):
-            tone += wx * wy * flat[at + (j * width + i)]
-    # Towards a corner the two edges' blurs are correlated: the leading terms of the bivariate normal integral.
-    corner = (row + 1 + corner_y) * width + column + 1 + corner_x
-    saddle = flat[corner] - flat[corner + 1] - flat[corner + width] + flat[corner + width + 1]
-    density = np.exp(-0.5 * (near_x**2 + near_y**2)) / _ROOT_2PI**2
-    terms = correlation * (
-        1
-        + 0.5 * correlation * near_x * near_y
-        + correlation**2 / 6 * (near_x**2 - 1) * (near_y**2 - 1)
-    )
-    tone += saddle * density * terms
-    return cover, tone
+    reflectance = table.ravel()
+    first = (row.cell + 1) * width + column.cell + 1  # of the nine cells
+    tone = np.zeros_like(across.mm)
+    for j, row_weight in enumerate(row.weights):
+        for i, column_weight in enumerate(column.weights):
+            tone += column_weight * row_weight * reflectance[first + (j * width + i)]
+    corner = first + row.is_last_nearer * width + column.is_last_nearer
+    saddle = reflectance[corner] - reflectance[corner + 1]
+    saddle += reflectance[corner + width + 1] - reflectance[corner + width]
+    return tone + saddle * _corner_share(across, down, column.edge_distance, row.edge_distance)
 
 
-def _cells(edges, x, soft):
-    """Cell of each sample, weights of the cell before, itself and the one after, which of its edges is nearer, and
-    how far.
+def _corner_share(across, down, x, y):
+    """Return the share of each spot in two opposite cells at a corner that its correlation adds.
+
+    x, y: distances from the corner, in sigmas. The leading terms of the bivariate normal integral.
     """
-    edges = edges.astype(np.float32)
-    cell = np.clip(np.searchsorted(edges, x.ravel()).reshape(x.shape) - 1, 0, len(edges) - 2)
-    low, high = (x - edges[cell]) / soft, (edges[cell + 1] - x) / soft
-    before, after = ndtr(-low), ndtr(-high)
-    first, last = cell == 0, cell == len(edges) - 2
-    before[first], after[last] = 0, 0
-    is_high = high < low
-    return (
-        cell,
-        (before, 1 - before - after, after),
-        is_high.astype(int),
-        np.where(is_high, -high, low),
-    )
+    density = np.exp(-0.5 * (x**2 + y**2)) / _ROOT_2PI**2
+    covariance = across.by_x * down.by_x + across.by_y * down.by_y
+    correlation = covariance / (across.soft_mm * down.soft_mm)
+    third = correlation**2 / 6 * (x**2 - 1) * (y**2 - 1)
+    return density * correlation * (1 + 0.5 * correlation * x * y + third)
 
 
-def _inside(edges, x, soft):
-    return ndtr((x - np.float32(edges[0])) / soft) * ndtr((np.float32(edges[-1]) - x) / soft)
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """The cells of a print, along one axis, in which spots lie.
+
+    cell: number of each spot's cell. weights: share of the spot in the cell before, in its own and
+    in the one after. is_last_nearer: whether the cell's last edge is nearer than its first.
+    edge_distance: from the spot's middle to the nearer edge, in sigmas, positive beyond it.
+    """
+
+    cell: np.ndarray
+    weights: tuple[np.ndarray, np.ndarray, np.ndarray]
+    is_last_nearer: np.ndarray
+    edge_distance: np.ndarray
+
+    @classmethod
+    def find(cls, edges, spot):
+        """Find the cells between edges (n,) in which spots lie."""
+        edges = edges.astype(np.float32)
+        last_cell = len(edges) - 2
+        cell = np.searchsorted(edges, spot.mm.ravel()).reshape(spot.mm.shape) - 1
+        cell = np.clip(cell, 0, last_cell)
+        from_first = (spot.mm - edges[cell]) / spot.soft_mm
+        to_last = (edges[cell + 1] - spot.mm) / spot.soft_mm
+        before = np.where(cell == 0, np.float32(0), ndtr(-from_first))
+        after = np.where(cell == last_cell, np.float32(0), ndtr(-to_last))
+        is_last_nearer = to_last < from_first
+        distance = np.where(is_last_nearer, -to_last, from_first)
+        return cls(cell, (before, 1 - before - after, after), is_last_nearer, distance)

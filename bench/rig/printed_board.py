@@ -18,7 +18,11 @@ class Ink:
 
 @dataclass(frozen=True)
 class Board:
-    """A ChArUco board as session.toml names it. Raises ValueError for a dictionary that OpenCV does not know."""
+    """A ChArUco board as session.toml names it.
+
+    Raises ValueError for a dictionary that OpenCV does not know, or a marker that does not fit its
+    square.
+    """
 
     squares: tuple[int, int]
     square_mm: float
@@ -34,59 +38,58 @@ class Board:
             raise ValueError("a board's marker is smaller than its square, and both are positive")
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
-        """The board as OpenCV has it."""
-        predefined = _dictionary(self.dictionary)
-        board = cv2.aruco.CharucoBoard(
-            tuple(self.squares), self.square_mm, self.marker_mm, predefined
-        )
+        """Return the board as OpenCV has it."""
+        return self._charuco(self.square_mm, self.marker_mm)
+
+    def _charuco(self, square, marker):
+        """Return OpenCV's board with squares and markers of these sizes."""
+        dictionary = _dictionary(self.dictionary)
+        board = cv2.aruco.CharucoBoard(tuple(self.squares), square, marker, dictionary)
         board.setLegacyPattern(self.legacy)
         return board
 
     @property
     def size_mm(self) -> tuple[float, float]:
-        """Width and height."""
+        """Return width and height."""
         return self.squares[0] * self.square_mm, self.squares[1] * self.square_mm
 
     @property
     def corners_mm(self) -> np.ndarray:
-        """Inner corners in the board frame, (n, 3)."""
+        """Return the inner corners in the board frame, (n, 3)."""
         return np.asarray(self.opencv().getChessboardCorners(), float)
 
-    def printed(self, ink: Ink, margin_mm: float) -> Print:
-        """The board's print, its coordinates the board frame's, within a white margin."""
-        board = self.opencv()
+    def to_print(self, ink: Ink, margin_mm: float) -> Print:
+        """Print the board within a white margin; the print's coordinates are the board frame's."""
         modules = _dictionary(self.dictionary).markerSize + 2
-        gap, module = (self.square_mm - self.marker_mm) / 2, self.marker_mm / modules
-        step = np.concatenate([[0], gap + module * np.arange(modules + 1)])
-        x, y = (
-            np.append(np.add.outer(np.arange(n) * self.square_mm, step), n * self.square_mm)
-            for n in self.squares
-        )
-        dark = np.ones((len(y) - 1, len(x) - 1), bool)
-        per = modules + 2
-        for marker, place in zip(board.getIds().ravel(), board.getObjPoints()):
-            i, j = (int(c // self.square_mm) for c in np.asarray(place)[:, :2].mean(0))
-            square = dark[j * per : (j + 1) * per, i * per : (i + 1) * per]
-            square[:] = False
-            square[1:-1, 1:-1] = _bits(self.dictionary, int(marker)) == 0
-        dark = ~dark if self.inverted else dark
-        print_ = Print(np.where(dark, ink.black, ink.white), x, y)
-        return print_.framed(margin_mm, ink.black if self.inverted else ink.white)
+        cells = modules + 2  # of a square, each way: a marker's modules, and a gap on either side
+        size = self.squares[0] * cells, self.squares[1] * cells
+        is_white = self._charuco(cells, modules).generateImage(size) > 0
+        gap = (self.square_mm - self.marker_mm) / 2
+        marker = gap + self.marker_mm / modules * np.arange(modules + 1)
+        edges = []
+        for count in self.squares:
+            starts = self.square_mm * np.arange(count)
+            cell_starts = np.add.outer(starts, np.append(0, marker))
+            edges.append(np.append(cell_starts, count * self.square_mm))
+        paper, printed = (ink.black, ink.white) if self.inverted else (ink.white, ink.black)
+        return Print(np.where(is_white, paper, printed), *edges).frame(margin_mm, paper)
 
 
-def marker(dictionary: str, number: int, side_mm: float, ink: Ink) -> Print:
-    """One marker in a white frame of a seventh of its side, centred on the plate's origin."""
-    bits = _bits(dictionary, number)
-    edges = np.linspace(-side_mm / 2, side_mm / 2, len(bits) + 1)
-    return Print(np.where(bits == 0, ink.black, ink.white), edges, edges).framed(
-        side_mm / 7, ink.white
-    )
+def marker_print(dictionary: str, number: int, side_mm: float, ink: Ink) -> Print:
+    """Print one marker in a white frame of a seventh of its side, centred on the plate's origin."""
+    is_black = _is_black(dictionary, number)
+    edges = np.linspace(-side_mm / 2, side_mm / 2, len(is_black) + 1)
+    marker = Print(np.where(is_black, ink.black, ink.white), edges, edges)
+    return marker.frame(side_mm / 7, ink.white)
 
 
 def _dictionary(name):
+    """Return OpenCV's dictionary of a name."""
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
 
 
-def _bits(dictionary, number):
+def _is_black(dictionary, number):
+    """Return which modules (rows, columns) of a marker are black, its border's included."""
     predefined = _dictionary(dictionary)
-    return cv2.aruco.generateImageMarker(predefined, number, predefined.markerSize + 2)
+    modules = predefined.markerSize + 2
+    return cv2.aruco.generateImageMarker(predefined, number, modules) == 0

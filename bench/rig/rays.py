@@ -1,5 +1,5 @@
-"""Rays of a picture's samples, and what is asked of an object that they meet: how much of a sample its outline covers,
-and where rays meet it first. Rays are (x, y, 1) in the camera's frame.
+"""Rays of a picture's samples, and what is computed of an object that they meet: how much of a
+sample its outline covers, and where rays meet it first. Rays are (x, y, 1) in the camera's frame.
 """
 
 from dataclasses import dataclass
@@ -11,65 +11,87 @@ from scipy.special import ndtr
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays x, y (rows, columns) through samples, undistorted; `focal_px` (2,) and the blur of an edge, px."""
+    """Undistorted rays through a grid of samples, and the sharpness of an edge drawn there.
+
+    x, y (rows, columns). focal_px (2,). soft_px: sigma of an edge's blur.
+    """
 
     x: np.ndarray
     y: np.ndarray
     focal_px: np.ndarray
     soft_px: float
 
-    def covered(self, level: np.ndarray, by_x: np.ndarray, by_y: np.ndarray) -> np.ndarray:
-        """How much of each sample is where a function of the rays is negative, by its derivatives there."""
-        return ndtr(
-            -level / (self.soft_px * np.hypot(by_x / self.focal_px[0], by_y / self.focal_px[1]))
-        )
+    def coverage(self, level: np.ndarray, by_x: np.ndarray, by_y: np.ndarray) -> np.ndarray:
+        """Return how much of each sample lies where a function of the rays is negative.
 
-    def beside(self, normal: np.ndarray) -> np.ndarray:
-        """How much of each sample is on the negative side of a plane through the camera, by its normal (3,)."""
-        return self.covered(
-            normal[0] * self.x + normal[1] * self.y + normal[2], normal[0], normal[1]
-        )
+        level: the function's values; by_x, by_y: its derivatives by the rays.
+        """
+        slope_per_px = np.hypot(by_x / self.focal_px[0], by_y / self.focal_px[1])
+        return ndtr(-level / (self.soft_px * slope_per_px))
 
-    def within(self, conic: np.ndarray) -> np.ndarray:
-        """How much of each sample is within a conic (3, 3), negative there."""
+    def half_plane_coverage(self, normal: np.ndarray) -> np.ndarray:
+        """Return how much of each sample lies on the negative side of a plane through the camera.
+
+        normal (3,): of the plane.
+        """
+        level = normal[0] * self.x + normal[1] * self.y + normal[2]
+        return self.coverage(level, normal[0], normal[1])
+
+    def conic_coverage(self, conic: np.ndarray) -> np.ndarray:
+        """Return how much of each sample lies within a conic (3, 3), whose form is negative there."""
         by_x, by_y, rest = (row[0] * self.x + row[1] * self.y + row[2] for row in conic)
-        return self.covered(0.5 * (self.x * by_x + self.y * by_y + rest), by_x, by_y)
+        return self.coverage(0.5 * (self.x * by_x + self.y * by_y + rest), by_x, by_y)
 
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Where rays (n,) meet a surface first: depths mm, NaN where they miss it; its normals there (n, 3); and how far
-    the eye stands off the surface's straight or least curved direction, 0 to 1: what its darkening is measured by."""
+    """Points where rays (n,) first meet a surface.
+
+    depth_mm (n,): NaN where a ray misses it. normals (n, 3): of the surface. obliqueness (n,):
+    sine of the angle between the ray and the surface's straight or least curved direction, by which
+    the surface darkens towards its edges.
+    """
 
     depth_mm: np.ndarray
     normals: np.ndarray
-    across: np.ndarray
+    obliqueness: np.ndarray
 
 
-class Seen(Protocol):
+class VisibleObject(Protocol):
     """An object in the camera's frame."""
 
     def points_mm(self) -> np.ndarray:
-        """Points (n, 3) about which it lies, to some thousandths of its size."""
+        """Return points (n, 3) whose hull holds it, to some thousandths of its size."""
 
-    def cover(self, rays: Rays) -> np.ndarray:
-        """How much of each sample it covers (rows, columns)."""
+    def coverage(self, rays: Rays) -> np.ndarray:
+        """Return how much of each sample (rows, columns) it covers."""
 
-    def hits(self, rays: np.ndarray) -> Hits:
-        """Where rays (n, 3) meet it first."""
-
-
-def unit(way: np.ndarray) -> np.ndarray:
-    """A direction (3,) of length 1."""
-    return way / np.linalg.norm(way)
+    def intersect(self, rays: np.ndarray) -> Hits:
+        """Find where rays (n, 3) first meet it."""
 
 
-def across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors (3,) across an axis and each other."""
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 3) scaled to length 1."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def perpendicular_axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two unit vectors (3,) at right angles to a unit axis and to each other."""
     first = unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin()]))
     return first, np.cross(axis, first)
 
 
-def sine_off(ways: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Sines (n,) of the angles between unit vectors (n, 3)."""
-    return np.sqrt(np.maximum(1 - (ways * along).sum(1) ** 2, 0))
+def circle_points(
+    centre: np.ndarray, radius: float, axis: np.ndarray, angles: np.ndarray
+) -> np.ndarray:
+    """Return the points (..., 3) of a circle about an axis at angles (...)."""
+    first, second = perpendicular_axes(axis)
+    cos = np.multiply.outer(np.cos(angles), first)
+    sin = np.multiply.outer(np.sin(angles), second)
+    return centre + radius * (cos + sin)
+
+
+def sine_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the sines (n,) of the angles between unit vectors (n, 3)."""
+    cosine = (one * other).sum(1)
+    return np.sqrt(np.maximum(1 - cosine**2, 0))

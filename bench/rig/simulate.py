@@ -75,7 +75,7 @@ def _check_can_be_built(job, name):
     """Boards and cameras say themselves what is wrong with them."""
     try:
         scene = build.scene(job.protocol)
-        scene.board.printed(scene.looks.ink, scene.looks.margin_mm)
+        scene.board.to_print(scene.appearance.ink, scene.appearance.margin_mm)
         build.rod(job.protocol), build.cameras(job.protocol)
     except (ValueError, cv2.error) as problem:
         raise BadInput(" ".join(str(problem).split()), file=name) from None

@@ -1,4 +1,5 @@
-"""Rings, spheres and cones in pictures: shaded where rays meet them, their edges blurred as a tube's are."""
+"""Rings, spheres and cones in pictures: shaded where rays meet them, their edges blurred as a tube's
+are."""
 
 from dataclasses import dataclass
 
@@ -7,13 +8,13 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.rig.bar import Bar
-from bench.rig.grazed import seen
 from bench.rig.layer import Layer
-from bench.rig.light import Light, Material, surface_shade
-from bench.rig.rays import Hits, Rays, Seen
+from bench.rig.light import Light, Material, shade_surface
+from bench.rig.quadrics import to_camera_frame
+from bench.rig.rays import Rays, VisibleObject, unit
 from bench.rig.window import Window
 
-_COVERS = 1e-6  # of a sample: what covers less is not drawn, what covers all but so much has no edge there
+_COVERS = 1e-6  # of a sample: what covers less is not drawn, what covers all but so much is no edge
 _GAUSS = 0.5 / np.sqrt(3)  # Gauss–Legendre's two points across a sample
 
 
@@ -25,78 +26,101 @@ class Solid:
     material: Material
 
     def layer(self, window: Window, light: Light) -> Layer | None:
-        """What it is in the samples of a window; None where it is not in it. Raises BadInput where it is not all before
-        the camera."""
+        """Return its layer in the samples of a window; None where it is not in it.
+
+        Raises BadInput where it is not all before the camera.
+        """
         camera = window.camera
-        shape = seen(self.thing, camera.rotation, camera.translation_mm)
-        points = shape.points_mm()
+        visible = to_camera_frame(self.thing, camera.rotation, camera.translation_mm)
+        points = visible.points_mm()
         if points[:, 2].min() <= 1.0:
             raise BadInput(f"camera {camera.name} stands within an object or beside it")
         points = (points - camera.translation_mm) @ camera.rotation
-        part = window.around(camera.project(points), 4 * window.soft_px + 2)
+        part = window.crop(camera.project(points), 4 * window.soft_px + 2)
         if part is None:
             return None
         x, y = (ray.astype(float) for ray in part.rays())
         rays = Rays(x, y, np.diag(camera.matrix)[:2], window.soft_px)
-        cover = shape.cover(rays)
-        covered = cover > _COVERS
-        if not covered.any():
+        cover = visible.coverage(rays)
+        index = np.nonzero(cover > _COVERS)
+        if not len(index[0]):
             return None
-        tone, depth = self._lit(shape, light, camera.rotation @ light.towards, rays, cover)
-        at, (rows, columns) = np.nonzero(covered), part.within(window)
-        return Layer(
-            (at[0] + rows.start, at[1] + columns.start), cover[covered], tone[at], depth[at]
-        )
+        shader = _Shader(visible, self.material, light, camera.rotation @ light.towards)
+        tone, depth = shader.shade(rays, cover)[:, *index]
+        return Layer(part.index_in(window, index), cover[index], tone, depth)
 
-    def _lit(self, shape: Seen, light: Light, towards: np.ndarray, rays: Rays, cover: np.ndarray):
-        """Brightness and distance (rows, columns) where it covers anything; towards (3,): the lamp, in the camera's
-        frame. At edges the mean of the four rays of a sample that meet it, beyond them the nearest sample's."""
-        tone, depth = (np.full(cover.shape, np.nan) for _ in range(2))
-        covered = cover > _COVERS
-        edge = covered & (cv2.erode((cover > 1 - _COVERS).astype(np.uint8), np.ones((3, 3))) == 0)
-        inner = covered & ~edge
-        tone[inner], depth[inner] = self._at(shape, light, towards, rays.x[inner], rays.y[inner])
-        tone[edge], depth[edge] = self._mean(shape, light, towards, rays, edge)
-        return (_filled(values, covered) for values in (tone, depth))
 
-    def _mean(self, shape, light, towards, rays, edge):
-        """Of samples at an edge, NaN where no ray meets it."""
-        x_down, x_right = (step[edge] for step in np.gradient(rays.x))
-        y_down, y_right = (step[edge] for step in np.gradient(rays.y))
-        found = []
-        for down, right in ((i, j) for i in (-_GAUSS, _GAUSS) for j in (-_GAUSS, _GAUSS)):
-            x = rays.x[edge] + down * x_down + right * x_right
-            y = rays.y[edge] + down * y_down + right * y_right
-            found.append(self._at(shape, light, towards, x, y))
-        found = np.array(found)
-        met = np.isfinite(found)
-        return np.where(met, found, 0).sum(0) / np.where(met.any(0), met.sum(0), np.nan)
+@dataclass(frozen=True, eq=False)
+class _Shader:
+    """An object, its material and its light in the camera's frame; towards (3,): the lamp there."""
 
-    def _at(self, shape, light, towards, x, y):
-        """Brightness and distance (n,) where rays meet it, NaN where they miss."""
+    visible: VisibleObject
+    material: Material
+    light: Light
+    towards: np.ndarray
+
+    def shade(self, rays: Rays, cover: np.ndarray) -> np.ndarray:
+        """Return brightness and distance, (2, rows, columns), of the samples that it covers.
+
+        At edges it is the mean of the four rays of a sample that meet it, beyond them the nearest
+        sample's.
+        """
+        shaded = np.full((2, *cover.shape), np.nan)
+        is_covered = cover > _COVERS
+        is_full = (cover > 1 - _COVERS).astype(np.uint8)
+        is_inner = cv2.erode(is_full, np.ones((3, 3))).astype(bool)
+        is_edge = is_covered & ~is_inner
+        shaded[:, is_inner] = self._shade_rays(rays.x[is_inner], rays.y[is_inner])
+        shaded[:, is_edge] = self._average(rays, is_edge)
+        return np.array([_fill(values, is_covered) for values in shaded])
+
+    def _average(self, rays, is_edge):
+        """Return the mean (2, n) over the four rays of each edge sample; NaN where none meets it."""
+        x = rays.x[is_edge]
+        y = rays.y[is_edge]
+        x_down, x_right = (step[is_edge] for step in np.gradient(rays.x))
+        y_down, y_right = (step[is_edge] for step in np.gradient(rays.y))
+        total = np.zeros((2, len(x)))
+        count = np.zeros((2, len(x)))
+        for down in (-_GAUSS, _GAUSS):
+            for right in (-_GAUSS, _GAUSS):
+                shaded = self._shade_rays(
+                    x + down * x_down + right * x_right, y + down * y_down + right * y_right
+                )
+                is_met = np.isfinite(shaded)
+                total += np.where(is_met, shaded, 0)
+                count += is_met
+        return total / np.where(count, count, np.nan)
+
+    def _shade_rays(self, x, y):
+        """Return brightness and distance, (2, n), where rays (n,) meet it; NaN where they miss.
+
+        Like a round bar's, its brightness follows its normal and falls towards its edges.
+        """
         rays = np.stack([x, y, np.ones_like(x)], -1)
         length = np.linalg.norm(rays, axis=1)
-        hits = shape.hits(rays)
-        return self._shade(light, towards, hits, rays / length[:, None]), hits.depth_mm * length
-
-    def _shade(self, light: Light, towards: np.ndarray, hits: Hits, unit: np.ndarray) -> np.ndarray:
-        """As a round bar is: by its normal, and darker towards the edges."""
-        half = towards - unit
-        half /= np.linalg.norm(half, axis=1)[:, None]
-        facing = np.clip(-(hits.normals * unit).sum(1) / np.maximum(hits.across, 1e-9), 0, 1)
-        return surface_shade(
-            light, self.material, hits.normals @ towards, (hits.normals * half).sum(1), facing
+        directions = rays / length[:, None]
+        hits = self.visible.intersect(rays)
+        half = unit(self.towards - directions)
+        facing = -(hits.normals * directions).sum(1) / np.maximum(hits.obliqueness, 1e-9)
+        tone = shade_surface(
+            self.light,
+            self.material,
+            hits.normals @ self.towards,
+            (hits.normals * half).sum(1),
+            np.clip(facing, 0, 1),
         )
+        return np.stack([tone, hits.depth_mm * length])
 
 
-def _filled(values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The same where they are wanted, that of the nearest sample that has one where they are NaN."""
-    known = np.isfinite(values)
-    if known[wanted].all():
+def _fill(values, is_wanted):
+    """Return values (rows, columns), the nearest sample's where one that is wanted is NaN."""
+    is_known = np.isfinite(values)
+    if is_known[is_wanted].all():
         return values
     _, labels = cv2.distanceTransformWithLabels(
-        (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+        (~is_known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     of_label = np.zeros(labels.max() + 1)
-    of_label[labels[known]] = values[known]
-    return np.where(known, values, of_label[labels])
+    of_label[labels[is_known]] = values[is_known]
+    return np.where(is_known, values, of_label[labels])

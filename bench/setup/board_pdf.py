@@ -101,7 +101,7 @@ def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.
         board.legacy,
         board.inverted,
     )
-    printed = made.printed(_INK, board.square_mm / 2 if board.inverted else 0.0).moved(
+    printed = made.to_print(_INK, board.square_mm / 2 if board.inverted else 0.0).shift(
         left_mm, top_mm
     )
     dark, x, y = printed.reflectance < 0.5, printed.x_mm, printed.y_mm

@@ -1,12 +1,13 @@
 """The whisker for a job: θ, α_est, thickness, length, taper and base tilt of the least worst error of (10).
 
-The error of a design at one slope, friction angle and distance is what (10) says of the moments of (13), (14) there,
-with what it leaves out to first order; its sigma is that of the estimators' own formulas, from the noise of one sample
-by the weights with which touch and moments are read. Worst is the largest |bias| + 1.96 sigma over the region.
+The error of a design at one slope, friction angle and distance is that of (10) with the moments of
+(13), (14) there, and with its neglected terms to first order; its sigma is that of the estimators'
+own formulas, from the noise of one sample by the weights with which touch and moments are read. Worst
+is the largest |bias| + 1.96 sigma over the region.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,17 +19,19 @@ from estimator.domain import Numbers
 
 NAMES = ("theta_deg", "alpha_est_deg", "diameter_mm", "length_mm", "taper", "tilt_deg")
 _SLOPES, _ALPHAS, _PLACES = 13, 7, 5  # of the region's grid: the worst may lie between its corners
-_ALONG = np.linspace(
-    0.0, 0.99, 34
-)  # parts of the way to the contact, at which the strain is looked at
-_NONE = 1e6  # %: of a design that is none; more where it is further from being one
+_ALONG = np.linspace(0.0, 0.99, 34)[:, None]  # shares of the way to the contact, of the strain
+_NO_DESIGN = 1e6  # %: of a design that is none; more where it is further from being one
+_SLIP_ROOM = 1.02  # of the largest distance: a whisker slips along, too
 _GENERATIONS, _POPULATION, _TOLERANCE = 120, 12, 1e-4
 
 
 @dataclass(frozen=True)
 class Region:
-    """What the whisker is to feel: ranges (low, high) of slope, friction angle and distance, the bar's radius, and how
-    far it may lean along the whisker, one sigma."""
+    """All that the whisker is to feel: ranges (low, high), and the bar.
+
+    beta_deg: slope. alpha_deg: friction angle. d_x_mm: distance. lean_sigma_deg: one sigma of the
+    bar's lean along the whisker.
+    """
 
     beta_deg: tuple[float, float]
     alpha_deg: tuple[float, float]
@@ -39,23 +42,24 @@ class Region:
     def points(
         self, slopes: int = _SLOPES, alphas: int = _ALPHAS, places: int = _PLACES
     ) -> np.ndarray:
-        """(3, slopes · alphas · places): slopes and friction angles, rad, and distances, over the region."""
-        axes = (
-            np.radians(np.linspace(*self.beta_deg, slopes)),
-            np.radians(np.linspace(*self.alpha_deg, alphas)),
-            np.linspace(*self.d_x_mm, places),
-        )
-        return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
+        """Return a grid over the region, (3, slopes · alphas · places).
+
+        Its rows are slopes, rad, friction angles, rad, and distances, mm.
+        """
+        beta = np.radians(np.linspace(*self.beta_deg, slopes))
+        alpha = np.radians(np.linspace(*self.alpha_deg, alphas))
+        d_x = np.linspace(*self.d_x_mm, places)
+        return np.stack(np.meshgrid(beta, alpha, d_x, indexing="ij")).reshape(3, -1)
 
     def corners(self) -> np.ndarray:
-        """(3, 8): its corners, likewise."""
+        """Return the region's corners, (3, 8): slopes and friction angles, rad, and distances, mm."""
         return self.points(2, 2, 2)
 
 
 @dataclass(frozen=True)
-class Means:
-    """What the bench has: the wire's stuff and the strain it bears, the gauges' noise a sample and full scale, and how
-    it whisks."""
+class Equipment:
+    """The wire's material and the strain it bears, the gauges' noise a sample and full scale, and
+    how the motor whisks."""
 
     youngs_modulus_GPa: float = 60.0
     most_strain: float = 0.005
@@ -67,8 +71,11 @@ class Means:
 
 @dataclass(frozen=True)
 class Design:
-    """One design. taper: share of the diameter at the base that is lost up to the tip; tilt_deg: of the plane of
-    whisking about the whisker, by which every slope is less."""
+    """One design; by default the paper's.
+
+    taper: share of the diameter at the base that is lost up to the tip. tilt_deg: of the plane of
+    whisking about the whisker, by which every slope is less.
+    """
 
     theta_deg: float = 3.0
     alpha_est_deg: float = 10.0
@@ -79,163 +86,200 @@ class Design:
 
     @property
     def theta_rad(self) -> float:
-        """Pushing angle."""
+        """Return the pushing angle."""
         return float(np.radians(self.theta_deg))
 
-    def rigidity_Nmm2(self, means: Means) -> float:
-        """EI at the base."""
-        return float(flexural_rigidity(means.youngs_modulus_GPa, self.diameter_mm))
+    def rigidity_Nmm2(self, equipment: Equipment) -> float:
+        """Return EI at the base."""
+        return float(flexural_rigidity(equipment.youngs_modulus_GPa, self.diameter_mm))
+
+    def thickness(self, arc_mm: Numbers) -> Numbers:
+        """Return the diameter at arcs from the base, over that at the base."""
+        return 1.0 - self.taper * arc_mm / self.length_mm
 
 
 @dataclass(frozen=True)
-class Expected:
-    """Error of (10) over n points, % of d_x: bias and sigma (n,). Both are infinite where it has no distance."""
+class ExpectedError:
+    """Error of (10) over n points, % of d_x: bias and sigma (n,), infinite where it has no distance."""
 
     bias_percent: np.ndarray
     sigma_percent: np.ndarray
 
     @property
     def bound_percent(self) -> np.ndarray:
-        """|bias| + 1.96 sigma (n,)."""
+        """Return |bias| + 1.96 sigma (n,)."""
         return np.abs(self.bias_percent) + uncertainty.Z_95 * self.sigma_percent
 
 
-def expected(design: Design, region: Region, means: Means, points: np.ndarray) -> Expected:
-    """What (10) is to be wrong by at points (3, n) of the region."""
-    (beta, alpha, d_x), theta = points, design.theta_rad
-    slope, left = beta - np.radians(design.tilt_deg), 1.0 - design.taper * d_x / design.length_mm
-    C, alpha_est = 3.0 * design.rigidity_Nmm2(means), float(np.radians(design.alpha_est_deg))
+def expected_error(
+    design: Design, region: Region, equipment: Equipment, points: np.ndarray
+) -> ExpectedError:
+    """Compute the error of (10) that is to be expected at points (3, n) of the region."""
+    beta, alpha, d_x = points
+    theta = design.theta_rad
+    slope = beta - np.radians(design.tilt_deg)
+    thickness = design.thickness(d_x)
+    C = 3.0 * design.rigidity_Nmm2(equipment)
+    alpha_est = float(np.radians(design.alpha_est_deg))
+    noise = stroke_noise(theta, equipment.noise_Nmm, equipment.rate_Hz, equipment.speed_deg_s)
     with np.errstate(all="ignore"):
-        m_y, m_z = slip.moments(d_x / left, theta, slope, alpha, C)
-        felt = theta, m_y, m_z, alpha_est, C
-        found = distance.with_friction(*felt)
-        of_friction = 1.0 / (1.0 / found + design.taper / design.length_mm) / d_x - 1.0
-        noise = (
-            _noise_share(
-                felt, found, stroke_noise(theta, means.noise_Nmm, means.rate_Hz, means.speed_deg_s)
-            )
-            * left
-        )
+        m_y, m_z = slip.moments(d_x / thickness, theta, slope, alpha, C)
+        of_cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
+        gradient = uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C)
+        sigma_mm = _noise_sigma(gradient, theta, np.stack([m_y, m_z], axis=-1), noise)
+        noise_share = sigma_mm / of_cylinder * thickness
+        by_friction = 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm) / d_x - 1.0
         phi = np.arctan2(m_y, m_z)
         lean = first_order.leaning(theta, np.radians(region.lean_sigma_deg), phi, alpha)
-    bias = of_friction + _left_out(design, region, slope, alpha, d_x, left)
-    told = np.isfinite(bias) & np.isfinite(noise)
-    pairs = (100.0 * np.where(told, share, np.inf) for share in (bias, np.hypot(noise, lean)))
-    return Expected(*pairs)
-
-
-def _noise_share(felt: tuple, found: Numbers, noise: StrokeNoise) -> Numbers:
-    """Relative sigma of the base's cylinder's distance (n,), by the noise of the samples."""
-    theta, m_y, m_z, *_ = felt
-    rise = np.stack([m_y, m_z], axis=-1)
-    size = np.linalg.norm(rise, axis=-1)
-    theta_sigma = noise.touch_Nmm * theta / size
-    mixed = noise.shared_Nmm2 * theta / size**2
-    told = {
-        "theta_sigma": np.where(np.isfinite(theta_sigma), theta_sigma, 0.0),
-        "covariance": noise.moment_Nmm**2 * np.eye(2),
-        "theta_moment_covariance": mixed[..., None] * rise,
-    }
-    return uncertainty.sigma(uncertainty.gradient_with_friction(*felt), **told) / found
-
-
-def _left_out(design: Design, region: Region, slope, alpha, d_x, left) -> Numbers:
-    """First order of what (10) leaves out, and the second of soft tips (docs/maps.md), as a share of d_x. The second
-    goes with how far the whisker is bent, θ cos β / cos α where it slips."""
-    theta = design.theta_rad
-    reach = region.bar_radius_mm + 0.5 * design.diameter_mm * left
-    slips = np.maximum(np.abs(slope) - alpha, 0.0)
-    rolled = first_order.rolling_at(theta, reach, slope, d_x, left)
-    ratio = np.tan(np.abs(slope)) / np.maximum(np.tan(alpha), 1e-9)
-    held = np.where(slips > 0, 0.0, np.sqrt(np.maximum(1.0 - ratio**2, 0.0)))
-    bent = theta * np.cos(slope) / np.cos(np.minimum(np.abs(slope), alpha))
-    return rolled + held * first_order.dragging(theta, alpha) + bent**2 / (6 * left)
-
-
-def worst_percent(design: Design, region: Region, means: Means) -> float:
-    """The largest |bias| + 1.96 sigma over the region, %; beyond a million where the design is none (`faults`)."""
-    beyond = sum(faults(design, region, means).values())
-    if beyond > 0:
-        return _NONE * (1.0 + beyond)
-    bound = expected(design, region, means, region.points()).bound_percent
-    return float(np.minimum(bound.max(), _NONE) + 1e-3 * np.minimum(bound, 1e3).mean())
-
-
-def faults(design: Design, region: Region, means: Means) -> dict[str, float]:
-    """By how much, as a share, a design goes beyond what can be: the whisker's reach, its strain, the gauges' range."""
-    d_x, far = (
-        np.array(region.d_x_mm),
-        1.02 * region.d_x_mm[1],
-    )  # 2 %: it slips along the whisker, too
-    if design.length_mm <= far:
-        return {"length": far / design.length_mm - 1.0 + 1e-9}
-    moments = (
-        design.theta_rad
-        * 3.0
-        * design.rigidity_Nmm2(means)
-        * (1.0 / d_x - design.taper / design.length_mm)
+    bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
+    has_distance = np.isfinite(bias) & np.isfinite(noise_share)
+    sigma = np.hypot(noise_share, lean)
+    return ExpectedError(
+        100.0 * np.where(has_distance, bias, np.inf), 100.0 * np.where(has_distance, sigma, np.inf)
     )
-    along = _ALONG[:, None] * d_x
-    bent = moments * (1.0 - _ALONG[:, None]) / (1.0 - design.taper * along / design.length_mm) ** 3
-    strain = 0.5 * design.diameter_mm * bent.max() / design.rigidity_Nmm2(means)
-    most = {
-        "strain": strain / means.most_strain,
-        "gauges' range": moments.max() / means.full_scale_Nmm,
+
+
+def _noise_sigma(gradient, theta, moments: np.ndarray, noise: StrokeNoise) -> Numbers:
+    """Return the sigma (n,) of the distance of the base's cylinder by the noise of the samples, mm.
+
+    gradient: of the distance by θ and moments. moments (n, 2): (m_y, m_z), N·mm.
+    """
+    magnitude = np.linalg.norm(moments, axis=-1)
+    theta_sigma = noise.touch_Nmm * theta / magnitude
+    shared = noise.shared_Nmm2 * theta / magnitude**2
+    return uncertainty.sigma(
+        gradient,
+        theta_sigma=np.where(np.isfinite(theta_sigma), theta_sigma, 0.0),
+        covariance=noise.moment_Nmm**2 * np.eye(2),
+        theta_moment_covariance=shared[..., None] * moments,
+    )
+
+
+def _neglected_bias(design: Design, region: Region, slope, alpha, d_x) -> Numbers:
+    """Return the bias of (10) by its neglected terms (docs/maps.md), as a share of d_x.
+
+    They are of first order in θ: rolling on round surfaces, and friction along a held whisker; and
+    of second order, of soft tips: it goes with the bend of the whisker, θ cos β / cos α where it
+    slips.
+    """
+    theta = design.theta_rad
+    thickness = design.thickness(d_x)
+    steepness = np.abs(slope)
+    reach = region.bar_radius_mm + 0.5 * design.diameter_mm * thickness
+    rolling = first_order.rolling_at(theta, reach, slope, d_x, thickness)
+    used_friction = np.tan(steepness) / np.maximum(np.tan(alpha), 1e-9)
+    left_friction = np.sqrt(np.maximum(1.0 - used_friction**2, 0.0))
+    held = np.where(steepness > alpha, 0.0, left_friction)
+    bend = theta * np.cos(slope) / np.cos(np.minimum(steepness, alpha))
+    return rolling + held * first_order.dragging(theta, alpha) + bend**2 / (6 * thickness)
+
+
+def worst_percent(design: Design, region: Region, equipment: Equipment) -> float:
+    """Return the figure that a search minimises: the largest |bias| + 1.96 sigma over the region, %.
+
+    A thousandth of the mean is added, so that it falls everywhere; it is beyond a million where
+    `faults` finds any.
+    """
+    excess = sum(faults(design, region, equipment).values())
+    if excess > 0:
+        return _NO_DESIGN * (1.0 + excess)
+    bound = expected_error(design, region, equipment, region.points()).bound_percent
+    return float(np.minimum(bound.max(), _NO_DESIGN) + 1e-3 * np.minimum(bound, 1e3).mean())
+
+
+def largest_percent(design: Design, region: Region, equipment: Equipment) -> float:
+    """Return the largest |bias| + 1.96 sigma over the region, %."""
+    return float(expected_error(design, region, equipment, region.points()).bound_percent.max())
+
+
+def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, float]:
+    """Return by how much, as a share, a design exceeds the whisker's reach, its strain or the gauges'
+    range; empty where it exceeds none."""
+    d_x = np.array(region.d_x_mm)
+    reach = _SLIP_ROOM * region.d_x_mm[1]
+    if design.length_mm <= reach:
+        return {"length": reach / design.length_mm - 1.0 + 1e-9}
+    rigidity = design.rigidity_Nmm2(equipment)
+    compliance = 1.0 / d_x - design.taper / design.length_mm  # of the distance, 1/mm
+    moments = design.theta_rad * 3.0 * rigidity * compliance
+    bending = moments * (1.0 - _ALONG) / design.thickness(_ALONG * d_x) ** 3
+    strain = 0.5 * design.diameter_mm * bending.max() / rigidity
+    shares = {
+        "strain": strain / equipment.most_strain,
+        "gauges' range": moments.max() / equipment.full_scale_Nmm,
     }
-    return {name: share - 1.0 for name, share in most.items() if share > 1.0}
+    return {name: share - 1.0 for name, share in shares.items() if share > 1.0}
 
 
 def best_design(
-    ranges: Mapping[str, tuple[float, float]], region: Region, means: Means, seed: int = 0
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int = 0
 ) -> tuple[Design, float]:
-    """(design, its worst error in %) within ranges (low, high) of each of NAMES, by differential evolution (Storn &
-    Price, Journal of Global Optimization 11, 1997). Raises BadInput where no design within them is one."""
+    """Find the design of least worst error within ranges (low, high) of each of NAMES.
+
+    Returns it and that error in %. By differential evolution (Storn & Price, Journal of Global
+    Optimization 11, 1997), then Nelder and Mead's simplex. Raises BadInput where no design within
+    the ranges is one.
+    """
     from scipy.optimize import Bounds, differential_evolution, minimize
 
+    design = Design(**{name: low for name, (low, _) in ranges.items()})
     free = [name for name in NAMES if ranges[name][0] < ranges[name][1]]
-    held = Design(**{name: ranges[name][0] for name in NAMES})
+    if free:
 
-    def worst(values) -> float:
-        return worst_percent(replace(held, **dict(zip(free, map(float, values)))), region, means)
+        def worst(values: np.ndarray) -> float:
+            return worst_percent(_with_values(design, free, values), region, equipment)
 
-    if not free:
-        return _told(held, worst([]), region, means)
-    low, high = np.array([ranges[name] for name in free]).T
-    how = {"maxiter": _GENERATIONS, "popsize": _POPULATION, "tol": _TOLERANCE, "polish": False}
-    found = differential_evolution(worst, Bounds(low, high), rng=np.random.default_rng(seed), **how)
-    near = minimize(worst, found.x, method="Nelder-Mead", bounds=Bounds(low, high))
-    values = near.x if near.fun < found.fun else found.x
-    return _told(
-        replace(held, **dict(zip(free, values.tolist()))), min(near.fun, found.fun), region, means
-    )
-
-
-def _told(design: Design, worst: float, region: Region, means: Means) -> tuple[Design, float]:
-    if worst >= _NONE:
-        beyond = faults(design, region, means)
-        why = ", ".join(f"{name} by {100 * share:.0f} %" for name, share in beyond.items())
-        raise BadInput(
-            f"no design within the ranges serves the whole region: {why} too much"
-            if beyond
-            else "no design within the ranges serves the whole region: (10) has no distance where φ + α_est reaches 90°"
+        bounds = Bounds(*np.array([ranges[name] for name in free]).T)
+        found = differential_evolution(
+            worst,
+            bounds,
+            rng=np.random.default_rng(seed),
+            maxiter=_GENERATIONS,
+            popsize=_POPULATION,
+            tol=_TOLERANCE,
+            polish=False,
         )
-    return design, float(expected(design, region, means, region.points()).bound_percent.max())
+        refined = minimize(worst, found.x, method="Nelder-Mead", bounds=bounds)
+        best = refined if refined.fun < found.fun else found
+        design = _with_values(design, free, best.x)
+    _require_design(design, region, equipment)
+    return design, largest_percent(design, region, equipment)
 
 
-def worth_of_each(
-    ranges: Mapping[str, tuple[float, float]], region: Region, means: Means, seed: int = 0
+def _with_values(design: Design, names: Sequence[str], values: np.ndarray) -> Design:
+    """Return a design with other values of the named choices."""
+    return replace(design, **dict(zip(names, map(float, values))))
+
+
+def _require_design(design: Design, region: Region, equipment: Equipment) -> None:
+    """Raise BadInput where the best design of some ranges does not serve the region."""
+    if worst_percent(design, region, equipment) < _NO_DESIGN:
+        return
+    excesses = []
+    for name, share in faults(design, region, equipment).items():
+        excesses.append(f"{name} by {100 * share:.0f} %")
+    if excesses:
+        why = f"{', '.join(excesses)} too much"
+    else:
+        why = "(10) has no distance where φ + α_est reaches 90°"
+    raise BadInput(f"no design within the ranges serves the whole region: {why}")
+
+
+def costs_of_paper_values(
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int = 0
 ) -> dict[str, float]:
-    """By name of what was free, the worst error of the best design with the paper's value of it, %; infinite where
-    there is none."""
-    paper = {f.name: f.default for f in fields(Design)}
-    found = {}
+    """Return the worst error of the best design with the paper's value of each free choice, %.
+
+    It is infinite where there is no such design.
+    """
+    costs = {}
     for name in NAMES:
         low, high = ranges[name]
-        if low < high:
-            try:
-                found[name] = best_design(
-                    {**ranges, name: (paper[name], paper[name])}, region, means, seed
-                )[1]
-            except BadInput:
-                found[name] = np.inf
-    return found
+        if low == high:
+            continue
+        value = getattr(Design(), name)
+        try:
+            _, costs[name] = best_design(ranges | {name: (value, value)}, region, equipment, seed)
+        except BadInput:
+            costs[name] = np.inf
+    return costs

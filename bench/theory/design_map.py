@@ -1,4 +1,5 @@
-"""`whisker-bench design`: the best design over a region, its corners by the rig, what each choice is worth; written."""
+"""`whisker-bench design`: the best design over a region, its corners by the rig, and how much each choice
+improves it; written."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,23 +12,22 @@ from matplotlib.figure import Figure
 from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
 from bench.base.tables import Column, Table
-from bench.rig.bar import Bar, first_touch
 from bench.rig.elastic_rod import Rod
-from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
 from bench.theory.design import (
     Design,
-    Expected,
-    Means,
+    Equipment,
+    ExpectedError,
     Region,
     best_design,
-    expected,
+    costs_of_paper_values,
+    expected_error,
     faults,
-    worth_of_each,
+    largest_percent,
 )
+from bench.theory.model_error import Push, feel
 from estimator.beam import Beam
 from estimator.builtin import with_friction
-from estimator.whisk import EstimatorSettings, Whisk
+from estimator.whisk import EstimatorSettings
 
 DESIGN = Table(
     "design",
@@ -43,12 +43,9 @@ DESIGN = Table(
         Column("exact_percent", "its error by exact mechanics; of the corners alone"),
     ),
 )
-_STEPS = 6  # of the march from touch, as in bench.theory.model_error
 _THINNEST = 1e-3  # share of the base's diameter: a tip that is thinner is a cone's
-_MAP, _MAP_ALPHAS = (
-    (61, 41),
-    7,
-)  # slopes and distances of the figure; friction angles of which the worst is shown
+_SLOPES, _ALPHAS, _PLACES = 61, 7, 41  # of the figure's grid; it shows the worst over α
+_SHOWN_PERCENT = 100.0  # of the figure's colours: the largest
 _UNITS = {
     "theta_deg": "θ = {:.2f}°",
     "alpha_est_deg": "α_est = {:.1f}°",
@@ -60,168 +57,164 @@ _UNITS = {
 
 
 @dataclass(frozen=True)
-class Designed:
-    """The best design with its worst error, %; exact_percent (8,): what exact mechanics make of (10) at the region's
-    corners, NaN where the whisker finds no hold; worth: see `worth_of_each`. paper_percent: of the paper's whisker."""
+class DesignReport:
+    """The best design with its worst error, %.
+
+    exact_percent (8,): error of (10) by exact mechanics at the region's corners, NaN where the
+    whisker finds no hold. costs_percent: of `costs_of_paper_values`. paper_percent: worst error of
+    the paper's whisker and settings, infinite where they do not serve the region.
+    """
 
     design: Design
     worst_percent: float
     region: Region
-    means: Means
+    equipment: Equipment
     exact_percent: np.ndarray
-    worth: Mapping[str, float]
+    costs_percent: Mapping[str, float]
     paper_percent: float
 
-
-def designed(
-    ranges: Mapping[str, tuple[float, float]], region: Region, means: Means, seed: int = 0
-) -> Designed:
-    """Raises BadInput where no design within the ranges serves the region."""
-    best = best_design(ranges, region, means, seed)
-    exact = np.array(
-        [exact_percent(best[0], region, means, corner) for corner in region.corners().T]
-    )
-    return Designed(
-        *best,
-        region,
-        means,
-        exact,
-        worth_of_each(ranges, region, means, seed),
-        of_paper(region, means),
-    )
+    def expected_at(self, points: np.ndarray) -> ExpectedError:
+        """Return the error that is to be expected of the design at points (3, n)."""
+        return expected_error(self.design, self.region, self.equipment, points)
 
 
-def of_paper(region: Region, means: Means) -> float:
-    """Worst error of the paper's whisker and settings, %; infinite where they do not serve the region."""
-    if faults(Design(), region, means):
-        return math.inf
-    return float(expected(Design(), region, means, region.points()).bound_percent.max())
+def find_design(
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int = 0
+) -> DesignReport:
+    """Find the best design within ranges (low, high) of each choice.
+
+    Raises BadInput where no design within the ranges serves the region.
+    """
+    design, worst = best_design(ranges, region, equipment, seed)
+    corners = region.corners().T
+    exact = [exact_percent(design, region, equipment, corner) for corner in corners]
+    costs = costs_of_paper_values(ranges, region, equipment, seed)
+    paper = Design()
+    is_paper_sound = not faults(paper, region, equipment)
+    paper_percent = largest_percent(paper, region, equipment) if is_paper_sound else math.inf
+    return DesignReport(design, worst, region, equipment, np.array(exact), costs, paper_percent)
 
 
-def exact_percent(design: Design, region: Region, means: Means, point: Sequence[float]) -> float:
-    """Error of (10) without noise at one slope, friction angle (rad) and distance, by the rig's exact mechanics, % of
-    d_x; NaN where the whisker finds no hold or (10) has no distance."""
-    (beta, alpha, d_x), theta = map(float, point), design.theta_rad
-    rod, beam = rod_and_beam(design, means)
-    bar = Bar.placed(
-        d_x_mm=d_x,
-        beta_rad=beta - math.radians(design.tilt_deg),
-        psi_rad=0.0,
-        touch_rad=0.0,
-        radius_mm=region.bar_radius_mm,
-        whisker_radius_mm=float(rod.radius_mm(d_x)),
+def exact_percent(
+    design: Design, region: Region, equipment: Equipment, point: Sequence[float]
+) -> float:
+    """Return the error of (10) without noise at one place by the rig's exact mechanics, % of d_x.
+
+    point: slope and friction angle, rad, and distance, mm. NaN where the whisker finds no hold or
+    (10) has no distance.
+    """
+    beta, alpha, d_x = point
+    push = Push(
+        beta_deg=math.degrees(beta) - design.tilt_deg,
+        alpha_deg=math.degrees(alpha),
+        d_x_mm=float(d_x),
+        bar_radius_mm=region.bar_radius_mm,
+        theta_deg=design.theta_deg,
     )
     try:
-        touch = first_touch(rod, bar, 0.0, d_x)
-        march = March(rod, bar, Friction(math.tan(alpha), math.tan(alpha)), touch)
-        *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
+        whisk, true_mm = feel(push, *rod_and_beam(design, equipment))
     except ArithmeticError:
         return math.nan
-    if state is None:
-        return math.nan
-    felt = Whisk(*(np.zeros(0),) * 4, theta, *moments_Nmm(state), np.zeros((2, 2)), 0.0, beam)
-    estimate = with_friction(felt, EstimatorSettings(math.radians(design.alpha_est_deg)))
-    return 100.0 * (estimate.d_x_mm / touch.d_x_mm - 1.0)
+    estimate = with_friction(whisk, EstimatorSettings(math.radians(design.alpha_est_deg)))
+    return 100.0 * (estimate.d_x_mm / true_mm - 1.0)
 
 
-def rod_and_beam(design: Design, means: Means) -> tuple[Rod, Beam]:
-    """The whisker of a design as the rig and as the estimators have it."""
-    size = design.length_mm, design.diameter_mm
-    share = 1.0 - design.taper
-    if share in (0.0, 1.0) or share < _THINNEST:
-        shape = "cylinder" if share == 1.0 else "cone"
-        beam = Beam.from_rigidity(design.rigidity_Nmm2(means), size[0], shape)
-        return Rod(shape, *size, means.youngs_modulus_GPa), beam
-    rod = Rod(
-        "tapered", *size, means.youngs_modulus_GPa, tip_diameter_mm=share * design.diameter_mm
-    )
-    return rod, Beam.from_rigidity(design.rigidity_Nmm2(means), size[0], "tapered", share)
+def rod_and_beam(design: Design, equipment: Equipment) -> tuple[Rod, Beam]:
+    """Return the whisker of a design as the rig and as the estimators have it."""
+    length = design.length_mm
+    modulus = equipment.youngs_modulus_GPa
+    rigidity = design.rigidity_Nmm2(equipment)
+    tip_share = 1.0 - design.taper
+    if _THINNEST <= tip_share < 1.0:
+        tip = tip_share * design.diameter_mm
+        rod = Rod("tapered", length, design.diameter_mm, modulus, tip_diameter_mm=tip)
+        return rod, Beam.from_rigidity(rigidity, length, "tapered", tip_share)
+    shape = "cylinder" if tip_share == 1.0 else "cone"
+    rod = Rod(shape, length, design.diameter_mm, modulus)
+    return rod, Beam.from_rigidity(rigidity, length, shape)
 
 
-def design_lines(made: Designed) -> Iterator[str]:
-    """The design, its worst error, what each choice is worth, and how the rig agrees."""
-    design, region = made.design, made.region
-    said = ", ".join(text.format(getattr(design, name)) for name, text in _UNITS.items())
-    yield f"{said} (EI {design.rigidity_Nmm2(made.means):.0f} N·mm² at the base)"
-    where = ", ".join(
-        f"{name} {low:g} to {high:g}{unit}"
-        for name, (low, high), unit in (
-            ("β", region.beta_deg, "°"),
-            ("α", region.alpha_deg, "°"),
-            ("d_x", region.d_x_mm, " mm"),
-        )
-    )
-    yield f"worst error of (10) over {where}: {made.worst_percent:.2f} % of d_x (|bias| + 1.96 sigma)"
-    yield f"the paper's whisker, θ = 3°, α_est = 10°: {_percent(made.paper_percent)}"
-    for name, worst in sorted(made.worth.items(), key=lambda item: -item[1]):
-        yield f"  all else as good as can be, but {_UNITS[name].format(getattr(Design(), name))}: {_percent(worst)}"
-    off = made.exact_percent - _at_corners(made).bias_percent
-    known = np.isfinite(off)
-    if known.any():
-        within = f"{np.abs(off[known]).max():.2f} % of d_x"
+def report_lines(report: DesignReport) -> Iterator[str]:
+    """Yield the design, its worst error, the cost of each choice, and how the rig agrees."""
+    design = report.design
+    region = report.region
+    choices = ", ".join(_with_unit(design, name) for name in _UNITS)
+    yield f"{choices} (EI {design.rigidity_Nmm2(report.equipment):.0f} N·mm² at the base)"
+    beta = "β {:g} to {:g}°".format(*region.beta_deg)
+    alpha = "α {:g} to {:g}°".format(*region.alpha_deg)
+    d_x = "d_x {:g} to {:g} mm".format(*region.d_x_mm)
+    worst = f"{report.worst_percent:.2f} % of d_x (|bias| + 1.96 sigma)"
+    yield f"worst error of (10) over {beta}, {alpha}, {d_x}: {worst}"
+    yield f"the paper's whisker, θ = 3°, α_est = 10°: {_percent(report.paper_percent)}"
+    for name, cost in sorted(report.costs_percent.items(), key=lambda item: -item[1]):
+        choice = _with_unit(Design(), name)
+        yield f"  all else as good as can be, but {choice}: {_percent(cost)}"
+    difference = report.exact_percent - report.expected_at(region.corners()).bias_percent
+    is_known = np.isfinite(difference)
+    if is_known.any():
+        within = f"{np.abs(difference[is_known]).max():.2f} % of d_x"
         yield f"exact mechanics at the region's corners: the bias is as expected within {within}"
-    if not known.all():
-        yield f"at {np.count_nonzero(~known)} of 8 corners the whisker finds no hold, or (10) no distance"
+    unknown = np.count_nonzero(~is_known)
+    if unknown:
+        yield f"at {unknown} of 8 corners the whisker finds no hold, or (10) no distance"
+
+
+def _with_unit(design: Design, name: str) -> str:
+    """Return a choice of a design as text."""
+    return _UNITS[name].format(getattr(design, name))
 
 
 def _percent(worst: float) -> str:
+    """Return a worst error as text."""
     return f"{worst:.2f} %" if math.isfinite(worst) else "does not serve the region"
 
 
-def _at_corners(made: Designed) -> Expected:
-    return expected(made.design, made.region, made.means, made.region.corners())
-
-
-def write_design(out: Path, made: Designed) -> list[Path]:
-    """design.txt, design.csv, design.png and .svg in a folder, each whole; their paths."""
+def write_design(out: Path, report: DesignReport) -> list[Path]:
+    """Write design.txt, design.csv, design.png and .svg into a folder, each whole; return their
+    paths."""
+    region = report.region
+    points = region.points()
+    unknown = np.full(points.shape[1], np.nan)
     with lock_output(out):
-        write_whole(out / "design.txt", "\n".join(design_lines(made)) + "\n")
-        DESIGN.write(out, _rows(made))
+        write_whole(out / "design.txt", "\n".join(report_lines(report)) + "\n")
+        corners = _rows(report, region.corners(), report.exact_percent)
+        DESIGN.write(out, [*corners, *_rows(report, points, unknown)])
         with style():
-            figures = publish(draw(made), out / "design")
+            figures = publish(draw(report), out / "design")
     return [out / "design.txt", out / DESIGN.file, *figures]
 
 
-def _rows(made: Designed) -> Iterator[dict]:
-    """The corners, with what the rig says, then the region's grid."""
-    yield from _of_points(made, made.region.corners(), made.exact_percent)
-    points = made.region.points()
-    yield from _of_points(made, points, np.full(points.shape[1], np.nan))
+def _rows(report: DesignReport, points: np.ndarray, exact_percent: np.ndarray) -> Iterator[dict]:
+    """Yield a row of DESIGN for each of points (3, n)."""
+    error = report.expected_at(points)
+    angles_deg = np.degrees(points[:2])
+    errors = error.bias_percent, error.sigma_percent, error.bound_percent, exact_percent
+    for row in np.stack([*angles_deg, points[2], *errors], axis=1).tolist():
+        yield dict(zip(DESIGN.names, row))
 
 
-def _of_points(made: Designed, points: np.ndarray, exact: np.ndarray) -> Iterator[dict]:
-    found = expected(made.design, made.region, made.means, points)
-    columns = np.degrees(points[0]), np.degrees(points[1]), points[2]
-    errors = found.bias_percent, found.sigma_percent, found.bound_percent, exact
-    for row in zip(*columns, *errors):
-        yield dict(zip(DESIGN.names, map(float, row)))
-
-
-def draw(made: Designed) -> Figure:
-    """The worst over α at each slope and distance: this design, and the paper's whisker."""
+def draw(report: DesignReport) -> Figure:
+    """Draw the worst error over α at each slope and distance: of this design, and of the paper's
+    whisker."""
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    beta, d_x = (
-        np.linspace(*ends, n) for ends, n in zip((made.region.beta_deg, made.region.d_x_mm), _MAP)
-    )
-    for panel, design, title in zip(
-        panels, (made.design, Design()), ("this design", "the paper's whisker")
-    ):
-        bound = _worst_over_alpha(design, made)
-        shown = panel.pcolormesh(
-            beta, d_x, np.minimum(bound, 100.0), cmap="viridis", shading="nearest", rasterized=True
+    region = report.region
+    beta_deg = np.linspace(*region.beta_deg, _SLOPES)
+    d_x_mm = np.linspace(*region.d_x_mm, _PLACES)
+    points = region.points(_SLOPES, _ALPHAS, _PLACES)
+    designs = {"this design": report.design, "the paper's whisker": Design()}
+    for panel, (title, design) in zip(panels, designs.items()):
+        error = expected_error(design, region, report.equipment, points)
+        bound = error.bound_percent.reshape(_SLOPES, _ALPHAS, _PLACES).max(axis=1).T
+        mesh = panel.pcolormesh(
+            beta_deg,
+            d_x_mm,
+            np.minimum(bound, _SHOWN_PERCENT),
+            cmap="viridis",
+            shading="nearest",
+            rasterized=True,
         )
-        figure.colorbar(shown, ax=panel, label="|bias| + 1.96 σ, % of d$_x$")
+        figure.colorbar(mesh, ax=panel, label="|bias| + 1.96 σ, % of d$_x$")
         panel.set(xlabel="slope β, °", title=title)
     panels[0].set_ylabel("d$_x$, mm")
     return figure
-
-
-def _worst_over_alpha(design: Design, made: Designed) -> np.ndarray:
-    """(distances, slopes), %."""
-    slopes, places = _MAP
-    points = made.region.points(slopes, _MAP_ALPHAS, places)
-    bound = expected(design, made.region, made.means, points).bound_percent.reshape(
-        slopes, _MAP_ALPHAS, places
-    )
-    return bound.max(axis=1).T

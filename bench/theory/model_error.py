@@ -1,10 +1,12 @@
-"""How wrong (10) is where its assumptions fail: by the rig's exact mechanics over β × ψ and over d_x × bar radius.
+"""The error of (10) where its assumptions fail: by the rig's exact mechanics over β × ψ and over
+d_x × bar radius.
 
-(10) gets what a perfect robot would have: exact moments, the exact pushing angle and the true friction angle. What is
-left is the small-angle model itself, and slip along the whisker, which the paper assumes away (sections II and VII).
+(10) gets what a perfect robot would have: exact moments, the exact pushing angle and the true
+friction angle. What remains is the error of the small-angle model itself, and of slip along the
+whisker, which the paper assumes away (sections II and VII).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +24,8 @@ from estimator.whisk import EstimatorSettings, Whisk
 ROD = Rod("cylinder", length_mm=120.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 _BEAM = Beam(3.0 * ROD.rigidity_Nmm2, ROD.length_mm)
 _NOISE_NMM = 0.01  # of m_y, by which a robot tells whether the contact slips sideways; a 250th of its moments here
-_NO_HOLD = (float("nan"), float("nan"))
-BETA_DEG, PSI_DEG = np.arange(0.0, 80.1, 2.5), np.arange(-60.0, 61.0, 10.0)
+BETA_DEG = np.arange(0.0, 80.1, 2.5)
+PSI_DEG = np.arange(-60.0, 61.0, 10.0)
 D_X_MM = np.arange(15.0, 101.0, 5.0)
 BAR_RADIUS_MM = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 15.0, 20.0, 25.0, 30.0])
 _STEPS = 6  # of the march from touch; 30 change no error by more than 0.002 % of d_x
@@ -43,9 +45,11 @@ class Push:
 
 @dataclass(frozen=True)
 class Panel:
-    """A map of errors [% of d_x], (rows, columns), over values of two fields of Push; NaN where there is no contact.
+    """A map of errors, % of d_x, (rows, columns), over values of two fields of Push.
 
-    predicted_percent: the same cells to first order, NaN where that is not known; corrected_percent: of (10) corrected.
+    x, y: names of the fields. error_percent: of (10); NaN where there is no contact.
+    predicted_percent: of (10) to first order; NaN where that is not known. corrected_percent: of
+    (10) corrected.
     """
 
     title: str
@@ -57,73 +61,83 @@ class Panel:
     corrected_percent: np.ndarray
 
 
-def error_percent(push: Push) -> float:
-    """Error of (10) with the true α, in percent of the true d_x; NaN where the whisker finds no hold on the bar."""
-    return errors_percent(push)[0]
+def feel(push: Push, rod: Rod = ROD, beam: Beam = _BEAM) -> tuple[Whisk, float]:
+    """Return a whisk with the exact moments of a push at its end, and the true d_x in mm.
 
-
-def errors_percent(push: Push) -> tuple[float, float]:
-    """The error of (10), and that of (10) corrected, which is told the bar's radius; as `error_percent`."""
-    theta, alpha = np.radians([push.theta_deg, push.alpha_deg])
+    Raises ArithmeticError where the whisker finds no hold on the bar.
+    """
     bar = Bar.placed(
         d_x_mm=push.d_x_mm,
         beta_rad=np.radians(push.beta_deg),
         psi_rad=np.radians(push.psi_deg),
         touch_rad=0.0,
         radius_mm=push.bar_radius_mm,
+        whisker_radius_mm=float(rod.radius_mm(push.d_x_mm)),
+    )
+    theta = np.radians(push.theta_deg)
+    friction = np.tan(np.radians(push.alpha_deg))
+    touch = first_touch(rod, bar, 0.0, push.d_x_mm)
+    march = March(rod, bar, Friction(friction, friction), touch)
+    _, states = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)
+    if states[-1] is None:
+        raise ArithmeticError("the whisker slips off the bar")
+    m_y, m_z = moments_Nmm(states[-1])
+    covariance = _NOISE_NMM**2 * np.eye(2)
+    none = np.zeros(0)
+    whisk = Whisk(none, none, none, none, theta, m_y, m_z, covariance, 0.0, beam)
+    return whisk, touch.d_x_mm
+
+
+def errors_percent(push: Push) -> tuple[float, float]:
+    """Return the errors of (10) and of (10) corrected with the true α, in percent of the true d_x.
+
+    (10) corrected is given the bar's radius. NaN where the whisker finds no hold on the bar.
+    """
+    try:
+        whisk, d_x = feel(push)
+    except ArithmeticError:
+        return np.nan, np.nan
+    settings = EstimatorSettings(
+        np.radians(push.alpha_deg),
+        object_radius_mm=push.bar_radius_mm,
         whisker_radius_mm=ROD.diameter_mm / 2,
     )
-    try:
-        touch = first_touch(ROD, bar, 0.0, push.d_x_mm)
-        march = March(ROD, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
-        *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
-    except ArithmeticError:
-        return _NO_HOLD
-    if state is None:
-        return _NO_HOLD
-    felt = Whisk(
-        *(np.zeros(0),) * 4, theta, *moments_Nmm(state), _NOISE_NMM**2 * np.eye(2), 0.0, _BEAM
-    )
-    settings = EstimatorSettings(
-        alpha, object_radius_mm=push.bar_radius_mm, whisker_radius_mm=ROD.diameter_mm / 2
-    )
-    return tuple(
-        100.0 * (f(felt, settings).d_x_mm / touch.d_x_mm - 1.0) for f in (with_friction, corrected)
-    )
+    plain = with_friction(whisk, settings).d_x_mm
+    better = corrected(whisk, settings).d_x_mm
+    return 100.0 * (plain / d_x - 1.0), 100.0 * (better / d_x - 1.0)
 
 
 def predicted_percent(push: Push) -> float:
-    """The error to first order in θ, derived in docs/maps.md.
+    """Return the error of (10) to first order in θ, derived in docs/maps.md.
 
-    Slipping sideways (β ≥ α): 100 θ (½ tan ψ sin φ / cos α − ⅜ (R/d_x) cos β / cos² ψ), with φ = β − α and R the radii
-    of bar and whisker together. Held at β = ψ = 0: 100 θ (−⅕ tan α − ⅜ R/d_x). NaN where it is held otherwise: there it
-    hangs on how friction is shared between the two directions.
+    Slipping sideways (β ≥ α): 100 θ (½ tan ψ sin φ / cos α − ⅜ (R/d_x) cos β / cos² ψ), with
+    φ = β − α and R the radii of bar and whisker together. Held at β = ψ = 0: 100 θ (−⅕ tan α −
+    ⅜ R/d_x). NaN where it is held otherwise: there it depends on how friction is shared between the
+    two directions.
     """
-    theta, alpha, beta, psi = np.radians(
-        [push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg]
-    )
+    angles_deg = [push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg]
+    theta, alpha, beta, psi = np.radians(angles_deg)
     if beta >= alpha:
         by_friction = 0.5 * np.tan(psi) * np.sin(beta - alpha) / np.cos(alpha)
     else:
         by_friction = -0.2 * np.tan(alpha) if beta == psi == 0 else np.nan
     reach = (push.bar_radius_mm + ROD.diameter_mm / 2) / push.d_x_mm
-    return float(100.0 * theta * (by_friction - 0.375 * reach * np.cos(beta) / np.cos(psi) ** 2))
+    by_rolling = 0.375 * reach * np.cos(beta) / np.cos(psi) ** 2
+    return float(100.0 * theta * (by_friction - by_rolling))
 
 
 def tilt_map(
     pool: Workers, *, beta_deg: Sequence[float] = BETA_DEG, psi_deg: Sequence[float] = PSI_DEG
 ) -> list[Panel]:
-    """β × ψ at d_x = 60 mm on a bar of 6 mm: without friction, on the paper's steel and on its sandpaper."""
-    return [
-        _panel(
-            pool,
-            f"α = {alpha:g}°",
-            Push(alpha_deg=alpha),
-            ("beta_deg", beta_deg),
-            ("psi_deg", psi_deg),
-        )
-        for alpha in (0.0, 10.5, 23.3)
-    ]
+    """Compute the errors over β × ψ at d_x = 60 mm on a bar of 6 mm.
+
+    A panel each without friction, on the paper's steel and on its sandpaper.
+    """
+    axes = {"beta_deg": beta_deg, "psi_deg": psi_deg}
+    panels = []
+    for alpha in (0.0, 10.5, 23.3):
+        panels.append(_panel(pool, f"α = {alpha:g}°", Push(alpha_deg=alpha), axes))
+    return panels
 
 
 def radius_map(
@@ -132,26 +146,31 @@ def radius_map(
     d_x_mm: Sequence[float] = D_X_MM,
     bar_radius_mm: Sequence[float] = BAR_RADIUS_MM,
 ) -> list[Panel]:
-    """d_x × bar radius at ψ = 0: slip along the whisker alone, with friction, and with slip sideways."""
-    return [
-        _panel(
-            pool,
-            f"β = {beta:g}°, α = {alpha:g}°",
-            Push(beta_deg=beta, alpha_deg=alpha),
-            ("d_x_mm", d_x_mm),
-            ("bar_radius_mm", bar_radius_mm),
+    """Compute the errors over d_x × bar radius at ψ = 0.
+
+    A panel each of slip along the whisker alone, with friction, and with slip sideways.
+    """
+    axes = {"d_x_mm": d_x_mm, "bar_radius_mm": bar_radius_mm}
+    panels = []
+    for beta, alpha in ((0.0, 0.0), (0.0, 23.3), (60.0, 10.5)):
+        push = Push(beta_deg=beta, alpha_deg=alpha)
+        panels.append(_panel(pool, f"β = {beta:g}°, α = {alpha:g}°", push, axes))
+    return panels
+
+
+def _panel(pool: Workers, title: str, push: Push, axes: Mapping[str, Sequence[float]]) -> Panel:
+    """Compute one panel: a push with the values of two fields, of columns and of rows."""
+    x, y = axes
+    pushes = []
+    for row in axes[y]:
+        pushes.append(
+            tuple(replace(push, **{x: float(column), y: float(row)}) for column in axes[x])
         )
-        for beta, alpha in ((0.0, 0.0), (0.0, 23.3), (60.0, 10.5))
-    ]
+    errors = np.array(pool.run(_row_errors, pushes, title))  # (rows, columns, 2)
+    predicted = np.array([[predicted_percent(one) for one in row] for row in pushes])
+    return Panel(title, x, y, tuple(pushes), errors[..., 0], predicted, errors[..., 1])
 
 
-def _panel(pool: Workers, title: str, push: Push, columns, rows) -> Panel:
-    (x, across), (y, up) = columns, rows
-    pushes = tuple(tuple(replace(push, **{x: float(a), y: float(b)}) for a in across) for b in up)
-    plain, better = np.moveaxis(np.array(pool.run(_row, pushes, title)), -1, 0)
-    predicted = [[predicted_percent(push) for push in row] for row in pushes]
-    return Panel(title, x, y, pushes, plain, np.array(predicted), better)
-
-
-def _row(pushes) -> list[tuple[float, float]]:
+def _row_errors(pushes) -> list[tuple[float, float]]:
+    """Compute the errors of a row of pushes, in a worker."""
     return [errors_percent(push) for push in pushes]

@@ -28,7 +28,6 @@ ERROR_BY = Table(
     ),
 )
 _LEVELS = np.array([-5.0, -2.0, -1.0, -0.5, -0.2, -0.1, 0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
-_LINES = {"levels": _LEVELS, "linewidths": 0.8}
 _LABEL_ROOM = 0.03  # of a panel's sides: a line's number nearer to an edge would be cut off
 _NAMES = {
     "beta_deg": "slope β  [°]",
@@ -40,7 +39,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Map:
-    """One of the maps: how it is computed, and the line above it."""
+    """One of the maps: the function that computes it, and the line above it."""
 
     compute: Callable[[Workers], list[Panel]]
     title: str
@@ -53,79 +52,87 @@ MAPS = {
 
 
 def write_map(name: str, out: Path, *, workers: int = 1, progress: bool = False) -> list[Path]:
-    """Compute and write error_by_<name>.png, .svg and .csv, each whole; the paths. Raises KeyError for another name."""
+    """Compute a map and write error_by_<name>.png, .svg and .csv, each whole; return their paths.
+
+    Raises KeyError for a name that no map has.
+    """
     chosen = MAPS[name]
     with Workers(workers, progress) as pool:
         panels = chosen.compute(pool)
     stem = Path(out) / f"error_by_{name}"
     with style():
         paths = publish(draw(panels, chosen.title), stem)
-    ERROR_BY.write_file(stem.with_suffix(".csv"), rows(panels))
-    return [*paths, stem.with_suffix(".csv")]
+    table = stem.with_suffix(".csv")
+    ERROR_BY.write_file(table, rows(panels))
+    return [*paths, table]
 
 
 def rows(panels: Sequence[Panel]) -> Iterator[dict]:
     """Yield a row of ERROR_BY a cell; errors that are not known are NaN."""
     for panel in panels:
-        errors_percent = panel.error_percent, panel.predicted_percent, panel.corrected_percent
-        for pushes, *errors in zip(panel.pushes, *errors_percent):
-            for push, *each in zip(pushes, *errors):
-                yield asdict(push) | dict(zip(_ERRORS, map(float, each)))
+        errors = np.stack([getattr(panel, name) for name in _ERRORS], axis=-1).tolist()
+        for pushes, row in zip(panel.pushes, errors):
+            for push, cell in zip(pushes, row):
+                yield asdict(push) | dict(zip(_ERRORS, cell))
 
 
 def draw(panels: Sequence[Panel], title: str) -> Figure:
-    """A column a panel, (10) above, corrected below: exact errors in colour and solid lines, first order dashed."""
+    """Draw a column a panel: (10) above, corrected below.
+
+    Exact errors are in colour and solid lines, those to first order dashed.
+    """
     figure = Figure(figsize=(3.9 * len(panels) + 0.6, 7.2), layout="constrained")
     grid = figure.subplots(2, len(panels), sharex=True, sharey=True, squeeze=False)
     for (above, below), panel in zip(grid.T, panels):
-        drawn = _errors(above, panel, panel.error_percent)
-        _errors(below, panel, panel.corrected_percent)
+        colours = _draw_errors(above, panel, panel.error_percent)
+        _draw_errors(below, panel, panel.corrected_percent)
         if np.isfinite(panel.predicted_percent).any():
-            above.contour(
-                *_axes(panel), panel.predicted_percent, **_LINES, colors="0.35", linestyles="--"
-            )
+            _draw_lines(above, panel, panel.predicted_percent, "0.35", "--")
         above.set_title(panel.title)
         below.set_xlabel(_NAMES[panel.x])
-    for axes, name in zip(grid[:, 0], ("(10)", "(10) corrected")):
-        axes.set_ylabel(f"{name}\n{_NAMES[panels[0].y]}")
-    lines = [Line2D([], [], color=c, ls=ls, lw=0.8) for c, ls in (("black", "-"), ("0.35", "--"))]
-    figure.legend(
-        lines, ["exact mechanics", "to first order in θ"], loc="outside lower center", ncols=2
-    )
+    y_name = _NAMES[panels[0].y]
+    grid[0, 0].set_ylabel(f"(10)\n{y_name}")
+    grid[1, 0].set_ylabel(f"(10) corrected\n{y_name}")
+    exact = Line2D([], [], color="black", ls="-", lw=0.8)
+    predicted = Line2D([], [], color="0.35", ls="--", lw=0.8)
+    names = ["exact mechanics", "to first order in θ"]
+    figure.legend([exact, predicted], names, loc="outside lower center", ncols=2)
     figure.suptitle(title, fontsize=9)
-    figure.colorbar(drawn, ax=grid, label="error of d$_x$  [%]", ticks=_LEVELS)
+    figure.colorbar(colours, ax=grid, label="error of d$_x$  [%]", ticks=_LEVELS)
     return figure
 
 
-def _errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:
-    """Errors in colour, and their lines with numbers."""
+def _draw_errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:
+    """Draw errors in colour and as lines with numbers; return the coloured areas."""
+    from matplotlib.colors import BoundaryNorm
+
     finite = np.ma.masked_invalid(percent)
-    drawn = axes.contourf(
-        *_axes(panel), finite, levels=_LEVELS, cmap="RdBu_r", norm=_norm(), extend="both"
+    steps = BoundaryNorm(_LEVELS, 256, extend="both")  # so that 0.1 % shows beside 5 %
+    colours = axes.contourf(
+        *_axes(panel), finite, levels=_LEVELS, cmap="RdBu_r", norm=steps, extend="both"
     )
-    lines = axes.contour(*_axes(panel), finite, **_LINES, colors="black", linestyles="-")
+    lines = _draw_lines(axes, panel, finite, "black", "-")
     for label in axes.clabel(lines, fmt=_percent, fontsize=7):
-        x, y = axes.transAxes.inverted().transform(axes.transData.transform(label.get_position()))
-        label.set_visible(bool(min(x, y, 1.0 - x, 1.0 - y) > _LABEL_ROOM))
-    return drawn
+        place = axes.transData.transform(label.get_position())
+        place = axes.transAxes.inverted().transform(place)
+        label.set_visible(bool(min(*place, *(1.0 - place)) > _LABEL_ROOM))
+    return colours
+
+
+def _draw_lines(axes: Axes, panel: Panel, percent: np.ndarray, colour: str, style: str):
+    """Draw lines of equal error at _LEVELS and return them."""
+    return axes.contour(
+        *_axes(panel), percent, levels=_LEVELS, linewidths=0.8, colors=colour, linestyles=style
+    )
 
 
 def _percent(level: float) -> str:
+    """Return the number of a line of equal error."""
     return f"{level:+g} %".replace("-", "−") if level else "0"
 
 
 def _axes(panel: Panel) -> tuple[np.ndarray, np.ndarray]:
-    return _values(panel, panel.x), _values(panel, panel.y)
-
-
-def _norm():
-    """Colours in steps, so that 0.1 % shows beside 5 %."""
-    from matplotlib.colors import BoundaryNorm
-
-    return BoundaryNorm(_LEVELS, 256, extend="both")
-
-
-def _values(panel: Panel, name: str) -> np.ndarray:
-    """Values of one field along its axis of the map."""
-    pushes = panel.pushes[0] if name == panel.x else [row[0] for row in panel.pushes]
-    return np.array([getattr(push, name) for push in pushes])
+    """Return the values of the panel's two fields, along columns and along rows."""
+    x = np.array([getattr(push, panel.x) for push in panel.pushes[0]])
+    y = np.array([getattr(row[0], panel.y) for row in panel.pushes])
+    return x, y

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.array.cloud import Contact
-from bench.array.size import felt_size, felt_sizes, size_lines
+from bench.array.size import fit_size, fit_sizes, size_lines
 from bench.array.surface import SEEN, Surface
 from vision.geometry.rods import Wire
 
@@ -52,18 +52,18 @@ def drawn(surface: Surface, rng: np.random.Generator, scale: float = 1.0) -> lis
         covariance += (arc * TOUCH_SIGMA) ** 2 * np.outer(aside, aside) + 1e-8 * np.outer(UP, UP)
         contacts.append(
             Contact(
-                f"w{number}",
-                "t",
-                0,
-                "with_friction",
-                base + arc * towards,
-                covariance,
-                np.full(3, np.nan),
-                np.nan,
-                "",
-                base,
-                WIRE,
-                -ALPHA_MM,
+                whisker=f"w{number}",
+                trial="t",
+                whisk=0,
+                estimator="with_friction",
+                point_mm=base + arc * towards,
+                covariance_mm2=covariance,
+                normal=np.full(3, np.nan),
+                normal_sigma_rad=np.nan,
+                status="",
+                base_mm=base,
+                wire=WIRE,
+                by_alpha_mm=-ALPHA_MM,
             )
         )
     return contacts
@@ -73,19 +73,19 @@ def drawn(surface: Surface, rng: np.random.Generator, scale: float = 1.0) -> lis
 def test_sizes_come_back_from_where_they_are_not_quite_said_to_be(surface, rng):
     """Without noise, begun 2 mm and a twentieth of the size aside: to the steps' accuracy."""
     contacts = drawn(surface, rng, 0.0)
-    key = felt_size("t", contacts, surface).key
+    key = fit_size("t", contacts, surface).key
     said = {
         "point_mm": surface.point_mm + np.array([2.0, -1.0, 1.0]),
         key: 1.05 * getattr(surface, key),
     }
-    found = felt_size("t", contacts, Surface(**(vars(surface) | said)))
+    found = fit_size("t", contacts, Surface(**(vars(surface) | said)))
     assert found.size.value == pytest.approx(getattr(surface, key), rel=1e-4)
     assert not found.status and found.chance > 0.999
 
 
 def test_sigmas_are_the_scatter(rng):
     """60 draws tell a standard deviation to 9 %: three of these. The friction angle's error is one for all."""
-    found = [felt_size("t", drawn(BALL, rng), BALL) for _ in range(60)]
+    found = [fit_size("t", drawn(BALL, rng), BALL) for _ in range(60)]
     pulls = [(one.size.value - 30.0) / one.size.sigma for one in found]
     assert np.std(pulls) == pytest.approx(1.0, abs=0.28) and abs(np.mean(pulls)) < 0.39
     assert np.mean([one.chance for one in found]) == pytest.approx(0.5, abs=0.11)
@@ -93,12 +93,12 @@ def test_sigmas_are_the_scatter(rng):
 
 def test_what_is_not_told_is_not_said(rng):
     contacts = drawn(BALL, rng, 0.0)
-    (line,) = size_lines([felt_size("t", contacts[:2], BALL)])
+    (line,) = size_lines([fit_size("t", contacts[:2], BALL)])
     assert line == "t: sphere, 2 contacts: no size; too few, of 2 sound distances"
-    by_touch = felt_size("t", [replace(contact, status="odd") for contact in contacts], BALL)
+    by_touch = fit_size("t", [replace(contact, status="odd") for contact in contacts], BALL)
     assert by_touch.distances == 0 and by_touch.size.value == pytest.approx(30.0, rel=1e-4)
-    assert by_touch.size.sigma > felt_size("t", contacts, BALL).size.sigma
+    assert by_touch.size.sigma > fit_size("t", contacts, BALL).size.sigma
     contacts[0].point_mm[1] += 1.0
-    assert "farther off such a surface" in felt_size("t", contacts, BALL).status
+    assert "farther off such a surface" in fit_size("t", contacts, BALL).status
     seen = Surface("bar", np.zeros(3), UP, 3.0, source=SEEN)
-    assert not felt_sizes(contacts, {"t": seen, "other": BALL})
+    assert not fit_sizes(contacts, {"t": seen, "other": BALL})

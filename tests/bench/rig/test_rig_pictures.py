@@ -108,7 +108,7 @@ def test_drawing_finer_changes_nothing(off_px, largest, whole):
         border = crossing(tube.silhouette(CAMERA)[0], window.u_px, 0) + off_px
         radiance = (0.05 + 0.6 * ndtr((window.v_px[:, None] - border) / soft_px)).astype(np.float32)
         tube.draw(window, radiance, light)
-        pictures.append(window.seen(radiance, 0.9)[margin:-margin, margin:-margin])
+        pictures.append(window.blur_to_pixels(radiance, 0.9)[margin:-margin, margin:-margin])
     difference = np.abs(pictures[0] - pictures[1])[40:-40, 40:-40]
     assert difference.max() < largest
     assert difference.sum(0).max() < whole
@@ -141,7 +141,7 @@ def test_lens_is_inverted_over_the_picture_and_its_margin():
 @pytest.mark.parametrize("inverted", [False, True])
 def test_the_print_is_opencvs(legacy, inverted):
     board = Board((7, 6), 15.0, 11.0, "DICT_5X5_100", legacy=legacy, inverted=inverted)
-    print_ = board.printed(Ink(1.0, 0.0), 5.0)
+    print_ = board.to_print(Ink(1.0, 0.0), 5.0)
     per_mm = 7  # marker modules of 11/7 mm are 11 px then
     px = (np.arange(7 * 15 * per_mm) + 0.5) / per_mm
     column, row = (np.searchsorted(e, px[px < e[-2]]) - 1 for e in (print_.x_mm, print_.y_mm))
@@ -217,7 +217,7 @@ def test_lamp_from_one_side_moves_the_seen_wire_towards_it():
 def test_noise_has_the_spread_that_the_protocol_says(bits, kind):
     sensor = Sensor(0.9, 0.0, read=1.5, shot=0.3, grain=0.02, bits=bits)
     level = 0.4 * 255
-    exposed = sensor.exposed(np.full((400, 500), 0.4, np.float32), np.random.default_rng(0))
+    exposed = sensor.expose(np.full((400, 500), 0.4, np.float32), np.random.default_rng(0))
     scale = (2**bits - 1) / 255
     expected = scale * math.sqrt(1.5**2 + 0.3**2 * level + (0.02 * level) ** 2 + 1 / 12 / scale**2)
     assert exposed.dtype == kind
@@ -226,13 +226,13 @@ def test_noise_has_the_spread_that_the_protocol_says(bits, kind):
 
 
 def test_vignetting_darkens_corners_by_what_it_says():
-    exposed = Sensor(0.9, 0.3, 0, 0, 0, bits=12).exposed(np.full((100, 160), 0.5, np.float32), None)
+    exposed = Sensor(0.9, 0.3, 0, 0, 0, bits=12).expose(np.full((100, 160), 0.5, np.float32), None)
     assert exposed[0, 0] / exposed[50, 80] == pytest.approx(0.7, abs=0.005)
 
 
 def test_a_camera_that_looks_straight_down_is_refused():
     with pytest.raises(ValueError, match="straight"):
-        Camera.looking(
+        Camera.aim(
             "c",
             size_px=(64, 48),
             focal_px=100.0,

@@ -9,7 +9,7 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.rig.bar import Bar, turned
-from bench.rig.layer import Front
+from bench.rig.layer import Occluder
 from bench.rig.light import Light, Material
 from bench.rig.pinhole import Camera
 from bench.rig.round_objects import Cone, Ring, Sphere
@@ -19,7 +19,7 @@ from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 from tests.scenes.rig_sessions import TINY, protocol_file
 
-CAMERA = Camera.looking(
+CAMERA = Camera.aim(
     "small",
     size_px=(320, 240),
     focal_px=1000.0,
@@ -151,7 +151,7 @@ def test_outlines_are_where_rays_graze(name):
     thing, window = THINGS[name], Window.whole(CAMERA, 3, 0.2, 4)
     layer = Solid(thing, Material(1.0)).layer(window, EVEN)
     cover = np.zeros(window.shape)
-    cover[layer.at] = layer.cover
+    cover[layer.index] = layer.cover
     columns = np.flatnonzero((cover.sum(0) > 12) & (cover[[0, -1]].max(0) < 1e-6))
     for column in np.linspace(columns[0] + 9, columns[-1] - 9, 4).astype(int):
         long, middle = amount(thing, window.u_px[column], 0.2)
@@ -165,9 +165,9 @@ def test_what_is_seen_is_what_sights_meet_first(name):
     thing, window = THINGS[name], Window.whole(CAMERA, 1, 0.3)
     layer = Solid(thing, Material(1.0)).layer(window, EVEN)
     inner = np.zeros(window.shape, np.uint8)
-    inner[layer.at] = layer.cover > 1 - 1e-9
-    whole = np.flatnonzero(cv2.erode(inner, np.ones((5, 5)))[layer.at])[::97]
-    ways = rays(window.u_px[layer.at[1][whole]], window.v_px[layer.at[0][whole]])
+    inner[layer.index] = layer.cover > 1 - 1e-9
+    whole = np.flatnonzero(cv2.erode(inner, np.ones((5, 5)))[layer.index])[::97]
+    ways = rays(window.u_px[layer.index[1][whole]], window.v_px[layer.index[0][whole]])
     seen = layer.depth_mm[whole]
     before, behind = (
         within(thing, CAMERA.centre_mm + (seen + step)[:, None] * ways) for step in (-0.02, 0.02)
@@ -185,12 +185,12 @@ def test_a_large_ring_looks_like_a_straight_bar():
     window = Window.whole(CAMERA, 3, 0.2, 4)
     bent, straight = (np.full(window.shape, 0.3, np.float32) for _ in range(2))
     layer = Solid(Ring.bent(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
-    bent[layer.at] += (layer.cover * (layer.tone - bent[layer.at])).astype(np.float32)
+    bent[layer.index] += (layer.cover * (layer.tone - bent[layer.index])).astype(np.float32)
     foot = bar.foot_mm(TOUCHED)
     Tube.straight(foot - 120 * bar.axis, foot + 120 * bar.axis, 3.0, METAL).draw(
         window, straight, LAMP
     )
-    pictures = [window.seen(one, 0.9)[4:-4, 4:-4] for one in (bent, straight)]
+    pictures = [window.blur_to_pixels(one, 0.9)[4:-4, 4:-4] for one in (bent, straight)]
     assert pictures[1].std() > 0.02
     assert np.abs(pictures[0] - pictures[1]).max() < 1 / 255
 
@@ -198,24 +198,24 @@ def test_a_large_ring_looks_like_a_straight_bar():
 def test_a_wire_is_seen_before_an_object_and_not_behind_it():
     thing, window = sphere(20), Window.whole(CAMERA, 3, 0.2)
     layer = Solid(thing, Material(0.6)).layer(window, EVEN)
-    front = Front.of(layer, window)
+    front = Occluder.from_layer(layer, window)
     towards = (CAMERA.centre_mm - thing.point_mm) / np.linalg.norm(
         CAMERA.centre_mm - thing.point_mm
     )
     still = np.full(window.shape, 0.3, np.float32)
-    still[layer.at] += (layer.cover * (layer.tone - still[layer.at])).astype(np.float32)
-    part = window.around(np.array([[60.0, 60.0], [260.0, 200.0]]), 3)
+    still[layer.index] += (layer.cover * (layer.tone - still[layer.index])).astype(np.float32)
+    part = window.crop(np.array([[60.0, 60.0], [260.0, 200.0]]), 3)
     for away_mm, is_seen in ((30.0, True), (-30.0, False)):
         middle = thing.point_mm + away_mm * towards
         half = np.array([35.0, 0, 0])
         wire = Tube.straight(middle - half, middle + half, 0.5, Material(0.05))
-        drawn = still[part.within(window)].copy()
+        drawn = still[part.slices_in(window)].copy()
         draw_tubes([wire], part, drawn, EVEN, front)
         dark = drawn < 0.1
-        on = front.cover[part.within(window)] > 0.99
+        on = front.cover[part.slices_in(window)] > 0.99
         assert dark[~on].sum() > 300
         assert (dark[on].sum() > 300) == is_seen
-        assert is_seen or np.abs(drawn - still[part.within(window)])[on].max() < 1e-4
+        assert is_seen or np.abs(drawn - still[part.slices_in(window)])[on].max() < 1e-4
 
 
 def test_an_object_beside_a_camera_is_refused():

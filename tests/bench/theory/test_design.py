@@ -7,11 +7,19 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.commands import cli
-from bench.theory.design import Design, Means, Region, best_design, expected, faults, worst_percent
-from bench.theory.design_map import designed, exact_percent, write_design
+from bench.theory.design import (
+    Design,
+    Equipment,
+    Region,
+    best_design,
+    expected_error,
+    faults,
+    worst_percent,
+)
+from bench.theory.design_map import exact_percent, find_design, write_design
 from bench.theory.sample_noise import stroke_noise
 
-REGION, MEANS, PAPER = Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0)), Means(), Design()
+REGION, EQUIPMENT, PAPER = Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0)), Equipment(), Design()
 HELD = {
     "theta_deg": (3.0, 3.0),
     "alpha_est_deg": (10.0, 10.0),
@@ -29,22 +37,22 @@ def test_the_bias_is_that_of_exact_mechanics(design):
     """At the region's corners to 0.5 % of d_x: what (10) leaves out is known to first order, and where β is little
     above α friction acts along the whisker, too (docs/rig.md)."""
     corners = REGION.corners()
-    told = expected(design, REGION, MEANS, corners).bias_percent
-    exact = [exact_percent(design, REGION, MEANS, corner) for corner in corners.T]
-    assert told == pytest.approx(exact, abs=0.5)
+    predicted = expected_error(design, REGION, EQUIPMENT, corners).bias_percent
+    exact = [exact_percent(design, REGION, EQUIPMENT, corner) for corner in corners.T]
+    assert predicted == pytest.approx(exact, abs=0.5)
     assert np.ptp(exact) > 1.0
 
 
 def test_the_tilt_of_least_error_is_the_middle_of_the_slopes():
-    found, worst = best_design({**HELD, "tilt_deg": (-60.0, 60.0)}, REGION, MEANS)
+    found, worst = best_design({**HELD, "tilt_deg": (-60.0, 60.0)}, REGION, EQUIPMENT)
     assert found.tilt_deg == pytest.approx(40.0, abs=0.5)
-    assert worst < 0.5 * best_design(HELD, REGION, MEANS)[1]
+    assert worst < 0.5 * best_design(HELD, REGION, EQUIPMENT)[1]
 
 
 def test_the_best_is_no_worse_than_any_on_a_grid():
-    _, worst = best_design({**HELD, "alpha_est_deg": (0.0, 30.0)}, REGION, MEANS)
+    _, worst = best_design({**HELD, "alpha_est_deg": (0.0, 30.0)}, REGION, EQUIPMENT)
     others = [replace(PAPER, alpha_est_deg=alpha) for alpha in np.linspace(0.0, 30.0, 61)]
-    assert worst <= min(worst_percent(other, REGION, MEANS) for other in others) + 1e-6
+    assert worst <= min(worst_percent(other, REGION, EQUIPMENT) for other in others) + 1e-6
 
 
 def test_noise_of_a_stroke_goes_with_one_sample_and_the_root_of_their_number():
@@ -62,25 +70,27 @@ def test_noise_of_a_stroke_goes_with_one_sample_and_the_root_of_their_number():
 
 
 def test_what_a_wire_cannot_bear_is_no_design():
-    assert faults(PAPER, REGION, MEANS) == {}
-    assert set(faults(replace(PAPER, diameter_mm=3.0), REGION, MEANS)) == {
+    assert faults(PAPER, REGION, EQUIPMENT) == {}
+    assert set(faults(replace(PAPER, diameter_mm=3.0), REGION, EQUIPMENT)) == {
         "strain",
         "gauges' range",
     }
-    assert set(faults(replace(PAPER, length_mm=80.0), REGION, MEANS)) == {"length"}
+    assert set(faults(replace(PAPER, length_mm=80.0), REGION, EQUIPMENT)) == {"length"}
     with pytest.raises(BadInput, match=r"no design .* gauges' range by"):
-        best_design({**HELD, "diameter_mm": (3.0, 3.0)}, REGION, MEANS)
+        best_design({**HELD, "diameter_mm": (3.0, 3.0)}, REGION, EQUIPMENT)
 
 
 def test_where_10_has_no_distance_there_is_no_design():
     with pytest.raises(BadInput, match="no distance"):
         best_design(
-            {**HELD, "alpha_est_deg": (50.0, 50.0)}, replace(REGION, beta_deg=(70.0, 80.0)), MEANS
+            {**HELD, "alpha_est_deg": (50.0, 50.0)},
+            replace(REGION, beta_deg=(70.0, 80.0)),
+            EQUIPMENT,
         )
 
 
 def test_what_is_written(tmp_path):
-    made = designed({**HELD, "tilt_deg": (0.0, 60.0)}, REGION, MEANS)
+    made = find_design({**HELD, "tilt_deg": (0.0, 60.0)}, REGION, EQUIPMENT)
     paths = write_design(tmp_path, made)
     assert [path.name for path in paths] == ["design.txt", "design.csv", "design.png", "design.svg"]
     text = (tmp_path / "design.txt").read_text()

@@ -67,7 +67,7 @@ def test_curves_pass_through_the_printed_points(number, curves):
                 abs(np.interp(x, c.x, c.beta_thresh_deg) - beta)
                 for c in drawn
                 if c.panel == panel
-                and c.row != "exact"
+                and c.form != "exact"
                 and np.isfinite(np.interp(x, c.x, c.beta_thresh_deg))
             ]
             assert min(near) <= 0.2 * 13, (panel, x, beta)
@@ -75,7 +75,7 @@ def test_curves_pass_through_the_printed_points(number, curves):
 
 def test_flatter_surfaces_and_smaller_angles_allow_steeper_slopes():
     """Section IV-B: β_thresh always increases with r_n and with the error allowed, and falls with θ."""
-    curves = {(c.row, *c.parameters.values()): c.beta_thresh_deg for c in figure_6()}
+    curves = {(c.form, *c.parameters.values()): c.beta_thresh_deg for c in figure_6()}
     for beta in curves.values():
         assert (np.diff(beta) > 0).all()
     for form in ("printed", "exact"):

@@ -148,7 +148,7 @@ def drawn(scene: Scene, most_cameras: int | None) -> tuple[TrialPictures, Camera
         for k, studio in enumerate(job.studios[:most_cameras])
     }
     background = {
-        s.camera.name: s.sensor.exposed(s.rig_brightness(), rng).astype(float) for s in job.studios
+        s.camera.name: s.sensor.expose(s.rig_brightness(), rng).astype(float) for s in job.studios
     }
     return (
         TrialPictures(frames, scene.recording.frames.time_s, scene.motor_rad, background),

@@ -32,13 +32,13 @@ from bench.rig.protocol import (
 )
 from bench.rig.recording import Recording
 from bench.session.signals import Signals
-from bench.theory.design import Design, Means, Region, best_design, expected
+from bench.theory.design import Design, Equipment, Region, best_design, expected_error
 from bench.theory.design_map import rod_and_beam
 from bench.trials.estimates import Readout, whisk_at
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings
 
-MEANS = Means()
+EQUIPMENT = Equipment()
 REGIONS = (
     Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0), lean_sigma_deg=0.0),
     Region((0.0, 75.0), (5.0, 25.0), (20.0, 90.0), lean_sigma_deg=0.0),
@@ -79,15 +79,15 @@ def errors_percent(
 
 
 def _protocol(design: Design, table: TrialTable) -> Protocol:
-    rod, _ = rod_and_beam(design, MEANS)
+    rod, _ = rod_and_beam(design, EQUIPMENT)
     size = {
         name: getattr(rod, name)
         for name in ("shape", "length_mm", "diameter_mm", "tip_diameter_mm")
     }
-    whisker = WhiskerTable(**size, youngs_modulus_GPa=MEANS.youngs_modulus_GPa)
+    whisker = WhiskerTable(**size, youngs_modulus_GPa=EQUIPMENT.youngs_modulus_GPa)
     gauges = GaugesTable(
         matrix_Nmm_per_V=((_VOLT_NMM, 0.0), (0.0, _VOLT_NMM)),
-        noise_V=MEANS.noise_Nmm / _VOLT_NMM,
+        noise_V=EQUIPMENT.noise_Nmm / _VOLT_NMM,
         hum_V=0.0,
         known=True,
     )
@@ -103,7 +103,7 @@ def _felt(design: Design, recording: Recording) -> float:
         Signals(time, np.radians(motor_deg), y, z, "V"), recording.run, Settings()
     )
     touch = allow_drift(stroke.touch(), np.zeros(2), stroke.speed_rad_s)
-    _, beam = rod_and_beam(design, MEANS)
+    _, beam = rod_and_beam(design, EQUIPMENT)
     whisk = whisk_at(
         stroke, Readout(GaugeMatrix(_VOLT_NMM * np.eye(2))), touch, beam, design.theta_rad
     )
@@ -114,7 +114,7 @@ def _felt(design: Design, recording: Recording) -> float:
 def rows(design: Design, region: Region, whisks: int, rng: np.random.Generator) -> Iterator[tuple]:
     """(corner, expected bias, mean error, expected sigma, scatter), % of d_x."""
     corners = region.corners()
-    told = expected(design, region, MEANS, corners)
+    told = expected_error(design, region, EQUIPMENT, corners)
     for corner, bias, sigma in zip(corners.T, told.bias_percent, told.sigma_percent):
         found = errors_percent(design, region, corner, whisks, rng)
         yield corner, bias, found.mean(), sigma, found.std(ddof=1)
@@ -131,7 +131,9 @@ def main() -> None:
     designs = [
         (
             region,
-            best_design({**RANGES, "length_mm": (1.05 * region.d_x_mm[1], 150.0)}, region, MEANS),
+            best_design(
+                {**RANGES, "length_mm": (1.05 * region.d_x_mm[1], 150.0)}, region, EQUIPMENT
+            ),
         )
         for region in REGIONS
     ]

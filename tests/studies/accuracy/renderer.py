@@ -26,7 +26,7 @@ from bench.rig.studio import Studio
 from bench.rig.tube import Tube
 from bench.rig.window import Window
 
-CAMERA = Camera.looking(
+CAMERA = Camera.aim(
     "small",
     size_px=(320, 240),
     focal_px=2000.0,
@@ -47,7 +47,7 @@ def rasterised(tube, blur_px, *, fine=3, soft_px=0.2, ground=GROUND, light=EVEN)
     window = Window.whole(CAMERA, fine, min(soft_px, blur_px), margin)
     radiance = np.full(window.shape, ground, np.float32)
     tube.draw(window, radiance, light)
-    return window.seen(radiance, blur_px)[margin:-margin, margin:-margin]
+    return window.blur_to_pixels(radiance, blur_px)[margin:-margin, margin:-margin]
 
 
 def wire(angle_deg, width_px, material=None, bent=False):

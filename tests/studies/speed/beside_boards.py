@@ -32,8 +32,8 @@ def board_pictures(protocol: Protocol, rng: np.random.Generator) -> np.ndarray:
     return np.array(
         [
             [
-                *(studio.sensor.exposed(studio.board_brightness(pose), rng) for pose in poses),
-                studio.sensor.exposed(studio.rig_brightness(), rng),
+                *(studio.sensor.expose(studio.board_brightness(pose), rng) for pose in poses),
+                studio.sensor.expose(studio.rig_brightness(), rng),
             ]
             for studio in studios
         ]
