@@ -49,9 +49,8 @@ class Camera:
             f"camera {self.name}: size_px = {list(self.size_px)}, must be two counts above 0",
         )
         object.__setattr__(self, "size_px", tuple(int(n) for n in self.size_px))
-        fx, fy, cx, cy = self.lens[:4]
         require(
-            np.allclose(self.matrix, _camera_matrix(fx, fy, cx, cy)) and min(fx, fy) > 0,
+            np.allclose(self.matrix, camera_matrix(self.lens)) and min(self.lens[:2]) > 0,
             f"camera {self.name}: matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx, fy above 0",
         )
         object.__setattr__(self, "T_camera_rig", self._exact_pose())
@@ -115,14 +114,15 @@ class Camera:
         shift_mm = self.T_camera_rig[:, 3] + step[12:15]
         return replace(
             self,
-            matrix=_camera_matrix(*lens[:4]),
+            matrix=camera_matrix(lens),
             distortion=lens[4:],
             T_camera_rig=np.column_stack([R, shift_mm]),
         )
 
 
-def _camera_matrix(fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
-    """Return the camera matrix (3, 3), px."""
+def camera_matrix(lens: np.ndarray) -> np.ndarray:
+    """Return the camera matrix (3, 3), px, of lens parameters fx fy cx cy …"""
+    fx, fy, cx, cy = lens[:4]
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
