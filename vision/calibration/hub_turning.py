@@ -12,6 +12,7 @@ Coarse: the chord of a whisker with sag and set, to some degrees and millimetres
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
@@ -31,14 +32,12 @@ _MOST_OTHERS = 4
 _SURE = 0.3
 # [pixels] Fewer are no line. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
 _FEWEST_PIXELS = 20
-# [pixels] More cost time alone. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
-_MOST_PIXELS = 4000
 # [1] Angles of a Hough transform, half a degree apart; refined afterwards. Study:
 # tests/bench/trials/test_placing_pictures.py.
 _TURNS = 360
 # [px] Width of a Hough transform's bins; refined afterwards. Study:
 # tests/bench/trials/test_placing_pictures.py.
-_BIN_PX = 3.0
+_BIN_PX = 6.0
 # [px] Beside a line: what a lens bends and a whisker sags. Study:
 # tests/bench/trials/test_placing_pictures.py.
 _NEAR_PX = 8.0
@@ -167,12 +166,13 @@ def _strongest_plane(camera: Camera, change: np.ndarray) -> _Plane | None:
 
     The line is fitted in rays, so that the lens's distortion does not bend it, with Cauchy's weights.
     """
-    row, column = np.nonzero(change > _SURE)
-    if len(row) < _FEWEST_PIXELS:
+    mask = (change > _SURE).astype(np.uint8)
+    lines = cv2.HoughLines(mask, _BIN_PX / HALF, np.pi / _TURNS, _FEWEST_PIXELS)
+    if lines is None:
         return None
-    px = HALF * np.column_stack([column, row]).astype(float)  # (n, 2)
-    every = -(-len(px) // _MOST_PIXELS)
-    middle_px = _middles_along(px, *_strongest_line(px[::every]))
+    offset, angle_rad = lines[0].ravel().astype(float)  # the strongest comes first
+    px = HALF * np.argwhere(mask.T).astype(float)  # (n, 2) x, y
+    middle_px = _middles_along(px, angle_rad, HALF * offset)
     rays = camera.rays(middle_px)
     rays = rays[np.isfinite(rays[:, 0])]
     weight = np.ones(len(rays))
@@ -199,22 +199,6 @@ def _middles_along(px: np.ndarray, angle_rad: float, offset_px: float) -> np.nda
     count = np.bincount(step)
     sums = np.column_stack([np.bincount(step, column) for column in near.T])
     return sums[count > 0] / count[count > 0, None]
-
-
-def _strongest_line(px: np.ndarray) -> tuple[float, float]:
-    """Return the angle of the normal, rad, and the offset, px, of the line with most points (n, 2) in three
-    neighbouring bins of a Hough transform.
-    """
-    angles = np.arange(_TURNS) * np.pi / _TURNS
-    offsets = px @ np.stack([np.cos(angles), np.sin(angles)])  # (n, turns)
-    bins = np.round(offsets / _BIN_PX).astype(int)
-    lowest = bins.min()
-    count = bins.max() - lowest + 1
-    votes = np.stack([np.bincount(column - lowest, minlength=count) for column in bins.T])
-    neighbours = np.pad(votes, ((0, 0), (1, 1)))
-    votes = votes + neighbours[:, 2:] + neighbours[:, :-2]
-    turn, place = np.unravel_index(np.argmax(votes), votes.shape)
-    return float(angles[turn]), float((place + lowest) * _BIN_PX)
 
 
 def _intersection(planes: Sequence[_Plane]) -> tuple[np.ndarray, np.ndarray] | None:
