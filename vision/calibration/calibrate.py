@@ -1,13 +1,13 @@
-"""Cameras from views of a board: one adjustment over everything, noise as the pictures show it, full
-covariance.
+"""Cameras from views of a board: one adjustment over everything, noise as the pictures show it,
+full covariance.
 
-In: views of a board held anywhere, and views of the board standing on the rig, whose pose T_rig_board
-places the cameras. Out: cameras in the rig frame with the joint covariance of all their parameters, and a
-report on the data of each.
+In: views of a board held anywhere, and views of the board standing on the rig, whose pose
+T_rig_board places the cameras. Out: cameras in the rig frame with the joint covariance of all their
+parameters, and a report on the data of each.
 
-Lens terms each carry a weak prior, as wide as lenses on a bench are (LENS_PRIOR). A term leaves zero only
-as far as the views demand it, and one they do not constrain keeps the prior's sigma instead of running
-away (a free k3 on 14 views came out at 6).
+Lens terms each carry a weak prior, as wide as lenses on a bench are (LENS_PRIOR). A term leaves
+zero only as far as the views demand it, and one they do not constrain keeps the prior's sigma
+instead of running away (a free k3 on 14 views came out at 6).
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ from vision.calibration.corner_noise import Adjustment, adjust_with_noise
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
-from vision.calibration.tied import Recorded, Timing, lens_priors, timing_note
+from vision.calibration.tied import JointInput, Timing, lens_priors, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras, camera_matrix
@@ -54,10 +54,10 @@ _WARP_SIGMA_MM = 2.0
 class CameraReport:
     """The data of one camera's calibration, and its residuals.
 
-    views, corners: used; left_out: corners beyond the rejection limit. rms_px: of the kept residuals.
-    error_px: model error per axis beside the corners' own sigma. coverage: share of the picture within the
-    hull of all corners. depth_ratio: farthest to nearest corner. tilt_deg: largest tilt of the board.
-    intrinsics_sigma: (9,), of fx fy cx cy k1 k2 p1 p2 k3.
+    views, corners: used; left_out: corners beyond the rejection limit. rms_px: of the kept
+    residuals. error_px: model error per axis beside the corners' own sigma. coverage: share of the
+    picture within the hull of all corners. depth_ratio: farthest to nearest corner. tilt_deg:
+    largest tilt of the board. intrinsics_sigma: (9,), of fx fy cx cy k1 k2 p1 p2 k3.
     """
 
     name: str
@@ -76,8 +76,9 @@ class CameraReport:
 class Calibration:
     """Cameras in the rig frame with their covariance, a report each, and notes in plain sentences.
 
-    together: whether the cameras saw the board at once. timing: None where pictures of one view count as of one
-    instant. board (3,): the board's relative size less 1, and its warps along x and y, mm.
+    together: whether the cameras saw the board at once. timing: None where pictures of one view
+    count as of one instant. board (3,): the board's relative size less 1, and its warps along x and
+    y, mm.
     """
 
     cameras: Cameras
@@ -98,21 +99,17 @@ def calibrate_cameras(
 ) -> Calibration:
     """Calibrate all cameras in one adjustment.
 
-    Whether the cameras saw the held board at once is found from its views; their times help. on_rig: where the board
-    stands on the rig; None for one camera or cameras that saw it at once: then the world is the first camera's frame.
-    work_points_mm (n, 3): where the whisker will be, which each camera's views must cover. triggered: pictures of one
-    view are known to be of one instant, so that no other is searched for.
+    Whether the cameras saw the held board at once is found from its views; their times help.
+    on_rig: where the board stands on the rig; None for one camera or cameras that saw it at once:
+    then the world is the first camera's frame. work_points_mm (n, 3): where the whisker will be,
+    which each camera's views must cover. triggered: pictures of one view are known to be of one
+    instant, so that no other is searched for.
 
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
     alone = {name: _alone(name, views, board, on_rig is not None) for name in views.boards}
-    standing = None
-    if on_rig:
-        standing = {}
-        for name in alone:
-            rig_view = without_strays(views.rig[name], board)
-            standing[name] = mean_view(rig_view, views.trials.get(name, ()))
-    joint = Recorded(alone, standing, board, on_rig, views.times_s, triggered).adjust()
+    standing = _standing(views, board) if on_rig else None
+    joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered).adjust()
     adjustment, warp_notes = _with_warp(joint.layout, joint.adjustment, board)
     notes = [*joint.notes, *warp_notes]
     if not triggered:
@@ -143,8 +140,19 @@ def calibrate_cameras(
     )
 
 
+def _standing(views: BoardViews, board: Board) -> dict[str, Corners]:
+    """Return the board on the rig in each camera, averaged over its picture and the trials' frames."""
+    standing = {}
+    for name in views.boards:
+        rig_view = without_strays(views.rig[name], board)
+        standing[name] = mean_view(rig_view, views.trials.get(name, ()))
+    return standing
+
+
 def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:
-    """Calibrate a camera by itself, for the start of the joint adjustment and the error of the camera alone."""
+    """Calibrate a camera by itself, for the start of the joint adjustment and the error of the
+    camera alone.
+    """
     size_px = views.sizes_px[name]
     rig_view = views.rig.get(name)
     usable = {}
@@ -166,7 +174,9 @@ def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:
 def calibrate_alone(
     views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, coarse: bool = False
 ) -> Adjustment:
-    """Calibrate one camera by itself, the world being the camera's frame. coarse: robustly, as a start for more."""
+    """Calibrate one camera by itself, the world being the camera's frame. coarse: robustly, as a
+    start for more.
+    """
     lens = first_lens(views, board.corners_mm, size_px)
     poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
     state = BundleState(lens[None], np.eye(3, 4)[None], poses)
@@ -177,7 +187,8 @@ def calibrate_alone(
 
 
 def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustment, list[str]]:
-    """Adjust with a warped board where that lowers the cost, at the flat board's noise, by more than chance would.
+    """Adjust with a warped board where that lowers the cost, at the flat board's noise, by more
+    than chance would.
 
     Returns the adjustment and notes.
     """

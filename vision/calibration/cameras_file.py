@@ -1,4 +1,4 @@
-"""cameras.toml and its covariance beside it in cameras.npz, as the session format has them."""
+"""cameras.toml, and its covariance in cameras.npz, as the session format has them."""
 
 import hashlib
 import tomllib
@@ -17,10 +17,10 @@ _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
 
 
 def cameras_as_files(cameras: Cameras, companion: str) -> tuple[bytes, bytes]:
-    """Return the contents of cameras.toml and of the file `companion` beside it.
+    """Return the contents of cameras.toml and of its companion file of that name.
 
-    The companion holds the joint covariance with the parameters' names, and the part of it that is the rig frame's,
-    where that is known.
+    The companion holds the joint covariance with the parameters' names, and the part of it that is
+    the rig frame's, where that is known.
     """
     packed = _pack_covariance(cameras)
     tables = {}
@@ -57,8 +57,8 @@ def _pack_covariance(cameras: Cameras) -> bytes:
 def read_cameras(path: Path | str) -> Cameras:
     """Read the cameras of `path`; without a covariance in it they are taken as exact.
 
-    Raises Refused where the file is no TOML, misses a key, or its covariance is not the one it was written
-    with.
+    Raises Refused where the file is no TOML, misses a key, or its covariance is not the one it was
+    written with.
     """
     path = Path(path)
     document = parse_toml(path, "is not TOML")
@@ -108,7 +108,8 @@ def _camera(name: str, table: dict) -> Camera:
 def _read_covariance(
     path: Path, document: dict, cameras: tuple[Camera, ...]
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Return the joint covariance and the placement's part of it; None for what the files do not hold.
+    """Return the joint covariance and the placement's part of it; None for what the files do not
+    hold.
 
     Raises Refused where the covariance's file is missing, another one, or not of these cameras.
     """
@@ -137,7 +138,9 @@ def _read_covariance(
 
 
 def _in_order(stored: "np.lib.npyio.NpzFile", cameras: tuple[Camera, ...]) -> np.ndarray:
-    """Return the stored covariance in the TOML's order of cameras and in this version's order of parameters."""
+    """Return the stored covariance in the TOML's order of cameras and in this version's order of
+    parameters.
+    """
     names = stored["cameras"].tolist()
     parameters = stored["parameters"].tolist()
     wanted = [camera.name for camera in cameras]

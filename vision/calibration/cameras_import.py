@@ -1,8 +1,9 @@
 """Cameras calibrated elsewhere: the TOML that caliscope and aniposelib write.
 
-Both keep OpenCV's lens and T_camera_world; caliscope in metres, with the rotation as a matrix or as a vector;
-aniposelib in the unit of its board, with the rotation as a vector. Neither states uncertainties, so the lenses are
-taken as exact; their world is not the rig, where a picture of the board on the rig places them (`place_on_rig`).
+Both keep OpenCV's lens and T_camera_world; caliscope in metres, with the rotation as a matrix or as
+a vector; aniposelib in the unit of its board, with the rotation as a vector. Neither states
+uncertainties, so the lenses are taken as exact; their world is not the rig, where a picture of the
+board on the rig places them (`place_on_rig`).
 """
 
 from collections.abc import Mapping
@@ -28,16 +29,17 @@ from vision.geometry.rotation import compose, exp_rotation, invert_transform
 _NEEDED = ("size", "matrix", "distortions", "rotation", "translation")
 
 
-def import_cameras(path: Path | str, *, unit_mm: float | None = None) -> Cameras:
-    """Import cameras of a caliscope or aniposelib TOML, their world as there, in mm, taken as exact.
+def import_cameras(path: Path | str) -> Cameras:
+    """Import cameras of a caliscope or aniposelib TOML, their world as there, in mm, taken as
+    exact.
 
-    unit_mm: length of the file's unit; by default 1000 for caliscope (metres) and 1 for aniposelib (a board in mm).
-    Raises Refused where the file is neither, a camera is a fisheye or unplaced, or its lens cannot be.
+    The file's unit is a metre for caliscope and, for a board that is described in mm, a millimetre
+    for aniposelib. Raises Refused where the file is neither, a camera is a fisheye or unplaced, or
+    its lens cannot be.
     """
     tables = _tables(Path(path))
-    if not unit_mm:
-        is_caliscope = any("cam_id" in table or "port" in table for table in tables.values())
-        unit_mm = 1000.0 if is_caliscope else 1.0
+    is_caliscope = any("cam_id" in table or "port" in table for table in tables.values())
+    unit_mm = 1000.0 if is_caliscope else 1.0
     cameras = Cameras(tuple(_camera(name, table, unit_mm) for name, table in tables.items()))
     for camera in cameras:
         check_lens(camera)
@@ -57,8 +59,8 @@ def _tables(path: Path) -> dict[str, dict]:
 
 
 def _name(key: str, table: dict) -> str:
-    """Return the camera's name: aniposelib states it; caliscope numbers cameras and calls the video of camera 0
-    cam_0.
+    """Return the camera's name: aniposelib states it; caliscope numbers cameras and calls the video
+    of camera 0 cam_0.
     """
     if "name" in table:
         return str(table["name"])
@@ -66,7 +68,9 @@ def _name(key: str, table: dict) -> str:
 
 
 def _camera(name: str, table: dict, unit_mm: float) -> Camera:
-    """Return the camera of one table; raise Refused where it is not calibrated, not placed, or a fisheye."""
+    """Return the camera of one table; raise Refused where it is not calibrated, not placed, or a
+    fisheye.
+    """
     missing = [key for key in _NEEDED if not table.get(key)]
     if missing:
         raise Refused(
@@ -100,7 +104,8 @@ def place_on_rig(
     board: Board,
     T_rig_board: np.ndarray,
 ) -> Cameras:
-    """Place each camera by its view of the board on the rig, its lens held; the covariance is of the poses only.
+    """Place each camera by its view of the board on the rig, its lens held; the covariance is of
+    the poses only.
 
     Raises Refused where a camera does not see the board.
     """
@@ -116,12 +121,12 @@ def place_on_rig(
         poses.append(compose(T_camera_board, T_board_rig))
         shots.append((k, 0, view))
     state = BundleState(np.array(lenses), np.array(poses), np.asarray(T_rig_board)[None])
-    priors = _pose_priors(len(cameras))
+    priors = _camera_pose_priors(len(cameras))
     adjustment = adjust_with_noise(state, gather(shots), board.corners_mm, priors)
     return as_cameras(cameras.names, {c.name: c.size_px for c in cameras}, adjustment)
 
 
-def _pose_priors(n_cameras: int) -> Priors:
+def _camera_pose_priors(n_cameras: int) -> Priors:
     """Return the priors with the cameras' poses free, and lenses and board held."""
     priors = lens_priors(n_cameras, 1)
     free = np.zeros_like(priors.free)

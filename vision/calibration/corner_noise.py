@@ -1,10 +1,10 @@
 """How large the corners' errors are, learned from the residuals, and which corners are no corners.
 
-A corner's variance is (sigma of its own fit)² + (model error of its camera)². The model error stands for
-what a corner's fit cannot know: print, lens beyond its terms, blur, motion. It is first read from the
-median of the residuals, which half of the corners being wrong does not move; corners beyond REJECT_SIGMA of
-that are left out once; then it is what makes the mean square of the rest one. Rejecting again by the
-smaller figure would eat the data from the tails inward.
+A corner's variance is (sigma of its own fit)² + (model error of its camera)². The model error
+stands for what a corner's fit cannot know: print, lens beyond its terms, blur, motion. It is first
+read from the median of the residuals, which half of the corners being wrong does not move; corners
+beyond REJECT_SIGMA of that are left out once; then it is what makes the mean square of the rest
+one. Rejecting again by the smaller figure would eat the data from the tails inward.
 """
 
 from dataclasses import dataclass, replace
@@ -52,8 +52,9 @@ _ROOT_PRECISION = 1e-15
 class Adjustment:
     """An adjustment with the noise learned from it.
 
-    solution: over the kept corners. seen: all corners with the sigmas used. kept (n,) bool. residual_px (n, 2): of
-    all corners. error_px (C,): model error of each camera. priors: as used last.
+    solution: over the kept corners. seen: all corners with the sigmas used. kept (n,) bool.
+    residual_px (n, 2): of all corners. error_px (C,): model error of each camera. priors: as used
+    last.
     """
 
     solution: Solution
@@ -64,7 +65,9 @@ class Adjustment:
     priors: Priors
 
     def rms_px(self, camera: int) -> float:
-        """Return the root mean square length of one camera's kept residuals, as OpenCV counts it; NaN of none."""
+        """Return the root mean square length of one camera's kept residuals, as OpenCV counts it;
+        NaN of none.
+        """
         residual_px = self.residual_px[self.kept & (self.seen.camera == camera)]
         if not len(residual_px):
             return np.nan
@@ -81,12 +84,13 @@ def adjust_with_noise(
     rounds: int | None = None,
     coarse: bool = False,
 ) -> Adjustment:
-    """Adjust robustly, learn each camera's model error, drop outliers once, and adjust by least squares.
+    """Adjust robustly, learn each camera's model error, drop outliers once, and adjust by least
+    squares.
 
-    Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's scatter of instants
-    begins. error_px (C,): model errors to begin with. rounds: of learning the noise anew, where it is nearly known.
-    coarse: adjust robustly and once only, to see how large the errors are. Raises Refused where no corner agrees with
-    the others.
+    Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's
+    scatter of instants begins. error_px (C,): model errors to begin with. rounds: of learning the
+    noise anew, where it is nearly known. coarse: adjust robustly and once only, to see how large
+    the errors are. Raises Refused where no corner agrees with the others.
     """
     moving = state.trajectory is not None
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
@@ -107,23 +111,34 @@ def adjust_with_noise(
             kept = np.ones(len(seen), dtype=bool)
             return Adjustment(solution, weighted, kept, solution.residual_px, error, priors)
 
-    kept = _inliers(solution.residual_px, _with_error(seen, error))
+    return _without_outliers(solution, seen, corners_mm, priors, error)
+
+
+def _without_outliers(
+    solution: Solution, seen: Sightings, corners_mm: np.ndarray, priors: Priors, error: np.ndarray
+) -> Adjustment:
+    """Drop outliers and adjust by least squares, from a robust solution and its model errors (C,).
+
+    Raises Refused where no corner is left.
+    """
+    residual_px = solution.residual_px
+    kept = _inliers(residual_px, _with_error(seen, error))
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
-    residual_px = solution.residual_px
     for _ in range(2):
         error = _error_by_mean(residual_px, seen, kept, error, priors)
-        solution = adjust_bundle(state, _with_error(seen, error).chosen(kept), corners_mm, priors)
-        state = solution.state
-        residual_px = seen.px - predict(state, seen, corners_mm)[0]
+        weighted = _with_error(seen, error)
+        solution = adjust_bundle(solution.state, weighted.chosen(kept), corners_mm, priors)
+        residual_px = seen.px - predict(solution.state, seen, corners_mm)[0]
     solution = replace(solution, residual_px=residual_px)
-    return Adjustment(solution, _with_error(seen, error), kept, residual_px, error, priors)
+    return Adjustment(solution, weighted, kept, residual_px, error, priors)
 
 
 def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Priors:
     """Return the priors with each camera's scatter of instants as the fitted instants have it.
 
-    Pictures that give their view its time count for nothing. A camera with few others gets the scatter of all.
+    Pictures that give their view its time count for nothing. A camera with few others gets the
+    scatter of all.
     """
     starts = seen.shot_starts()
     camera = seen.camera[starts]
@@ -157,7 +172,9 @@ def _error_by_median(residual: np.ndarray, seen: Sightings, n_cameras: int) -> n
 
 
 def _inliers(residual: np.ndarray, weighted: Sightings) -> np.ndarray:
-    """Return the mask (n,) of corners within the rejection limit, in pictures that keep enough of them."""
+    """Return the mask (n,) of corners within the rejection limit, in pictures that keep enough of
+    them.
+    """
     kept = np.sum(residual**2, axis=1) < (REJECT_SIGMA * weighted.sigma_px) ** 2
     starts = weighted.shot_starts()
     count = np.add.reduceat(kept.astype(int), starts)
@@ -168,8 +185,8 @@ def _inliers(residual: np.ndarray, weighted: Sightings) -> np.ndarray:
 def _error_by_mean(
     residual, seen: Sightings, kept: np.ndarray, error: np.ndarray, priors: Priors
 ) -> np.ndarray:
-    """Return each camera's model error (C,), px, at which the kept residuals' mean square is what so many fitted
-    parameters leave of it.
+    """Return each camera's model error (C,), px, at which the kept residuals' mean square is what
+    so many fitted parameters leave of it.
     """
     parameters = priors.free.sum() + 6 * priors.view_free.sum()
     if priors.late_sigma_s is not None:
@@ -184,9 +201,12 @@ def _error_by_mean(
 
 
 def _matching_error(squared: np.ndarray, sigma: np.ndarray) -> float:
-    """Return e ≥ 0 with mean(squared / (2 (sigma² + e²))) = 1; 0 where sigma alone explains the squares."""
+    """Return e ≥ 0 with mean(squared / (2 (sigma² + e²))) = 1; 0 where sigma alone explains the
+    squares.
+    """
 
     def excess(variance: float) -> float:
+        """Return the mean square over the one that this e² explains, less 1."""
         return float(np.mean(squared / (2 * (sigma**2 + variance)))) - 1.0
 
     if not len(squared) or excess(0.0) <= 0:

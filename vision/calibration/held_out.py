@@ -1,12 +1,13 @@
 """The errors of cameras on views that they were not calibrated from.
 
-Three figures, each stricter than the one before. A board pose fitted to one camera by itself takes up much of what
-is wrong. One pose for all cameras tests whether they agree. Distances between neighbouring corners, triangulated, are
-compared in millimetres with the printed pitch.
+Three figures, each stricter than the one before. A board pose fitted to one camera by itself takes
+up much of what is wrong. One pose for all cameras tests whether they agree. Distances between
+neighbouring corners, triangulated, are compared in millimetres with the printed pitch.
 
-Of cameras that are not triggered together, the last two are taken three ways, in the order of what is fitted to the
-held-out pictures themselves: nothing but the board's pose, the pictures being as of one instant; the same with each
-camera late by its one offset, known from the other views; and with the instant of each picture fitted too.
+Of cameras that are not triggered together, the last two are taken three ways, in the order of what
+is fitted to the held-out pictures themselves: nothing but the board's pose, the pictures being as
+of one instant; the same with each camera late by its one offset, known from the other views; and
+with the instant of each picture fitted too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,8 +36,8 @@ _ROBUST_WIDTH = 3.0
 class Agreement:
     """The agreement of cameras with each other; NaN where there is nothing to measure.
 
-    joint_px: root mean square of the residuals with one board pose for all. pitch_rms_mm, pitch_mean_mm: distance of
-    neighbouring corners in space less the pitch, of so many pitches.
+    joint_px: root mean square of the residuals with one board pose for all. pitch_rms_mm,
+    pitch_mean_mm: distance of neighbouring corners in space less the pitch, of so many pitches.
     """
 
     joint_px: float = np.nan
@@ -49,9 +50,10 @@ class Agreement:
 class HeldOut:
     """Errors on held-out views (how many) with corners (how many) that more than one camera has.
 
-    alone_px: per camera, a pose for each view of that camera. at_once: all pictures of a view taken as of one instant.
-    offsets: each camera late by its one offset, none of it fitted here. instants: each picture's instant fitted along
-    with the board's pose. The last two are None where cameras count as triggered together.
+    alone_px: per camera, a pose for each view of that camera. at_once: all pictures of a view taken
+    as of one instant. offsets: each camera late by its one offset, none of it fitted here.
+    instants: each picture's instant fitted along with the board's pose. The last two are None where
+    cameras count as triggered together.
     """
 
     alone_px: Mapping[str, float]
@@ -94,13 +96,13 @@ def held_out(
     rows = held_views[layout.seen.view] & _is_shared(layout)  # (n,) corners
     if not rows.any():
         return HeldOut(alone_px)
-    joint = _JointFit(calibration, layout, board)
-    is_timed = calibration.timing is not None
+    fits = _JointFits(calibration, layout, board, rows)
+    timed = calibration.timing is not None
     return HeldOut(
         alone_px,
-        at_once=_agreement(cameras, layout, joint.at_once(), rows, board),
-        offsets=_agreement(cameras, layout, joint.offsets(), rows, board) if is_timed else None,
-        instants=_agreement(cameras, layout, joint.instants(), rows, board) if is_timed else None,
+        at_once=fits.at_once(),
+        offsets=fits.offsets() if timed else None,
+        instants=fits.instants() if timed else None,
         views=len(np.unique(layout.seen.view[rows])),
         corners=int(rows.sum()),
     )
@@ -119,7 +121,9 @@ def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
 
 
 def _alone_px(camera: Camera, alone: Alone, is_held: Sequence[bool], board: Board) -> float:
-    """Return the RMS of one camera's residuals with a pose fitted to each view, by plain least squares."""
+    """Return the RMS of one camera's residuals with a pose fitted to each view, by plain least
+    squares.
+    """
     held = {k: view for k, view in alone.views.items() if is_held[k]}
     if not held:
         return np.nan
@@ -148,34 +152,42 @@ def _with_equal_sigmas(seen: Sightings) -> Sightings:
 
 
 @dataclass(frozen=True, eq=False)
-class _JointFit:
-    """Fits of one board pose a view for all cameras, with three accounts of when the pictures were taken."""
+class _JointFits:
+    """Fits of one board pose a view for all cameras, with three accounts of when the pictures were
+    taken.
+
+    rows (n,) bool: the corners in which their agreement is measured.
+    """
 
     calibration: Calibration
     layout: Layout
     board: Board
+    rows: np.ndarray
 
-    def at_once(self) -> Solution:
-        """Fit the poses with all pictures of a view as of one instant."""
-        first = replace(self.layout.first, board=self.calibration.board)
-        seen = _with_equal_sigmas(self.layout.seen)
-        return adjust_bundle(first, seen, self.board.corners_mm, self._priors)
+    def at_once(self) -> Agreement:
+        """Return the agreement with all pictures of a view as of one instant."""
+        return self._with_equal_sigmas(replace(self.layout.first, board=self.calibration.board))
 
-    def offsets(self) -> Solution:
-        """Fit the poses on the board's path, with each camera late by its offset."""
-        seen = _with_equal_sigmas(self.layout.seen)
-        return adjust_bundle(self._moving, seen, self.board.corners_mm, self._priors)
+    def offsets(self) -> Agreement:
+        """Return the agreement on the board's path, with each camera late by its offset."""
+        return self._with_equal_sigmas(self._moving)
 
-    def instants(self) -> Solution:
-        """Fit the poses and each picture's own instant, robustly."""
+    def instants(self) -> Agreement:
+        """Return the agreement with each picture's own instant fitted, robustly."""
         error_px = np.array([report.error_px for report in self.calibration.report])
         seen = self.layout.seen
         seen = replace(seen, sigma_px=np.hypot(seen.sigma_px, error_px[seen.camera]))
         priors = replace(self._priors, late_sigma_s=self.calibration.timing.scatter_s)
         corners_mm = self.board.corners_mm
-        return adjust_bundle(
+        fitted = adjust_bundle(
             self._moving, seen, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-5
         )
+        return self._agreement(fitted)
+
+    def _with_equal_sigmas(self, first: BundleState) -> Agreement:
+        """Return the agreement with all corners alike, from a first state."""
+        seen = _with_equal_sigmas(self.layout.seen)
+        return self._agreement(adjust_bundle(first, seen, self.board.corners_mm, self._priors))
 
     @property
     def _priors(self) -> Priors:
@@ -192,25 +204,27 @@ class _JointFit:
             trajectory=self.layout.trajectory,
         )
 
-
-def _agreement(
-    cameras: Cameras, layout: Layout, fitted: Solution, rows: np.ndarray, board: Board
-) -> Agreement:
-    """Return how the cameras agree in these corners (n,) bool, by a fit of the board's poses."""
-    # Corners as they would have been seen at their view's own time.
-    then_px, _ = predict(fitted.state, layout.seen, board.corners_mm)
-    still_px, _ = predict(replace(fitted.state, trajectory=None), layout.seen, board.corners_mm)
-    px = layout.seen.px + still_px - then_px
-    errors_mm = _pitch_errors_mm(cameras, layout, px, rows, board)
-    mean_mm = float(errors_mm.mean()) if len(errors_mm) else np.nan
-    joint_px = _rms(fitted.residual_px[rows])
-    return Agreement(joint_px, _rms(errors_mm[:, None]), mean_mm, len(errors_mm))
+    def _agreement(self, fitted: Solution) -> Agreement:
+        """Return how the cameras agree, by a fit of the board's poses."""
+        seen = self.layout.seen
+        corners_mm = self.board.corners_mm
+        # Corners as they would have been seen at their view's own time.
+        then_px, _ = predict(fitted.state, seen, corners_mm)
+        still_px, _ = predict(replace(fitted.state, trajectory=None), seen, corners_mm)
+        px = seen.px + still_px - then_px
+        cameras = self.calibration.cameras
+        errors_mm = _pitch_errors_mm(cameras, self.layout, px, self.rows, self.board)
+        mean_mm = float(errors_mm.mean()) if len(errors_mm) else np.nan
+        joint_px = _rms(fitted.residual_px[self.rows])
+        return Agreement(joint_px, _rms(errors_mm[:, None]), mean_mm, len(errors_mm))
 
 
 def _pitch_errors_mm(
     cameras: Cameras, layout: Layout, px: np.ndarray, rows: np.ndarray, board: Board
 ) -> np.ndarray:
-    """Return the distances of neighbouring corners, triangulated by all cameras that see them, less the pitch."""
+    """Return the distances of neighbouring corners, triangulated by all cameras that see them, less
+    the pitch.
+    """
     seen = layout.seen
     columns = board.squares[0] - 1
     shape = (len(layout.index), board.squares[1] - 1, columns)

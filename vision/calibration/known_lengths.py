@@ -13,10 +13,11 @@ _SCALE_TOLERANCE = 0.005
 
 
 def check_known_lengths(lengths: Mapping[str, tuple[float, float, float, float]]) -> None:
-    """Raise Refused for a board at the wrong scale, by lengths known otherwise (bar diameter, whisker length).
+    """Raise Refused for a board at the wrong scale, by lengths known otherwise (bar diameter,
+    whisker length).
 
-    lengths: name to (seen mm, its sigma, known mm, its sigma). Everything in space scales with the square's size, so
-    one factor must explain all; the factor is named, never applied.
+    lengths: name to (seen mm, its sigma, known mm, its sigma). Everything in space scales with the
+    square's size, so one factor must explain all; the factor is named, never applied.
     """
     seen, seen_sigma, known, known_sigma = np.array(list(lengths.values())).T  # (n,) mm each
     ratio = seen / known

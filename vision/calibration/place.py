@@ -1,7 +1,7 @@
 """The place of the rig frame, by the board and by the free strokes together.
 
-The swing gives the rig frame (conventions: origin, z, x) by itself (`vision.calibration.swing`), as a rotation w and
-shift v of the frame that the board gave:
+The swing gives the rig frame (conventions: origin, z, x) by itself (`vision.calibration.swing`), as
+a rotation w and shift v of the frame that the board gave:
 
     x_board_rig = Exp(w) x_rig + v
 
@@ -45,10 +45,12 @@ _COMPONENTS = (
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """The rig frame relative to the one that the board gives: step (6,) = w rad, v mm, with its covariance (6, 6).
+    """The rig frame relative to the one that the board gives: step (6,) = w rad, v mm, with its
+    covariance (6, 6).
 
-    rise_rad: elevation of the whisker's base above the plane of rotation (None without a swing). width_rad: of the
-    widest stroke. notes: sentences for the report. alarm: how swing and board disagree, None where they do not.
+    rise_rad: elevation of the whisker's base above the plane of rotation (None without a swing).
+    width_rad: of the widest stroke. notes: sentences for the report. alarm: how swing and board
+    disagree, None where they do not.
     """
 
     step: np.ndarray
@@ -60,7 +62,9 @@ class Placement:
 
     @property
     def T_board_rig(self) -> np.ndarray:
-        """Return the transform (3, 4) from rig coordinates to those of the rig frame that the board gave."""
+        """Return the transform (3, 4) from rig coordinates to those of the rig frame that the board
+        gave.
+        """
         return np.column_stack([exp_rotation(self.step[:3]), self.step[3:]])
 
     @property
@@ -87,8 +91,8 @@ class Placement:
 def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Placement:
     """Return the placement by the board alone: no step, and the covariance of its measured pose.
 
-    T_rig_board errs by a shift and by a rotation about the board's origin, per axis; at the rig's origin that rotation
-    shifts.
+    T_rig_board errs by a shift and by a rotation about the board's origin, per axis; at the rig's
+    origin that rotation shifts.
     """
     lever = np.eye(6)
     lever[3:, :3] = skew(T_rig_board[:, 3])
@@ -97,7 +101,8 @@ def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Plac
 
 
 def combine(board: Placement, swing: Placement) -> Placement:
-    """Combine both placements by their covariances; with an alarm where they disagree by more than chance allows.
+    """Combine both placements by their covariances; with an alarm where they disagree by more than
+    chance allows.
 
     A board taken as exact stays as it is, the alarm included.
     """
@@ -117,8 +122,8 @@ def combine(board: Placement, swing: Placement) -> Placement:
 
 
 def check_swing_suffices(placement: Placement) -> str:
-    """Return '' where the swing alone fixes the centre well along the whisker, which is what distances count from;
-    else a warning that says how wide a stroke would.
+    """Return '' where the swing alone fixes the centre well along the whisker, which is what
+    distances count from; else a warning that says how wide a stroke would.
 
     Raises Refused where a ruler would do better.
     """
@@ -151,10 +156,12 @@ def _alarm(difference: np.ndarray, sigma: np.ndarray) -> str:
 
 
 def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cameras:
-    """Return the cameras in the rig frame of `after`, whose poses were made in that of `before` (see `by_board`).
+    """Return the cameras in the rig frame of `after`, whose poses were made in that of `before`
+    (see `by_board`).
 
-    Their covariance loses the placement error that `before` gave to all of them in common and gains that of `after`.
-    The swing is seen by the same cameras; that link is left out, which errs to the wide side.
+    Their covariance loses the placement error that `before` gave to all of them in common and gains
+    that of `after`. The swing is seen by the same cameras; that link is left out, which errs to the
+    wide side.
     """
     moved = []
     for camera in cameras:
@@ -163,14 +170,15 @@ def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cam
     by_placement = cameras.by_placement
     change = by_placement @ (after.covariance - before.covariance) @ by_placement.T
     scale = np.sqrt(np.diag(cameras.covariance))
-    covariance = _positive(cameras.covariance + change, scale)
+    covariance = _clip_eigenvalues(cameras.covariance + change, scale)
     # `after` counts along the old axes, the cameras along theirs
     rotation = np.kron(np.eye(2), after.T_board_rig[:, :3])
     return Cameras(tuple(moved), covariance, rotation.T @ after.covariance @ rotation)
 
 
-def _positive(covariance: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Remove the negative eigenvalues that rounding left where nearly all of a variance was taken off.
+def _clip_eigenvalues(covariance: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Remove the negative eigenvalues that rounding left where nearly all of a variance was taken
+    off.
 
     scale: of each parameter.
     """

@@ -1,8 +1,8 @@
 """The centre and axis of rotation and the encoder's zero, by free strokes.
 
-On a free stroke the whisker near its base is straight and rotates rigidly with the motor. All its lines meet in
-the centre of rotation, their fan's axis is the motor's, and the line at motor angle 0 is rig x. A narrow fan fixes its
-apex well across the whisker and badly along it.
+On a free stroke the whisker near its base is straight and rotates rigidly with the motor. All its
+lines meet in the centre of rotation, their fan's axis is the motor's, and the line at motor angle 0
+is rig x. A narrow fan fixes its apex well across the whisker and badly along it.
 """
 
 from collections.abc import Sequence
@@ -22,9 +22,11 @@ _MIN_FRAMES = 4
 
 
 def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
-    """Return the placement by several free strokes. Raises Refused where none of them is wide enough.
+    """Return the placement by several free strokes. Raises Refused where none of them is wide
+    enough.
 
-    What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it as one.
+    What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it
+    as one.
     """
     usable = []
     for lines in strokes:
@@ -50,7 +52,9 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
 
 
 def by_swing(lines: BaseLines) -> Placement:
-    """Return the placement by one swing. Raises Refused with fewer than four frames or a motor that stood still."""
+    """Return the placement by one swing. Raises Refused with fewer than four frames or a motor at
+    rest.
+    """
     if len(lines.motor_rad) < _MIN_FRAMES or lines.width_rad == 0:
         raise _too_few(lines)
     elevation_rad = np.arcsin(np.clip(np.mean(lines.direction[:, 2]), -1, 1))
@@ -62,7 +66,7 @@ def by_swing(lines: BaseLines) -> Placement:
 
 
 def _too_few(lines: BaseLines | None) -> Refused:
-    """Return the refusal of a stroke with too few frames or a motor that stood still; None: of no stroke."""
+    """Return the refusal of a stroke with too few frames or a motor at rest; None: of no stroke."""
     frames = 0 if lines is None else len(lines.motor_rad)
     width_rad = 0.0 if lines is None else lines.width_rad
     return Refused(
@@ -72,15 +76,15 @@ def _too_few(lines: BaseLines | None) -> Refused:
 
 
 def _excess(fitted: OptimizeResult) -> float:
-    """Return the variance of the residuals over the stated one (a motor angle's own noise); 1 where chance explains
-    the difference.
+    """Return the variance of the residuals over the stated one (a motor angle's own noise); 1 where
+    chance explains the difference.
     """
     chi2 = 2 * fitted.cost
     freedom = len(fitted.fun) - len(fitted.x)
     return chi2 / freedom if chi2 > chdtri(freedom, FALSE_ALARM) else 1.0
 
 
-def _predicted(p: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
+def _predict(p: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
     """Return directions (n, 3) of the whisker's base at these motor angles, for p = w, v, rise."""
     forward = np.cos(p[6])
     upward = np.full(len(motor_rad), np.sin(p[6]))
@@ -89,31 +93,37 @@ def _predicted(p: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
 
 
 def _residuals(p: np.ndarray, lines: BaseLines) -> np.ndarray:
-    """Return two residuals of the line's place and two of its direction per frame, across the line, in their sigmas."""
-    across = _across(_predicted(p, lines.motor_rad))
-    place = _whitened(across, lines.point_mm - p[3:6], lines.point_covariance)
-    direction = _whitened(across, lines.direction, lines.direction_covariance)
+    """Return two residuals of the line's place and two of its direction per frame, across the line,
+    in their sigmas.
+    """
+    across = _across(_predict(p, lines.motor_rad))
+    place = _whiten(across, lines.point_mm - p[3:6], lines.point_covariance)
+    direction = _whiten(across, lines.direction, lines.direction_covariance)
     return np.concatenate([place, direction])
 
 
 def _across(along: np.ndarray) -> np.ndarray:
-    """Return two unit vectors across each direction (n, 3), as rows (n, 2, 3). Whiskers are not along z."""
+    """Return two unit vectors across each direction (n, 3), as rows (n, 2, 3). Whiskers are not
+    along z.
+    """
     first = np.cross([0.0, 0.0, 1.0], along)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(along, first)], axis=1)
 
 
-def _whitened(across: np.ndarray, vectors: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Return the components (2 n,) of vectors (n, 3) along `across` (n, 2, 3), whitened by their covariance."""
+def _whiten(across: np.ndarray, vectors: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Return the components (2 n,) of vectors (n, 3) along `across` (n, 2, 3), whitened by their
+    covariance.
+    """
     components = across @ vectors[:, :, None]
     root = np.linalg.cholesky(across @ covariance @ np.swapaxes(across, 1, 2))
     return np.linalg.solve(root, components).ravel()
 
 
 def _covariance(J: np.ndarray) -> np.ndarray:
-    """Return (JᵀJ)⁻¹, with columns scaled to be alike in size."""
-    scale = 1.0 / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    return np.linalg.inv((J * scale).T @ (J * scale)) * np.outer(scale, scale)
+    """Return (JᵀJ)⁻¹, by the triangular factor of J."""
+    inverse = np.linalg.inv(np.linalg.qr(J, mode="r"))
+    return inverse @ inverse.T
 
 
 def _note(widths_rad: Sequence[float], placement: Placement) -> str:

@@ -1,8 +1,9 @@
 """The joint adjustment: whether views of one index are of one board at one instant, and its result.
 
-Cameras that looked at once share a board pose a view, and that ties them to each other. Series of their own may look
-alike (boards held in the same order of poses), and cameras that are not triggered see a moving board at other instants.
-Each camera by itself needs no such tie, and so says how well its views can be explained.
+Cameras that see one board at once share its pose in each view, and that ties them to each other.
+Series of their own may agree by chance (boards held in the same order of poses), and cameras that
+are not triggered see a moving board at other instants. Each camera by itself needs no such tie, and
+so gives the error with which its views can be explained.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,8 +52,8 @@ _LEAST_ERROR_PX = 1e-3
 class Timing:
     """The lateness of cameras that are not triggered together.
 
-    offset_s, scatter_s (C,): mean and standard deviation of how late each camera's pictures are, in s, or in frame
-    intervals where the pictures' times were not given (in_frames).
+    offset_s, scatter_s (C,): mean and standard deviation of how late each camera's pictures are, in
+    s, or in frame intervals where the pictures' times were not given (in_frames).
     """
 
     offset_s: np.ndarray
@@ -61,8 +62,11 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
-    """The joint adjustment of all cameras, with notes for the report. timing: None for pictures of one instant."""
+class JointAdjustment:
+    """The joint adjustment of all cameras, with notes for the report.
+
+    timing: None for pictures of one instant.
+    """
 
     layout: Layout
     adjustment: Adjustment
@@ -71,11 +75,11 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class JointInput:
     """The input of the joint adjustment.
 
-    alone: cameras by themselves. standing: the board on the rig in each; on_rig: its measured pose. times_s: of each
-    picture. triggered: see `calibrate_cameras`.
+    alone: cameras by themselves. standing: the board on the rig in each; on_rig: its measured pose.
+    times_s: of each picture. triggered: see `calibrate_cameras`.
     """
 
     alone: Mapping[str, Alone]
@@ -85,17 +89,17 @@ class Recorded:
     times_s: Mapping[str, Sequence[float]] | None
     triggered: bool
 
-    def adjust(self) -> Joint:
+    def adjust(self) -> JointAdjustment:
         """Adjust all cameras jointly.
 
-        Views of one index count as of one board where they agree with that and it explains them; where each camera by
-        itself explains its views far better, they are its own. Raises Refused where nothing else determines how the
-        cameras stand to each other.
+        Views of one index count as of one board where they agree with that and it explains them;
+        where each camera by itself explains its views far better, they are its own. Raises Refused
+        where nothing else determines how the cameras stand to each other.
         """
         if not looked_at_once(self.alone):
-            return self._adjusted(together=False)
+            return self._adjust(self._layout(together=False))
         try:
-            joint = self._adjusted(together=True)
+            joint = self._adjust(self._layout(together=True))
             complaint = "" if self.triggered else self._far_worse(joint.adjustment)
         except Refused as reason:
             complaint = str(reason)
@@ -107,11 +111,11 @@ class Recorded:
                 f"views {found}; record views that all cameras see at once, or a picture of the board on the rig"
             )
         note = f"Views {found}. Each camera's views count as its own."
-        return replace(self._adjusted(together=False), notes=(note,))
+        return replace(self._adjust(self._layout(together=False)), notes=(note,))
 
     def _far_worse(self, adjustment: Adjustment) -> str:
-        """Return in which camera the adjustment explains the views far worse than the camera by itself does; '' if
-        in none.
+        """Return in which camera the adjustment explains the views far worse than the camera by
+        itself does; '' if in none.
         """
         own_px = self._own_errors_px()
         ratio = adjustment.error_px / np.maximum(_DISAGREE * own_px, MOST_ERROR_PX)
@@ -127,15 +131,11 @@ class Recorded:
         """Return the model error (C,) of each camera by itself."""
         return np.array([camera.error_px for camera in self.alone.values()])
 
-    def _adjusted(self, *, together: bool) -> Joint:
-        """Adjust with views of one index as of one board, or each camera's own.
-
-        Pictures of one view count as of one instant, unless the cameras agree far worse with each other than with
-        themselves.
-        """
+    def _layout(self, *, together: bool) -> Layout:
+        """Return all views, those of one index as of one board, or each camera's own."""
         T_rig_board = self.on_rig.T_rig_board if self.on_rig else None
         poses = place_cameras(self.alone, self.standing, self.board, T_rig_board, together=together)
-        layout = lay_out(
+        return lay_out(
             self.alone,
             poses,
             standing=self.standing,
@@ -143,30 +143,40 @@ class Recorded:
             together=together,
             times_s=self.times_s,
         )
+
+    def _adjust(self, layout: Layout) -> JointAdjustment:
+        """Adjust all cameras.
+
+        Pictures of one view count as of one instant, unless the cameras agree far worse with each
+        other than with themselves.
+        """
         corners_mm = self.board.corners_mm
-        priors = _priors(layout.first, self.board, self.on_rig)
-        if layout.trajectory is None or self.triggered or len(self.alone) < 2:
-            adjustment = adjust_with_noise(layout.first, layout.seen, corners_mm, priors)
-            return Joint(layout, adjustment, None)
-        coarse = adjust_with_noise(layout.first, layout.seen, corners_mm, priors, coarse=True)
-        own_px = self._own_errors_px()
-        first = coarse.solution.state
-        if np.median(coarse.error_px / np.maximum(own_px, _LEAST_ERROR_PX)) < _DISAGREE:
-            return Joint(layout, adjust_with_noise(first, layout.seen, corners_mm, priors), None)
-        adjustment = adjust_with_noise(
-            replace(first, trajectory=layout.trajectory),
-            layout.seen,
-            corners_mm,
-            allow_lateness(priors, layout.trajectory),
-            error_px=own_px + _FIRST_EXCESS_PX,
+        first = layout.first
+        priors = _priors(first, self.board, self.on_rig)
+        if layout.trajectory is not None and not self.triggered and len(self.alone) > 1:
+            coarse = adjust_with_noise(first, layout.seen, corners_mm, priors, coarse=True)
+            own_px = self._own_errors_px()
+            first = coarse.solution.state
+            if np.median(coarse.error_px / np.maximum(own_px, _LEAST_ERROR_PX)) >= _DISAGREE:
+                adjustment = adjust_with_noise(
+                    replace(first, trajectory=layout.trajectory),
+                    layout.seen,
+                    corners_mm,
+                    allow_lateness(priors, layout.trajectory),
+                    error_px=own_px + _FIRST_EXCESS_PX,
+                )
+                offset_s = adjustment.solution.state.clock
+                timing = Timing(offset_s, adjustment.priors.late_sigma_s, self.times_s is None)
+                return JointAdjustment(layout, adjustment, timing)
+        return JointAdjustment(
+            layout, adjust_with_noise(first, layout.seen, corners_mm, priors), None
         )
-        offset_s = adjustment.solution.state.clock
-        timing = Timing(offset_s, adjustment.priors.late_sigma_s, self.times_s is None)
-        return Joint(layout, adjustment, timing)
 
 
 def timing_note(names: Sequence[str], timing: Timing) -> str:
-    """Return a sentence on how much later than the view each camera's pictures are, and their scatter."""
+    """Return a sentence on how much later than the view each camera's pictures are, and their
+    scatter.
+    """
     scale, unit = (1.0, "frames") if timing.in_frames else (1e3, "ms")
     late = []
     for name, offset_s, scatter_s in zip(names, timing.offset_s, timing.scatter_s):
@@ -178,7 +188,9 @@ def timing_note(names: Sequence[str], timing: Timing) -> str:
 
 
 def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
-    """Return the priors with clocks and pictures' instants free; the clock of the camera that ranks first is held."""
+    """Return the priors with clocks and pictures' instants free; the clock of the camera that ranks
+    first is held.
+    """
     free = priors.free.copy()
     sigma = priors.sigma.copy()
     clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
@@ -189,8 +201,8 @@ def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
 
 
 def lens_priors(n_cameras: int, n_views: int) -> Priors:
-    """Return the priors with lenses and poses free, LENS_PRIOR on the lenses, an exact board, and cameras that are
-    triggered together.
+    """Return the priors with lenses and poses free, LENS_PRIOR on the lenses, an exact board, and
+    cameras that are triggered together.
     """
     camera_sigma = [LENS_PRIOR.get(name, np.inf) for name in CAMERA_COLUMNS]
     camera_free = [not name.endswith("_s") for name in CAMERA_COLUMNS]
@@ -203,8 +215,8 @@ def lens_priors(n_cameras: int, n_views: int) -> Priors:
 
 
 def _priors(first: BundleState, board: Board, on_rig: MeasuredPose | None) -> Priors:
-    """Return the priors with the rig board's measured pose and the square's size, each held where its sigma is 0 and
-    an observation else.
+    """Return the priors with the rig board's measured pose and the square's size, each held where
+    its sigma is 0 and an observation else.
 
     Without a rig board the first camera is the world's frame.
     """

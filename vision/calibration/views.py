@@ -13,10 +13,11 @@ from vision.boards.corners import Corners
 class BoardViews:
     """The corners of a board by camera.
 
-    boards: views of the board held before the cameras, a view a frame, empty where the board is not seen; view k of one
-    camera may be of the same instant as view k of another. sizes_px: of each camera's pictures. rig: the board standing
-    on the rig, absent where there is no picture; trials: the same board in the trials' frames, of cameras that did not
-    move. times_s: of each picture in `boards`, None where not recorded.
+    boards: views of the board held before the cameras, a view a frame, empty where the board is not
+    seen; view k of one camera may be of the same instant as view k of another. sizes_px: of each
+    camera's pictures. rig: the board standing on the rig, absent where there is no picture; trials:
+    the same board in the trials' frames, of cameras that did not move. times_s: of each picture in
+    `boards`, None where not recorded.
     """
 
     boards: Mapping[str, Sequence[Corners]]
@@ -37,8 +38,8 @@ class BoardViews:
 class MeasuredPose:
     """The measured pose of the board on the rig, T_rig_board (3, 4), mm.
 
-    sigma_mm, sigma_rad: per axis, of the shift and of a rotation about the board's origin, shared by all cameras; 0
-    takes the pose as exact.
+    sigma_mm, sigma_rad: per axis, of the shift and of a rotation about the board's origin, shared
+    by all cameras; 0 takes the pose as exact.
     """
 
     T_rig_board: np.ndarray

@@ -1,4 +1,6 @@
-"""The whisker's base as lines in space, one per frame of a free stroke, from which the rig is located."""
+"""The whisker's base as lines in space, one per frame of a free stroke, from which the rig is
+located.
+"""
 
 from dataclasses import dataclass, field
 
@@ -9,15 +11,15 @@ from vision.geometry.refusals import Refused
 
 @dataclass(frozen=True, eq=False)
 class BaseLines:
-    """The whisker's straight part near its base on free strokes, one row per frame, in the rig frame
-    that the board defines.
+    """The whisker's straight part near its base on free strokes, one row per frame, in the rig
+    frame that the board defines.
 
     motor_rad (n,).
     point_mm (n, 3): any point on the line; point_covariance (n, 3, 3), mm².
     direction (n, 3): unit, from the base outward; direction_covariance (n, 3, 3). Both covariances
     are of the errors that each frame has by itself.
-    shared_covariance (6, 6): of a rotation w about the base and a shift v, rad and mm, that all lines
-    have in common (light on the wire, lenses).
+    shared_covariance (6, 6): of a rotation w about the base and a shift v, rad and mm, that all
+    lines have in common (light on the wire, lenses).
     Raises Refused where shapes do not match.
     """
 

@@ -54,16 +54,20 @@ class Board:
         return self.squares[0] * self.squares[1] // 2
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
-        """Return the board as OpenCV's object, with only the markers of its dictionary that it uses.
+        """Return the board as OpenCV's object, with only the markers of its dictionary that it
+        uses.
 
-        Comparing pictures with a thousand markers takes 40 % of detection. (The other markers are as
-        far from the board's as they are in the whole dictionary, so that they are not taken for it.)
+        Comparing pictures with a thousand markers takes 40 % of detection. (The other markers are
+        as far from the board's as they are in the whole dictionary, so that they are not taken for
+        it.)
         """
         return _opencv_board(self)
 
     @cached_property
     def corners_mm(self) -> np.ndarray:
-        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the ChArUco id."""
+        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the
+        ChArUco id.
+        """
         x = np.arange(1, self.squares[0]) * self.square_mm
         y = np.arange(1, self.squares[1]) * self.square_mm
         x_grid, y_grid = np.meshgrid(x, y)

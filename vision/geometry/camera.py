@@ -1,6 +1,7 @@
 """The cameras: calibrated and placed in the rig frame, with the covariance of all their parameters.
 
-Lengths in mm, angles in rad, picture coordinates in px with pixel centres at integers (OpenCV's convention).
+Lengths in mm, angles in rad, picture coordinates in px with pixel centres at integers (OpenCV's
+convention).
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,10 +25,11 @@ _ROTATION_TOLERANCE = 1e-4
 class Camera:
     """One calibrated camera, placed in the rig frame.
 
-    size_px: (width, height). matrix: (3, 3), px. distortion: (5,) k1 k2 p1 p2 k3. T_camera_rig: (3, 4), mm.
-    Its 15 parameters (for Jacobians and covariances, see PARAMETERS) are fx fy cx cy k1 k2 p1 p2 k3 and a
-    small rotation w and shift v in the camera frame: x_camera = Exp(w) R x_rig + t + v, with w = v = 0 at
-    the stored pose. Raises Refused where numbers are missing, not finite, or no camera's.
+    size_px: (width, height). matrix: (3, 3), px. distortion: (5,) k1 k2 p1 p2 k3. T_camera_rig: (3,
+    4), mm. Its 15 parameters (for Jacobians and covariances, see PARAMETERS) are fx fy cx cy k1 k2
+    p1 p2 k3 and a small rotation w and shift v in the camera frame: x_camera = Exp(w) R x_rig + t +
+    v, with w = v = 0 at the stored pose. Raises Refused where numbers are missing, not finite, or
+    no camera's.
     """
 
     name: str
@@ -41,7 +43,7 @@ class Camera:
         """Raise Refused where a field cannot be, and store read-only arrays with an exact rotation."""
         shapes = {"matrix": (3, 3), "distortion": (5,), "T_camera_rig": (3, 4)}
         for name, shape in shapes.items():
-            value = _finite(f"camera {self.name}: {name}", getattr(self, name), shape)
+            value = _require_finite(f"camera {self.name}: {name}", getattr(self, name), shape)
             object.__setattr__(self, name, value)
         are_counts = all(n > 0 and n % 1 == 0 for n in self.size_px)  # NaN and infinity are not
         require(
@@ -87,8 +89,8 @@ class Camera:
     def project_with_jacobians(
         self, points_mm: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return pixels (n, 2) of rig points (n, 3), d px / d point (n, 2, 3), and d px / d parameters
-        (n, 2, 15).
+        """Return pixels (n, 2) of rig points (n, 3), d px / d point (n, 2, 3), and d px / d
+        parameters (n, 2, 15).
         """
         R = self.T_camera_rig[:, :3]
         rotated = np.asarray(points_mm, dtype=float) @ R.T
@@ -98,16 +100,16 @@ class Camera:
         return px, by_x @ R, np.concatenate([by_lens, by_rotation, by_x], axis=2)
 
     def rays(self, px: np.ndarray) -> np.ndarray:
-        """Return the rays (n, 3) through pixels (n, 2), unit vectors of the rig frame; NaN where the
-        lens folds.
+        """Return the rays (n, 3) through pixels (n, 2), unit vectors of the rig frame; NaN where
+        the lens folds.
         """
         ab = lens_model.unproject(np.asarray(px, dtype=float), self.lens)
         directions = np.column_stack([ab, np.ones(len(ab))]) @ self.T_camera_rig[:, :3]
         return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
     def moved(self, step: np.ndarray) -> "Camera":
-        """Return the camera whose 15 parameters differ by `step` (15,): a draw from a covariance, or a
-        step of a fit.
+        """Return the camera whose 15 parameters differ by `step` (15,): a draw from a covariance,
+        or a step of a fit.
         """
         lens = self.lens + step[:9]
         R = exp_rotation(step[9:12]) @ self.T_camera_rig[:, :3]
@@ -126,7 +128,7 @@ def camera_matrix(lens: np.ndarray) -> np.ndarray:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
-def _finite(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
+def _require_finite(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
     """Return a read-only copy of `value`; raise Refused unless it is of this shape and finite."""
     array = np.array(value, dtype=float)
     require(
@@ -142,10 +144,10 @@ def _finite(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
 class Cameras:
     """The cameras of one rig with the joint covariance of all their parameters.
 
-    covariance: (15 n, 15 n) in the cameras' order, each camera's parameters as in PARAMETERS; a row of
-    zeros is a parameter held fixed. Left out, everything is taken as exact.
-    placement (6, 6): the part of it that is the rig frame's own, of a rotation w (rad) and shift v (mm)
-    that all cameras share, x = Exp(w) x_rig + v; None where it is not known.
+    covariance: (15 n, 15 n) in the cameras' order, each camera's parameters as in PARAMETERS; a row
+    of zeros is a parameter held fixed. Left out, everything is taken as exact.
+    placement (6, 6): the part of it that is the rig frame's own, of a rotation w (rad) and shift v
+    (mm) that all cameras share, x = Exp(w) x_rig + v; None where it is not known.
     """
 
     cameras: tuple[Camera, ...]
@@ -178,7 +180,9 @@ class Cameras:
         object.__setattr__(self, "placement", self._known_placement())
 
     def _known_placement(self) -> np.ndarray | None:
-        """Return the placement's covariance (6, 6), 0 for exact cameras; raise Refused where it cannot be."""
+        """Return the placement's covariance (6, 6), 0 for exact cameras; raise Refused where it
+        cannot be.
+        """
         placement = self.placement
         if placement is None and not self.covariance.any():
             placement = np.zeros((6, 6))  # exact cameras are exactly placed
@@ -194,8 +198,8 @@ class Cameras:
 
     @property
     def by_placement(self) -> np.ndarray:
-        """Return the parameters' derivatives (15 n, 6) by a rotation and a shift of the rig frame; 0 for
-        the lenses.
+        """Return the parameters' derivatives (15 n, 6) by a rotation and a shift of the rig frame;
+        0 for the lenses.
         """
         rows = np.zeros((len(self), N_PARAMETERS, 6))
         for camera, own in zip(self.cameras, rows):
@@ -242,8 +246,8 @@ class Cameras:
         return Cameras(tuple(self[name] for name in names), covariance, self.placement)
 
     def moved(self, step: np.ndarray) -> "Cameras":
-        """Return the cameras with all parameters changed by `step` (15 n,), in the same order, and with
-        the same covariance.
+        """Return the cameras with all parameters changed by `step` (15 n,), in the same order, and
+        with the same covariance.
         """
         steps = np.asarray(step, dtype=float).reshape(len(self), N_PARAMETERS)
         return replace(self, cameras=tuple(c.moved(s) for c, s in zip(self.cameras, steps)))

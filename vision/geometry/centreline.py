@@ -1,10 +1,12 @@
-"""The whisker's centreline in space: its rest shape, rotated with the motor, and the bend of one point force.
+"""The whisker's centreline in space: its rest shape, rotated with the motor, and the bend of one
+point force.
 
-Hub frame: origin at the base, x along the clamped whisker, z the rotation axis; it rotates with the motor. A
-round rod that is pushed at one point bends in the plane of its tangent and the force; its tangent angle grows as
-the integral of (contact - s)/EI(s) up to the contact and stays constant beyond. For a uniform rod that is
-2u - u², u = s/contact. The force stands across the whisker at the contact, so that a bent rod has shorter levers
-towards its base: the bend's square adds what `bend_growth` says, and so does friction along it.
+Hub frame: origin at the base, x along the clamped whisker, z the rotation axis; it rotates with the
+motor. A round rod that is pushed at one point bends in the plane of its tangent and the force; its
+tangent angle grows as the integral of (contact - s)/EI(s) up to the contact and stays constant
+beyond. For a uniform rod that is 2u - u², u = s/contact. The force stands across the whisker at the
+contact, so that a bent rod has shorter levers towards its base: the bend's square adds what
+`bend_growth` says, and so does friction along it.
 """
 
 from dataclasses import dataclass
@@ -32,16 +34,16 @@ _LEAST_RADIUS = 1e-3
 def tangent_growth(
     arc_mm: float | np.ndarray, contact_mm: float | np.ndarray, wire: Wire
 ) -> np.ndarray:
-    """Return the share (…) of the final tangent angle reached at an arc length, for small bends: 0 at the
-    base, 1 from the contact on.
+    """Return the share (…) of the final tangent angle reached at an arc length, for small bends: 0
+    at the base, 1 from the contact on.
     """
     turn = _turn(np.minimum(arc_mm, contact_mm), contact_mm, wire.taper_per_mm)
     return turn / _turn(contact_mm, contact_mm, wire.taper_per_mm)
 
 
 def _turn(s, contact, taper_per_mm):
-    """Return the tangent angle of a tapering rod per point force and base stiffness: the integral of
-    (contact - t)/(1 - t taper)⁴ from 0 to s.
+    """Return the tangent angle of a tapering rod per point force and base stiffness: the integral
+    of (contact - t)/(1 - t taper)⁴ from 0 to s.
 
     In this form nothing cancels, whatever the taper; without any it is s (contact - s/2).
     """
@@ -56,13 +58,14 @@ def bend_growth(
     contact_mm: np.ndarray,
     wire: Wire,
 ) -> np.ndarray:
-    """Return the share (…, m) of the final tangent angle turn_rad (…, 1) reached at the nodes of a curve,
-    arc_mm (m,).
+    """Return the share (…, m) of the final tangent angle turn_rad (…, 1) reached at the nodes of a
+    curve, arc_mm (m,).
 
-    The force at contact_mm (…, 1) is across the tangent there, and along it pull (…, 1) times as strong, towards the
-    tip: EI ψ'' = −F cos(ψ − B) − P sin(ψ − B), B = turn_rad. To the second order in bend and pull, with g the share by
-    small bends, the lever ∫ ds from s to the contact is shorter by ∫ B² (1 − g)²/2 − P/F B (1 − g) ds. Of a uniform
-    rod the share grows by B² (w⁶ − w²)/30 and less so P/F B (w⁴ − w²)/6, w = 1 − u: within 3 µm at B = 0.6 and 60 mm.
+    The force at contact_mm (…, 1) is across the tangent there, and along it pull (…, 1) times as
+    strong, towards the tip: EI ψ'' = −F cos(ψ − B) − P sin(ψ − B), B = turn_rad. To the second
+    order in bend and pull, with g the share by small bends, the lever ∫ ds from s to the contact is
+    shorter by ∫ B² (1 − g)²/2 − P/F B (1 − g) ds. Of a uniform rod the share grows by B² (w⁶ −
+    w²)/30 and less so P/F B (w⁴ − w²)/6, w = 1 − u: within 3 µm at B = 0.6 and 60 mm.
     """
     growth = tangent_growth(arc_mm, contact_mm, wire)
     if wire.taper_per_mm == 0.0:
@@ -82,23 +85,22 @@ def bend_growth(
 
 @dataclass(frozen=True)
 class Curves:
-    """Centrelines as nodes: arc_mm (m,), points and tangents (…, m, 3), in the frame they were made for."""
+    """Centrelines as nodes: arc_mm (m,), points and tangents (…, m, 3), in the frame they were made
+    for.
+    """
 
     arc_mm: np.ndarray
     points_mm: np.ndarray
     tangents: np.ndarray
 
     def at(self, arc_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Interpolate points and (unnormalised) tangents (…, k, 3) at arc lengths (k,) or (…, k), by
-        cubic Hermite segments.
+        """Interpolate points and (unnormalised) tangents (…, k, 3) at arc lengths (k,) or (…, k),
+        by cubic Hermite segments.
         """
-        arc = np.broadcast_to(arc_mm, (*self.points_mm.shape[:-2], np.shape(arc_mm)[-1]))
-        k, t = self._segment(arc)
-        first = k[..., None]
-        p0 = np.take_along_axis(self.points_mm, first, axis=-2)
-        p1 = np.take_along_axis(self.points_mm, first + 1, axis=-2)
-        m0 = np.take_along_axis(self.tangents, first, axis=-2)
-        m1 = np.take_along_axis(self.tangents, first + 1, axis=-2)
+        lead = self.points_mm.shape[:-2]
+        k, t = self._segment(np.broadcast_to(arc_mm, (*lead, np.shape(arc_mm)[-1])))
+        curve = np.arange(np.prod(lead, dtype=int)).reshape(lead)[..., None]
+        p0, p1, m0, m1 = self._ends((-1, 3), curve * len(self.arc_mm) + k)
         u = 1.0 - t
         tangents = (
             (6.0 * t * u / self._step_mm) * (p1 - p0)
@@ -112,18 +114,25 @@ class Curves:
         return Curves(self.arc_mm, self.points_mm[k], self.tangents[k])
 
     def at_one_each(self, which: np.ndarray, arc_mm: np.ndarray) -> np.ndarray:
-        """Interpolate points (…, n, 3), each on its own curve: which (n,) of the curves (…, f), at arc
-        lengths (n,).
+        """Interpolate points (…, n, 3), each on its own curve: which (n,) of the curves (…, f), at
+        arc lengths (n,).
         """
         k, t = self._segment(np.asarray(arc_mm))
-        first = which * len(self.arc_mm) + k
-        points = self.points_mm.reshape(*self.points_mm.shape[:-3], -1, 3)
-        tangents = self.tangents.reshape(*self.tangents.shape[:-3], -1, 3)
-        p0 = points.take(first, axis=-2)
-        p1 = points.take(first + 1, axis=-2)
-        m0 = tangents.take(first, axis=-2)
-        m1 = tangents.take(first + 1, axis=-2)
-        return self._point_between(t, p0, p1, m0, m1)
+        one_row = (*self.points_mm.shape[:-3], -1, 3)
+        return self._point_between(t, *self._ends(one_row, which * len(self.arc_mm) + k))
+
+    def _ends(self, shape: tuple[int, ...], node: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return points and tangents at both ends of segments: two points, two tangents.
+
+        shape: (…, nodes, 3), all curves in one row. node: of the segments' beginnings in that row.
+        """
+        points = self.points_mm.reshape(shape)
+        tangents = self.tangents.reshape(shape)
+        p0 = points.take(node, axis=-2)
+        p1 = points.take(node + 1, axis=-2)
+        m0 = tangents.take(node, axis=-2)
+        m1 = tangents.take(node + 1, axis=-2)
+        return p0, p1, m0, m1
 
     @property
     def _step_mm(self) -> float:
@@ -131,8 +140,8 @@ class Curves:
         return self.arc_mm[1] - self.arc_mm[0]
 
     def _segment(self, arc_mm):
-        """Return the number of the segment of each arc length (…), and the place in it (…, 1), from 0
-        to 1.
+        """Return the number of the segment of each arc length (…), and the place in it (…, 1), from
+        0 to 1.
         """
         steps = arc_mm / self._step_mm
         k = np.clip(steps.astype(int), 0, len(self.arc_mm) - 2)
@@ -158,9 +167,9 @@ def centrelines(
 ) -> Curves:
     """Return the centrelines in the rig frame of batches of shapes.
 
-    rest_mm (…, 2, 4): polynomials in s/length, (y, z); bend_rad (…, 2): the tangent angle at the contact,
-    (y, z) components, hub frame; contact_mm (…): arc length of the contact; motor_rad (…); pull (…): force along the
-    whisker at the contact over that across it, towards the tip.
+    rest_mm (…, 2, 4): polynomials in s/length, (y, z); bend_rad (…, 2): the tangent angle at the
+    contact, (y, z) components, hub frame; contact_mm (…): arc length of the contact; motor_rad (…);
+    pull (…): force along the whisker at the contact over that across it, towards the tip.
     """
     rest_mm = np.asarray(rest_mm)
     bend_rad = np.asarray(bend_rad)
@@ -184,9 +193,9 @@ def centrelines(
 
 @lru_cache
 def simpson() -> np.ndarray:
-    """Return the matrix (m, m) that integrates values at the nodes of a curve, one apart, from the first node to
-    each: by the parabola through three nodes, over its first and its second half by turns; over the last step its
-    second half.
+    """Return the matrix (m, m) that integrates values at the nodes of a curve, one apart, from the
+    first node to each: by the parabola through three nodes, over its first and its second half by
+    turns; over the last step its second half.
 
     As `scipy.integrate.cumulative_simpson`, which takes an eighth of a second to load.
     """
@@ -233,7 +242,9 @@ def one_curve(
 
 
 def resting_lines(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> list[np.ndarray]:
-    """Return lines (m, 2) px in one camera of a straight, unbent wire at each of the motor angles (n,)."""
+    """Return lines (m, 2) px in one camera of a straight, unbent wire at each of the motor angles
+    (n,).
+    """
     straight = np.zeros((2, REST_POWERS))
     lines = []
     for angle in motor_rad:

@@ -1,4 +1,6 @@
-"""Checks of the things on the bench when they are made: lengths and sigmas that cannot be are refused."""
+"""Checks of the things on the bench when they are made: lengths and sigmas that cannot be are
+refused.
+"""
 
 import math
 

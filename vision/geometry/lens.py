@@ -1,4 +1,5 @@
-"""The lens: camera coordinates to pixels and back (Brown–Conrady, OpenCV's order), with analytic Jacobians.
+"""The lens: camera coordinates to pixels and back (Brown–Conrady, OpenCV's order), with analytic
+Jacobians.
 
 The nine lens parameters are fx fy cx cy k1 k2 p1 p2 k3. With a = x/z, b = y/z, r² = a² + b²:
 
@@ -12,13 +13,14 @@ import numpy as np
 LENS_TERMS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 # [steps] Newton's, which end before; where they do not, the pixel has no direction. Derived.
 _MOST_STEPS = 30
+# [px] To which a projection is inverted: rounding. Derived.
+_TOLERANCE_PX = 1e-9
 
 
 def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     """Return normalised picture coordinates (n, 2) as the lens distorts them, (n, 2)."""
     _, _, p1, p2, _ = distortion
-    a = ab[:, 0]
-    b = ab[:, 1]
+    a, b = ab.T
     r2 = a * a + b * b
     radial = _radial(r2, distortion)
     ab2 = 2.0 * a * b
@@ -28,10 +30,11 @@ def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
 
 
 def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
-    """Return d distort / d ab, (n, 2, 2); symmetric, since both coordinates come from one potential."""
+    """Return d distort / d ab, (n, 2, 2); symmetric, since both coordinates come from one
+    potential.
+    """
     k1, k2, p1, p2, k3 = distortion
-    a = ab[:, 0]
-    b = ab[:, 1]
+    a, b = ab.T
     r2 = a * a + b * b
     radial = _radial(r2, distortion)
     slope = 2.0 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # d radial / d r² · 2
@@ -44,10 +47,10 @@ def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
 
 
 def project(x_camera: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """Project points in camera coordinates (n, 3) to pixels (n, 2); NaN where a point is not in front
-    of the camera.
+    """Project points in camera coordinates (n, 3) to pixels (n, 2); NaN where a point is not in
+    front of the camera.
     """
-    return distort(_normalised(x_camera), lens[4:]) * lens[:2] + lens[2:4]
+    return distort(_normalise(x_camera), lens[4:]) * lens[:2] + lens[2:4]
 
 
 def project_with_jacobians(
@@ -56,21 +59,22 @@ def project_with_jacobians(
     """Return pixels (n, 2) with their derivatives by the point (n, 2, 3) and by the nine lens
     parameters (n, 2, 9).
     """
-    ab = _normalised(x_camera)
+    ab = _normalise(x_camera)
     distorted = distort(ab, lens[4:])
     px = distorted * lens[:2] + lens[2:4]
     return px, _by_point(ab, x_camera[:, 2], lens), _by_lens(ab, distorted, lens)
 
 
-def unproject(px: np.ndarray, lens: np.ndarray, tolerance_px: float = 1e-9) -> np.ndarray:
-    """Return the normalised coordinates (n, 2) whose projection is px (n, 2), by Newton's method; NaN
-    where none is found.
+def unproject(px: np.ndarray, lens: np.ndarray) -> np.ndarray:
+    """Return the normalised coordinates (n, 2) whose projection is px (n, 2), by Newton's method;
+    NaN where none is found.
 
-    Newton needs four to six steps for the lenses of a bench; past the lens's fold there is no solution.
+    Newton needs four to six steps for the lenses of a bench; past the lens's fold there is no
+    solution.
     """
     target = (px - lens[2:4]) / lens[:2]
     ab = target.copy()
-    tolerance = tolerance_px / min(lens[:2])
+    tolerance = _TOLERANCE_PX / min(lens[:2])
     for _ in range(_MOST_STEPS):
         residual = distort(ab, lens[4:]) - target
         if not np.any(np.abs(residual) > tolerance):
@@ -84,8 +88,8 @@ def fold_radius(distortion: np.ndarray) -> float:
     """Return how far from the principal point the picture reaches before the lens folds it back, in
     distorted normalised coordinates (px over focal length); inf where it never does.
 
-    The radial curve r (1 + k1 r² + k2 r⁴ + k3 r⁶) stops rising there. Beyond, two directions share a
-    pixel: a lens that folds inside its own picture is over-fitted.
+    The radial curve r (1 + k1 r² + k2 r⁴ + k3 r⁶) stops rising there. Beyond, two directions share
+    a pixel: a lens that folds inside its own picture is over-fitted.
     """
     k1, k2, _, _, k3 = distortion
     roots = np.roots(np.trim_zeros([7 * k3, 5 * k2, 3 * k1, 1.0], "f"))
@@ -102,7 +106,7 @@ def _radial(r2: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     return 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
 
 
-def _normalised(x_camera: np.ndarray) -> np.ndarray:
+def _normalise(x_camera: np.ndarray) -> np.ndarray:
     """Return (x/z, y/z) (n, 2) of points (n, 3); NaN where z is not positive."""
     z = np.where(x_camera[:, 2] > 0, x_camera[:, 2], np.nan)
     return x_camera[:, :2] / z[:, None]
@@ -116,8 +120,7 @@ def _by_point(ab: np.ndarray, z: np.ndarray, lens: np.ndarray) -> np.ndarray:
 
 def _by_lens(ab: np.ndarray, distorted: np.ndarray, lens: np.ndarray) -> np.ndarray:
     """Return d px / d lens parameters (n, 2, 9), columns as in LENS_TERMS."""
-    a = ab[:, 0]
-    b = ab[:, 1]
+    a, b = ab.T
     r2 = a * a + b * b
     jacobian = np.zeros((len(ab), 2, 9))
     jacobian[:, 0, 0] = distorted[:, 0]
@@ -137,8 +140,8 @@ def _by_lens(ab: np.ndarray, distorted: np.ndarray, lens: np.ndarray) -> np.ndar
 
 def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return x (n, 2) with J x = y, by Cramer's rule; NaN where J (n, 2, 2) is singular."""
-    determinant = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
+    a, b, c, d = J.reshape(-1, 4).T
+    determinant = a * d - b * c
     determinant = np.where(np.abs(determinant) > 1e-12, determinant, np.nan)
-    x0 = J[:, 1, 1] * y[:, 0] - J[:, 0, 1] * y[:, 1]
-    x1 = J[:, 0, 0] * y[:, 1] - J[:, 1, 0] * y[:, 0]
-    return np.column_stack([x0, x1]) / determinant[:, None]
+    y0, y1 = y.T
+    return np.column_stack([d * y0 - b * y1, a * y1 - c * y0]) / determinant[:, None]

@@ -6,7 +6,7 @@ import numpy as np
 
 # [steps] Ends before. Not measured.
 _MOST_STEPS = 12
-# [px⁻²] What the pictures do not tell is told to half a pixel by nothing. Stated.
+# [px⁻²] A prior of half a pixel on what the pictures do not constrain. Stated.
 _LEAST_CURVATURE = 4.0
 
 
@@ -20,9 +20,10 @@ def descend(
 ) -> tuple[np.ndarray, float, np.ndarray]:
     """Minimise a function from `begin` (n,) by Newton's method with derivatives from differences.
 
-    steps (n,): of the differences. longest (n,): limit of a Newton step. Each step is tried whole and in
-    part, by the factors `parts`. Ends when no parameter changes by more than `tolerance`, or no part of a
-    step is lower. Returns the minimum (n,), the value there, and the second derivatives (n, n).
+    steps (n,): of the differences. longest (n,): limit of a Newton step. Each step is tried whole
+    and in part, by the factors `parts`. Ends when no parameter changes by more than `tolerance`, or
+    no part of a step is lower. Returns the minimum (n,), the value there, and the second
+    derivatives (n, n).
     """
     point = np.asarray(begin, dtype=float)
     value = function(begin)
@@ -65,7 +66,9 @@ def _derivatives(function, point, value: float, steps) -> tuple[np.ndarray, np.n
 
 
 def _downhill(slope, curvature, longest) -> np.ndarray:
-    """Return Newton's step (n,), turned downhill where the curvature is not positive, within `longest`."""
+    """Return Newton's step (n,), turned downhill where the curvature is not positive, within
+    `longest`.
+    """
     values, vectors = np.linalg.eigh(curvature)
     values = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values)))
     step = -vectors @ ((vectors.T @ slope) / values)
@@ -73,8 +76,8 @@ def _downhill(slope, curvature, longest) -> np.ndarray:
 
 
 def cauchy_weights(residual: np.ndarray, scale: float) -> np.ndarray:
-    """Return the weights of least squares that make residuals count as under a Cauchy distribution of
-    this scale.
+    """Return the weights of least squares that make residuals count as under a Cauchy distribution
+    of this scale.
     """
     return 1.0 / (1.0 + (residual / scale) ** 2)
 
@@ -84,8 +87,9 @@ def gauss_newton(
 ) -> np.ndarray:
     """Fit parameters (k,) by Gauss–Newton's method from 0.
 
-    rows_of(parameters) returns pairs of residuals (n,) and their derivatives (n, k), weighted. prior
-    (k,): standard deviations about 0. Ends with a step below `steps` (k,), or after so many rounds.
+    rows_of(parameters) returns pairs of residuals (n,) and their derivatives (n, k), weighted.
+    prior (k,): standard deviations about 0. Ends with a step below `steps` (k,), or after so many
+    rounds.
     """
     parameters = np.zeros(len(prior))
     for _ in range(rounds):

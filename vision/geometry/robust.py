@@ -7,5 +7,7 @@ _MEDIAN = 0.6745
 
 
 def robust_sigma(deviations: np.ndarray) -> float:
-    """Return the standard deviation of the normal distribution whose deviations have this median size (MAD)."""
+    """Return the standard deviation of the normal distribution whose deviations have this median
+    size (MAD).
+    """
     return float(np.median(np.abs(deviations))) / _MEDIAN

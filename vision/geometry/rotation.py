@@ -1,7 +1,7 @@
 """Rotations as small vectors: exponential, logarithm, the nearest proper rotation. Angles in rad.
 
-SciPy's Rotation is used for the exponential. Its logarithm takes 3 to 15 times as long as the one here
-and raises where a pose is NaN; the Jacobian is not in it.
+SciPy's Rotation is used for the exponential. Its logarithm takes 3 to 15 times as long as the one
+here and raises where a pose is NaN; the Jacobian is not in it.
 """
 
 import numpy as np
@@ -24,11 +24,13 @@ def skew(v: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the cross products (..., 3) of vectors (..., 3), in half of NumPy's time for few vectors."""
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        product[..., k] = a[..., i] * b[..., j] - a[..., j] * b[..., i]
-    return product
+    """Return the cross products (..., 3) of vectors (..., 3), in half of NumPy's time for few
+    vectors.
+    """
+    next_axis = [1, 2, 0]
+    last_axis = [2, 0, 1]
+    forward = a.take(next_axis, -1) * b.take(last_axis, -1)
+    return forward - a.take(last_axis, -1) * b.take(next_axis, -1)
 
 
 def exp_rotation(w: np.ndarray) -> np.ndarray:

@@ -1,4 +1,6 @@
-"""Points in space from where two or more cameras see them, with the calibration's share of their covariance."""
+"""Points in space from where two or more cameras see them, with the calibration's share of their
+covariance.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,8 +28,8 @@ class Points:
     by_cameras: np.ndarray
 
     def covariance(self, cameras: Cameras) -> np.ndarray:
-        """Return the covariance (n, 3, 3), mm², of noise and calibration. The calibration's share is
-        common to all points.
+        """Return the covariance (n, 3, 3), mm², of noise and calibration. The calibration's share
+        is common to all points.
         """
         J = self.by_cameras
         return self.noise_covariance + J @ cameras.covariance @ np.swapaxes(J, 1, 2)
@@ -64,8 +66,8 @@ def _nearest_to_rays(cameras: Cameras, px) -> np.ndarray:
 
 
 def _gauss_newton_step(cameras: Cameras, px, sigma_px, points: np.ndarray):
-    """Return Gauss–Newton's step (n, 3), its matrix (n, 3, 3), and minus the derivative of the gradient
-    by the cameras' parameters (n, 3, 15 c).
+    """Return Gauss–Newton's step (n, 3), its matrix (n, 3, 3), and minus the derivative of the
+    gradient by the cameras' parameters (n, 3, 15 c).
     """
     n = len(points)
     normal = np.zeros((n, 3, 3))

@@ -10,13 +10,13 @@ class VisionSettings:
     wire_piece_px, bar_piece_px: length of the segments that give one line point each.
     wire_margin_px, bar_margin_px: background read on either side of the rod.
     rounds: how often the lines are traced anew from the fit.
-    clock_sigma_s: uncertainty of the cameras' clock against the motor's; 0 takes frame times as exact.
-    bar_reach_mm: length of bar used on either side of the contact.
+    clock_sigma_s: uncertainty of the cameras' clock against the motor's; 0 takes frame times as
+    exact. bar_reach_mm: length of bar used on either side of the contact.
     picture_scale: factor, a whole number, by which pictures are shrunk.
-    every_frame: one in so many of a stroke's frames is evaluated; all where these leave too few before
-    touch.
-    check_beam: whether the wire is fitted again as a curve that is no beam and with another width, to
-    check that it is the one that is stated.
+    every_frame: one in so many of a stroke's frames is evaluated; all where these leave too few
+    before touch.
+    check_beam: whether the wire is fitted again as a curve that is no beam and with another width,
+    to check that it is the one that is stated.
     """
 
     wire_piece_px: int = 12

@@ -1,9 +1,11 @@
-"""Truth at a wanted pushing angle: a local fit over touching frames; where slip jumps, bounds by the frames around it.
+"""Truth at a wanted pushing angle: a local fit over touching frames; where slip jumps, bounds by
+the frames around it.
 
-A jump between two frames may lie before the wanted angle or after it, so slip is that of the one frame or of the other.
-The middle with half of the difference is its mean and standard deviation where both are as likely, and no distribution
-between the two has a larger one (Popoviciu). Where the contact is follows from angle and slip, and so do deflection and
-the force's angle: a line in both, over the frames nearby, carries slip's sigma to them.
+A jump between two frames may lie before the wanted angle or after it, so slip is that of the one
+frame or of the other. The middle with half of the difference is its mean and standard deviation
+where both are as likely, and no distribution between the two has a larger one (Popoviciu). Where
+the contact is follows from angle and slip, and so do deflection and the force's angle: a line in
+both, over the frames nearby, carries slip's sigma to them.
 """
 
 from dataclasses import dataclass
@@ -12,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri, stdtrit
 
 from vision.geometry.reasons import NO_REASON, Reason
-from vision.truth.value import FIELDS, Value, WhileTouching
+from vision.truth.value import FIELDS, Value, WhileTouching, propagated_sigma
 
 # [rad] To either side of the wanted angle, of the local fit. Set by eye. Study: thresholds.py
 # truth.at_angle _WINDOW_RAD ….
@@ -50,8 +52,8 @@ class TruthAtAngle(WhileTouching):
 
 @dataclass(frozen=True)
 class Smooth:
-    """The touching frames, for interpolation: values (f,) by name, their Jacobians (f, p) by the parameters,
-    that of the angle of touch (p,), and the parameters' covariance (p, p).
+    """The touching frames, for interpolation: values (f,) by name, their Jacobians (f, p) by the
+    parameters, that of the angle of touch (p,), and the parameters' covariance (p, p).
     """
 
     theta_rad: np.ndarray
@@ -60,19 +62,10 @@ class Smooth:
     jacobians: dict[str, np.ndarray]
     covariance: np.ndarray
 
-    def sigmas(self, rows: np.ndarray) -> np.ndarray:
-        """Return the standard deviations (k,) of quantities with derivatives (k, p) by the parameters."""
-        variances = np.einsum("fi,ij,fj->f", rows, self.covariance, rows)
-        return np.sqrt(np.maximum(variances, 0.0))
-
-    def sigma(self, row: np.ndarray) -> float:
-        """Return the standard deviation of one quantity with derivatives (p,) by the parameters."""
-        return float(self.sigmas(row[None])[0])
-
 
 def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthAtAngle:
-    """Return slip, deflection and force angle at a pushing angle, each with sigma; a status where they are
-    not known.
+    """Return slip, deflection and force angle at a pushing angle, each with sigma; a status where
+    they are not known.
 
     without: the status where there are no touching frames.
     """
@@ -97,15 +90,16 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthA
 def _smooth_value(smooth: Smooth, name: str, theta_rad: float) -> Value:
     """Return a smooth quantity by the local fit.
 
-    Its sigma is not below that of the best frame nearby; the fit's residuals are added to it. The error of
-    touch moves all pushing angles together.
+    Its sigma is not below that of the best frame nearby; the fit's residuals are added to it. The
+    error of touch moves all pushing angles together.
     """
     weights, slope_weights = _local_fit(smooth.theta_rad, theta_rad)
     values = smooth.values[name]
     jacobian = smooth.jacobians[name]
-    total = weights @ jacobian + (slope_weights @ values) * smooth.touch_jacobian
+    by_parameter = weights @ jacobian + (slope_weights @ values) * smooth.touch_jacobian
     near = _near(smooth.theta_rad - theta_rad)
-    sigma = max(smooth.sigma(total), np.min(smooth.sigmas(jacobian[near])))
+    least = np.min(propagated_sigma(jacobian[near], smooth.covariance))
+    sigma = max(propagated_sigma(by_parameter, smooth.covariance), least)
     residual = _between_frames_sigma(smooth, name, theta_rad)
     return Value(float(weights @ values), float(np.hypot(sigma, residual)))
 
@@ -121,22 +115,23 @@ def _slip_jumps(smooth: Smooth, theta_rad: float) -> bool:
 
 
 def _frames_around(smooth: Smooth, theta_rad: float) -> np.ndarray:
-    """Return the frames (k,) from the last that is surely before theta to the first that is surely past it.
+    """Return the frames (k,) from the last that is surely before theta to the first that is surely
+    past it.
 
-    The uncertainty is that of touch, which moves them all. At the ends of the record they are the two
-    nearest at least.
+    The uncertainty is that of touch, which moves them all. At the ends of the record they are the
+    two nearest at least.
     """
     order = np.argsort(smooth.theta_rad)
     rising = smooth.theta_rad[order]
-    margin_rad = _SURE_SIGMAS * smooth.sigma(smooth.touch_jacobian)
+    margin_rad = _SURE_SIGMAS * propagated_sigma(smooth.touch_jacobian, smooth.covariance)
     first = np.searchsorted(rising, theta_rad - margin_rad) - 1
     last = np.searchsorted(rising, theta_rad + margin_rad)
     return order[max(min(first, len(order) - 2), 0) : max(last, 1) + 1]
 
 
 def _value_in_jump(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarray) -> Value:
-    """Return a quantity where slip is anywhere between these frames (k,), by its linear dependence on
-    angle and slip nearby.
+    """Return a quantity where slip is anywhere between these frames (k,), by its linear dependence
+    on angle and slip nearby.
     """
     slip = smooth.values["slip"]
     values = smooth.values[name]
@@ -148,7 +143,7 @@ def _value_in_jump(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarr
     freedom = max(len(design) - design.shape[1], 1)
     residual_variance = np.sum((values[near] - design @ coefficients) ** 2) / freedom
     rows = smooth.jacobians[name][frames] + by_angle * smooth.touch_jacobian
-    sigma = np.max(smooth.sigmas(rows))
+    sigma = np.max(propagated_sigma(rows, smooth.covariance))
     half_mm = 0.5 * float(np.ptp(slip[frames]))
     value = coefficients @ [1.0, 0.0, np.min(slip[frames]) + half_mm]
     variance = (by_slip * half_mm) ** 2 + residual_variance + sigma**2
@@ -156,7 +151,8 @@ def _value_in_jump(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarr
 
 
 def _local_fit(theta, at):
-    """Return the weights (f,) of a polynomial fit around `at` for its value there, and for its slope.
+    """Return the weights (f,) of a polynomial fit around `at` for its value there, and for its
+    slope.
 
     It is quadratic where five frames are near, else a line, else the nearest frame.
     """
@@ -174,8 +170,8 @@ def _local_fit(theta, at):
 def _between_frames_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
     """Return the standard deviation of a value between the frames about the local fit.
 
-    It is that of the frames. Where chance hardly leaves them that far, small jumps do: each frame's own
-    jump moves the fit as well, and so few frames give their size by Student's t only.
+    It is that of the frames. Where chance hardly leaves them that far, small jumps do: each frame's
+    own jump moves the fit as well, and so few frames give their size by Student's t only.
     """
     found = scatter(smooth, name, theta_rad)
     chi2_limit = chdtri(found.freedom, _CHANCE) * found.expected**2 if found.freedom else np.inf
@@ -190,8 +186,9 @@ def _between_frames_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
 class Scatter:
     """The scatter of frames about a smooth curve.
 
-    rms: at the wanted angle. expected: the same where nothing jumps and frames err as their covariance
-    says. freedom: degrees of freedom, 0 where there are no more frames than the curve has coefficients.
+    rms: at the wanted angle. expected: the same where nothing jumps and frames err as their
+    covariance says. freedom: degrees of freedom, 0 where there are no more frames than the curve
+    has coefficients.
     """
 
     rms: float = 0.0
@@ -200,12 +197,13 @@ class Scatter:
 
 
 def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
-    """Return the scatter of frames near theta, wider than the local fit where those are few: small jumps
-    are in no frame's sigma, but between the frames.
+    """Return the scatter of frames near theta, wider than the local fit where those are few: small
+    jumps are in no frame's sigma, but between the frames.
 
-    Teeth go from one friction angle to another: the force's angle jumps by as much in all of them, and lengths by as
-    much for their pushing angle. Frames are weighted by their precision. With weights W and the projection M off the
-    curve, a scatter of τ in all of them leaves τ² tr(M W²), with tr(M W²)² / tr((M W²)²) degrees of freedom.
+    Teeth go from one friction angle to another: the force's angle jumps by as much in all of them,
+    and lengths by as much for their pushing angle. Frames are weighted by their precision. With
+    weights W and the projection M off the curve, a scatter of τ in all of them leaves τ² tr(M W²),
+    with tr(M W²)² / tr((M W²)²) degrees of freedom.
     """
     near = _near(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
     degree = _degree(int(np.sum(near)))
@@ -227,13 +225,15 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
 
 
 def _share(smooth: Smooth, name: str, theta_rad: float) -> np.ndarray:
-    """Return each frame's (f,) share of a quantity's size at theta where the force keeps its direction."""
+    """Return each frame's (f,) share of a quantity's size at theta where the force keeps its
+    direction.
+    """
     return np.ones(len(smooth.theta_rad)) if name in _ANGLES else smooth.theta_rad / theta_rad
 
 
 def _near(distance_rad, fewest: int = 2) -> np.ndarray:
-    """Return the mask (f,) of frames within the window of the angle, of so many of the nearest where there
-    are fewer.
+    """Return the mask (f,) of frames within the window of the angle, of so many of the nearest
+    where there are fewer.
     """
     near = np.abs(distance_rad) <= _WINDOW_RAD
     if np.sum(near) < fewest:

@@ -17,10 +17,11 @@ from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrameTruth(WhileTouching):
-    """The frames (n,) of a whisk, mm and rad; NaN where a value is unknown, with the reason in `status`.
+    """The frames (n,) of a whisk, mm and rad; NaN where a value is unknown, with the reason in
+    `status`.
 
-    Values that exist only while touching are NaN before. point_mm: value and sigma (n, 3). arc_mm: the contact's
-    place along the whisker.
+    Values that exist only while touching are NaN before. point_mm: value and sigma (n, 3). arc_mm:
+    the contact's place along the whisker.
     """
 
     index: np.ndarray
@@ -37,7 +38,8 @@ class FrameTruth(WhileTouching):
 class WireShape:
     """The fitted wire, as `vision.geometry.centreline` describes it.
 
-    rest_mm (2, 4); of each frame of the fit its index (f,), bend_rad (f, 2), and arc_mm (f,) of the contact.
+    rest_mm (2, 4); of each frame of the fit its index (f,), bend_rad (f, 2), and arc_mm (f,) of the
+    contact.
     """
 
     rest_mm: np.ndarray
@@ -50,8 +52,8 @@ class WireShape:
 class GaveWay:
     """The displacement of a bar that gives way, in each touching frame (n,).
 
-    index: of the frame. theta_rad: pushing angle. normal_mm: away from the contact. aside_mm: across that direction
-    and the bar, where springs need not move it.
+    index: of the frame. theta_rad: pushing angle. normal_mm: away from the contact. aside_mm:
+    across that direction and the bar, where springs need not move it.
     """
 
     index: np.ndarray
@@ -64,8 +66,9 @@ class GaveWay:
 class SeenObject:
     """An object that is no straight bar, where a whisk shows it.
 
-    point_mm (3,): centre of ring or sphere, or the cone's tip. axis (3,): normal of the ring's plane, or the cone's
-    direction. As stated: radius_mm of the sphere or of the ring's bar, ring_radius_mm, half_angle_rad of the cone.
+    point_mm (3,): centre of ring or sphere, or the cone's tip. axis (3,): normal of the ring's
+    plane, or the cone's direction. As stated: radius_mm of the sphere or of the ring's bar,
+    ring_radius_mm, half_angle_rad of the cone.
     """
 
     shape: str
@@ -78,17 +81,19 @@ class SeenObject:
 
 @dataclass(frozen=True)
 class WhiskTruth:
-    """The truth of one whisk: first touch, the contact then, the bar's slopes, and one row per frame.
+    """The truth of one whisk: first touch, the contact then, the bar's slopes, and one row per
+    frame.
 
     d_x_mm is NaN exactly where there is no truth; `status` says why, or holds warnings.
-    overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
-    the frames before touch. beam: the comparison with a curve that is no beam. turns: the whisker's rotation in each
-    frame of the fit beyond the motor's. refinements: what the truth would be without each part of the model, by name.
-    lines: the precision of each camera's lines. ends: by camera how far from its base, mm, the whisker is seen to end;
-    looks: its width in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
-    point_mm. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object that moves, as seen;
-    None where it stands. gave: of one that gives way. rounded: one that is no straight bar. problem: what was fitted,
-    from which `sights_of` takes one camera's share.
+    overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the
+    whisker's base in the frames before touch. beam: the comparison with a curve that is no beam.
+    turns: the whisker's rotation in each frame of the fit beyond the motor's. refinements: what the
+    truth would be without each part of the model, by name. lines: the precision of each camera's
+    lines. ends: by camera how far from its base, mm, the whisker is seen to end; looks: its width
+    in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
+    point_mm. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object
+    that moves, as seen; None where it stands. gave: of one that gives way. rounded: one that is no
+    straight bar. problem: what was fitted, from which `sights_of` takes one camera's share.
     """
 
     whisk: int
@@ -125,8 +130,8 @@ class WhiskTruth:
 
 @dataclass(frozen=True)
 class TrialTruth:
-    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, its direction (3,), and by camera
-    its width in the pictures over the stated one.
+    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, its direction
+    (3,), and by camera its width in the pictures over the stated one.
     """
 
     bar_point_mm: np.ndarray

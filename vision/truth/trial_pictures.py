@@ -23,8 +23,8 @@ class TrialPictures:
     frames: per camera the grey pictures (h, w) by frame index; a missing index is a lost frame.
     time_s, motor_rad (n,): at each frame.
     background: per camera the scene (h, w) without whisker and bar, or None.
-    object_velocity_mm_s (3,): of a bar that moves, rig frame, with one sigma along each axis; None where it stands.
-    object_gives_way: the bar stands until it is touched, and comes back.
+    object_velocity_mm_s (3,): of a bar that moves, rig frame, with one sigma along each axis; None
+    where it stands. object_gives_way: the bar stands until it is touched, and comes back.
     others: by camera, rods in its pictures that are not the wire.
     itself: by camera, the wire's place to a pixel or two, where that is known beforehand.
     """
@@ -52,7 +52,9 @@ class TrialPictures:
         return replace(self, frames=frames, background=background, others=others, itself=itself)
 
     def views(self, cameras: Cameras) -> tuple[View, ...]:
-        """Return the view of each camera that has three pictures or more; raise Refused where none has."""
+        """Return the view of each camera that has three pictures or more; raise Refused where none
+        has.
+        """
         views = []
         for camera in cameras:
             if len(self.frames.get(camera.name, ())) >= _FEWEST_PICTURES:

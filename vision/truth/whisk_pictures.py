@@ -12,16 +12,17 @@ from vision.fit.covariance import Uncertainty, uncertainty
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State, shifts_mm
+from vision.fit.problem import Problem, State, curves_of, shifts_mm
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
+from vision.geometry.centreline import Curves
 from vision.geometry.reasons import Reason
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.search import SeenBar
-from vision.truth.value import Value
+from vision.truth.value import Value, propagated_sigma
 from vision.wire.one_sided import WireAppearance
 
 # [rad] A bar begins to give way at touch: a tenth of a micrometre there, less than the contact's
@@ -38,9 +39,9 @@ _FEWEST_SHARE = 0.7
 class WhiskPictures:
     """One whisk in the pictures of a trial.
 
-    indices: the frames of the stroke. time_s, motor_rad (n,): at every frame of the trial. light: filled with how
-    each camera sees the wire. left_out: a line on each camera that is not used. stated_velocity: of a bar that moves.
-    gives: of one that gives way.
+    indices: the frames of the stroke. time_s, motor_rad (n,): at every frame of the trial. light:
+    filled with how each camera sees the wire. left_out: a line on each camera that is not used.
+    stated_velocity: of a bar that moves. gives: of one that gives way.
     """
 
     number: int
@@ -72,7 +73,9 @@ class WhiskPictures:
         return None if self.gives is None else Onset(self.gives.touch_rad, _EXACT_RAD)
 
     def yielding(self, came_mm: np.ndarray, touch_rad: float) -> "WhiskPictures":
-        """Return the whisk with the displacements (f, 3) of a bar that gives way, and the angle of its touch."""
+        """Return the whisk with the displacements (f, 3) of a bar that gives way, and the angle of
+        its touch.
+        """
         if self.gives is None:
             return self
         span_rad = max(float(self.angles_rad.max()) - touch_rad, _LEAST_SPAN_RAD)
@@ -127,7 +130,9 @@ class WhiskPictures:
         return self.during(range(thinned.start, thinned.stop, int(np.sign(thinned.step))))
 
     def without_gaps(self) -> "WhiskPictures":
-        """Return the whisk by the cameras that have most of its frames: one camera's gaps are not all cameras'."""
+        """Return the whisk by the cameras that have most of its frames: one camera's gaps are not
+        all cameras'.
+        """
         counts = {}
         for view in self.views:
             counts[view.camera.name] = sum(f in view.frames for f in self.indices)
@@ -153,7 +158,9 @@ class WhiskPictures:
 
 @dataclass(frozen=True, eq=False)
 class FittedWhisk:
-    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for."""
+    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user
+    asks for.
+    """
 
     problem: Problem
     state: State
@@ -164,8 +171,8 @@ class FittedWhisk:
 
     @classmethod
     def of(cls, problem: Problem, state: State, gain: np.ndarray, frames: list[int]) -> Self:
-        """Return a fit with its uncertainty; gain (size, size): sensitivity of the parameters to the observations
-        (see `Uncertainty`).
+        """Return a fit with its uncertainty; gain (size, size): sensitivity of the parameters to
+        the observations (see `Uncertainty`).
         """
         measured, by_parameter = jacobians(problem, state)
         errors = uncertainty(problem, state, gain)
@@ -183,20 +190,24 @@ class FittedWhisk:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """Return the covariance (size, size) of the parameters, slip within the exposure and contradictions
-        between the cameras included.
+        """Return the covariance (size, size) of the parameters, slip within the exposure and
+        contradictions between the cameras included.
         """
         contradictions = covariance_of(self.one_less, self.problem.size)
         return self.uncertainty.covariance + self.exposure.covariance + contradictions
 
+    def some_curves(self, count: int) -> dict[int, Curves]:
+        """Return the centrelines of so many frames spread over the whisk, by frame."""
+        chosen = np.unique(np.linspace(0, len(self.frames) - 1, count).astype(int))
+        curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
+        return {self.frames[k]: curves.one(k) for k in chosen.tolist()}
+
     def of_whisk(self, name: str) -> Value:
         """Return a quantity of the whole whisk by its name."""
-        gradient = self.by_parameter.whisk[name]
-        sigma = float(np.sqrt(gradient @ self.covariance @ gradient))
-        return Value(float(self.measured.whisk[name]), sigma)
+        sigma = propagated_sigma(self.by_parameter.whisk[name], self.covariance)
+        return Value(float(self.measured.whisk[name]), float(sigma))
 
     def of_frames(self, name: str) -> Value:
         """Return a quantity of each frame (f,) by its name."""
-        rows = self.by_parameter.frame[name]
-        variances = np.einsum("fi,ij,fj->f", rows, self.covariance, rows)
-        return Value(self.measured.frame[name], np.sqrt(np.maximum(variances, 0.0)))
+        sigma = propagated_sigma(self.by_parameter.frame[name], self.covariance)
+        return Value(self.measured.frame[name], sigma)

@@ -1,8 +1,9 @@
 """The whisker's length in the pictures, which checks the manifest.
 
-Along the fitted curve, and straight on beyond its stated end, the wire is what neither of two pictures explains: that
-without rods, and what stands still in the trial. Where that ends, the wire does: the place at which what is left over
-half of the wire's own evidence, summed from the base, is largest (Page's test, Biometrika 41, 100, 1954).
+Along the fitted curve, and straight on beyond its stated end, the wire is what neither of two
+pictures explains: that without rods, and what stands still in the trial. Where that ends, the wire
+does: the place at which what is left over half of the wire's own evidence, summed from the base, is
+largest (Page's test, Biometrika 41, 100, 1954).
 """
 
 from collections.abc import Mapping
@@ -10,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.fit.problem import curves_of
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import outline_of_bar
@@ -45,7 +45,8 @@ _BEYOND_MM = 10.0
 
 
 def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
-    """Return by camera how far from the base, mm, the wire ends in its pictures, where that is known.
+    """Return by camera how far from the base, mm, the wire ends in its pictures, where that is
+    known.
 
     Of a wire that tapers it is empty, for its tip is too thin to be seen.
     """
@@ -53,7 +54,9 @@ def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     if wire.taper_per_mm > 0.0:
         return {}
     sure_mm = float(np.min(fitted.state.arcs_mm))
-    curves = _some_curves(fitted, _REACH * wire.length_mm)
+    curves = {}
+    for frame, curve in fitted.some_curves(_FRAMES).items():
+        curves[frame] = _extend(curve, _REACH * wire.length_mm)
     ends = {}
     for view in whisk.views:
         place_mm, evidence = _evidence_along(view, whisk, curves)
@@ -63,14 +66,7 @@ def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     return ends
 
 
-def _some_curves(fitted: FittedWhisk, to_mm: float) -> dict[int, Curves]:
-    """Return centrelines of frames spread over the whisk, up to another length."""
-    chosen = np.unique(np.linspace(0, len(fitted.frames) - 1, _FRAMES).astype(int))
-    curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    return {fitted.frames[k]: _extended(curves.one(k), to_mm) for k in chosen.tolist()}
-
-
-def _extended(curve: Curves, to_mm: float) -> Curves:
+def _extend(curve: Curves, to_mm: float) -> Curves:
     """Return a curve with nodes up to another length, straight beyond its end."""
     step_mm = curve.arc_mm[1]
     count = int(np.ceil((to_mm - curve.arc_mm[-1]) / step_mm))
@@ -85,8 +81,8 @@ def _extended(curve: Curves, to_mm: float) -> Curves:
 
 
 def _in_picture_mm(camera: Camera, curves: Mapping[int, Curves], least_mm: float) -> float:
-    """Return the arc length, mm, least_mm at least, up to which all curves stay in the picture: beyond, they may
-    come up to the camera.
+    """Return the arc length, mm, least_mm at least, up to which all curves stay in the picture:
+    beyond, they may come up to the camera.
     """
     arc_mm = next(iter(curves.values())).arc_mm
     px = np.stack([camera.project(curve.points_mm) for curve in curves.values()])
@@ -98,7 +94,9 @@ def _in_picture_mm(camera: Camera, curves: Mapping[int, Curves], least_mm: float
 def _evidence_along(
     view: View, whisk: WhiskPictures, curves: Mapping[int, Curves]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (b,) along the wire, mm, clear of hub and bar, and the evidence of it in one camera there."""
+    """Return places (b,) along the wire, mm, clear of hub and bar, and the evidence of it in one
+    camera there.
+    """
     length_mm = whisk.rods.wire.length_mm
     visible_mm = max(length_mm, _in_picture_mm(view.camera, curves, length_mm))
     wire = replace(whisk.rods.wire, length_mm=visible_mm)
@@ -106,13 +104,15 @@ def _evidence_along(
     pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, still)
     bar = outline_of_bar(view.camera, whisk.bar.axis, whisk.bar_swept_mm)
     clear = clear_of_bar(pieces, *bar, _BAR_MARGIN_PX)
-    return _binned(pieces.place[clear], _evidence(pieces.select(clear)))
+    return _bin_evidence(pieces.place[clear], _evidence(pieces.select(clear)))
 
 
 def _evidence(pieces: Pieces) -> np.ndarray:
-    """Return by how much (s,) each segment's middle differs from both backgrounds more than its flanks do.
+    """Return by how much (s,) each segment's middle differs from both backgrounds more than its
+    flanks do.
 
-    It is the log ratio of mean squares over the noise's; NaN where too little of the segment is in the picture.
+    It is the log ratio of mean squares over the noise's; NaN where too little of the segment is in
+    the picture.
     """
     outside_px = np.abs(pieces.offset_px) - pieces.radius_px[:, None]
     middle = (pieces.weight > 0) & (outside_px < 0.0)
@@ -130,13 +130,17 @@ def _above_flanks(difference, flanks) -> np.ndarray:
 
 
 def _row_means(values, mask) -> np.ndarray:
-    """Return the mean (s,) of each row of `values` (s, p) where `mask` holds; NaN where it holds nowhere."""
+    """Return the mean (s,) of each row of `values` (s, p) where `mask` holds; NaN where it holds
+    nowhere.
+    """
     count = mask.sum(axis=1)
     return np.where(count > 0, np.sum(values * mask, axis=1) / np.maximum(count, 1), np.nan)
 
 
-def _binned(place_mm, evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middles (b,) of bins along the wire, mm, and the median evidence in each, of those that have any."""
+def _bin_evidence(place_mm, evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middles (b,) of bins along the wire, mm, and the median evidence in each, of those
+    that have any.
+    """
     known = np.isfinite(evidence) & (place_mm > NEAR_CLAMP_MM)
     number = np.floor(place_mm[known] / _BIN_MM).astype(int)
     bins = np.unique(number)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vision.fit.problem import bar_axis, curves_of
+from vision.fit.problem import bar_axis
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import clear_pieces, wire_knots
@@ -16,10 +16,10 @@ LIGHT_PX = 0.25
 
 
 def relative_wire_widths(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
-    """Return the wire's width over its stated one, by camera; cameras that do not resolve it are left out."""
-    chosen = np.unique(np.linspace(0, len(fitted.frames) - 1, _FRAMES).astype(int))
-    curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    some = {fitted.frames[k]: curves.one(k) for k in chosen.tolist()}
+    """Return the wire's width over its stated one, by camera; cameras that do not resolve it are
+    left out.
+    """
+    some = fitted.some_curves(_FRAMES)
     axis = bar_axis(fitted.problem, fitted.state.vector)
     knots = wire_knots(whisk.during(list(some)))
     widths = {}
