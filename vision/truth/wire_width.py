@@ -15,7 +15,7 @@ _FRAMES = 4
 LIGHT_PX = 0.25
 
 
-def relative_wire_widths(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
+def wire_widths(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     """Return the wire's width over its stated one, by camera; cameras that do not resolve it are
     left out.
     """
