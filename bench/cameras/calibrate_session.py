@@ -15,7 +15,7 @@ from vision.boards.corners import Corners
 from vision.calibration.calibrate import Calibration, CameraReport, calibrate_cameras
 from vision.calibration.cameras_import import import_cameras, place_on_rig
 from vision.calibration.held_out import Agreement, HeldOut, held_out
-from vision.calibration.place import by_board, placed
+from vision.calibration.place import by_board, move_rig_frame
 from vision.calibration.views import MeasuredPose
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.lens import LENS_TERMS
@@ -84,7 +84,7 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
     board = by_board(
         session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
     )
-    return placed(exact, replace(board, covariance=np.zeros((6, 6))), board)
+    return move_rig_frame(exact, replace(board, covariance=np.zeros((6, 6))), board)
 
 
 def calibrate_from(session: Session, views: SessionViews) -> Calibration:

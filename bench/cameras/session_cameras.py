@@ -31,7 +31,7 @@ from bench.session.session import Session
 from vision.boards.corners import refine_corners
 from vision.boards.static_board import camera_moved
 from vision.calibration.cameras_file import read_cameras
-from vision.calibration.place import Placement, by_board, placed
+from vision.calibration.place import Placement, by_board, move_rig_frame
 from vision.geometry.camera import Cameras
 from vision.geometry.counted import counted
 from vision.geometry.reasons import NO_REASON, Reason
@@ -117,7 +117,7 @@ def _at_base(cameras: Cameras, view: Session) -> Cameras:
         ).covariance
         turned = np.kron(np.eye(2), T_rig_base[:, :3])
         own = turned @ board @ turned.T
-    return placed(cameras, Placement(np.zeros(6), before), Placement(step, own))
+    return move_rig_frame(cameras, Placement(np.zeros(6), before), Placement(step, own))
 
 
 def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
@@ -168,7 +168,11 @@ def on_the_rig(
     strokes = counted(first.strokes, "stroke")
     note = f"T_rig_board is missing: a first look at {strokes} says where whisker and motor are."
     T_rig_board = None if T_world_board is None else compose(first.T_rig_world, T_world_board)
-    return placed(cameras, Placement(np.zeros(6), np.zeros((6, 6))), there), T_rig_board, note
+    return (
+        move_rig_frame(cameras, Placement(np.zeros(6), np.zeros((6, 6))), there),
+        T_rig_board,
+        note,
+    )
 
 
 def _key(session: Session, digests: Digests) -> str:

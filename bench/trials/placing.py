@@ -15,7 +15,13 @@ from bench.session.session import Session
 from bench.trials.consistency import Cause, Difference
 from bench.trials.lost import seen_units
 from bench.trials.unit import Unit
-from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
+from vision.calibration.place import (
+    Placement,
+    by_board,
+    check_swing_suffices,
+    combine,
+    move_rig_frame,
+)
 from vision.calibration.swing import by_strokes
 from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
@@ -149,7 +155,7 @@ def _settled(
 def _moved(
     calibration: SessionCalibration, before: Placement, after: Placement
 ) -> SessionCalibration:
-    cameras = placed(calibration.cameras, before, after)
+    cameras = move_rig_frame(calibration.cameras, before, after)
     T_rig_board = calibration.T_rig_board
     if T_rig_board is not None:
         T_rig_board = compose(invert_transform(after.T_board_rig), T_rig_board)

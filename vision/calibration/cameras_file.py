@@ -1,4 +1,4 @@
-"""cameras.toml and its covariance beside it in cameras.npz, as the session format has them."""
+"""cameras.toml, and its covariance in cameras.npz, as the session format has them."""
 
 import hashlib
 import tomllib
@@ -17,65 +17,71 @@ _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
 
 
 def cameras_as_files(cameras: Cameras, companion: str) -> tuple[bytes, bytes]:
-    """Contents of cameras.toml and of the file `companion` beside it: the joint covariance with the parameters' names,
-    and the part of it that is the rig frame's, where that is known."""
+    """Return the contents of cameras.toml and of its companion file of that name.
+
+    The companion holds the joint covariance with the parameters' names, and the part of it that is
+    the rig frame's, where that is known.
+    """
     packed = _pack_covariance(cameras)
+    tables = {}
+    for camera in cameras:
+        tables[camera.name] = {
+            "size_px": list(camera.size_px),
+            "matrix": camera.matrix.tolist(),
+            "distortion": camera.distortion.tolist(),
+            "T_camera_rig": camera.T_camera_rig.tolist(),
+            "rms_px": float(camera.rms_px),
+        }
     document = {
         "covariance": companion,
         "covariance_sha256": hashlib.sha256(packed).hexdigest(),
-        "cameras": {camera.name: _as_table(camera) for camera in cameras},
+        "cameras": tables,
     }
     return tomli_w.dumps(document).encode(), packed
 
 
-def _as_table(camera: Camera) -> dict:
-    return {
-        "size_px": list(camera.size_px),
-        "matrix": camera.matrix.tolist(),
-        "distortion": camera.distortion.tolist(),
-        "T_camera_rig": camera.T_camera_rig.tolist(),
-        "rms_px": float(camera.rms_px),
-    }
-
-
 def _pack_covariance(cameras: Cameras) -> bytes:
+    """Return the covariance as a NumPy archive."""
+    arrays = {
+        "covariance": cameras.covariance,
+        "cameras": np.array(cameras.names),
+        "parameters": np.array(PARAMETERS),
+    }
+    if cameras.placement is not None:
+        arrays["placement"] = cameras.placement
     buffer = BytesIO()
-    placement = {} if cameras.placement is None else {"placement": cameras.placement}
-    np.savez(
-        buffer,
-        covariance=cameras.covariance,
-        cameras=np.array(cameras.names),
-        parameters=np.array(PARAMETERS),
-        **placement,
-    )
+    np.savez(buffer, **arrays)
     return buffer.getvalue()
 
 
 def read_cameras(path: Path | str) -> Cameras:
-    """Cameras of `path`; without a covariance in it they are taken as exact.
+    """Read the cameras of `path`; without a covariance in it they are taken as exact.
 
-    Raises Refused where the file is no TOML, misses a key, or its covariance is not the one it was written
-    with.
+    Raises Refused where the file is no TOML, misses a key, or its covariance is not the one it was
+    written with.
     """
     path = Path(path)
-    document = _parse(path)
+    document = parse_toml(path, "is not TOML")
     tables = document.get("cameras")
     if not isinstance(tables, dict) or not tables:
         raise Refused("no [cameras.<name>] table found")
     cameras = tuple(_camera(name, table) for name, table in tables.items())
     for camera in cameras:
         check_lens(camera)
-    return Cameras(cameras, *_read_covariance(path, document, cameras))
+    covariance, placement = _read_covariance(path, document, cameras)
+    return Cameras(cameras, covariance, placement)
 
 
-def _parse(path: Path) -> dict:
+def parse_toml(path: Path, complaint: str) -> dict:
+    """Parse a TOML file; raise Refused with the complaint and the parser's own where it is none."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise Refused(f"is not TOML: {error}") from error
+        raise Refused(f"{complaint}: {error}") from error
 
 
 def _camera(name: str, table: dict) -> Camera:
+    """Return the camera of one table; raise Refused where its keys or values are not a camera's."""
     if not isinstance(table, dict):
         raise Refused(f"cameras.{name} must be a table with {', '.join(_KEYS)}")
     if "translation" in table:
@@ -83,26 +89,30 @@ def _camera(name: str, table: dict) -> Camera:
             f"cameras.{name} is as caliscope and aniposelib write it, in a world of its own: place it in the rig with "
             "`whisker-bench calibrate cameras SESSION --lenses FILE --out cameras.toml`"
         )
-    missing, unknown = (
-        sorted(set(_KEYS) - set(table)),
-        sorted(set(table) - set(_KEYS) - {"covariance"}),
-    )
+    missing = sorted(set(_KEYS) - set(table))
     if missing:
         raise Refused(f"cameras.{name}: {', '.join(missing)} missing")
+    unknown = sorted(set(table) - set(_KEYS) - {"covariance"})
     if unknown:
         raise Refused(
             f"cameras.{name}: unknown key {', '.join(unknown)}; allowed are {', '.join(_KEYS)}"
         )
     try:
         return Camera(name, **{key: table[key] for key in _KEYS})
+    except Refused:
+        raise
     except (TypeError, ValueError) as error:
-        raise (
-            error if isinstance(error, Refused) else Refused(f"cameras.{name}: {error}")
-        ) from error
+        raise Refused(f"cameras.{name}: {error}") from error
 
 
-def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) -> tuple:
-    """Joint covariance and the placement's part of it; None for what the files do not tell."""
+def _read_covariance(
+    path: Path, document: dict, cameras: tuple[Camera, ...]
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Return the joint covariance and the placement's part of it; None for what the files do not
+    hold.
+
+    Raises Refused where the covariance's file is missing, another one, or not of these cameras.
+    """
     name = document.get("covariance")
     if name is None:
         return None, None
@@ -128,13 +138,15 @@ def _read_covariance(path: Path, document: dict, cameras: tuple[Camera, ...]) ->
 
 
 def _in_order(stored: "np.lib.npyio.NpzFile", cameras: tuple[Camera, ...]) -> np.ndarray:
-    """The stored covariance in the TOML's order of cameras and this version's order of parameters."""
-    names, parameters = stored["cameras"].tolist(), stored["parameters"].tolist()
-    if sorted(names) != sorted(c.name for c in cameras) or sorted(parameters) != sorted(PARAMETERS):
+    """Return the stored covariance in the TOML's order of cameras and in this version's order of
+    parameters.
+    """
+    names = stored["cameras"].tolist()
+    parameters = stored["parameters"].tolist()
+    wanted = [camera.name for camera in cameras]
+    if sorted(names) != sorted(wanted) or sorted(parameters) != sorted(PARAMETERS):
         raise Refused("covariance is of other cameras or other parameters than the ones listed")
-    rows = [
-        len(parameters) * names.index(c.name) + parameters.index(p)
-        for c in cameras
-        for p in PARAMETERS
-    ]
+    places = [parameters.index(name) for name in PARAMETERS]
+    firsts = [len(parameters) * names.index(name) for name in wanted]
+    rows = np.add.outer(firsts, places).ravel()
     return stored["covariance"][np.ix_(rows, rows)]

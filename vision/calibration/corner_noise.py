@@ -1,15 +1,16 @@
 """How large the corners' errors are, learned from the residuals, and which corners are no corners.
 
-A corner's variance is (sigma of its own fit)² + (model error of its camera)². The model error stands for
-what a corner's fit cannot know: print, lens beyond its terms, blur, motion. It is first read from the
-median of the residuals, which half of the corners being wrong does not move; corners beyond REJECT_SIGMA of
-that are left out once; then it is what makes the mean square of the rest one. Rejecting again by the
-smaller figure would eat the data from the tails inward.
+A corner's variance is (sigma of its own fit)² + (model error of its camera)². The model error
+stands for what a corner's fit cannot know: print, lens beyond its terms, blur, motion. It is first
+read from the median of the residuals, which half of the corners being wrong does not move; corners
+beyond REJECT_SIGMA of that are left out once; then it is what makes the mean square of the rest
+one. Rejecting again by the smaller figure would eat the data from the tails inward.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from vision.calibration.adjust import Solution, adjust_bundle
 from vision.calibration.bundle import BundleState, Priors, Sightings, predict
@@ -28,9 +29,11 @@ _ROBUST_WIDTH = 3.0
 _FIRST_ERROR_PX = 0.3
 # [1] Median of the squared length of a two-dimensional Gaussian of unit sigma. Derived.
 _MEDIAN_SQUARED = 2 * np.log(2)
-# [rounds] Of adjusting and learning the noise anew; instants and their scatter settle more
-# slowly. Study: cameras.py.
-_ROUNDS, _ROUNDS_MOVING = 2, 5
+# [rounds] Of adjusting and learning the noise anew. Study: cameras.py.
+_ROUNDS = 2
+# [rounds] Of cameras that are not triggered: instants and their scatter converge more slowly.
+# Study: cameras.py.
+_ROUNDS_MOVING = 5
 # [corners] A shot with fewer says less than the six parameters of its pose. Derived.
 _MIN_SHOT = 4
 # [instants] Fewer give no scatter. Derived.
@@ -41,15 +44,18 @@ _LEAST_LATE_SHARE = 0.02
 # [1] Of the residuals' number, left over however many parameters are fitted: keeps the model
 # error finite. Stated.
 _LEAST_FREEDOM = 0.1
-# [steps] Of a bisection: 2⁻⁵⁰ is rounding. Derived.
-_HALVINGS = 50
+# [1] Of a variance, to which its root is found: rounding. Derived.
+_ROOT_PRECISION = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
-    """An adjustment with its noise: the solution over the kept corners, `seen` with the sigmas used (all
-    corners), kept (n,) bool, residual_px (n, 2) of all corners, error_px (C,) model error of each camera, known as
-    used."""
+class Adjustment:
+    """An adjustment with the noise learned from it.
+
+    solution: over the kept corners. seen: all corners with the sigmas used. kept (n,) bool.
+    residual_px (n, 2): of all corners. error_px (C,): model error of each camera. priors: as used
+    last.
+    """
 
     solution: Solution
     seen: Sightings
@@ -59,16 +65,16 @@ class Settled:
     priors: Priors
 
     def rms_px(self, camera: int) -> float:
-        """Root mean square length of the kept residuals of one camera, as OpenCV counts it."""
-        rows = self.kept & (self.seen.camera == camera)
-        return (
-            float(np.sqrt(np.mean(np.sum(self.residual_px[rows] ** 2, axis=1))))
-            if rows.any()
-            else np.nan
-        )
+        """Return the root mean square length of one camera's kept residuals, as OpenCV counts it;
+        NaN of none.
+        """
+        residual_px = self.residual_px[self.kept & (self.seen.camera == camera)]
+        if not len(residual_px):
+            return np.nan
+        return float(np.sqrt(np.mean(np.sum(residual_px**2, axis=1))))
 
 
-def settle(
+def adjust_with_noise(
     state: BundleState,
     seen: Sightings,
     corners_mm: np.ndarray,
@@ -76,117 +82,134 @@ def settle(
     *,
     error_px: np.ndarray | None = None,
     rounds: int | None = None,
-    rough: bool = False,
-) -> Settled:
-    """Adjusts robustly, learns each camera's model error, drops outliers once and adjusts by least squares.
+    coarse: bool = False,
+) -> Adjustment:
+    """Adjust robustly, learn each camera's model error, drop outliers once, and adjust by least
+    squares.
 
-    Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's scatter of instants
-    begins. error_px (C,): model errors to begin with. rounds: of learning the noise anew, where it is nearly known.
-    rough: robustly and once only, to see how large the errors are. Raises Refused
-    where no corner agrees with the others.
+    Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's
+    scatter of instants begins. error_px (C,): model errors to begin with. rounds: of learning the
+    noise anew, where it is nearly known. coarse: adjust robustly and once only, to see how large
+    the errors are. Raises Refused where no corner agrees with the others.
     """
     moving = state.trajectory is not None
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
     for _ in range(rounds or (_ROUNDS_MOVING if moving else _ROUNDS)):
-        weighed = _weighed(seen, error)
+        weighted = _with_error(seen, error)
         solution = adjust_bundle(
-            state, weighed, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
+            state, weighted, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
         )
-        _require_finite(solution)
-        state, error = solution.state, _error_by_median(solution.residual_px, seen, len(error))
-        priors = _with_lateness(priors, state, seen) if moving else priors
-        if rough:
-            return Settled(
-                solution,
-                weighed,
-                np.ones(len(seen), dtype=bool),
-                solution.residual_px,
-                error,
-                priors,
+        if not np.isfinite(solution.cost):
+            raise Refused(
+                "the views contradict each other from the start: is this the board as described?"
             )
-    kept = _inliers(solution.residual_px, _weighed(seen, error))
+        state = solution.state
+        error = _error_by_median(solution.residual_px, seen, len(error))
+        if moving:
+            priors = _with_lateness(priors, state, seen)
+        if coarse:
+            kept = np.ones(len(seen), dtype=bool)
+            return Adjustment(solution, weighted, kept, solution.residual_px, error, priors)
+
+    return _without_outliers(solution, seen, corners_mm, priors, error)
+
+
+def _without_outliers(
+    solution: Solution, seen: Sightings, corners_mm: np.ndarray, priors: Priors, error: np.ndarray
+) -> Adjustment:
+    """Drop outliers and adjust by least squares, from a robust solution and its model errors (C,).
+
+    Raises Refused where no corner is left.
+    """
+    residual_px = solution.residual_px
+    kept = _inliers(residual_px, _with_error(seen, error))
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
-        error = _error_by_mean(solution.residual_px, seen, kept, error, priors)
-        used = _weighed(seen, error).chosen(kept)
-        solution = adjust_bundle(state, used, corners_mm, priors)
-        state = solution.state
-        solution = replace(solution, residual_px=seen.px - predict(state, seen, corners_mm)[0])
-    return Settled(solution, _weighed(seen, error), kept, solution.residual_px, error, priors)
-
-
-def _require_finite(solution: Solution) -> None:
-    if not np.isfinite(solution.cost):
-        raise Refused(
-            "the views contradict each other from the start: is this the board as described?"
-        )
+        error = _error_by_mean(residual_px, seen, kept, error, priors)
+        weighted = _with_error(seen, error)
+        solution = adjust_bundle(solution.state, weighted.chosen(kept), corners_mm, priors)
+        residual_px = seen.px - predict(solution.state, seen, corners_mm)[0]
+    solution = replace(solution, residual_px=residual_px)
+    return Adjustment(solution, weighted, kept, residual_px, error, priors)
 
 
 def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Priors:
-    """Each camera's scatter of instants as the instants found have it; of pictures that give their view its time, none.
+    """Return the priors with each camera's scatter of instants as the fitted instants have it.
 
-    A camera with few others keeps the scatter of all.
+    Pictures that give their view its time count for nothing. A camera with few others gets the
+    scatter of all.
     """
     starts = seen.shot_starts()
-    camera, view = seen.camera[starts], seen.view[starts]
-    loose = ~state.trajectory.is_reference(view, camera)
-    squared = np.where(loose, state.instants[view, camera] ** 2, np.nan)
+    camera = seen.camera[starts]
+    view = seen.view[starts]
+    is_free = ~state.trajectory.is_reference(view, camera)
+    squared = np.where(is_free, state.instants[view, camera] ** 2, np.nan)
     overall = np.nanmean(squared)
-    of = [squared[loose & (camera == c)] for c in range(len(priors.late_sigma_s))]
-    sigma = np.sqrt([np.mean(s) if len(s) >= _MIN_LATE else overall for s in of])
-    return replace(priors, late_sigma_s=np.maximum(sigma, _LEAST_LATE_SHARE * np.sqrt(overall)))
+    variances = np.full(len(priors.late_sigma_s), overall)
+    for c in range(len(variances)):
+        own = squared[is_free & (camera == c)]
+        if len(own) >= _MIN_LATE:
+            variances[c] = np.mean(own)
+    least = _LEAST_LATE_SHARE * np.sqrt(overall)
+    return replace(priors, late_sigma_s=np.maximum(np.sqrt(variances), least))
 
 
-def _weighed(seen: Sightings, error_px: np.ndarray) -> Sightings:
+def _with_error(seen: Sightings, error_px: np.ndarray) -> Sightings:
+    """Return the corners with their camera's model error in their sigmas."""
     return replace(seen, sigma_px=np.hypot(seen.sigma_px, error_px[seen.camera]))
 
 
 def _error_by_median(residual: np.ndarray, seen: Sightings, n_cameras: int) -> np.ndarray:
+    """Return each camera's model error (C,), px, by the median of its squared residuals."""
     excess = np.sum(residual**2, axis=1) / _MEDIAN_SQUARED - seen.sigma_px**2
-    medians = [
-        np.median(excess[seen.camera == c]) if (seen.camera == c).any() else 0.0
-        for c in range(n_cameras)
-    ]
-    return np.sqrt(np.maximum(medians, 0.0))
+    variances = np.zeros(n_cameras)
+    for c in range(n_cameras):
+        own = excess[seen.camera == c]
+        if len(own):
+            variances[c] = max(np.median(own), 0.0)
+    return np.sqrt(variances)
 
 
-def _inliers(residual: np.ndarray, weighed: Sightings) -> np.ndarray:
-    kept = np.sum(residual**2, axis=1) < (REJECT_SIGMA * weighed.sigma_px) ** 2
-    starts = weighed.shot_starts()
-    left = np.add.reduceat(kept.astype(int), starts)
-    return kept & np.repeat(left >= _MIN_SHOT, np.diff(np.append(starts, len(kept))))
+def _inliers(residual: np.ndarray, weighted: Sightings) -> np.ndarray:
+    """Return the mask (n,) of corners within the rejection limit, in pictures that keep enough of
+    them.
+    """
+    kept = np.sum(residual**2, axis=1) < (REJECT_SIGMA * weighted.sigma_px) ** 2
+    starts = weighted.shot_starts()
+    count = np.add.reduceat(kept.astype(int), starts)
+    sizes = np.diff(np.append(starts, len(kept)))
+    return kept & np.repeat(count >= _MIN_SHOT, sizes)
 
 
 def _error_by_mean(
     residual, seen: Sightings, kept: np.ndarray, error: np.ndarray, priors: Priors
 ) -> np.ndarray:
-    """Model error at which the kept residuals' mean square is what so many fitted parameters leave of it."""
-    squared = np.sum(residual**2, axis=1)
+    """Return each camera's model error (C,), px, at which the kept residuals' mean square is what
+    so many fitted parameters leave of it.
+    """
     parameters = priors.free.sum() + 6 * priors.view_free.sum()
-    parameters += len(seen.shot_starts()) if priors.late_sigma_s is not None else 0
-    left = max(1.0 - parameters / max(2 * kept.sum(), 1), _LEAST_FREEDOM)
-    return np.array(
-        [
-            _match(squared[rows] / left, seen.sigma_px[rows])
-            for rows in _by_camera(seen, kept, len(error))
-        ]
-    )
+    if priors.late_sigma_s is not None:
+        parameters += len(seen.shot_starts())
+    freedom = max(1.0 - parameters / max(2 * kept.sum(), 1), _LEAST_FREEDOM)
+    squared = np.sum(residual**2, axis=1) / freedom
+    errors = np.zeros(len(error))
+    for c in range(len(error)):
+        rows = kept & (seen.camera == c)
+        errors[c] = _matching_error(squared[rows], seen.sigma_px[rows])
+    return errors
 
 
-def _by_camera(seen: Sightings, kept: np.ndarray, n_cameras: int) -> list[np.ndarray]:
-    return [np.flatnonzero(kept & (seen.camera == c)) for c in range(n_cameras)]
+def _matching_error(squared: np.ndarray, sigma: np.ndarray) -> float:
+    """Return e ≥ 0 with mean(squared / (2 (sigma² + e²))) = 1; 0 where sigma alone explains the
+    squares.
+    """
 
+    def excess(variance: float) -> float:
+        """Return the mean square over the one that this e² explains, less 1."""
+        return float(np.mean(squared / (2 * (sigma**2 + variance)))) - 1.0
 
-def _match(squared: np.ndarray, sigma: np.ndarray) -> float:
-    """e ≥ 0 with mean(squared / (2 (sigma² + e²))) = 1, by bisection on e²; 0 where sigma alone explains it."""
-    if not len(squared) or np.mean(squared / (2 * sigma**2)) <= 1:
+    if not len(squared) or excess(0.0) <= 0:
         return 0.0
-    low, high = 0.0, float(np.mean(squared))
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if np.mean(squared / (2 * (sigma**2 + middle))) > 1:
-            low = middle
-        else:
-            high = middle
-    return float(np.sqrt(high))
+    largest = float(np.mean(squared))
+    return float(np.sqrt(brentq(excess, 0.0, largest, xtol=_ROOT_PRECISION * largest)))

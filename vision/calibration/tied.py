@@ -1,8 +1,9 @@
-"""Views of one index, taken as of one board at one instant or not: which of it explains what was seen.
+"""The joint adjustment: whether views of one index are of one board at one instant, and its result.
 
-Cameras that looked at once share a board pose a view, and that ties them to each other. Series of their own may look
-alike (boards held in the same order of poses), and cameras that are not triggered see a moving board at other instants.
-Each camera by itself needs no such tie, and so says how well its views can be explained.
+Cameras that see one board at once share its pose in each view, and that ties them to each other.
+Series of their own may agree by chance (boards held in the same order of poses), and cameras that
+are not triggered see a moving board at other instants. Each camera by itself needs no such tie, and
+so gives the error with which its views can be explained.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,7 @@ from vision.calibration.bundle import (
     BundleState,
     Priors,
 )
-from vision.calibration.corner_noise import Settled, settle
+from vision.calibration.corner_noise import Adjustment, adjust_with_noise
 from vision.calibration.layout import Alone, Layout, lay_out, looked_at_once, place_cameras
 from vision.calibration.views import MeasuredPose
 from vision.geometry.board import Board
@@ -43,12 +44,17 @@ _CLOCK_SIGMA = 0.6
 _FIRST_LATENESS = 0.2
 # [px] Where the fit of instants starts; learnt anew. Study: cameras.py.
 _FIRST_EXCESS_PX = 0.1
+# [px] Of one camera by itself, so that nothing is divided by 0. Derived.
+_LEAST_ERROR_PX = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Cameras that are not triggered together: offset_s and scatter_s (C,), how late pictures are on average and how
-    much that varies; s, or frame intervals where the pictures' times were not given (in_frames)."""
+    """The lateness of cameras that are not triggered together.
+
+    offset_s, scatter_s (C,): mean and standard deviation of how late each camera's pictures are, in
+    s, or in frame intervals where the pictures' times were not given (in_frames).
+    """
 
     offset_s: np.ndarray
     scatter_s: np.ndarray
@@ -56,9 +62,25 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False)
-class Tied:
-    """What one adjustment is made from: cameras by themselves, the board on the rig in each, and its measured pose.
-    times_s: of each picture; triggered: see `calibrate_cameras`."""
+class JointAdjustment:
+    """The joint adjustment of all cameras, with notes for the report.
+
+    timing: None for pictures of one instant.
+    """
+
+    layout: Layout
+    adjustment: Adjustment
+    timing: Timing | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class JointInput:
+    """The input of the joint adjustment.
+
+    alone: cameras by themselves. standing: the board on the rig in each; on_rig: its measured pose.
+    times_s: of each picture. triggered: see `calibrate_cameras`.
+    """
 
     alone: Mapping[str, Alone]
     standing: Mapping[str, Corners] | None
@@ -67,46 +89,53 @@ class Tied:
     times_s: Mapping[str, Sequence[float]] | None
     triggered: bool
 
-    def adjusted(self) -> tuple[Layout, Settled, Timing | None, list[str]]:
-        """The layout, its adjustment, how late pictures are, and a note.
+    def adjust(self) -> JointAdjustment:
+        """Adjust all cameras jointly.
 
-        Views of one index count as of one board where they look it and that explains them; where each camera by itself
-        explains its views far better, they are its own. Raises Refused where nothing else tells how cameras stand.
+        Views of one index count as of one board where they agree with that and it explains them;
+        where each camera by itself explains its views far better, they are its own. Raises Refused
+        where nothing else determines how the cameras stand to each other.
         """
         if not looked_at_once(self.alone):
-            return *self._settled(False), []
+            return self._adjust(self._layout(together=False))
         try:
-            tied = self._settled(True)
-            doubt = "" if self.triggered else self._far_worse(tied[1])
+            joint = self._adjust(self._layout(together=True))
+            complaint = "" if self.triggered else self._far_worse(joint.adjustment)
         except Refused as reason:
-            doubt = str(reason)
-        if not doubt:
-            return *tied, []
-        said = f"views of one index look as if the cameras saw one board at once, but they did not: {doubt}"
+            complaint = str(reason)
+        if not complaint:
+            return joint
+        found = f"of one index look as if the cameras saw one board at once, but they did not: {complaint}"
         if self.standing is None:
             raise Refused(
-                f"{said}; record views that all cameras see at once, or a picture of the board on the rig"
+                f"views {found}; record views that all cameras see at once, or a picture of the board on the rig"
             )
-        return *self._settled(False), [
-            f"{said[0].upper()}{said[1:]}. Each camera's views count as its own."
-        ]
+        note = f"Views {found}. Each camera's views count as its own."
+        return replace(self._adjust(self._layout(together=False)), notes=(note,))
 
-    def _far_worse(self, settled: Settled) -> str:
-        """In which camera the adjustment explains the views far worse than the camera by itself does; '' in none."""
-        own = np.array([a.error_px for a in self.alone.values()])
-        over = settled.error_px / np.maximum(_DISAGREE * own, MOST_ERROR_PX)
-        worst = int(np.argmax(over))
-        if settled.solution.converged and over[worst] < 1.0:
+    def _far_worse(self, adjustment: Adjustment) -> str:
+        """Return in which camera the adjustment explains the views far worse than the camera by
+        itself does; '' if in none.
+        """
+        own_px = self._own_errors_px()
+        ratio = adjustment.error_px / np.maximum(_DISAGREE * own_px, MOST_ERROR_PX)
+        worst = int(np.argmax(ratio))
+        if adjustment.solution.converged and ratio[worst] < 1.0:
             return ""
         return (
-            f"so taken, corners of camera {list(self.alone)[worst]} are off by {settled.error_px[worst]:.2f} px an "
-            f"axis, by itself {own[worst]:.2f} px"
+            f"so taken, corners of camera {list(self.alone)[worst]} are off by "
+            f"{adjustment.error_px[worst]:.2f} px an axis, by itself {own_px[worst]:.2f} px"
         )
 
-    def _settled(self, together: bool) -> tuple[Layout, Settled, Timing | None]:
+    def _own_errors_px(self) -> np.ndarray:
+        """Return the model error (C,) of each camera by itself."""
+        return np.array([camera.error_px for camera in self.alone.values()])
+
+    def _layout(self, *, together: bool) -> Layout:
+        """Return all views, those of one index as of one board, or each camera's own."""
         T_rig_board = self.on_rig.T_rig_board if self.on_rig else None
         poses = place_cameras(self.alone, self.standing, self.board, T_rig_board, together=together)
-        layout = lay_out(
+        return lay_out(
             self.alone,
             poses,
             standing=self.standing,
@@ -114,69 +143,80 @@ class Tied:
             together=together,
             times_s=self.times_s,
         )
-        priors = _priors(layout.first, self.board, self.on_rig)
-        return layout, *_settle(
-            layout, self.board, priors, _errors(self.alone, self.triggered), self.times_s is None
+
+    def _adjust(self, layout: Layout) -> JointAdjustment:
+        """Adjust all cameras.
+
+        Pictures of one view count as of one instant, unless the cameras agree far worse with each
+        other than with themselves.
+        """
+        corners_mm = self.board.corners_mm
+        first = layout.first
+        priors = _priors(first, self.board, self.on_rig)
+        if layout.trajectory is not None and not self.triggered and len(self.alone) > 1:
+            coarse = adjust_with_noise(first, layout.seen, corners_mm, priors, coarse=True)
+            own_px = self._own_errors_px()
+            first = coarse.solution.state
+            if np.median(coarse.error_px / np.maximum(own_px, _LEAST_ERROR_PX)) >= _DISAGREE:
+                adjustment = adjust_with_noise(
+                    replace(first, trajectory=layout.trajectory),
+                    layout.seen,
+                    corners_mm,
+                    allow_lateness(priors, layout.trajectory),
+                    error_px=own_px + _FIRST_EXCESS_PX,
+                )
+                offset_s = adjustment.solution.state.clock
+                timing = Timing(offset_s, adjustment.priors.late_sigma_s, self.times_s is None)
+                return JointAdjustment(layout, adjustment, timing)
+        return JointAdjustment(
+            layout, adjust_with_noise(first, layout.seen, corners_mm, priors), None
         )
 
 
-def _errors(alone: Mapping[str, Alone], triggered: bool) -> np.ndarray | None:
-    """Each camera's error by itself, against which to judge how they agree; None where there is no need to."""
-    return None if triggered or len(alone) < 2 else np.array([a.error_px for a in alone.values()])
-
-
-def _settle(
-    layout: Layout, board: Board, priors: Priors, error_alone: np.ndarray | None, in_frames: bool
-):
-    """With pictures of one view at one instant, unless cameras agree far worse with each other than with themselves."""
-    if layout.trajectory is None or error_alone is None:
-        return settle(layout.first, layout.seen, board.corners_mm, priors), None
-    rough = settle(layout.first, layout.seen, board.corners_mm, priors, rough=True)
-    if np.median(rough.error_px / np.maximum(error_alone, 1e-3)) < _DISAGREE:
-        return settle(rough.solution.state, layout.seen, board.corners_mm, priors), None
-    state = replace(rough.solution.state, trajectory=layout.trajectory)
-    priors = allow_lateness(priors, layout.trajectory)
-    settled = settle(
-        state, layout.seen, board.corners_mm, priors, error_px=error_alone + _FIRST_EXCESS_PX
-    )
-    return settled, Timing(settled.solution.state.clock, settled.priors.late_sigma_s, in_frames)
-
-
 def timing_note(names: Sequence[str], timing: Timing) -> str:
-    """A sentence for the report: by how much each camera's pictures are later than the view, and their scatter."""
+    """Return a sentence on how much later than the view each camera's pictures are, and their
+    scatter.
+    """
     scale, unit = (1.0, "frames") if timing.in_frames else (1e3, "ms")
-    late = (
-        f"{name} {scale * offset:+.3g} ± {scale * scatter:.2g} {unit}"
-        for name, offset, scatter in zip(names, timing.offset_s, timing.scatter_s)
+    late = []
+    for name, offset_s, scatter_s in zip(names, timing.offset_s, timing.scatter_s):
+        late.append(f"{name} {scale * offset_s:+.3g} ± {scale * scatter_s:.2g} {unit}")
+    return (
+        "Pictures of one view were not taken at one instant: later than the view by "
+        f"{', '.join(late)} (below 0: earlier); taken into account."
     )
-    said = f"later than the view by {', '.join(late)} (below 0: earlier)"
-    return f"Pictures of one view were not taken at one instant: {said}; taken into account."
 
 
 def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
-    """The same with clocks and pictures' instants free. The clock of the camera that ranks first is the clock."""
-    free, sigma = priors.free.copy(), priors.sigma.copy()
+    """Return the priors with clocks and pictures' instants free; the clock of the camera that ranks
+    first is held.
+    """
+    free = priors.free.copy()
+    sigma = priors.sigma.copy()
     clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
     free[clocks[trajectory.camera_rank > 0]] = True
     sigma[clocks] = _CLOCK_SIGMA * trajectory.interval_s
-    late = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
-    return replace(priors, free=free, sigma=sigma, late_sigma_s=late)
+    late_s = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
+    return replace(priors, free=free, sigma=sigma, late_sigma_s=late_s)
 
 
 def lens_priors(n_cameras: int, n_views: int) -> Priors:
-    """Lenses and poses free, the lenses' prior; board exact, cameras triggered together."""
-    size = N_CAMERA * n_cameras + N_BOARD
-    free, mean, sigma = np.ones(size, dtype=bool), np.zeros(size), np.full(size, np.inf)
-    for column, name in enumerate(CAMERA_COLUMNS):
-        rows = column + N_CAMERA * np.arange(n_cameras)
-        sigma[rows] = LENS_PRIOR.get(name, np.inf)
-        free[rows] = not name.endswith("_s")
-    free[-N_BOARD:] = False
-    return Priors(free, mean, sigma, np.ones(n_views, dtype=bool))
+    """Return the priors with lenses and poses free, LENS_PRIOR on the lenses, an exact board, and
+    cameras that are triggered together.
+    """
+    camera_sigma = [LENS_PRIOR.get(name, np.inf) for name in CAMERA_COLUMNS]
+    camera_free = [not name.endswith("_s") for name in CAMERA_COLUMNS]
+    return Priors(
+        np.array(camera_free * n_cameras + [False] * N_BOARD),
+        np.zeros(N_CAMERA * n_cameras + N_BOARD),
+        np.array(camera_sigma * n_cameras + [np.inf] * N_BOARD),
+        np.ones(n_views, dtype=bool),
+    )
 
 
 def _priors(first: BundleState, board: Board, on_rig: MeasuredPose | None) -> Priors:
-    """The rig board's pose as it was measured: held where its sigma is 0, else an observation. Likewise the square.
+    """Return the priors with the rig board's measured pose and the square's size, each held where
+    its sigma is 0 and an observation else.
 
     Without a rig board the first camera is the world's frame.
     """

@@ -1,4 +1,4 @@
-"""What cameras are calibrated from: views of the board, and its pose on the rig as it was measured."""
+"""The data of a calibration: views of the board, and its measured pose on the rig."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,12 +11,13 @@ from vision.boards.corners import Corners
 
 @dataclass(frozen=True, eq=False)
 class BoardViews:
-    """Corners by camera.
+    """The corners of a board by camera.
 
-    boards: views of the board held before the cameras, a view a frame, empty where the board is not seen; view k of one
-    camera may be of the same instant as view k of another. sizes_px: of each camera's pictures. rig: the board standing
-    on the rig, absent where there is no picture; trials: the same board in the trials' frames, of cameras that did not
-    move. times_s: of each picture in `boards`, None where not recorded.
+    boards: views of the board held before the cameras, a view a frame, empty where the board is not
+    seen; view k of one camera may be of the same instant as view k of another. sizes_px: of each
+    camera's pictures. rig: the board standing on the rig, absent where there is no picture; trials:
+    the same board in the trials' frames, of cameras that did not move. times_s: of each picture in
+    `boards`, None where not recorded.
     """
 
     boards: Mapping[str, Sequence[Corners]]
@@ -26,18 +27,20 @@ class BoardViews:
     times_s: Mapping[str, Sequence[float]] | None = None
 
     def without(self, is_held: Sequence[bool] | np.ndarray) -> Self:
-        """The same without the views k of the held board with is_held[k]."""
-        kept = {
-            name: [Corners.none() if out else view for view, out in zip(views, is_held)]
-            for name, views in self.boards.items()
-        }
+        """Return these views without the views k of the held board with is_held[k]."""
+        kept = {}
+        for name, views in self.boards.items():
+            kept[name] = [Corners.none() if out else view for view, out in zip(views, is_held)]
         return replace(self, boards=kept)
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPose:
-    """T_rig_board (3, 4), mm, as it was measured; its sigmas are per axis, of the shift and of a turn about the board's
-    origin, and are shared by all cameras. 0: taken as exact."""
+    """The measured pose of the board on the rig, T_rig_board (3, 4), mm.
+
+    sigma_mm, sigma_rad: per axis, of the shift and of a rotation about the board's origin, shared
+    by all cameras; 0 takes the pose as exact.
+    """
 
     T_rig_board: np.ndarray
     sigma_mm: float = 0.0
@@ -45,5 +48,5 @@ class MeasuredPose:
 
     @property
     def is_exact(self) -> bool:
-        """Whether nothing is to be learnt of the pose."""
+        """Return whether the pose is held instead of fitted."""
         return self.sigma_mm == 0 and self.sigma_rad == 0

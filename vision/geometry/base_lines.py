@@ -1,4 +1,6 @@
-"""The whisker's base as lines in space, a line a frame: what a free stroke tells of where the rig is."""
+"""The whisker's base as lines in space, one per frame of a free stroke, from which the rig is
+located.
+"""
 
 from dataclasses import dataclass, field
 
@@ -9,12 +11,16 @@ from vision.geometry.refusals import Refused
 
 @dataclass(frozen=True, eq=False)
 class BaseLines:
-    """The whisker's straight piece near its base on free strokes, a row a frame, in the rig frame as the board has it.
+    """The whisker's straight part near its base on free strokes, one row per frame, in the rig
+    frame that the board defines.
 
-    motor_rad (n,); point_mm (n, 3) anywhere on the line and its covariance (n, 3, 3), mm²; direction (n, 3), unit, from
-    the base outward, and its covariance (n, 3, 3): errors of each frame by itself. shared_covariance (6, 6): of a turn
-    w about the base and a shift v, rad and mm, that all lines have in common (light on the wire, lenses). Refused where
-    shapes do not fit.
+    motor_rad (n,).
+    point_mm (n, 3): any point on the line; point_covariance (n, 3, 3), mm².
+    direction (n, 3): unit, from the base outward; direction_covariance (n, 3, 3). Both covariances
+    are of the errors that each frame has by itself.
+    shared_covariance (6, 6): of a rotation w about the base and a shift v, rad and mm, that all
+    lines have in common (light on the wire, lenses).
+    Raises Refused where shapes do not match.
     """
 
     motor_rad: np.ndarray
@@ -25,13 +31,15 @@ class BaseLines:
     shared_covariance: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
 
     def __post_init__(self):
+        """Raise Refused where shapes do not match."""
         n = len(self.motor_rad)
-        vectors, matrices = ("point_mm", "direction"), ("point_covariance", "direction_covariance")
-        shapes = (
-            dict.fromkeys(vectors, (n, 3))
-            | dict.fromkeys(matrices, (n, 3, 3))
-            | {"shared_covariance": (6, 6)}
-        )
+        shapes = {
+            "point_mm": (n, 3),
+            "direction": (n, 3),
+            "point_covariance": (n, 3, 3),
+            "direction_covariance": (n, 3, 3),
+            "shared_covariance": (6, 6),
+        }
         for name, shape in shapes.items():
             found = np.shape(getattr(self, name))
             if found != shape:
@@ -39,5 +47,5 @@ class BaseLines:
 
     @property
     def width_rad(self) -> float:
-        """How far the motor turned over the frames."""
+        """Return the range of motor angles over the frames; 0 of none."""
         return float(np.ptp(self.motor_rad)) if len(self.motor_rad) else 0.0

@@ -11,7 +11,10 @@ from vision.geometry.checks import require, require_length, require_sigma
 
 @dataclass(frozen=True)
 class Board:
-    """A ChArUco board. squares = (along x, along y); frame as OpenCV's: origin top left, z into the board."""
+    """A ChArUco board in OpenCV's frame: origin top left, z into the board.
+
+    squares: (along x, along y). Raises Refused for a board that cannot be.
+    """
 
     squares: tuple[int, int]
     square_mm: float
@@ -22,6 +25,7 @@ class Board:
     square_sigma_mm: float = 0.0
 
     def __post_init__(self):
+        """Raise Refused for counts, lengths or a dictionary that cannot be."""
         object.__setattr__(self, "squares", tuple(int(n) for n in self.squares))
         require(
             len(self.squares) == 2 and min(self.squares) >= 2,
@@ -37,52 +41,53 @@ class Board:
             self.dictionary.startswith("DICT_") and hasattr(cv2.aruco, self.dictionary),
             f"board dictionary {self.dictionary!r} is not one of OpenCV's, such as DICT_5X5_100",
         )
+        available = len(_dictionary(self.dictionary).bytesList)
         require(
-            self.marker_count <= self.markers_in_dictionary,
+            self.marker_count <= available,
             f"board of {self.squares[0]} x {self.squares[1]} squares needs {self.marker_count} markers, "
-            f"{self.dictionary} has {self.markers_in_dictionary}",
+            f"{self.dictionary} has {available}",
         )
 
     @property
     def marker_count(self) -> int:
-        """One marker on every second square."""
+        """Return the number of markers: one on every second square."""
         return self.squares[0] * self.squares[1] // 2
 
-    @property
-    def markers_in_dictionary(self) -> int:
-        """How many markers the dictionary has."""
-        return len(self._opencv_dictionary().bytesList)
-
-    def _opencv_dictionary(self) -> cv2.aruco.Dictionary:
-        return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
-
     def opencv(self) -> cv2.aruco.CharucoBoard:
-        """The same board as OpenCV's object, with no more of its dictionary than the board has: comparing what is seen
-        with a thousand markers took 40 % of detection. (Others are as far from the board's as before: not taken.)
+        """Return the board as OpenCV's object, with only the markers of its dictionary that it
+        uses.
+
+        Comparing pictures with a thousand markers takes 40 % of detection. (The other markers are
+        as far from the board's as they are in the whole dictionary, so that they are not taken for
+        it.)
         """
         return _opencv_board(self)
 
     @cached_property
     def corners_mm(self) -> np.ndarray:
-        """Inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the ChArUco id."""
+        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the
+        ChArUco id.
+        """
         x = np.arange(1, self.squares[0]) * self.square_mm
         y = np.arange(1, self.squares[1]) * self.square_mm
-        corners = np.column_stack(
-            [np.tile(x, len(y)), np.repeat(y, len(x)), np.zeros(len(x) * len(y))]
-        )
+        x_grid, y_grid = np.meshgrid(x, y)
+        corners = np.stack([x_grid, y_grid, np.zeros_like(x_grid)], axis=-1).reshape(-1, 3)
         corners.setflags(write=False)
         return corners
 
 
+def _dictionary(name: str) -> cv2.aruco.Dictionary:
+    """Return OpenCV's dictionary of markers of that name."""
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
 @lru_cache(maxsize=32)
 def _opencv_board(board: Board) -> cv2.aruco.CharucoBoard:
-    """Made once: OpenCV warns of narrow borders each time."""
-    whole = board._opencv_dictionary()
-    own = cv2.aruco.Dictionary(
-        whole.bytesList[: board.marker_count], whole.markerSize, whole.maxCorrectionBits
-    )
-    made = cv2.aruco.CharucoBoard(
-        board.squares, float(board.square_mm), float(board.marker_mm), own
-    )
-    made.setLegacyPattern(board.legacy)
-    return made
+    """Make OpenCV's board, once for each board: OpenCV warns of narrow borders each time."""
+    whole = _dictionary(board.dictionary)
+    markers = whole.bytesList[: board.marker_count]
+    own = cv2.aruco.Dictionary(markers, whole.markerSize, whole.maxCorrectionBits)
+    square_mm = float(board.square_mm)
+    charuco = cv2.aruco.CharucoBoard(board.squares, square_mm, float(board.marker_mm), own)
+    charuco.setLegacyPattern(board.legacy)
+    return charuco

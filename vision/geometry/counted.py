@@ -2,5 +2,6 @@
 
 
 def counted(count: int, noun: str) -> str:
-    """As `1 frame` or `2 frames`."""
-    return f"{count} {noun}" + ("" if count == 1 else "s")
+    """Return a count with its noun, such as `1 frame` or `2 frames`."""
+    plural = "" if count == 1 else "s"
+    return f"{count} {noun}{plural}"

@@ -1,4 +1,5 @@
-"""The lens: camera coordinates to pixels and back (Brown–Conrady, OpenCV's order), with analytic Jacobians.
+"""The lens: camera coordinates to pixels and back (Brown–Conrady, OpenCV's order), with analytic
+Jacobians.
 
 The nine lens parameters are fx fy cx cy k1 k2 p1 p2 k3. With a = x/z, b = y/z, r² = a² + b²:
 
@@ -12,108 +13,83 @@ import numpy as np
 LENS_TERMS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 # [steps] Newton's, which end before; where they do not, the pixel has no direction. Derived.
 _MOST_STEPS = 30
+# [px] To which a projection is inverted: rounding. Derived.
+_TOLERANCE_PX = 1e-9
 
 
 def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
-    """Normalised picture coordinates (n, 2) as the lens bends them, (n, 2)."""
-    k1, k2, p1, p2, k3 = distortion
-    a, b = ab[:, 0], ab[:, 1]
+    """Return normalised picture coordinates (n, 2) as the lens distorts them, (n, 2)."""
+    _, _, p1, p2, _ = distortion
+    a, b = ab.T
     r2 = a * a + b * b
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial = _radial(r2, distortion)
     ab2 = 2.0 * a * b
-    return np.column_stack(
-        [
-            a * radial + p1 * ab2 + p2 * (r2 + 2 * a * a),
-            b * radial + p1 * (r2 + 2 * b * b) + p2 * ab2,
-        ]
-    )
+    distorted_a = a * radial + p1 * ab2 + p2 * (r2 + 2 * a * a)
+    distorted_b = b * radial + p1 * (r2 + 2 * b * b) + p2 * ab2
+    return np.column_stack([distorted_a, distorted_b])
 
 
 def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
-    """d distort / d ab, (n, 2, 2); symmetric, since both come from one potential."""
+    """Return d distort / d ab, (n, 2, 2); symmetric, since both coordinates come from one
+    potential.
+    """
     k1, k2, p1, p2, k3 = distortion
-    a, b = ab[:, 0], ab[:, 1]
+    a, b = ab.T
     r2 = a * a + b * b
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))
-    out = np.empty((len(ab), 2, 2))
-    out[:, 0, 0] = radial + a * a * slope + 2 * p1 * b + 6 * p2 * a
-    out[:, 1, 1] = radial + b * b * slope + 6 * p1 * b + 2 * p2 * a
-    out[:, 0, 1] = out[:, 1, 0] = a * b * slope + 2 * p1 * a + 2 * p2 * b
-    return out
+    radial = _radial(r2, distortion)
+    slope = 2.0 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # d radial / d r² · 2
+    jacobian = np.empty((len(ab), 2, 2))
+    jacobian[:, 0, 0] = radial + a * a * slope + 2 * p1 * b + 6 * p2 * a
+    jacobian[:, 1, 1] = radial + b * b * slope + 6 * p1 * b + 2 * p2 * a
+    jacobian[:, 0, 1] = a * b * slope + 2 * p1 * a + 2 * p2 * b
+    jacobian[:, 1, 0] = jacobian[:, 0, 1]
+    return jacobian
 
 
 def project(x_camera: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """Pixels (n, 2) of points in camera coordinates (n, 3); NaN where a point is not in front of the camera."""
-    return distort(_normalised(x_camera), lens[4:]) * lens[:2] + lens[2:4]
+    """Project points in camera coordinates (n, 3) to pixels (n, 2); NaN where a point is not in
+    front of the camera.
+    """
+    return distort(_normalise(x_camera), lens[4:]) * lens[:2] + lens[2:4]
 
 
 def project_with_jacobians(
     x_camera: np.ndarray, lens: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels (n, 2) with their derivatives by the point (n, 2, 3) and by the nine lens parameters (n, 2, 9)."""
-    ab = _normalised(x_camera)
-    bent = distort(ab, lens[4:])
-    px = bent * lens[:2] + lens[2:4]
-    return px, _by_point(ab, x_camera[:, 2], lens), _by_lens(ab, bent, lens)
+    """Return pixels (n, 2) with their derivatives by the point (n, 2, 3) and by the nine lens
+    parameters (n, 2, 9).
+    """
+    ab = _normalise(x_camera)
+    distorted = distort(ab, lens[4:])
+    px = distorted * lens[:2] + lens[2:4]
+    return px, _by_point(ab, x_camera[:, 2], lens), _by_lens(ab, distorted, lens)
 
 
-def _normalised(x_camera: np.ndarray) -> np.ndarray:
-    z = np.where(x_camera[:, 2] > 0, x_camera[:, 2], np.nan)
-    return x_camera[:, :2] / z[:, None]
+def unproject(px: np.ndarray, lens: np.ndarray) -> np.ndarray:
+    """Return the normalised coordinates (n, 2) whose projection is px (n, 2), by Newton's method;
+    NaN where none is found.
 
-
-def _by_point(ab: np.ndarray, z: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """Chain rule through a = x/z, b = y/z."""
-    by_ab = distort_jacobian(ab, lens[4:]) * lens[:2, None] / z[:, None, None]
-    return np.concatenate([by_ab, -(by_ab @ ab[:, :, None])], axis=2)
-
-
-def _by_lens(ab: np.ndarray, bent: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    a, b = ab[:, 0], ab[:, 1]
-    r2 = a * a + b * b
-    out = np.zeros((len(ab), 2, 9))
-    out[:, 0, 0], out[:, 1, 1] = bent[:, 0], bent[:, 1]
-    out[:, 0, 2] = out[:, 1, 3] = 1.0
-    for column, power in ((4, r2), (5, r2 * r2), (8, r2 * r2 * r2)):
-        out[:, :, column] = ab * power[:, None]
-    out[:, 0, 6] = out[:, 1, 7] = 2 * a * b
-    out[:, 0, 7], out[:, 1, 6] = r2 + 2 * a * a, r2 + 2 * b * b
-    out[:, :, 4:] *= lens[:2, None]
-    return out
-
-
-def unproject(px: np.ndarray, lens: np.ndarray, tolerance_px: float = 1e-9) -> np.ndarray:
-    """Normalised coordinates (n, 2) whose projection is px (n, 2), by Newton's method; NaN where none is
-    found.
-
-    Newton needs four to six steps for the lenses of a bench; past the lens's fold there is no answer.
+    Newton needs four to six steps for the lenses of a bench; past the lens's fold there is no
+    solution.
     """
     target = (px - lens[2:4]) / lens[:2]
     ab = target.copy()
-    tolerance = tolerance_px / min(lens[:2])
+    tolerance = _TOLERANCE_PX / min(lens[:2])
     for _ in range(_MOST_STEPS):
-        miss = distort(ab, lens[4:]) - target
-        if not np.any(np.abs(miss) > tolerance):
+        residual = distort(ab, lens[4:]) - target
+        if not np.any(np.abs(residual) > tolerance):
             break
-        ab = ab - _solve_2x2(distort_jacobian(ab, lens[4:]), miss)
+        ab = ab - _solve_2x2(distort_jacobian(ab, lens[4:]), residual)
     converged = np.all(np.abs(distort(ab, lens[4:]) - target) <= 1e3 * tolerance, axis=1)
     return np.where(converged[:, None], ab, np.nan)
 
 
-def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:
-    determinant = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
-    determinant = np.where(np.abs(determinant) > 1e-12, determinant, np.nan)
-    x = J[:, 1, 1] * y[:, 0] - J[:, 0, 1] * y[:, 1]
-    return np.column_stack([x, J[:, 0, 0] * y[:, 1] - J[:, 1, 0] * y[:, 0]]) / determinant[:, None]
-
-
 def fold_radius(distortion: np.ndarray) -> float:
-    """How far from the principal point the picture reaches before the lens folds it back, in normalised picture
-    coordinates (distorted; px over focal length); inf where it never does.
+    """Return how far from the principal point the picture reaches before the lens folds it back, in
+    distorted normalised coordinates (px over focal length); inf where it never does.
 
-    The radial curve r (1 + k1 r² + k2 r⁴ + k3 r⁶) stops rising there. Beyond, two directions share a pixel: a lens that
-    folds inside its own picture is over-fitted.
+    The radial curve r (1 + k1 r² + k2 r⁴ + k3 r⁶) stops rising there. Beyond, two directions share
+    a pixel: a lens that folds inside its own picture is over-fitted.
     """
     k1, k2, _, _, k3 = distortion
     roots = np.roots(np.trim_zeros([7 * k3, 5 * k2, 3 * k1, 1.0], "f"))
@@ -121,4 +97,51 @@ def fold_radius(distortion: np.ndarray) -> float:
     if not len(squares):
         return np.inf
     r2 = squares.min()
-    return float(np.sqrt(r2) * (1 + r2 * (k1 + r2 * (k2 + r2 * k3))))
+    return float(np.sqrt(r2) * _radial(r2, distortion))
+
+
+def _radial(r2: np.ndarray, distortion: np.ndarray) -> np.ndarray:
+    """Return the radial factor 1 + k1 r² + k2 r⁴ + k3 r⁶ at squared radii."""
+    k1, k2, _, _, k3 = distortion
+    return 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+
+
+def _normalise(x_camera: np.ndarray) -> np.ndarray:
+    """Return (x/z, y/z) (n, 2) of points (n, 3); NaN where z is not positive."""
+    z = np.where(x_camera[:, 2] > 0, x_camera[:, 2], np.nan)
+    return x_camera[:, :2] / z[:, None]
+
+
+def _by_point(ab: np.ndarray, z: np.ndarray, lens: np.ndarray) -> np.ndarray:
+    """Return d px / d point (n, 2, 3), by the chain rule through a = x/z, b = y/z."""
+    by_ab = distort_jacobian(ab, lens[4:]) * lens[:2, None] / z[:, None, None]
+    return np.concatenate([by_ab, -(by_ab @ ab[:, :, None])], axis=2)
+
+
+def _by_lens(ab: np.ndarray, distorted: np.ndarray, lens: np.ndarray) -> np.ndarray:
+    """Return d px / d lens parameters (n, 2, 9), columns as in LENS_TERMS."""
+    a, b = ab.T
+    r2 = a * a + b * b
+    jacobian = np.zeros((len(ab), 2, 9))
+    jacobian[:, 0, 0] = distorted[:, 0]
+    jacobian[:, 1, 1] = distorted[:, 1]
+    jacobian[:, 0, 2] = 1.0
+    jacobian[:, 1, 3] = 1.0
+    radial_powers = {4: r2, 5: r2 * r2, 8: r2 * r2 * r2}
+    for column, power in radial_powers.items():
+        jacobian[:, :, column] = ab * power[:, None]
+    jacobian[:, 0, 6] = 2 * a * b
+    jacobian[:, 1, 7] = 2 * a * b
+    jacobian[:, 0, 7] = r2 + 2 * a * a
+    jacobian[:, 1, 6] = r2 + 2 * b * b
+    jacobian[:, :, 4:] *= lens[:2, None]
+    return jacobian
+
+
+def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return x (n, 2) with J x = y, by Cramer's rule; NaN where J (n, 2, 2) is singular."""
+    a, b, c, d = J.reshape(-1, 4).T
+    determinant = a * d - b * c
+    determinant = np.where(np.abs(determinant) > 1e-12, determinant, np.nan)
+    y0, y1 = y.T
+    return np.column_stack([d * y0 - b * y1, a * y1 - c * y0]) / determinant[:, None]

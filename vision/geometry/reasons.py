@@ -54,7 +54,8 @@ NO_REASON = Reason("", "")
 def as_reason(text: str | None) -> Reason:
     """Return any text as a reason.
 
-    A text that is none already has the code of its attribute `code`, where it has one, else UNNAMED.
+    A text that is none already has the code of its attribute `code`, where it has one, else
+    UNNAMED.
     """
     if isinstance(text, Reason):
         return text

@@ -1,15 +1,16 @@
-"""The one way in which vision says no."""
+"""The exception by which vision refuses what it cannot evaluate."""
 
 from vision.geometry.reasons import Reason
 
 
 class Refused(ValueError):
-    """What was seen cannot give the truth; one line says what was found, what is allowed, what to record.
+    """Pictures or settings from which no truth can be had.
 
-    code: of the kind of refusal.
+    The message is one line: what was found, what is allowed, what to record. code: kind of refusal.
     """
 
     def __init__(self, sentence: str, code: str = "refused"):
+        """Keep the code beside the message."""
         super().__init__(sentence)
         self.code = code
 
@@ -20,12 +21,13 @@ class Refused(ValueError):
 
 
 class TooFewFrames(Refused):
-    """Of a stroke's frames too few were looked at: all of them may tell more."""
+    """Too few of a stroke's frames were evaluated; all of them may suffice."""
 
 
 class Misled(Refused):
-    """One camera shows something else than the others: `camera` is its name. Without it there may be a truth."""
+    """One camera contradicts the others: `camera` is its name. Without it there may be a truth."""
 
     def __init__(self, camera: str, reason: str):
+        """Name the camera in the message."""
         super().__init__(f"camera {camera} was left out: {reason}", code="camera_lines_scatter")
         self.camera = camera

@@ -1,4 +1,4 @@
-"""How wide a normal distribution is, from deviations of which some are outliers."""
+"""The width of a normal distribution, from deviations of which some are outliers."""
 
 import numpy as np
 
@@ -7,5 +7,7 @@ _MEDIAN = 0.6745
 
 
 def robust_sigma(deviations: np.ndarray) -> float:
-    """Standard deviation of the normal distribution whose deviations have this median size (MAD)."""
+    """Return the standard deviation of the normal distribution whose deviations have this median
+    size (MAD).
+    """
     return float(np.median(np.abs(deviations))) / _MEDIAN

@@ -1,95 +1,103 @@
 """Rotations as small vectors: exponential, logarithm, the nearest proper rotation. Angles in rad.
 
-SciPy's Rotation makes the exponential in half the time (to the last digit but one), but takes 3 to 15 times as long for
-the logarithm, and raises where a pose is NaN; the Jacobian is in neither.
+SciPy's Rotation is used for the exponential. Its logarithm takes 3 to 15 times as long as the one
+here and raises where a pose is NaN; the Jacobian is not in it.
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+
+# [1] Sine of the angle below which a rotation matrix gives its axis by its symmetric part. Derived.
+_SMALL_SINE = 1e-6
+# [rad] Below it (θ − sin θ)/θ³ loses its digits; its limit is 1/6. Derived.
+_SMALL_ANGLE_RAD = 1e-4
 
 
 def skew(v: np.ndarray) -> np.ndarray:
-    """Cross-product matrices: skew(v) @ x = v × x. (..., 3) → (..., 3, 3)."""
+    """Return cross-product matrices (..., 3, 3) of vectors (..., 3): skew(v) @ x = v × x."""
     v = np.asarray(v, dtype=float)
-    out = np.zeros((*v.shape[:-1], 3, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
-    return out
+    matrix = np.zeros((*v.shape[:-1], 3, 3))
+    matrix[..., 2, 1] = v[..., 0]
+    matrix[..., 0, 2] = v[..., 1]
+    matrix[..., 1, 0] = v[..., 2]
+    return matrix - np.swapaxes(matrix, -1, -2)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products (..., 3) of vectors (..., 3): NumPy's to the last digit, of a few in half of its time."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        out[..., k] = a[..., i] * b[..., j] - a[..., j] * b[..., i]
-    return out
+    """Return the cross products (..., 3) of vectors (..., 3), in half of NumPy's time for few
+    vectors.
+    """
+    next_axis = [1, 2, 0]
+    last_axis = [2, 0, 1]
+    forward = a.take(next_axis, -1) * b.take(last_axis, -1)
+    return forward - a.take(last_axis, -1) * b.take(next_axis, -1)
 
 
 def exp_rotation(w: np.ndarray) -> np.ndarray:
-    """Rodrigues' formula: the turn by |w| about w. (..., 3) → (..., 3, 3)."""
+    """Return the rotation matrices (..., 3, 3) by the angles |w| about the axes w (..., 3)."""
     w = np.asarray(w, dtype=float)
-    angle = np.linalg.norm(w, axis=-1)[..., None, None]
-    cross = skew(w)
-    # np.sinc keeps both coefficients exact at angle 0.
-    sine = np.sinc(angle / np.pi)
-    versine = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    return np.eye(3) + sine * cross + versine * (cross @ cross)
+    matrices = Rotation.from_rotvec(w.reshape(-1, 3)).as_matrix()
+    return matrices.reshape(*w.shape, 3)
 
 
 def log_rotation(R: np.ndarray) -> np.ndarray:
-    """The vector w of smallest length with exp_rotation(w) = R. (..., 3, 3) → (..., 3)."""
+    """Return the shortest vectors w (..., 3) with exp_rotation(w) = R (..., 3, 3)."""
     R = np.asarray(R, dtype=float)
-    axis_sine = 0.5 * np.stack(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
-        axis=-1,
-    )
+    antisymmetric = R - np.swapaxes(R, -1, -2)
+    axis_sine = 0.5 * antisymmetric[..., [2, 0, 1], [1, 2, 0]]
     sine = np.linalg.norm(axis_sine, axis=-1)
     cosine = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0)
     angle = np.arctan2(sine, cosine)
-    w = axis_sine * np.where(sine > 1e-6, angle / np.maximum(sine, 1e-6), 1.0)[..., None]
-    for index in map(tuple, np.argwhere((sine <= 1e-6) & (cosine < 0))):
+    is_small = sine <= _SMALL_SINE
+    factor = np.where(is_small, 1.0, angle / np.maximum(sine, _SMALL_SINE))
+    w = axis_sine * factor[..., None]
+    for index in map(tuple, np.argwhere(is_small & (cosine < 0))):
         w[index] = angle[index] * _axis_of_half_turn(R[index])
     return w
 
 
 def left_jacobian(w: np.ndarray) -> np.ndarray:
-    """J with Exp(w + d) = Exp(J d) Exp(w) to first order in d. (..., 3) → (..., 3, 3)."""
+    """Return J (..., 3, 3) with Exp(w + d) = Exp(J d) Exp(w) to first order in d, at w (..., 3)."""
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
-    small = angle < 1e-4  # (θ − sin θ)/θ³ loses its digits there; its limit is 1/6
-    safe = np.where(small, 1.0, angle)
-    second = np.where(small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
-    cross = skew(w)
-    return np.eye(3) + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross + second * (cross @ cross)
+    is_small = angle < _SMALL_ANGLE_RAD
+    safe = np.where(is_small, 1.0, angle)
+    second = np.where(is_small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    W = skew(w)
+    return np.eye(3) + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * W + second * (W @ W)
 
 
 def _axis_of_half_turn(R: np.ndarray) -> np.ndarray:
-    """R = 2 a aᵀ − 1 at half a turn: the longest column of R + 1 is along the axis."""
+    """Return the unit axis (3,) of a rotation by half a turn, R = 2 a aᵀ − 1: the direction of the
+    longest column of R + 1.
+    """
     columns = R + np.eye(3)
     axis = columns[:, np.argmax(np.diag(columns))]
     return axis / np.linalg.norm(axis)
 
 
 def nearest_rotation(M: np.ndarray) -> np.ndarray:
-    """The proper rotation closest to M in the Frobenius norm (by SVD). (3, 3) → (3, 3)."""
+    """Return the proper rotation (3, 3) closest to M (3, 3) in the Frobenius norm, by SVD."""
     U, _, Vt = np.linalg.svd(M)
     return U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
 
 
 def invert_transform(T: np.ndarray) -> np.ndarray:
-    """T_b_a of T_a_b, both (3, 4)."""
+    """Return T_b_a of T_a_b, both (3, 4)."""
     R = T[:, :3].T
     return np.column_stack([R, -R @ T[:, 3]])
 
 
 def compose(T_a_b: np.ndarray, T_b_c: np.ndarray) -> np.ndarray:
-    """T_a_c of two (3, 4) transforms."""
+    """Return T_a_c of two transforms (3, 4)."""
     return np.column_stack([T_a_b[:, :3] @ T_b_c[:, :3], T_a_b[:, :3] @ T_b_c[:, 3] + T_a_b[:, 3]])
 
 
 def apply(T_a_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
-    """Points of frame b in frame a: (3, 4), (n, 3) → (n, 3)."""
+    """Transform points (n, 3) of frame b to frame a by T_a_b (3, 4)."""
     return points_b @ T_a_b[:, :3].T + T_a_b[:, 3]
 
 
 def pose_difference(T_from: np.ndarray, T_to: np.ndarray) -> np.ndarray:
-    """(w, v) that moves one pose to the other: T_to = (Exp(w) R_from, t_from + v). (6,) rad and mm."""
-    return np.concatenate([log_rotation(T_to[:, :3] @ T_from[:, :3].T), T_to[:, 3] - T_from[:, 3]])
+    """Return (w, v) (6,), rad and mm, between two poses (3, 4): T_to = (Exp(w) R_from, t_from + v)."""
+    w = log_rotation(T_to[:, :3] @ T_from[:, :3].T)
+    return np.concatenate([w, T_to[:, 3] - T_from[:, 3]])

@@ -1,19 +1,22 @@
-"""One object that carries every knob of seeing: how hard to look, and what is believed beforehand."""
+"""The settings of everything that is measured in pictures."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class VisionSettings:
-    """How a trial is looked at.
+    """Settings with which the pictures of a trial are evaluated.
 
-    wire_piece_px, bar_piece_px: length of the pieces of which each gives one line point. wire_margin_px,
-    bar_margin_px: background read on either side of the rod. rounds: how often the lines are traced anew from the
-    fit. clock_sigma_s: how well the cameras' clock is known against the motor's; 0 takes frame times as exact.
-    bar_reach_mm: length of bar used on either side of the contact. picture_scale: pictures are shrunk by so much, a
-    whole number. every_frame: of a stroke's frames one in so many is looked at, all where these leave too few before
-    touch. check_beam: whether the wire is fitted once more as a curve that is no beam, and looked at for another width,
-    to see whether it is the one that is stated.
+    wire_piece_px, bar_piece_px: length of the segments that give one line point each.
+    wire_margin_px, bar_margin_px: background read on either side of the rod.
+    rounds: how often the lines are traced anew from the fit.
+    clock_sigma_s: uncertainty of the cameras' clock against the motor's; 0 takes frame times as
+    exact. bar_reach_mm: length of bar used on either side of the contact.
+    picture_scale: factor, a whole number, by which pictures are shrunk.
+    every_frame: one in so many of a stroke's frames is evaluated; all where these leave too few
+    before touch.
+    check_beam: whether the wire is fitted again as a curve that is no beam and with another width,
+    to check that it is the one that is stated.
     """
 
     wire_piece_px: int = 12

@@ -12,7 +12,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
-from vision.geometry.newton import cauchy_weights, settle
+from vision.geometry.newton import cauchy_weights, gauss_newton
 from vision.geometry.silhouette import edges
 from vision.wire.points import LinePoints
 
@@ -48,7 +48,7 @@ def settle_axis(
             if len(points)
         ]
 
-    return upward(shifted_axis(axis, across, settle(rows_of, _PRIOR, _STEPS, rounds)))
+    return upward(shifted_axis(axis, across, gauss_newton(rows_of, _PRIOR, _STEPS, rounds)))
 
 
 def _axis_rows(

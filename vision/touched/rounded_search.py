@@ -18,7 +18,7 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import axis_frame, shifted_axis
 from vision.geometry.grazing import sights_beside
-from vision.geometry.newton import cauchy_weights, settle
+from vision.geometry.newton import cauchy_weights, gauss_newton
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rounded import Rounded
@@ -271,7 +271,7 @@ def fit_silhouette(
             if len(points)
         ]
 
-    return shifted_object(place, across, settle(rows_of, prior, _STEPS, _GAUSS_NEWTON))
+    return shifted_object(place, across, gauss_newton(rows_of, prior, _STEPS, _GAUSS_NEWTON))
 
 
 def shifted_object(place: Rounded, across: np.ndarray, vector: np.ndarray) -> Rounded:

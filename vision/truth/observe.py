@@ -40,7 +40,7 @@ from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import coarse_shapes, fit_whisk, free_stroke
 from vision.truth.wire_end import wire_ends
-from vision.truth.wire_width import wire_looks
+from vision.truth.wire_width import wire_widths
 from vision.wire.one_sided import one_sided_lines
 from vision.wire.trace import lines_of
 
@@ -141,7 +141,7 @@ def _whisks_of(
                 bar_seen,
                 settings,
                 left_out=tuple(behind),
-                told=told,
+                stated_velocity=told,
                 gives=gives,
             )
             for number, stroke in enumerate(strokes)
@@ -265,7 +265,7 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     )
     turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
     base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
-    looks = wire_looks(whisk, fitted) if whisk.settings.check_beam and whisk.number == 0 else {}
+    looks = wire_widths(whisk, fitted) if whisk.settings.check_beam and whisk.number == 0 else {}
     told = {
         "base": base,
         "beam": beam,

@@ -1,4 +1,4 @@
-"""What a trial showed: a row a frame and a row a whisk, each number with its sigma."""
+"""The truth of a trial: one row per frame and one per whisk, each number with its sigma."""
 
 from dataclasses import dataclass, field
 
@@ -17,10 +17,11 @@ from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrameTruth(WhileTouching):
-    """A row a frame (n,), mm and rad; NaN where there is nothing to tell, with the reason in `status`.
+    """The frames (n,) of a whisk, mm and rad; NaN where a value is unknown, with the reason in
+    `status`.
 
-    Values that exist only while touching are NaN before. point_mm: value and sigma (n, 3). arc_mm: of the contact along
-    the whisker.
+    Values that exist only while touching are NaN before. point_mm: value and sigma (n, 3). arc_mm:
+    the contact's place along the whisker.
     """
 
     index: np.ndarray
@@ -35,8 +36,11 @@ class FrameTruth(WhileTouching):
 
 @dataclass(frozen=True, eq=False)
 class WireShape:
-    """The wire as fitted, in the terms of `vision.geometry.centreline`: rest_mm (2, 4), and of each frame of the fit
-    its index (f,), bend_rad (f, 2) and arc_mm (f,) of the contact."""
+    """The fitted wire, as `vision.geometry.centreline` describes it.
+
+    rest_mm (2, 4); of each frame of the fit its index (f,), bend_rad (f, 2), and arc_mm (f,) of the
+    contact.
+    """
 
     rest_mm: np.ndarray
     index: np.ndarray
@@ -46,8 +50,11 @@ class WireShape:
 
 @dataclass(frozen=True, eq=False)
 class GaveWay:
-    """How far a bar that gives way has come in each touching frame (n,): index of the frame, pushing angle, and mm away
-    from the contact (normal_mm) and across that and the bar (aside_mm), which its springs need not have."""
+    """The displacement of a bar that gives way, in each touching frame (n,).
+
+    index: of the frame. theta_rad: pushing angle. normal_mm: away from the contact. aside_mm:
+    across that direction and the bar, where springs need not move it.
+    """
 
     index: np.ndarray
     theta_rad: np.ndarray
@@ -57,9 +64,12 @@ class GaveWay:
 
 @dataclass(frozen=True, eq=False)
 class SeenObject:
-    """An object that is no straight bar, where a whisk shows it: centre of ring or sphere, or the cone's tip (3,), mm;
-    the normal of the ring's plane, or where the cone points (3,); as said radius of the sphere or of the ring's bar and
-    of the ring, mm, and half-angle, rad."""
+    """An object that is no straight bar, where a whisk shows it.
+
+    point_mm (3,): centre of ring or sphere, or the cone's tip. axis (3,): normal of the ring's
+    plane, or the cone's direction. As stated: radius_mm of the sphere or of the ring's bar,
+    ring_radius_mm, half_angle_rad of the cone.
+    """
 
     shape: str
     point_mm: np.ndarray
@@ -71,18 +81,19 @@ class SeenObject:
 
 @dataclass(frozen=True)
 class WhiskTruth:
-    """A whisk seen: first touch, the contact then, the bar's slopes, and a row a frame.
+    """The truth of one whisk: first touch, the contact then, the bar's slopes, and one row per
+    frame.
 
-    d_x_mm is NaN exactly where there is no truth; `status` says why, or what is doubtful.
-    overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the whisker's base in
-    the frames before touch. beam: the same by a curve that is no beam. turns: the whisker's turn in each frame of the
-    fit beyond the motor's. refinements: what the truth would be without each part of the model, by name. lines: what
-    each camera's lines are worth. ends: by camera how far from its base, mm, the whisker is seen to end; looks: how
-    thick it looks over how thick it is said to be, of a trial's first whisk.
-    point_covariance_mm2 (3, 3): of point_mm; shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of
-    an object that moves, as seen; None where it stands. gave: of one that gives way. rounded: one
-    that is no straight bar. problem: what was fitted, from
-    which `sights_of` takes what one camera shows.
+    d_x_mm is NaN exactly where there is no truth; `status` says why, or holds warnings.
+    overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the
+    whisker's base in the frames before touch. beam: the comparison with a curve that is no beam.
+    turns: the whisker's rotation in each frame of the fit beyond the motor's. refinements: what the
+    truth would be without each part of the model, by name. lines: the precision of each camera's
+    lines. ends: by camera how far from its base, mm, the whisker is seen to end; looks: its width
+    in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
+    point_mm. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object
+    that moves, as seen; None where it stands. gave: of one that gives way. rounded: one that is no
+    straight bar. problem: what was fitted, from which `sights_of` takes one camera's share.
     """
 
     whisk: int
@@ -113,14 +124,15 @@ class WhiskTruth:
     problem: Problem | None = None
 
     def at(self, theta_rad: float) -> TruthAtAngle:
-        """Truth at a pushing angle, by a fit over the frames around it."""
+        """Return the truth at a pushing angle, by a fit over the frames around it."""
         return at_angle(self.smooth, theta_rad, self.status)
 
 
 @dataclass(frozen=True)
 class TrialTruth:
-    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, its direction (3,), and by camera
-    how thick it looks over how thick it is said to be."""
+    """All whisks of a trial and the bar that they shared: a point (3,) of its axis, its direction
+    (3,), and by camera its width in the pictures over the stated one.
+    """
 
     bar_point_mm: np.ndarray
     bar_direction: np.ndarray

@@ -1,9 +1,11 @@
-"""What one camera alone shows of a whisk's wire: the lines on which its points lie, with all that they may be off by.
+"""What one camera alone shows of a whisk's wire: the lines of sight to its points, with their
+uncertainty.
 
-Where to look in the pictures came from all cameras; what is measured there is the one camera's. Nothing else of the fit
-is here.
+The places in the pictures came from all cameras; what is measured there is the one camera's.
+Nothing else of the fit is here.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +14,18 @@ from vision.fit.blocks import WIRE_MODES_PX
 from vision.fit.problem import Problem, wire_modes
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
+from vision.wire.points import LinePoints
 
 
 @dataclass(frozen=True, eq=False)
 class Sights:
-    """Lines of sight of one camera to the wire, rig frame: motor_rad (f,) of each frame; frame (n,), each point's place
-    among these; eye_mm (3,); sight (n, 3) unit; across (n, 3), unit normals of the planes of sight and seen line;
-    sigma_rad (n,) across; shared_rad (n, k): by how much each moves with one sigma of each cause that points share,
-    light, lens and pose."""
+    """Lines of sight of one camera to the wire, in the rig frame.
+
+    motor_rad (f,): of each frame. frame (n,): each point's place among these. eye_mm (3,). sight
+    (n, 3): unit. across (n, 3): unit normals of the planes of sight and wire. sigma_rad (n,):
+    across. shared_rad (n, k): how far each moves across with one sigma of each cause that points
+    share, light, lens and pose.
+    """
 
     motor_rad: np.ndarray
     frame: np.ndarray
@@ -31,45 +37,57 @@ class Sights:
 
 
 def sights_of(problem: Problem, name: str) -> Sights | None:
-    """One camera's; None where it shows nothing of the wire, or was left out."""
+    """Return the lines of sight of one camera; None where it shows nothing of the wire, or was left
+    out.
+    """
     if name not in problem.cameras:
         return None
-    number, camera = problem.cameras.index(name), problem.cameras[name]
-    mine = [
-        one for one in problem.seen if one.camera == number and one.frame >= 0 and len(one.points)
-    ]
-    if not mine:
+    camera = problem.cameras[name]
+    number = problem.cameras.index(name)
+    seen = [one for one in problem.seen if one.camera == number and one.frame >= 0]
+    seen = [one for one in seen if len(one.points)]
+    if not seen:
         return None
-    frame = np.concatenate([np.full(len(one.points), one.frame) for one in mine])
-    px, normal, sigma, place, of_light = (
-        np.concatenate([getattr(one.points, field) for one in mine])
-        for field in ("px", "normal", "sigma_px", "place", "shared_px")
-    )
-    sight = camera.rays(px)
-    across = np.cross(sight, camera.rays(px + _right_angle(normal)))
+    frame = np.concatenate([np.full(len(one.points), one.frame) for one in seen])
+    points = _join([one.points for one in seen])
+
+    sight = camera.rays(points.px)
+    along = points.normal @ [[0.0, 1.0], [-1.0, 0.0]]  # the normals turned by 90 degrees
+    across = np.cross(sight, camera.rays(points.px + along))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    per_px = np.einsum("ni,ni->n", across, camera.rays(px + normal) - sight)
-    modes = WIRE_MODES_PX * wire_modes(
-        problem.wire.length_mm, place, problem.motor_rad[frame], problem.motor_rad
-    )
-    of_camera = _by_camera(problem, name, place, problem.motor_rad[frame], normal)
-    shared = np.concatenate([modes, of_light, of_camera], axis=1) * per_px[:, None]
+    rad_per_px = np.einsum("ni,ni->n", across, camera.rays(points.px + points.normal) - sight)
+
+    motor_rad = problem.motor_rad[frame]
+    modes = wire_modes(problem.wire.length_mm, points.place, motor_rad, problem.motor_rad)
+    by_camera_px = _by_camera(problem, name, points, motor_rad)
+    shared_px = np.concatenate([WIRE_MODES_PX * modes, points.shared_px, by_camera_px], axis=1)
     return Sights(
-        problem.motor_rad, frame, camera.centre_mm, sight, across, sigma * np.abs(per_px), shared
+        motor_rad=problem.motor_rad,
+        frame=frame,
+        eye_mm=camera.centre_mm,
+        sight=sight,
+        across=across,
+        sigma_rad=points.sigma_px * np.abs(rad_per_px),
+        shared_rad=shared_px * rad_per_px[:, None],
     )
 
 
-def _right_angle(normal: np.ndarray) -> np.ndarray:
-    return np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+def _join(points: Sequence[LinePoints]) -> LinePoints:
+    """Return the line points of several frames as one."""
+    joined = {}
+    for name in LinePoints.__dataclass_fields__:
+        joined[name] = np.concatenate([getattr(one, name) for one in points])
+    return LinePoints(**joined)
 
 
-def _by_camera(problem: Problem, name: str, place_mm, motor_rad, normal) -> np.ndarray:
-    """Pixels (n, 15) that points of an unbent wire move along their normals with one sigma of lens and pose each."""
+def _by_camera(problem: Problem, name: str, points: LinePoints, motor_rad) -> np.ndarray:
+    """Return how far (n, 15), px, points of an unbent wire move along their normals with one sigma
+    of each principal component of lens and pose.
+    """
     camera: Camera = problem.cameras[name]
     rows = problem.cameras.parameters_of(name)
-    values, vectors = np.linalg.eigh(problem.cameras.covariance[rows, rows])
-    straight = place_mm[:, None] * rotation_z(motor_rad)[:, :, 0]
-    _, _, by_parameter = camera.project_with_jacobians(straight)
-    return np.einsum("ni,nip->np", normal, by_parameter) @ (
-        vectors * np.sqrt(np.maximum(values, 0.0))
-    )
+    variances, vectors = np.linalg.eigh(problem.cameras.covariance[rows, rows])
+    components = vectors * np.sqrt(np.maximum(variances, 0.0))
+    straight_mm = points.place[:, None] * rotation_z(motor_rad)[:, :, 0]
+    _, _, by_parameter = camera.project_with_jacobians(straight_mm)
+    return np.einsum("ni,nip->np", points.normal, by_parameter) @ components

@@ -72,11 +72,11 @@ def _rounded(fitted: FittedWhisk) -> SeenObject:
 
 def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
     """Of a bar that moves, as told and seen, mm/s (3,)."""
-    if whisk.told is None:
+    if whisk.stated_velocity is None:
         return None
     own = fitted.problem.blocks.motion.slice
     sigma = np.sqrt(np.diag(fitted.covariance)[own])
-    return Value(whisk.told.velocity_mm_s + fitted.state.vector[own], sigma)
+    return Value(whisk.stated_velocity.velocity_mm_s + fitted.state.vector[own], sigma)
 
 
 def _gave(fitted: FittedWhisk) -> GaveWay:

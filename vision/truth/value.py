@@ -9,10 +9,20 @@ NAN = float("nan")
 
 @dataclass(frozen=True, eq=False)
 class Value:
-    """A measured quantity and its one sigma, in one unit and of one shape; NaN where there is none."""
+    """A measured quantity and its standard deviation, in one unit and of one shape; NaN where there
+    is none.
+    """
 
     value: float | np.ndarray = NAN
     sigma: float | np.ndarray = NAN
+
+
+def propagated_sigma(rows: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Return the standard deviations (...) of quantities with derivatives (..., p) by parameters of
+    this covariance (p, p).
+    """
+    variances = np.sum((rows @ covariance) * rows, axis=-1)
+    return np.sqrt(np.maximum(variances, 0.0))
 
 
 UNKNOWN = Value()
@@ -21,8 +31,9 @@ UNKNOWN_POINT = Value(np.full(3, NAN), np.full(3, NAN))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WhileTouching:
-    """Slip along the bar and along the whisker, deflection, its direction, and the force's angle from the contact's
-    normal: floats at one pushing angle, or (n,) over frames."""
+    """Slip along the bar and along the whisker, deflection, its direction, and the force's angle
+    from the contact's normal: floats at one pushing angle, or (n,) over frames.
+    """
 
     slip_mm: Value = UNKNOWN
     longitudinal_slip_mm: Value = UNKNOWN

@@ -1,8 +1,9 @@
-"""A whisk being seen: its pictures and what is known beforehand, and the fit to them."""
+"""One whisk in a trial's pictures, with what is known beforehand, and the fit to them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -11,16 +12,17 @@ from vision.fit.covariance import Uncertainty, uncertainty
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State, shifts_mm
+from vision.fit.problem import Problem, State, curves_of, shifts_mm
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
+from vision.geometry.centreline import Curves
 from vision.geometry.reasons import Reason
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.search import SeenBar
-from vision.truth.value import Value
+from vision.truth.value import Value, propagated_sigma
 from vision.wire.one_sided import WireAppearance
 
 # [rad] A bar begins to give way at touch: a tenth of a micrometre there, less than the contact's
@@ -28,9 +30,8 @@ from vision.wire.one_sided import WireAppearance
 _EXACT_RAD = 1e-6
 # [rad] Of a whisk that ends at touch, so that nothing is divided by 0. Derived.
 _LEAST_SPAN_RAD = 1e-4
-# [1] Of the frames that the best camera has: a camera with fewer costs more than it tells. Set by
-# eye. Study: thresholds.py truth.whisk_pictures _FEWEST_SHARE ….
-# of the frames that the best camera has: a camera with fewer costs more than it tells
+# [1] Of the frames that the best camera has: a camera with fewer costs more frames than it adds
+# precision. Set by eye. Study: thresholds.py truth.whisk_pictures _FEWEST_SHARE ….
 _FEWEST_SHARE = 0.7
 
 
@@ -38,9 +39,9 @@ _FEWEST_SHARE = 0.7
 class WhiskPictures:
     """One whisk in the pictures of a trial.
 
-    indices: the frames of the stroke; time_s, motor_rad (n,) at every frame of the trial; light: filled with how each
-    camera sees the wire; left_out: a line on each camera that is not asked; told: of a bar that moves; gives: of
-    one that gives way.
+    indices: the frames of the stroke. time_s, motor_rad (n,): at every frame of the trial. light:
+    filled with how each camera sees the wire. left_out: a line on each camera that is not used.
+    stated_velocity: of a bar that moves. gives: of one that gives way.
     """
 
     number: int
@@ -54,111 +55,112 @@ class WhiskPictures:
     settings: VisionSettings
     light: dict[str, WireAppearance] = field(default_factory=dict)
     left_out: tuple[Reason, ...] = ()
-    told: StatedVelocity | None = None
+    stated_velocity: StatedVelocity | None = None
     gives: Gives | None = None
 
     @property
     def motion(self) -> Motion | Yielding | None:
-        """How a bar that moves goes through the frames."""
+        """Return the motion of the bar through the frames; None where it stands."""
         if self.gives is not None:
             return Yielding(self.gives, self.angles_rad, self.bar.axis.direction)
-        return None if self.told is None else Motion.steady(self.told, self.time_s[self.frames])
+        if self.stated_velocity is None:
+            return None
+        return Motion.steady(self.stated_velocity, self.time_s[self.frames])
 
     @property
     def onset(self) -> Onset | None:
-        """When a bar begins to give way: then the unbent whisker touches it."""
+        """Return when a bar begins to give way, which is when the unbent whisker touches it."""
         return None if self.gives is None else Onset(self.gives.touch_rad, _EXACT_RAD)
 
     def yielding(self, came_mm: np.ndarray, touch_rad: float) -> "WhiskPictures":
-        """The whisk once it is known where a bar that gives way is in its frames (f, 3), and when it is touched."""
+        """Return the whisk with the displacements (f, 3) of a bar that gives way, and the angle of
+        its touch.
+        """
         if self.gives is None:
             return self
         span_rad = max(float(self.angles_rad.max()) - touch_rad, _LEAST_SPAN_RAD)
-        return replace(
-            self, gives=Gives(touch_rad, span_rad, float(np.linalg.norm(came_mm, axis=1).max()))
-        )
+        farthest_mm = float(np.linalg.norm(came_mm, axis=1).max())
+        return replace(self, gives=Gives(touch_rad, span_rad, farthest_mm))
 
     def yielding_as(self, problem: Problem, state: State) -> "WhiskPictures":
-        """`yielding` by a fit."""
+        """Return the whisk with the displacements and the touch of a fit, see `yielding`."""
         if self.gives is None:
             return self
-        touch = float(first_touch(problem, state.vector).motor_rad)
-        return self.yielding(shifts_mm(problem, state.vector), touch)
+        touch_rad = float(first_touch(problem, state.vector).motor_rad)
+        return self.yielding(shifts_mm(problem, state.vector), touch_rad)
 
     @property
     def bar_swept_mm(self) -> float:
-        """Radius about its axis within which the bar stays through the whisk."""
+        """Return the radius about its axis within which the bar stays through the whisk."""
+        farthest_mm = 0.0
         if self.gives is not None:
-            return self.rods.bar.radius_mm + self.gives.most_mm
-        moved = (
-            0.0
-            if self.told is None
-            else float(np.linalg.norm(self.motion.expected_mm, axis=1).max(initial=0.0))
-        )
-        return self.rods.bar.radius_mm + moved
+            farthest_mm = self.gives.most_mm
+        elif self.stated_velocity is not None:
+            distances_mm = np.linalg.norm(self.motion.expected_mm, axis=1)
+            farthest_mm = float(distances_mm.max(initial=0.0))
+        return self.rods.bar.radius_mm + farthest_mm
 
     @cached_property
     def frames(self) -> list[int]:
-        """The frames that every camera has."""
+        """Return the frames that every camera has."""
         return [f for f in self.indices if all(f in view.frames for view in self.views)]
 
     @cached_property
     def motor(self) -> dict[int, float]:
-        """Motor angle by frame, of the frames that every camera has."""
+        """Return the motor angle, rad, by frame, of the frames that every camera has."""
         return {f: float(self.motor_rad[f]) for f in self.frames}
 
     @property
     def angles_rad(self) -> np.ndarray:
-        """Motor angles (f,) of those frames."""
+        """Return the motor angles (f,) of the frames that every camera has."""
         return self.motor_rad[self.frames]
 
     def during(self, frames: Sequence[int]) -> "WhiskPictures":
-        """The whisk in some of its frames."""
+        """Return the whisk in some of its frames."""
         return replace(self, indices=frames)
 
     @property
     def is_thinned(self) -> bool:
-        """Whether not all frames of the stroke are looked at."""
+        """Return whether only some frames of the stroke are used."""
         return isinstance(self.indices, range) and abs(self.indices.step) > 1
 
     def with_all_frames(self) -> "WhiskPictures":
-        """The whisk in every frame of a stroke that was thinned."""
+        """Return the whisk in every frame of a stroke that was thinned."""
         thinned = self.indices
         return self.during(range(thinned.start, thinned.stop, int(np.sign(thinned.step))))
 
     def without_gaps(self) -> "WhiskPictures":
-        """The whisk by the cameras that have most of its frames: one camera's gaps are not all cameras'."""
-        counts = {
-            view.camera.name: sum(f in view.frames for f in self.indices) for view in self.views
-        }
-        few = [
-            name for name, count in counts.items() if count <= _FEWEST_SHARE * max(counts.values())
-        ]
-        lines = (
-            Reason(
-                "camera_with_few_frames",
-                f"camera {name} was left out: {counts[name]} frames of {len(self.indices)}",
-            )
-            for name in few
-        )
-        return replace(
-            self._by([name for name in counts if name not in few]),
-            left_out=(*lines, *self.left_out),
-        )
+        """Return the whisk by the cameras that have most of its frames: one camera's gaps are not
+        all cameras'.
+        """
+        counts = {}
+        for view in self.views:
+            counts[view.camera.name] = sum(f in view.frames for f in self.indices)
+        fewest = _FEWEST_SHARE * max(counts.values())
+        lines = []
+        for name, count in counts.items():
+            if count <= fewest:
+                sentence = f"camera {name} was left out: {count} frames of {len(self.indices)}"
+                lines.append(Reason("camera_with_few_frames", sentence))
+        kept = self._by([name for name, count in counts.items() if count > fewest])
+        return replace(kept, left_out=(*lines, *self.left_out))
 
     def without(self, camera: str, line: Reason) -> "WhiskPictures":
-        """The whisk by the other cameras, and a line on why."""
+        """Return the whisk by the other cameras, and a line on why."""
         others = [view.camera.name for view in self.views if view.camera.name != camera]
         return replace(self._by(others), left_out=(*self.left_out, line))
 
     def _by(self, names: list[str]) -> "WhiskPictures":
+        """Return the whisk by the cameras of these names."""
         views = tuple(view for view in self.views if view.camera.name in names)
         return replace(self, views=views, cameras=self.cameras.subset(names))
 
 
 @dataclass(frozen=True, eq=False)
 class FittedWhisk:
-    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user asks for."""
+    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user
+    asks for.
+    """
 
     problem: Problem
     state: State
@@ -168,40 +170,44 @@ class FittedWhisk:
     by_parameter: Jacobians
 
     @classmethod
-    def of(
-        cls, problem: Problem, state: State, answer: np.ndarray, frames: list[int]
-    ) -> "FittedWhisk":
-        """answer (size, size): how the parameters answer the observations (see `Uncertainty`)."""
+    def of(cls, problem: Problem, state: State, gain: np.ndarray, frames: list[int]) -> Self:
+        """Return a fit with its uncertainty; gain (size, size): sensitivity of the parameters to
+        the observations (see `Uncertainty`).
+        """
         measured, by_parameter = jacobians(problem, state)
-        return cls(
-            problem, state, frames, uncertainty(problem, state, answer), measured, by_parameter
-        )
+        errors = uncertainty(problem, state, gain)
+        return cls(problem, state, frames, errors, measured, by_parameter)
 
     @cached_property
     def exposure(self) -> Exposure:
-        """Slip while the shutter was open."""
+        """Return the slip while the shutter was open."""
         return slip_in_exposure(self.problem, self.state, self.by_parameter.frame["slip"])
 
     @cached_property
     def one_less(self) -> list[OneLess]:
-        """The fit without each of its cameras."""
+        """Return the fits without each of its cameras."""
         return leave_out_each(self.problem, self.state, self.uncertainty, self.by_parameter)
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(size, size), of the parameters, slip within the exposure and cameras that contradict each other included."""
-        apart = covariance_of(self.one_less, self.problem.size)
-        return self.uncertainty.covariance + self.exposure.covariance + apart
+        """Return the covariance (size, size) of the parameters, slip within the exposure and
+        contradictions between the cameras included.
+        """
+        contradictions = covariance_of(self.one_less, self.problem.size)
+        return self.uncertainty.covariance + self.exposure.covariance + contradictions
+
+    def some_curves(self, count: int) -> dict[int, Curves]:
+        """Return the centrelines of so many frames spread over the whisk, by frame."""
+        chosen = np.unique(np.linspace(0, len(self.frames) - 1, count).astype(int))
+        curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
+        return {self.frames[k]: curves.one(k) for k in chosen.tolist()}
 
     def of_whisk(self, name: str) -> Value:
-        """A quantity of the whole whisk by its name."""
-        gradient = self.by_parameter.whisk[name]
-        return Value(
-            float(self.measured.whisk[name]), float(np.sqrt(gradient @ self.covariance @ gradient))
-        )
+        """Return a quantity of the whole whisk by its name."""
+        sigma = propagated_sigma(self.by_parameter.whisk[name], self.covariance)
+        return Value(float(self.measured.whisk[name]), float(sigma))
 
     def of_frames(self, name: str) -> Value:
-        """A quantity of each frame (f,) by its name."""
-        rows = self.by_parameter.frame[name]
-        variances = np.einsum("fi,ij,fj->f", rows, self.covariance, rows)
-        return Value(self.measured.frame[name], np.sqrt(np.maximum(variances, 0.0)))
+        """Return a quantity of each frame (f,) by its name."""
+        sigma = propagated_sigma(self.by_parameter.frame[name], self.covariance)
+        return Value(self.measured.frame[name], sigma)

@@ -7,7 +7,13 @@ import pytest
 
 from tests.scenes.base_lines import STEP, some_lines
 from vision.calibration.known_lengths import check_known_lengths
-from vision.calibration.place import Placement, by_board, check_swing_suffices, combine, placed
+from vision.calibration.place import (
+    Placement,
+    by_board,
+    check_swing_suffices,
+    combine,
+    move_rig_frame,
+)
 from vision.calibration.swing import by_swing
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
@@ -99,7 +105,7 @@ def test_cameras_follow_the_frame_and_trade_the_shared_error():
     shared = np.zeros((15, 15))
     R = np.kron(np.eye(2), T[:, :3])
     shared[9:, 9:] = R @ before.covariance @ R.T
-    moved = placed(Cameras((camera,), shared), before, after)
+    moved = move_rig_frame(Cameras((camera,), shared), before, after)
     rig = np.array([[20.0, 3.0, -5.0]])
     old = rig @ exp_rotation(STEP[:3]).T + STEP[3:]
     np.testing.assert_allclose(moved["a"].project(rig), camera.project(old), atol=1e-9)

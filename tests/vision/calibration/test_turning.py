@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS
-from vision.calibration.hub_turning import MovingLines, first_rig, moving_lines
+from vision.calibration.hub_turning import first_rig
+from vision.calibration.moving_line import MovingLines, moving_lines
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vision.truth.at_angle import Smooth, _scatter, at_angle, scatter
+from vision.truth.at_angle import Smooth, _between_frames_sigma, at_angle, scatter
 from vision.truth.value import FIELDS
 
 THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
@@ -25,7 +25,7 @@ def test_scatter_expected_is_that_of_draws(shared):
     seen = [
         scatter(frames(covariance, 0.3 * THETA_RAD**2 + one, "phi"), "phi", wanted) for one in draws
     ]
-    assert np.sqrt(np.mean([one.left**2 for one in seen])) == pytest.approx(
+    assert np.sqrt(np.mean([one.rms**2 for one in seen])) == pytest.approx(
         seen[0].expected, rel=0.03
     )
     assert seen[0].expected == pytest.approx(0.01 * np.sqrt(1.0 - shared))
@@ -44,10 +44,12 @@ def test_small_jumps_that_few_frames_show_are_known_by_students_t(name):
     for sigma, widened in ((1e-6, 2.306 / 1.960), (0.01, 1.0)):
         own = sigma * (THETA_RAD / wanted if name == "slip" else np.ones(len(THETA_RAD)))
         smooth = frames(np.diag(own**2), zigzag, name)
-        left = scatter(smooth, name, wanted).left
+        left = scatter(smooth, name, wanted).rms
         assert left == pytest.approx(0.01, rel=0.2)
         with_fit = np.sqrt(4 / 3) if widened > 1.0 else 1.0
-        assert _scatter(smooth, name, wanted) == pytest.approx(widened * with_fit * left, rel=0.02)
+        assert _between_frames_sigma(smooth, name, wanted) == pytest.approx(
+            widened * with_fit * left, rel=0.02
+        )
 
 
 @pytest.mark.parametrize("first", range(8))
@@ -65,7 +67,7 @@ def test_frames_in_step_with_teeth_are_told_by_those_further_away(first):
         {"phi": np.eye(len(theta))},
         1e-6 * np.eye(len(theta)),
     )
-    assert _scatter(smooth, "phi", np.radians(3.0)) > 0.01
+    assert _between_frames_sigma(smooth, "phi", np.radians(3.0)) > 0.01
 
 
 TOOTH_RAD, JUMP_MM, SIGMA_MM, TOUCH_RAD = np.radians(0.8), 0.3, 0.004, np.radians(0.02)

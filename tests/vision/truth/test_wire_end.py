@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vision.geometry.centreline import Curves
-from vision.truth.wire_end import _end, _straight_on
+from vision.truth.wire_end import _end, _extend
 
 PLACE_MM = np.arange(7.0, 160.0, 2.0)
 
@@ -43,6 +43,6 @@ def test_a_curve_goes_straight_on():
     flat = Curves(
         arc, np.stack([arc, 0.0 * arc, 0.0 * arc], axis=-1), np.tile([1.0, 0.0, 0.0], (51, 1))
     )
-    longer = _straight_on(flat, 150.0)
+    longer = _extend(flat, 150.0)
     points, _ = longer.at(np.array([50.0, 120.0, 149.0]))
     assert points == pytest.approx(np.array([[50.0, 0, 0], [120.0, 0, 0], [149.0, 0, 0]]))
