@@ -18,7 +18,7 @@ def seen(thing: Bar, rotation: np.ndarray, translation_mm: np.ndarray) -> Seen:
     """A ring, sphere or cone of the rig frame in that of a camera."""
     turn = rotation.T
     kinds = {Ring: SeenRing, Sphere: SeenSphere, Cone: SeenCone}
-    return kinds[type(thing)](thing.seen_from(np.column_stack([turn, -turn @ translation_mm])))
+    return kinds[type(thing)](thing.in_frame(np.column_stack([turn, -turn @ translation_mm])))
 
 
 @dataclass(frozen=True, eq=False)

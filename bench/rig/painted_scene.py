@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig.bar import Bar, turned
+from bench.rig.bar import Bar
 from bench.rig.layer import Front, draw_layers
 from bench.rig.light import Light, Material
+from bench.rig.linear import rotate_about_z
 from bench.rig.pinhole import Camera
 from bench.rig.plate import Plate, Print
 from bench.rig.printed_board import Board, Ink, marker
-from bench.rig.round_objects import Ring
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
@@ -117,7 +117,7 @@ class Stand:
 
     def hub(self, motor_rad: float) -> Box:
         """The hub at a motor angle."""
-        axes = self.pose[:, :3] @ turned(np.eye(3), motor_rad).T
+        axes = self.pose[:, :3] @ rotate_about_z(np.eye(3), motor_rad).T
         return Box(self.low_mm, self.high_mm, axes, self.pose[:, 3], 0.05, self.has_marker)
 
     def posts(self, looks: Looks) -> Iterator[Tube]:
@@ -178,7 +178,7 @@ class Scene:
         behind it, None where it is not seen. What is below the board is hidden."""
         looks = self.looks
         self._stand_posts(window, radiance)
-        held = held_mm(thing)
+        held = thing.support_mm()
         rod = Tube.straight(held, held + _ROD_MM * _AWAY, _ROD_RADIUS_MM, looks.dark)
         layers = [
             rod.layer(window, looks.light),
@@ -244,14 +244,6 @@ class Scene:
         return np.concatenate(
             [camera.project(corners), *(px for one in whiskers for px in one.silhouette(camera))]
         )
-
-
-def held_mm(thing: Bar) -> np.ndarray:
-    """Where a rod holds it, (3,): a ring at its farthest from the base along the rig's y, others in their middle."""
-    if not isinstance(thing, Ring):
-        return thing.point_mm
-    way = _AWAY - thing.axis[1] * thing.axis
-    return thing.point_mm + thing.ring_radius_mm * way / np.linalg.norm(way)
 
 
 def _block(bar: Bar, middle_mm: np.ndarray) -> Box:

@@ -62,7 +62,7 @@ class Studio:
     def setting(self, bar: Bar, middle_mm: np.ndarray) -> "Setting":
         """The still scene of a trial: the rig with a bar whose middle is near a point, or a ring, sphere or cone."""
         radiance, front = self.backdrop.copy(), None
-        if type(bar) is Bar:
+        if bar.is_straight:
             self.scene.stand_bar(self.window, radiance, bar, middle_mm)
         else:
             front = self.scene.stand_rounded(self.window, radiance, bar)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
 from bench.base.tables import Column, Table
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction, March
@@ -103,7 +103,7 @@ def exact_percent(design: Design, region: Region, means: Means, point: Sequence[
     d_x; NaN where the whisker finds no hold or (10) has no distance."""
     (beta, alpha, d_x), theta = map(float, point), design.theta_rad
     rod, beam = rod_and_beam(design, means)
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x,
         beta_rad=beta - math.radians(design.tilt_deg),
         psi_rad=0.0,
@@ -112,7 +112,7 @@ def exact_percent(design: Design, region: Region, means: Means, point: Sequence[
         whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
     try:
-        touch = first_touch(rod, bar, 0.0, d_x)
+        touch = find_first_touch(rod, bar, 0.0, d_x)
         march = March(rod, bar, Friction(math.tan(alpha), math.tan(alpha)), touch)
         *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
     except ArithmeticError:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.workers import Workers
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction, March
@@ -65,7 +65,7 @@ def error_percent(push: Push) -> float:
 def errors_percent(push: Push) -> tuple[float, float]:
     """The error of (10), and that of (10) corrected, which is told the bar's radius; as `error_percent`."""
     theta, alpha = np.radians([push.theta_deg, push.alpha_deg])
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=push.d_x_mm,
         beta_rad=np.radians(push.beta_deg),
         psi_rad=np.radians(push.psi_deg),
@@ -74,7 +74,7 @@ def errors_percent(push: Push) -> tuple[float, float]:
         whisker_radius_mm=ROD.diameter_mm / 2,
     )
     try:
-        touch = first_touch(ROD, bar, 0.0, push.d_x_mm)
+        touch = find_first_touch(ROD, bar, 0.0, push.d_x_mm)
         march = March(ROD, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
         *_, state = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)[1]
     except ArithmeticError:

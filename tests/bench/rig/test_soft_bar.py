@@ -25,7 +25,7 @@ def test_the_bar_is_painted_where_the_contact_is(beta_deg):
         if state is None:
             assert not gave.any()
             continue
-        there = made.bar.given(gave)
+        there = made.bar.shift(gave)
         assert np.linalg.norm(state.point_mm - there.foot_mm(state.point_mm)) == pytest.approx(
             3.5, abs=2e-4
         )

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.parts import Job, frames_of
+from bench.rig.parts import Job, render_frames
 from bench.rig.protocol import TrialTable, load
 from bench.rig.recording import Recording
 
@@ -86,7 +86,7 @@ def main() -> None:
         ]
         for name, seen in (
             ("recorded", pictures),
-            ("twin", list(frames_of(job, number, CAMERA, recording))),
+            ("twin", list(render_frames(job, number, CAMERA, recording))),
         ):
             place, amount = np.moveaxis(places(recording, job.studios[CAMERA].camera, seen), -1, 0)
             print(folder.name, name)
