@@ -15,7 +15,8 @@ from bench.base.errors import BadInput
 from bench.rig import build
 from bench.rig.bar import Touch, find_first_touch, unloaded_curve
 from bench.rig.elastic_rod import Rest, Rod
-from bench.rig.protocol import ColumnTable, Protocol, Run
+from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol_tables import ColumnTable
 from bench.rig.recording import (
     Frames,
     Recording,

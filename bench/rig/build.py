@@ -11,7 +11,8 @@ from bench.rig.linear import rotation_about_z
 from bench.rig.painted_scene import Looks, Scene, Stand
 from bench.rig.pinhole import Camera
 from bench.rig.printed_board import Board, Ink
-from bench.rig.protocol import ColumnTable, Protocol
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import ColumnTable
 from bench.rig.sensor import Sensor
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.rig.protocol import GaugesTable, LoadCellTable
+from bench.rig.protocol_tables import GaugesTable, LoadCellTable
 from bench.rig.strain_gauges import OVERSAMPLED, low_pass
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from bench.rig import boards, build, papers
+from bench.rig import boards, build, papers, truth_files
 from bench.rig.album import write_frames, write_picture
 from bench.rig.array_rig import ArrayRecording, MountedWhisker, mount_whiskers
 from bench.rig.moments import array_exposure_moments, exposure_moments
@@ -52,7 +52,7 @@ class Job:
         stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
         return {
             "session.toml": papers.session_toml(self.protocol, stated, self.whiskers),
-            "truth.json": papers.truth_json(self.protocol, self.seed, self.whiskers),
+            "truth.json": truth_files.truth_json(self.protocol, self.seed, self.whiskers),
         }
 
     @cached_property
@@ -125,8 +125,8 @@ def _write_trial(job, number, folder):
         "trial.toml": papers.trial_toml(recording),
         "signals.csv": papers.signals_csv(recording),
         "frames.csv": papers.frames_csv(recording.frames.time_s, clock_offset_s),
-        "truth.csv": papers.truth_csv(recording),
-        "truth.toml": papers.truth_toml(recording),
+        "truth.csv": truth_files.truth_csv(recording),
+        "truth.toml": truth_files.truth_toml(recording),
     }
     _write_files(job, folder, texts, lambda i: render_frames(job, number, i, recording))
 
@@ -146,8 +146,8 @@ def _write_array_trial(job, number, folder):
     }
     for name, own in recording.recordings.items():
         if own is not None:
-            texts[f"truth@{name}.csv"] = papers.truth_csv(own)
-            texts[f"truth@{name}.toml"] = papers.truth_toml(own)
+            texts[f"truth@{name}.csv"] = truth_files.truth_csv(own)
+            texts[f"truth@{name}.toml"] = truth_files.truth_toml(own)
     _write_files(job, folder, texts, lambda i: render_array_frames(job, number, i, recording))
 
 

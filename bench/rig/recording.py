@@ -13,7 +13,8 @@ from bench.rig.force_sensor import sample_forces_N
 from bench.rig.linear import rotate_about_z
 from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
-from bench.rig.protocol import GaugesTable, Protocol, Run
+from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol_tables import GaugesTable
 from bench.rig.round_objects import OBJECTS
 from bench.rig.stick_slip import Friction
 from bench.rig.strain_gauges import fine_times_s, sample_times_s, sample_volts

@@ -20,14 +20,14 @@ import numpy as np
 from bench.rig.bar import Touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
-from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding, Surface
+from bench.rig.laws import Held, Oiled, Sliding, Surface
 from bench.rig.linear import across, cross, cross_matrix, rotation_about_z, solve
+from bench.rig.loaded_point import LoadedPoint
 from bench.rig.touched_object import TouchedObject
 
 # [1] Steps of Newton's method before it is given up. Stated.
 _MOST_STEPS = 40
 _PARTS = 0.5 ** np.arange(8)  # of a Newton step, tried in turn until one helps
-_SIDEWAYS = np.array([1.0, 0.0])  # (2,): y and z of the way across where no force defines one
 _BACKWARDS_MM = -1e-9  # mm: less is rounding
 _LAST = 1e-6  # of a Newton step, in parts
 
@@ -61,12 +61,7 @@ class ContactState:
 
 
 class Contact:
-    """The contact problem of one whisker and one object at a given motor angle.
-
-    `guess` (4,) is a force in the hub frame and an arc. `old` is the state before. Everything
-    raises ArithmeticError where no contact is found, or one that pulls, or friction along the
-    motion.
-    """
+    """The contact problem of one whisker and one object."""
 
     def __init__(self, rod: Rod, bar: TouchedObject):
         self.rod = rod
@@ -86,56 +81,26 @@ class Contact:
             "tip" if touch.arc_mm >= self.rod.length_mm else "held",
         )
 
-    def hold(
-        self,
-        motor_rad: float,
-        old: ContactState,
-        guess: np.ndarray,
-        friction: float,
-        tip: bool = False,
-    ) -> ContactState:
-        """Find the equilibrium at which the material has not moved along the object since `old`,
-        friction being what the cone leaves."""
-        return self._solve(motor_rad, old, guess, Held(friction), tip)
-
-    def slide(
-        self,
-        motor_rad: float,
-        old: ContactState,
-        guess: np.ndarray,
-        heading_rad: float,
-        friction: float,
-        tip: bool = False,
-    ) -> ContactState:
-        """Find the equilibrium on the edge of the cone, the force against the motion since
-        `old`."""
-        return self._solve(motor_rad, old, np.append(guess, heading_rad), Sliding(friction), tip)
-
-    def ease(
-        self,
-        motor_rad: float,
-        old: ContactState,
-        guess: np.ndarray,
-        friction: float,
-        tip: bool = False,
-    ) -> ContactState:
-        """Find a sliding equilibrium where no heading is at hand (the motor has just turned back).
-
-        Friction is first as soft as oil, then ever stiffer, until it gives way by at most 10 nm.
-        """
-        for give_mm in np.geomspace(1.0, GIVE_MM, 16):
-            state = self._solve(motor_rad, old, guess, Oiled(friction, give_mm), tip)
-            guess = state.unknowns
-        return state
-
     def is_past_foot(self, state: ContactState) -> bool:
         """Return whether the object's nearest point lies behind the contact along the whisker."""
         foot = self.bar.at(state.motor_rad).foot_mm(state.point_mm)
         return bool((state.point_mm - foot) @ state.tangent > 0)
 
-    def _solve(self, motor_rad, old, unknowns, law, tip):
-        """Solve by Newton's method with Deuflhard's monotonicity test: a step is halved until the
-        next one would be smaller."""
+    def solve(
+        self,
+        motor_rad: float,
+        old: ContactState,
+        unknowns: np.ndarray,
+        law: Sliding | Oiled | Held,
+        tip: bool,
+    ) -> ContactState:
+        """Find the equilibrium under a law of friction, the material having moved since `old`.
+
+        unknowns: a guess of the force (3,) in the hub frame, the arc, and the law's own. tip:
+        whether the tip touches. Newton's method with Deuflhard's monotonicity test: a step is
+        halved until the next one would be smaller. Raises ArithmeticError where no contact is
+        found, or one that pulls, or friction along the motion.
+        """
         bar = self.bar.at(motor_rad)
         bar_moved_mm = self.bar.moved_mm(motor_rad) - self.bar.moved_mm(old.motor_rad)
         problem = _Problem(self, bar, bar_moved_mm, rotation_about_z(motor_rad), old, law, tip)
@@ -149,65 +114,10 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class _LoadedPoint:
-    """Position and tangent, each (3,), of the loaded point in the rig frame, and their derivatives
-    (3, 4) by the force and the arc. angle (n,): of the elastica."""
-
-    point: np.ndarray
-    point_by: np.ndarray
-    tangent: np.ndarray
-    tangent_by: np.ndarray
-    angle: np.ndarray
-
-    @classmethod
-    def solve(cls, contact: Contact, rotation, unknowns, guess) -> "_LoadedPoint":
-        """Bend the whisker by a force at an arc, unknowns (4,), and turn it to the motor angle."""
-        force_x, force_y, force_z, arc = unknowns[:4].tolist()
-        force_e = math.hypot(force_y, force_z)
-        e = np.array([force_y, force_z]) / force_e if force_e else _SIDEWAYS
-        bent = contact.elastica.solve(force_x, force_e, arc, guess)
-        point, point_by = _lift(bent.end_mm, bent.end_by, e, force_e)
-        planar = np.array([math.cos(bent.slope), math.sin(bent.slope)])
-        planar_by = np.outer([-planar[1], planar[0]], bent.slope_by)
-        tangent, tangent_by = _lift(planar, planar_by, e, force_e)
-        rest = contact.rod.rest
-        rest_slope = rest.slope(arc)
-        point_by[:, 3] += rest_slope
-        tangent_by[:, 3] += rest.curvature(arc)
-        return cls(
-            rotation @ (point + rest.offset_mm(arc)),
-            rotation @ point_by,
-            rotation @ (tangent + rest_slope),
-            rotation @ tangent_by,
-            bent.angle,
-        )
-
-
-def _lift(planar, planar_by, e, force_e):
-    """Return a vector (3,) of the plane of bending in three dimensions, and its derivatives (3, 4)
-    by F_x, F_y, F_z and arc.
-
-    planar (2,), planar_by (2, 3): along x and e, by force x, force e and arc. e (2,): y and z of
-    the unit vector across.
-    """
-    axes = np.zeros((3, 2))  # of the plane, as columns
-    axes[0, 0] = 1.0
-    axes[1:, 1] = e
-    chain = np.zeros((3, 4))  # derivatives of force x, force e and arc
-    chain[0, 0] = 1.0
-    chain[1, 1:3] = e
-    chain[2, 3] = 1.0
-    vector_by = axes @ planar_by @ chain
-    per_sideways_force = planar[1] / force_e if force_e else planar_by[1, 1]
-    vector_by[1:, 1:3] += per_sideways_force * (np.eye(2) - np.outer(e, e))
-    return axes @ planar, vector_by
-
-
-@dataclass(frozen=True)
 class _Equations:
     """The equations at one set of unknowns: residual (n,), jacobian (n, n)."""
 
-    loaded: _LoadedPoint
+    loaded: LoadedPoint
     residual: np.ndarray
     jacobian: np.ndarray
     surface: Surface
@@ -259,7 +169,7 @@ class _Problem:
         """Return the equations at unknowns (n,), the elastica starting from `angle`."""
         rod = self.contact.rod
         arc = unknowns[3]
-        loaded = _LoadedPoint.solve(self.contact, self.rotation, unknowns, angle)
+        loaded = LoadedPoint.solve(self.contact.elastica, self.rotation, unknowns, angle)
         local = self.bar.local_bar(loaded.point)
         offset_by = local.offset_by @ loaded.point_by
         distance = math.sqrt(local.offset_mm @ local.offset_mm)

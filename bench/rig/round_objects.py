@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.rig.bar import Bar
 from bench.rig.linear import across, cross, cross_matrix
-from bench.rig.protocol import TrialTable
+from bench.rig.protocol_tables import TrialTable
 from bench.rig.touched_object import LocalBar, TouchedObject
 
 _UP = np.array([0.0, 0.0, 1.0])  # (3,): axes have a positive z

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.rig.bar import Touch
 from bench.rig.elastic_rod import Rod
+from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import Contact, ContactState
 from bench.rig.touched_object import TouchedObject
@@ -169,7 +170,7 @@ class March:
             at = high - excess_high * (high - low) / (excess_high - excess_low)
             guess = _extrapolate(state, held, at)
             try:
-                edge = self.contact.hold(at, state, guess, self._static, tip)
+                edge = self.contact.solve(at, state, guess, Held(self._static), tip)
             except ArithmeticError:
                 break
             excess = edge.shear_ratio - self._static
@@ -187,7 +188,8 @@ class March:
 
     def _hold(self, motor_rad, tip):
         """Find the state that is held at a motor angle."""
-        return self.contact.hold(motor_rad, self.state, self._guess(motor_rad), self._static, tip)
+        law = Held(self._static)
+        return self.contact.solve(motor_rad, self.state, self._guess(motor_rad), law, tip)
 
     def _slide_on(self, motor_rad, tip):
         """Slide in the direction of the step before; at first touch from where the contact would
@@ -213,12 +215,20 @@ class March:
         return self._slide(motor_rad, old, guess, math.atan2(across, along), tip)
 
     def _slide(self, motor_rad, old, guess, heading_rad, tip):
-        """Find the sliding state near a guess; ease into it where the heading is another."""
+        """Find the sliding state near a guess.
+
+        Where the heading is another (the motor has just turned back), friction is first as soft as
+        oil, then ever stiffer, until it gives way by at most 10 nm.
+        """
         kinetic = self.friction.kinetic
+        unknowns = np.append(guess, heading_rad)
         try:
-            return self.contact.slide(motor_rad, old, guess, heading_rad, kinetic, tip)
+            return self.contact.solve(motor_rad, old, unknowns, Sliding(kinetic), tip)
         except ArithmeticError:
-            return self.contact.ease(motor_rad, old, guess, kinetic, tip)
+            for give_mm in np.geomspace(1.0, GIVE_MM, 16):
+                state = self.contact.solve(motor_rad, old, guess, Oiled(kinetic, give_mm), tip)
+                guess = state.unknowns
+            return state
 
     def _guess(self, motor_rad):
         """Extrapolate the last two states; at first, guess the small-angle force of a whisker held

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import signal
 
-from bench.rig.protocol import GaugesTable
+from bench.rig.protocol_tables import GaugesTable
 
 OVERSAMPLED = 4  # times the sampling rate, ahead of the filter against aliases
 

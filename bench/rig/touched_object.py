@@ -14,7 +14,7 @@ from bench.rig.linear import rotate_about_z
 
 if TYPE_CHECKING:
     from bench.rig.bar import Bar
-    from bench.rig.protocol import TrialTable
+    from bench.rig.protocol_tables import TrialTable
 
 
 class LocalBar(NamedTuple):

@@ -9,7 +9,8 @@ from bench.base.errors import BadInput
 from bench.rig import build
 from bench.rig.array_rig import ArrayRecording, find_touch_from_afar, mount_whiskers
 from bench.rig.bar import Bar, find_first_touch
-from bench.rig.protocol import ColumnTable, Protocol, TrialTable
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import ColumnTable, TrialTable
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file

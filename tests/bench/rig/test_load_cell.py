@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from bench.rig.force_sensor import sample_forces_N
-from bench.rig.protocol import GaugesTable, LoadCellTable, Protocol, TrialTable, load
+from bench.rig.protocol import Protocol, load
+from bench.rig.protocol_tables import GaugesTable, LoadCellTable, TrialTable
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file

@@ -9,7 +9,7 @@ from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
-from bench.rig.protocol import GaugesTable
+from bench.rig.protocol_tables import GaugesTable
 from bench.rig.stick_slip import Friction
 from bench.rig.strain_gauges import fine_times_s, sample_volts
 from bench.rig.stroke import Stroke

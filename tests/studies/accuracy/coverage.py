@@ -27,7 +27,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.rig.parts import Job, render_frames
-from bench.rig.protocol import WhiskerTable
+from bench.rig.protocol_tables import WhiskerTable
 from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
 from tests.studies.accuracy.scenes import (
     Scene,

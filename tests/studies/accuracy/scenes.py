@@ -17,12 +17,12 @@ import msgspec
 import numpy as np
 
 from bench.rig import build
-from bench.rig.protocol import (
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import (
     BoardTable,
     CameraTable,
     LightTable,
     PicturesTable,
-    Protocol,
     TrialTable,
     WhiskerTable,
 )

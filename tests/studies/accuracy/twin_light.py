@@ -19,7 +19,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.rig.parts import Job, render_frames
-from bench.rig.protocol import TrialTable, load
+from bench.rig.protocol import load
+from bench.rig.protocol_tables import TrialTable
 from bench.rig.recording import Recording
 
 TWIN, CAMERA, NAME = Path(__file__).with_name("twin.toml"), 1, "low"
