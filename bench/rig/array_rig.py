@@ -116,21 +116,19 @@ class ArrayRecording:
         recordings = {}
         channels = {}
         for whisker, rng in zip(whiskers, rngs[1:]):
+            name = whisker.name
             stroke = strokes[whisker.column.name]
-            touch = touches[whisker.name]
+            touch = touches[name]
+            recordings[name] = None
             if touch is None or touch.motor_rad >= stroke.angles_rad.max():
-                recording = None
                 signals = sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
             else:
                 frames = _take_frames(stroke, frame_times_s)
-                bar_there = bars[whisker.name]
-                recording = _record(protocol, run, whisker, bar_there, touch, stroke, frames, rng)
-                signals = recording.signals
-            recordings[whisker.name] = recording
-            channels.setdefault("time_s", signals[:, 0])
-            channels.setdefault(motor_channel(whisker, len(strokes) > 1), signals[:, 1])
-            for name, column in zip(_CHANNELS, signals[:, 2:].T):
-                channels[f"{name}@{whisker.name}"] = column
+                recordings[name] = _record(
+                    protocol, run, whisker, bars[name], touch, stroke, frames, rng
+                )
+                signals = recordings[name].signals
+            _add_channels(channels, whisker, signals, len(strokes) > 1)
         return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
@@ -211,6 +209,15 @@ def _take_frames(stroke, frame_times_s) -> Frames:
     times = np.concatenate(frame_times_s)
     whisk = np.repeat(np.arange(len(frame_times_s)), [len(some) for some in frame_times_s])
     return Frames(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
+
+
+def _add_channels(channels, whisker, signals, several_motors):
+    """Add a whisker's columns of signals.csv; time and its motor's, where they are not there
+    yet."""
+    channels.setdefault("time_s", signals[:, 0])
+    channels.setdefault(motor_channel(whisker, several_motors), signals[:, 1])
+    for name, column in zip(_CHANNELS, signals[:, 2:].T):
+        channels[f"{name}@{whisker.name}"] = column
 
 
 def motor_channel(whisker: MountedWhisker, several_motors: bool) -> str:

@@ -167,18 +167,16 @@ class _Problem:
 
     def at(self, unknowns, angle) -> _Equations:
         """Return the equations at unknowns (n,), the elastica starting from `angle`."""
-        rod = self.contact.rod
-        arc = unknowns[3]
         loaded = LoadedPoint.solve(self.contact.elastica, self.rotation, unknowns, angle)
         local = self.bar.local_bar(loaded.point)
         offset_by = local.offset_by @ loaded.point_by
         distance = math.sqrt(local.offset_mm @ local.offset_mm)
         frame, frame_by = _contact_frame(local, offset_by, distance, loaded.point_by)
         surface = self._surface(unknowns, loaded, frame, frame_by)
-        law, law_by = self.law.equations(surface, unknowns[4:])
-
         residual = np.empty(len(unknowns))
         jacobian = np.zeros((len(unknowns), len(unknowns)))
+        rod = self.contact.rod
+        arc = unknowns[3]
         if self.tip:
             residual[0] = arc - rod.length_mm
             jacobian[0, 3] = 1.0
@@ -190,8 +188,7 @@ class _Problem:
         residual[1] = distance + surface.press / stiffness - reach
         jacobian[1, :4] = frame[0] @ loaded.point_by + surface.press_by / stiffness
         jacobian[1, 3] -= rod.taper
-        residual[2:] = law
-        jacobian[2:] = law_by
+        residual[2:], jacobian[2:] = self.law.equations(surface, unknowns[4:])
         return _Equations(loaded, residual, jacobian, surface)
 
     def _surface(self, unknowns, loaded, frame, frame_by) -> Surface:

@@ -75,32 +75,40 @@ def truth_csv(recording: Recording) -> str:
 
     The status is free, held, sliding or tip.
     """
-    is_soft = math.isfinite(recording.bar.stiffness_N_mm)
-    is_straight = recording.bar.is_straight
     header = [_HEADER]
-    header += ["gave_mm"] if is_soft else []
-    header += [] if is_straight else COLUMNS
+    if math.isfinite(recording.bar.stiffness_N_mm):
+        header.append("gave_mm")
+    if not recording.bar.is_straight:
+        header += COLUMNS
     way_slips_mm = functools.cache(slips_mm)  # whisks of one friction are one object
     rows = []
     for frame, (time_s, motor_rad, number, back) in enumerate(recording.frames):
-        whisk = recording.whisks[number]
-        way = whisk.way(back)
-        state = way.state_at(motor_rad)
-        row = way.row_at(motor_rad)
-        values = [math.nan, math.nan, math.nan, math.nan, math.nan, 0.0, 0.0]
-        if state is not None:
-            slip = whisk.slip_mm(state.point_mm, motor_rad)
-            values = [*state.point_mm, slip, state.arc_mm, *way.moment_Nmm[row]]
-        cells = [str(frame), *_fixed([time_s, math.degrees(motor_rad)])]
-        cells += [str(int(state is not None)), *_fixed(values)]
-        cells.append("free" if state is None else state.status)
-        if is_soft:
-            cells += _fixed([np.linalg.norm(whisk.gave_mm(motor_rad, back))])
-        if not is_straight:
-            free = [math.nan] * len(COLUMNS)
-            cells += _fixed(free if state is None else way_slips_mm(whisk, back)[row])
-        rows.append(",".join(cells))
+        times = _fixed([time_s, math.degrees(motor_rad)])
+        contact = _contact_cells(recording.whisks[number], motor_rad, back, way_slips_mm)
+        rows.append(",".join([str(frame), *times, *contact]))
     return csv_text(",".join(header), rows)
+
+
+def _contact_cells(whisk, motor_rad, back, way_slips_mm) -> list[str]:
+    """Return the cells of truth.csv about the contact at a motor angle of a way.
+
+    way_slips_mm: gives the surface slips (n, 4) of a way of a whisk.
+    """
+    way = whisk.way(back)
+    row = way.row_at(motor_rad)
+    state = way.state_at(motor_rad)
+    if state is None:
+        cells = ["0", *_fixed([math.nan] * 5), *_fixed([0.0, 0.0]), "free"]
+    else:
+        slip = whisk.slip_mm(state.point_mm, motor_rad)
+        values = [*state.point_mm, slip, state.arc_mm, *way.moment_Nmm[row]]
+        cells = ["1", *_fixed(values), state.status]
+    if math.isfinite(whisk.bar.stiffness_N_mm):
+        cells += _fixed([np.linalg.norm(whisk.gave_mm(motor_rad, back))])
+    if not whisk.bar.is_straight:
+        slips = [math.nan] * len(COLUMNS) if state is None else way_slips_mm(whisk, back)[row]
+        cells += _fixed(slips)
+    return cells
 
 
 def _fixed(values) -> list[str]:

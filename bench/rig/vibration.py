@@ -56,22 +56,26 @@ class Mode:
         allowed = np.eye(len(_CLAMPED))
         if prop_mm is not None:
             allowed = null_space(_evaluate(_CLAMPED, np.array([prop_mm / rod.length_mm])))
-        squares, modes = eigh(
-            allowed.T @ (curvatures.T * stiffness) @ curvatures @ allowed,
-            allowed.T @ (shapes.T * mass) @ shapes @ allowed,
-            subset_by_index=[0, 0],
-        )
-        mode = allowed @ modes[:, 0]
+        frequency, mode = _first_mode(shapes @ allowed, curvatures @ allowed, mass, stiffness)
+        mode = allowed @ mode  # (shapes,)
         momentum = mass * (shapes @ mode)
         curvature_at_base = float(_evaluate(_CURVATURES, np.zeros(1))[0] @ mode) / length**2
-
-        frequency = math.sqrt(squares[0])
         moment = -1e-3 * rod.rigidity_Nmm2 * curvature_at_base
         swing = -float(momentum @ at) * length
         if prop_mm is None:
             return cls(frequency, moment, swing)
         lag_mm, push = _push_against_prop(rod, at * rod.length_mm, prop_mm)
         return cls(frequency, moment, swing, 1e-3 * float(momentum @ lag_mm), push)
+
+
+def _first_mode(shapes, curvatures, mass, stiffness):
+    """Return the lowest frequency, rad/s, and its mode (k,) in shapes (n, k) at stations (n,)."""
+    squares, modes = eigh(
+        (curvatures.T * stiffness) @ curvatures,
+        (shapes.T * mass) @ shapes,
+        subset_by_index=[0, 0],
+    )
+    return math.sqrt(squares[0]), modes[:, 0]
 
 
 def _evaluate(polynomials, at):
