@@ -16,7 +16,7 @@ from bench.rig.protocol import load
 _PIXELS = 1280 * 720  # of the pictures that the sizes and times below are of
 # MB a picture (tests/studies/speed/rig.py)
 _MEGABYTES = {"jpg": 0.28, "png": 0.46, "mkv": 0.45}
-_SAMPLE_MEGABYTES = 38e-6
+_SAMPLE_MEGABYTES = 38e-6  # of signals.csv
 _PICTURE_S, _WHISK_S = 0.08, 0.3  # of one core
 
 

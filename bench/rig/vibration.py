@@ -20,7 +20,7 @@ _CLAMPED = [
     Legendre.basis(degree, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1])
     for degree in range(14)
 ]
-_CURVATURES = [shape.deriv(2) for shape in _CLAMPED]
+_CURVATURES = [shape.deriv(2) for shape in _CLAMPED]  # by which a rod bends at its clamp
 
 
 @dataclass(frozen=True)
