@@ -1,4 +1,4 @@
-"""Several whiskers, each on its own base, pushed against one object: the exact mechanics of one, once a whisker.
+"""Several whiskers, each on its own base, pushed against one object: the mechanics of one, for each.
 
 A column's whiskers sit on one motor. All motors start together and go equally far at one speed,
 each from before the first touch of its column. No whisker touches another.

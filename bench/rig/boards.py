@@ -1,4 +1,4 @@
-"""The views of a camera's calibration: the board tilted all ways, near and far, all over the picture."""
+"""The views for a camera's lens: the board tilted all ways, near and far, all over the picture."""
 
 import math
 

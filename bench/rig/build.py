@@ -90,7 +90,7 @@ def stated_T_rig_board(protocol: Protocol, rng: np.random.Generator) -> np.ndarr
 
 
 def scene(protocol: Protocol) -> Scene:
-    """Build the scene: its light and what things look like in it."""
+    """Build the scene: its light and the appearance of what is in it."""
     table = protocol.light
     direction = np.array(table.towards) / np.linalg.norm(table.towards)
     looks = Looks(

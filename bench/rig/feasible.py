@@ -9,7 +9,8 @@ from bench.base.errors import BadInput
 if TYPE_CHECKING:
     from bench.rig.protocol import Protocol, Run
 
-# As far as the march finds its way (docs/extremes.md): at a slope of 89.5° it does, at a tilt of 85° no more.
+# As far as the march finds its way (docs/extremes.md): at a slope of 89.5° it does, at a tilt of 85°
+# it does not.
 _STEEPEST_DEG, _MOST_TILT_DEG, _NEAREST = 89.0, 80.0, 0.02
 # Of the whisker's own speed at the contact: a bar that runs away as fast is never touched.
 _FASTEST_SHARE = 0.5

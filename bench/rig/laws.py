@@ -1,7 +1,7 @@
-"""The laws of friction at one contact: equations in the plane that touches the object, and their exact derivatives.
+"""The laws of friction at one contact: equations in the tangent plane, and their exact derivatives.
 
-A law's `equations(surface, beyond)` returns residuals (n,) and their derivatives (n, 4 + beyond), by
-the four unknowns of the contact and the law's own.
+A law's `equations(surface, beyond)` returns residuals (n,) and their derivatives (n, 4 + beyond),
+by the four unknowns of the contact and the law's own.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Vectors and linear systems of a few numbers, without the checks that take NumPy longer than the work."""
+"""Vectors and linear systems of a few numbers, where NumPy's checks would take longer than the work."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The point of the whisker where a force acts: its place and tangent in space, and their exact derivatives.
+"""The point of the whisker where a force acts: its place and tangent, with exact derivatives.
 
 The force and the clamped tangent span the plane of bending, in which the elastica is solved; the
 rest shape is added to first order.

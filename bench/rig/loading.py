@@ -1,4 +1,4 @@
-"""Moments at the base over a whole recording: the quasi-static ones of each whisk, and what rings on top."""
+"""Moments at the base over a recording: the quasi-static ones of each whisk, and what rings on top."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence

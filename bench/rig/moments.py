@@ -1,4 +1,4 @@
-"""What moves at the instants of one exposure: hubs and whiskers, as many instants as motion blur asks for."""
+"""Hubs and whiskers at the instants of one exposure, as many instants as motion blur requires."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The text files that a session's people and programs write: session.toml, trial.toml, frames.csv, signals.csv."""
+"""The text files of any session: session.toml, trial.toml, frames.csv, signals.csv."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path

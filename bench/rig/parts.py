@@ -1,4 +1,4 @@
-"""The parts of a session: each a folder, made by itself from the protocol and a random stream of its own."""
+"""The parts of a session: folders, each made from the protocol and a random stream of its own."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The tables of a protocol file: a rig and what is to be recorded on it. Every key has a default."""
+"""The tables of a protocol file: a rig and what is recorded on it. Every key has a default."""
 
 from typing import Annotated, Literal
 
@@ -51,7 +51,7 @@ class CameraTable(ProtocolTable, kw_only=True):
     """One of the tables [[cameras]]."""
 
     name: Name
-    position_mm: Three | None = None  # `plan` looks for a place where there is none
+    position_mm: Three | None = None  # `plan` finds a place where there is none
     target_mm: Three = (55.0, 0.0, 0.0)
     roll_deg: float = 0.0
     focal_px: Positive = 2000.0
@@ -147,7 +147,8 @@ class FrictionTable(ProtocolTable):
     """The table [friction]."""
 
     scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
-    irregular: Zero = 0.0  # sigma (of a log-normal) of how much of its excess over motion each single rest reaches
+    # Sigma (of a log-normal) of how much of its excess over motion each single rest reaches
+    irregular: Zero = 0.0
     finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
 
 
@@ -211,7 +212,7 @@ class TrialTable(ProtocolTable):
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
     # Of the bar's surface, which gives way; by default it is rigid
     stiffness_N_mm: Positive | None = None
-    # UNSET is absent from the fingerprint, which so does not depend on these where they are not given.
+    # Where these are not given, UNSET keeps them out of the fingerprint.
     # By default a straight bar
     object: Literal["ring", "sphere", "cone"] | msgspec.UnsetType = msgspec.UNSET
     # Of the circle that a ring's axis is

@@ -1,4 +1,4 @@
-"""One trial as it is recorded: object, whisks, frame times, signals. Its pictures are taken from it."""
+"""One trial as it is recorded: object, whisks, frame times and signals; pictures are made from it."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""A bent whisker on a round object: the equations of one contact, their exact derivatives, and Newton's method.
+"""A bent whisker on a round object: the equations of one contact, solved by Newton's method.
 
 Unknowns: the object's force on the whisker (hub frame, N), the arc length of the contact (mm), and
 where it slides, in which direction. Two equations say where the contact is: the centreline's point

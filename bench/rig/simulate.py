@@ -1,4 +1,4 @@
-"""Recording a whole session on the synthetic rig: folders that appear whole, the same bytes whoever does the work."""
+"""A whole session of the synthetic rig: folders that appear whole, the same for any workers."""
 
 import shutil
 from collections.abc import Callable
@@ -120,7 +120,7 @@ def _claim(job):
 
 
 def make_part(job: Job, part: Part) -> None:
-    """Make one part, written beside its place under another name and moved there when whole.
+    """Make one part, written next to its place under another name and moved there when whole.
 
     Raises BadInput where the whisker slips off the bar or buckles.
     """

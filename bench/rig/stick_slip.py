@@ -1,4 +1,4 @@
-"""Coulomb friction marched along the motor's path: hold, slide, the saw-tooth between them, the way back, letting go."""
+"""Coulomb friction marched along the motor's path: hold, slide, the teeth between, the way back."""
 
 import math
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""The truth that only a synthetic session has: truth.json, and truth.csv and truth.toml of each trial."""
+"""The truth of a synthetic session: truth.json, and truth.csv and truth.toml of each trial."""
 
 import functools
 import json

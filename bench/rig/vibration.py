@@ -1,4 +1,4 @@
-"""The whisker's first bending mode: free, then propped at the bar; rung by ramps, touch and stick–slip.
+"""The whisker's first bending mode: free, or propped at the bar; rung by ramps, touch, stick–slip.
 
 Small and linear on top of the quasi-static whisk. What rings is the moment at the base; the
 whisker in the pictures does not shake.
@@ -29,7 +29,7 @@ class Mode:
 
     moment_Nmm: moment on the base for a unit of the mode, of the sign of a push's. swing: modal
     acceleration for a unit of the hub's angular acceleration.
-    strike: modal speed for a unit of angular speed that the prop stopped. push_Nmm: the quasi-static
+    strike: modal speed for a unit of angular speed that the prop stopped. push_Nmm: quasi-static
     moment for a radian pushed head-on against the prop. These two are zero without a prop.
     """
 
