@@ -13,7 +13,7 @@ from bench.plan.sight import bar_points, curves_of
 from bench.plan.staged import Staged
 from bench.rig import boards, build
 from bench.rig.album import JPEG_QUALITY
-from bench.rig.moments import moments_of
+from bench.rig.moments import exposure_moments
 from bench.rig.painted_scene import block_corners_mm
 from bench.rig.protocol import Protocol
 from bench.rig.studio import Setting, Studio
@@ -82,7 +82,9 @@ class Painter:
 
     def _corner_px(self, number: int) -> float:
         studio, camera = self.studios[number], self.cameras[number]
-        pose = boards.poses(build.board(self.protocol), studio.camera, 2, self._stream(number))[0]
+        pose = boards.draw_poses(
+            build.board(self.protocol), studio.camera, 2, self._stream(number)
+        )[0]
         picture = studio.sensor.expose(studio.board_brightness(pose), self._stream(number, 2))
         px = camera.project(apply(pose, self.board.corners_mm))
         corners = refine_corners(picture, px, np.arange(len(px)), self.board)
@@ -100,7 +102,7 @@ class Painter:
     def frame(self, number: int, staged: Staged, setting: Setting, frame: int) -> np.ndarray:
         """One frame of one camera as its sensor gives it."""
         studio, recording = self.studios[number], staged.recording
-        instants = moments_of(
+        instants = exposure_moments(
             self.protocol, studio, recording, staged.whisk, float(staged.motor_rad[frame]), False
         )
         return self._as_written(

@@ -68,7 +68,7 @@ def _held(camera: Camera, work: BoardWork, number: int, seed: int) -> list[np.nd
         board.legacy,
         board.inverted,
     )
-    return boards.poses(
+    return boards.draw_poses(
         printed, rig_camera(camera), work.views, np.random.default_rng([seed, _VIEWS, number])
     )
 

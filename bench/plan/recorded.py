@@ -11,7 +11,7 @@ from bench.plan.plan_rows import Facts, Row, tried_on
 from bench.plan.staged import Staged, on_bar
 from bench.plan.tries import Try
 from bench.records.trial_result import SeenTrial, SeenWhisk
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.session.session import Session
 from bench.session.trial import Trial
@@ -70,7 +70,7 @@ def stage_again(task: SeenTask) -> Staged:
     whisk, trial = task.whisk, task.trial
     rod = _rod(task.session.whisker)
     d_x, touch = float(whisk.d_x_mm.value), float(whisk.touch_rad.value)
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x,
         beta_rad=float(whisk.beta_rad.value),
         psi_rad=float(whisk.psi_rad.value),
@@ -84,7 +84,7 @@ def stage_again(task: SeenTask) -> Staged:
     made = on_bar(
         rod,
         bar,
-        first_touch(rod, bar, touch, d_x),
+        find_first_touch(rod, bar, touch, d_x),
         float(friction),
         frames.motor_rad,
         frames.time_s,

@@ -178,9 +178,7 @@ def _described(cameras: Cameras, staged: Sequence[Staged]) -> Iterator[str]:
 def _draw_rig(
     out: Path, protocol: Protocol, painter: Painter, cameras: Cameras, staged: dict[str, Staged]
 ) -> None:
-    name, shown = max(
-        staged.items(), key=lambda one: abs(one[1].whisk.bar.slope(one[1].touch.motor_rad)[0])
-    )
+    name, shown = max(staged.items(), key=lambda one: abs(one[1].whisk.slope[0]))
     views = painted_views(painter, shown)
     (out / "views").mkdir(parents=True, exist_ok=True)
     for camera, picture in views.items():

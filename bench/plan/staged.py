@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from bench.rig.bar import Bar, Touch, turned
+from bench.rig.bar import Bar, Touch
 from bench.rig.elastic_rod import Rod
+from bench.rig.linear import rotate_about_z
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
 from bench.rig.recording import Recording
@@ -127,7 +128,7 @@ def staged(whisk: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) -> St
 
 def _bend(rod: Rod, state) -> np.ndarray:
     """Tangent angle (2,) at the contact, across and along the rotation axis, hub frame."""
-    tangent = turned(state.tangent, -state.motor_rad)
+    tangent = rotate_about_z(state.tangent, -state.motor_rad)
     aside = tangent[1:] / np.linalg.norm(tangent) - rod.rest.slope(state.arc_mm)[1:]
     size = float(np.linalg.norm(aside))
     return aside * (math.asin(min(size, 1.0)) / size if size > 0.0 else 1.0)

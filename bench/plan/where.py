@@ -13,7 +13,8 @@ from bench.plan.planned_cameras import seen_camera
 from bench.plan.staged import Staged
 from bench.plan.tries import USUAL, direction_of
 from bench.rig import build
-from bench.rig.protocol import CameraTable, Protocol
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import CameraTable
 from vision.geometry.camera import Camera, Cameras
 
 # From where cameras look, azimuth (0: beyond the tip; -90: from the side that the whisker comes from), elevation.

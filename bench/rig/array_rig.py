@@ -1,218 +1,237 @@
-"""Several whiskers, each on its own base, pushed against one bar: the exact mechanics of one, once a whisker.
+"""Several whiskers, each on its own base, pushed against one object: the mechanics of one, for each.
 
-A column's whiskers sit on one motor. All motors start together and go equally far at one speed, each from before the
-first touch of its column. No whisker touches another.
+A column's whiskers sit on one motor. All motors start together and go equally far at one speed,
+each from before the first touch of its column. No whisker touches another.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 
 from bench.base.errors import BadInput
 from bench.rig import build
-from bench.rig.bar import Bar, Touch, first_touch, unloaded
+from bench.rig.bar import Touch, find_first_touch, unloaded_curve
 from bench.rig.elastic_rod import Rest, Rod
-from bench.rig.protocol import ColumnTable, Protocol, Run
-from bench.rig.recording import Frames, Recording, placed_bar, signals
-from bench.rig.strain_gauges import Gauges
+from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol_tables import ColumnTable
+from bench.rig.recording import (
+    Frames,
+    Recording,
+    Whisker,
+    place_object,
+    plan_stroke,
+    sample_signals,
+)
 from bench.rig.stroke import Stroke
+from bench.rig.touched_object import TouchedObject
 
-_FARTHEST_RAD = math.radians(
-    25.0
-)  # rad: a protocol's largest push, for the whisker that touches first
-_SWEPT_RAD = np.radians(
-    np.arange(-60.0, 60.0, 0.25)
-)  # rad: where a whisker's first touch is looked for, about the
-# direction in which one at the rig's origin would touch
-_SIZES = ("length_mm", "diameter_mm")
-_ARCS = 200  # points of a whisker in that look; a bar is thicker than their distance
+# rad: a protocol's largest push, for the whisker that touches first
+_FARTHEST_RAD = math.radians(25.0)
+# rad: where a whisker's first touch is searched, about the direction in which one at the rig's
+# origin would touch
+_SWEPT_RAD = np.radians(np.arange(-60.0, 60.0, 0.25))
+_ARCS = 200  # points of a whisker in that search; a bar is thicker than their distance
+_CHANNELS = ("y_V", "z_V", "f_x_N", "f_y_N", "f_z_N")
 
 
 @dataclass(frozen=True, eq=False)
-class Mounted:
-    """A whisker of an array: its table as a whisker's, rod, gauges, and pose (3, 4), T_rig_base, mm."""
+class MountedWhisker(Whisker):
+    """A whisker of an array: its name, its column's table, and its pose (3, 4), T_rig_base, mm."""
 
     name: str
     column: ColumnTable
-    base_mm: tuple[float, ...]
-    rod: Rod
-    gauges: Gauges
     pose: np.ndarray
 
 
-def mounted(protocol: Protocol, rng: np.random.Generator) -> list[Mounted]:
-    """The whiskers of a protocol's columns; rng draws their gauges' coefficients."""
-    return [whisker for column in protocol.columns for whisker in _of_column(protocol, column, rng)]
+def mount_whiskers(protocol: Protocol, rng: np.random.Generator) -> list[MountedWhisker]:
+    """Mount the whiskers of a protocol's columns; rng draws their gauges' coefficients."""
+    whiskers = []
+    for column in protocol.columns:
+        rotation = build.column_pose(column)[:, :3]
+        for number, height in enumerate(column.heights_mm):
+            scatter = np.exp(column.gauge_scatter * rng.standard_normal((2, 2)))
+            matrix = protocol.gauges.matrix_Nmm_per_V * scatter
+            gauges = msgspec.structs.replace(protocol.gauges, matrix_Nmm_per_V=matrix.tolist())
+            base_mm = np.round(np.array(column.base_mm) + height * rotation[:, 2], 9)
+            pose = np.column_stack([rotation, base_mm])
+            name = f"{column.name}{number + 1}"
+            rod = _column_rod(protocol, column, number)
+            whiskers.append(MountedWhisker(rod, gauges, name, column, pose))
+    return whiskers
 
 
-def _of_column(protocol, column, rng) -> Iterator[Mounted]:
-    whisker, turn = protocol.whisker, build.column_pose(column)[:, :3]
-    for number, height in enumerate(column.heights_mm):
-        sizes = {key: _one(getattr(column, key), number) or getattr(whisker, key) for key in _SIZES}
-        rest = Rest(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
-        rod = replace(build.rod(protocol), **sizes, rest=rest)
-        gauges = build.gauges(protocol)
-        matrix = gauges.matrix_Nmm_per_V * np.exp(
-            column.gauge_scatter * rng.standard_normal((2, 2))
-        )
-        base = np.array(column.base_mm) + height * turn[:, 2]
-        place = tuple(np.round(base, 9).tolist())
-        pose = np.column_stack([turn, place])
-        yield Mounted(
-            f"{column.name}{number + 1}",
-            column,
-            place,
-            rod,
-            replace(gauges, matrix_Nmm_per_V=matrix),
-            pose,
-        )
-
-
-def _one(given, number):
-    return given[number] if isinstance(given, list) else given
+def _column_rod(protocol, column, number) -> Rod:
+    """Build one of a column's rods, with its own length and diameter where the column gives
+    them."""
+    sizes = {}
+    for key in ("length_mm", "diameter_mm"):
+        given = getattr(column, key)
+        size = given[number] if isinstance(given, list) else given
+        sizes[key] = size or getattr(protocol.whisker, key)
+    whisker = protocol.whisker
+    rest = Rest(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
+    return replace(build.rod(protocol), rest=rest, **sizes)
 
 
 @dataclass(frozen=True, eq=False)
 class ArrayRecording:
-    """A trial of an array. recordings: by whisker, None of one that touches nothing, each in its own base frame;
-    strokes: by column; channels: by column of signals.csv, each (n,); bar: in the rig frame."""
+    """A trial of an array.
+
+    bar: in the rig frame. recordings: by whisker, each in its own base frame, None of one that
+    touches nothing. strokes: by column. channels: by column of signals.csv, each (n,).
+    frame_times_s: of each whisk.
+    """
 
     run: Run
-    bar: Bar
+    bar: TouchedObject
     recordings: dict[str, Recording | None]
     strokes: dict[str, Stroke]
     channels: dict[str, np.ndarray]
-    frame_times_s: np.ndarray
+    frame_times_s: list[np.ndarray]
 
     @classmethod
     def make(
         cls,
         protocol: Protocol,
         run: Run,
-        whiskers: Sequence[Mounted],
+        whiskers: Sequence[MountedWhisker],
         rngs: Sequence[np.random.Generator],
     ) -> "ArrayRecording":
-        """The trial that seeded generators make of a run: the first of where the bar stands, then one a whisker.
-        Raises ArithmeticError, naming the whisker, where one cannot go on, BadInput where one cannot begin."""
-        bar, near_rad, _ = placed_bar(protocol, run, build.rod(protocol), rngs[0])
-        bars = {w.name: bar.seen_from(w.pose) for w in whiskers}
-        touches = {w.name: _touch(w, bars[w.name], near_rad) for w in whiskers}
-        strokes = _strokes(protocol, run, whiskers, touches, near_rad)
-        times = _frame_times_s(protocol, run, next(iter(strokes.values())))
-        channels, recordings = {}, {}
+        """Simulate a run; the first generator is for where the object stands, then one a whisker.
+
+        Raises ArithmeticError, naming the whisker, where one cannot go on, BadInput where one
+        cannot begin.
+        """
+        bar, near_rad, _ = place_object(protocol, run, build.rod(protocol), rngs[0])
+        bars = {}
+        touches = {}
+        for whisker in whiskers:
+            bars[whisker.name] = bar.in_frame(whisker.pose)
+            touches[whisker.name] = _find_touch(whisker, bars[whisker.name], near_rad)
+        strokes = _plan_strokes(protocol, run, whiskers, touches, near_rad)
+        frame_times_s = _frame_times_s(protocol, run, next(iter(strokes.values())))
+        recordings = {}
+        channels = {}
         for whisker, rng in zip(whiskers, rngs[1:]):
-            stroke, touch = strokes[whisker.column.name], touches[whisker.name]
-            if touch is not None and touch.motor_rad >= stroke.angles_rad.max():
-                touch = None
-            made = None
-            if touch is not None:
-                made = _pushed(
-                    protocol, run, whisker, bars[whisker.name], touch, stroke, times, rng
+            name = whisker.name
+            stroke = strokes[whisker.column.name]
+            touch = touches[name]
+            recordings[name] = None
+            if touch is None or touch.motor_rad >= stroke.angles_rad.max():
+                signals = sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
+            else:
+                frames = _take_frames(stroke, frame_times_s)
+                recordings[name] = _record(
+                    protocol, run, whisker, bars[name], touch, stroke, frames, rng
                 )
-            recordings[whisker.name] = made
-            free = made is None and signals(protocol, run, stroke, (), whisker.gauges, rng)
-            _add_channels(
-                channels, whisker, free if made is None else made.signals, len(strokes) > 1
-            )
-        return cls(run, bar, recordings, strokes, channels, times)
+                signals = recordings[name].signals
+            _add_channels(channels, whisker, signals, len(strokes) > 1)
+        return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
-def _towards(whisker: Mounted, angle_rad: float) -> float:
-    """Motor angle at which a whisker points as one at the rig's origin does at `angle_rad`."""
-    x, y, _ = whisker.pose[:, :3].T @ [math.cos(angle_rad), math.sin(angle_rad), 0.0]
-    return math.atan2(y, x)
-
-
-def _touch(whisker: Mounted, bar: Bar, near_rad: float) -> Touch | None:
+def _record(protocol, run, whisker, bar, touch, stroke, frames, rng) -> Recording:
+    """Simulate one whisker; raise ArithmeticError, naming it, where it cannot go on."""
     try:
-        return touch_from_afar(whisker.rod, bar, _towards(whisker, near_rad))
+        return Recording.record(protocol, run, whisker, bar, touch, stroke, frames, rng)
+    except ArithmeticError as problem:
+        raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
+
+
+def _find_touch(whisker: MountedWhisker, bar: TouchedObject, near_rad: float) -> Touch | None:
+    """Find a whisker's first touch; raise BadInput where it lies within the object."""
+    try:
+        return find_touch_from_afar(whisker.rod, bar, _motor_towards(whisker, near_rad))
     except ValueError as problem:
         raise BadInput(
             f"whisker {whisker.name} {problem}; its base_mm or the trial's d_x_mm is another"
         ) from None
 
 
-def touch_from_afar(rod: Rod, bar: Bar, towards_rad: float) -> Touch | None:
-    """First touch of a whisker that comes from lower motor angles, looked for within 60° of a direction; None where it
-    meets nothing there. Raises ValueError where it lies within the bar from the beginning."""
+def _motor_towards(whisker: MountedWhisker, angle_rad: float) -> float:
+    """Return the motor angle at which a whisker points as one at the rig's origin does at
+    `angle_rad`."""
+    x, y, _ = whisker.pose[:, :3].T @ [math.cos(angle_rad), math.sin(angle_rad), 0.0]
+    return math.atan2(y, x)
+
+
+def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> Touch | None:
+    """Find the first touch of a whisker that comes from lower motor angles, within 60° of a
+    direction; None where it meets nothing there.
+
+    Raises ValueError where it lies within the object from the beginning.
+    """
     arcs = np.linspace(0.0, rod.length_mm, _ARCS)
-    for angle in towards_rad + _SWEPT_RAD:
-        points = unloaded(rod, angle, arcs)[0]
+    for number, angle in enumerate(towards_rad + _SWEPT_RAD):
+        points, _ = unloaded_curve(rod, angle, arcs)
         gaps = bar.outside_mm(points) - rod.radius_mm(arcs)
         if gaps.min() <= 0.0:
-            if angle == towards_rad + _SWEPT_RAD[0]:
+            if number == 0:
                 raise ValueError("stands in the bar before it moves")
-            return first_touch(rod, bar, angle, float(arcs[gaps.argmin()]))
+            return find_first_touch(rod, bar, angle, float(arcs[gaps.argmin()]))
     return None
 
 
-def _strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Stroke]:
-    """Each column's stroke, from before its first touch; all go as far as the one that goes farthest."""
-    motor, ends = protocol.motor, {}
-    for name in dict.fromkeys(w.column.name for w in whiskers):
-        mine = [w for w in whiskers if w.column.name == name]
-        angles = [touches[w.name].motor_rad for w in mine if touches[w.name] is not None]
-        angles = angles or [_towards(mine[0], near_rad)]
-        last = min(max(angles), min(angles) + _FARTHEST_RAD - math.radians(run.after_deg))
-        ends[name] = min(angles) - math.radians(run.before_deg), last + math.radians(run.after_deg)
-    span = max(high - low for low, high in ends.values())
-    return {
-        name: Stroke.plan(
-            low,
-            low + span,
-            math.radians(run.speed_deg_s),
-            whisks=run.table.whisks,
-            ramp_s=motor.ramp_s,
-            pause_s=motor.pause_s,
-            back=protocol.goes_back(run),
-        )
-        for name, (low, _) in ends.items()
-    }
+def _plan_strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Stroke]:
+    """Plan each column's stroke, from before its first touch; all go as far as the one that goes
+    farthest."""
+    before_rad = math.radians(run.before_deg)
+    after_rad = math.radians(run.after_deg)
+    touch_angles = {}  # by column
+    for whisker in whiskers:
+        touch = touches[whisker.name]
+        angles = touch_angles.setdefault(whisker.column.name, [])
+        angles += [] if touch is None else [touch.motor_rad]
+    starts = {}
+    spans = []
+    for name, angles in touch_angles.items():
+        if not angles:
+            first = next(whisker for whisker in whiskers if whisker.column.name == name)
+            angles = [_motor_towards(first, near_rad)]
+        starts[name] = min(angles) - before_rad
+        last = min(max(angles), min(angles) + _FARTHEST_RAD - after_rad)
+        spans.append(last + after_rad - starts[name])
+    span = max(spans)
+    return {name: plan_stroke(protocol, run, low, low + span) for name, low in starts.items()}
 
 
 def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
-    """Middles of the exposures of each forward stroke, from end to end of it."""
+    """Return the middles of the exposures of each forward stroke, from end to end of it."""
     pictures = protocol.pictures
     step_s = 1.0 / pictures.rate_Hz if pictures.rate_Hz else pictures.step_deg / run.speed_deg_s
     return [np.arange(start, end, step_s) for start, end in stroke.forward]
 
 
-def _pushed(protocol, run, whisker, bar, touch, stroke, times, rng) -> Recording:
-    every, whisk = np.concatenate(times), np.repeat(np.arange(len(times)), [len(t) for t in times])
-    frames = Frames(every, stroke.angle_rad(every), whisk, np.zeros(len(every), bool))
-    try:
-        return Recording.pushed(
-            protocol, run, whisker.rod, bar, touch, stroke, frames, whisker.gauges, rng
-        )
-    except ArithmeticError as problem:
-        raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
+def _take_frames(stroke, frame_times_s) -> Frames:
+    """Return the frames of all whisks; none is on a way back."""
+    times = np.concatenate(frame_times_s)
+    whisk = np.repeat(np.arange(len(frame_times_s)), [len(some) for some in frame_times_s])
+    return Frames(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
 
 
-def _add_channels(
-    channels: dict, whisker: Mounted, recorded: np.ndarray, several_motors: bool
-) -> None:
-    """A whisker's columns of signals.csv; its motor's, where that is not there yet."""
-    channels.setdefault("time_s", recorded[:, 0])
-    channels.setdefault(motor_channel(whisker, several_motors), recorded[:, 1])
-    names = ("y_V", "z_V", "f_x_N", "f_y_N", "f_z_N")
-    channels.update(
-        {f"{name}@{whisker.name}": column for name, column in zip(names, recorded[:, 2:].T)}
-    )
+def _add_channels(channels, whisker, signals, several_motors):
+    """Add a whisker's columns of signals.csv; time and its motor's, where they are not there
+    yet."""
+    channels.setdefault("time_s", signals[:, 0])
+    channels.setdefault(motor_channel(whisker, several_motors), signals[:, 1])
+    for name, column in zip(_CHANNELS, signals[:, 2:].T):
+        channels[f"{name}@{whisker.name}"] = column
 
 
-def motor_channel(whisker: Mounted, several_motors: bool) -> str:
-    """Name of its motor's column."""
+def motor_channel(whisker: MountedWhisker, several_motors: bool) -> str:
+    """Return the name of the whisker's motor column in signals.csv."""
     return f"motor_deg@{whisker.column.name}" if several_motors else "motor_deg"
 
 
-def base_keys(whisker: Mounted, several_motors: bool) -> dict:
-    """What session.toml says of a whisker of the array."""
-    rod, gauges = whisker.rod, whisker.gauges
+def base_keys(whisker: MountedWhisker, several_motors: bool) -> dict:
+    """Return the keys of [[whiskers]] of session.toml for a whisker."""
+    rod = whisker.rod
+    gauges = whisker.gauges
     keys = {
         "name": whisker.name,
-        "base_mm": list(whisker.base_mm),
+        "base_mm": whisker.pose[:, 3].tolist(),
         "base_deg": list(whisker.column.base_deg),
         "shape": rod.shape,
         "length_mm": rod.length_mm,
@@ -224,6 +243,5 @@ def base_keys(whisker: Mounted, several_motors: bool) -> dict:
     if several_motors:
         keys["channels"] = {"motor_deg": motor_channel(whisker, several_motors)}
     matrix = np.round(gauges.matrix_Nmm_per_V, 9).tolist()
-    return keys | {
-        "gauges": {"offset_V": list(map(float, gauges.offset_V)), "matrix_Nmm_per_V": matrix}
-    }
+    keys["gauges"] = {"offset_V": list(gauges.offset_V), "matrix_Nmm_per_V": matrix}
+    return keys

@@ -1,40 +1,40 @@
-"""How a careful person holds the board up for a camera's calibration: tilted all ways, near and far, all over the
-picture.
-"""
+"""The views for a camera's lens: the board tilted all ways, near and far, all over the picture."""
 
 import math
 
 import cv2
 import numpy as np
 
+from bench.rig.linear import rotation_about_z
 from bench.rig.pinhole import Camera
 from bench.rig.printed_board import Board
 
-_GOLDEN_RAD = math.pi * (
-    3 - math.sqrt(5)
-)  # rad: the golden angle, by which views lean to all sides evenly
+# rad: the golden angle, by which views lean to all sides evenly
+_GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 
 
-def poses(board: Board, camera: Camera, count: int, rng: np.random.Generator) -> list[np.ndarray]:
-    """T_rig_board (3, 4) of each view."""
+def draw_poses(
+    board: Board, camera: Camera, count: int, rng: np.random.Generator
+) -> list[np.ndarray]:
+    """Draw T_rig_board (3, 4) of each view."""
     order = rng.permutation(count)
-    return [_pose(board, camera, i, int(order[i]), count, rng) for i in range(count)]
+    return [_draw_pose(board, camera, i, count, int(order[i]), rng) for i in range(count)]
 
 
-def _pose(board, camera, index, depth_rank, count, rng):
-    share = (depth_rank + 0.5) / count
-    width = (0.85 - 0.45 * share) * camera.size_px[0]  # of the board in the picture
-    depth = camera.matrix[0, 0] * board.size_mm[0] / width
-    tilt = math.radians(rng.uniform(15, 42)) if index else 0.0
-    way = index * _GOLDEN_RAD
-    axis = np.array([math.cos(way), math.sin(way), 0.0])
-    turn = (
-        cv2.Rodrigues(tilt * axis)[0]
-        @ cv2.Rodrigues(np.array([0, 0, math.radians(rng.uniform(-50, 50))]))[0]
-    )
-    spread = 0.28 * np.array([math.cos(2.4 * way), math.sin(2.4 * way)]) * math.sqrt(index / count)
-    off_px = spread * camera.size_px + rng.uniform(-20, 20, 2)
-    ray = np.append(off_px / np.diag(camera.matrix)[:2], 1.0)
-    middle = turn @ [0.5 * board.size_mm[0], 0.5 * board.size_mm[1], 0]
+def _draw_pose(board, camera, index, count, depth_rank, rng):
+    """Draw T_rig_board (3, 4) of one view; depth_rank 0 is the nearest."""
+    nearness = (depth_rank + 0.5) / count
+    board_px = (0.85 - 0.45 * nearness) * camera.size_px[0]
+    depth_mm = camera.matrix[0, 0] * board.size_mm[0] / board_px
+    tilt_rad = math.radians(rng.uniform(15, 42)) if index else 0.0
+    lean_rad = index * _GOLDEN_RAD
+    tilt = cv2.Rodrigues(tilt_rad * np.array([math.cos(lean_rad), math.sin(lean_rad), 0.0]))[0]
+    rotation = tilt @ rotation_about_z(math.radians(rng.uniform(-50, 50)))
+    direction = np.array([math.cos(2.4 * lean_rad), math.sin(2.4 * lean_rad)])
+    offset_px = 0.28 * direction * math.sqrt(index / count) * camera.size_px
+    offset_px += rng.uniform(-20, 20, 2)
+    ray = np.append(offset_px / np.diag(camera.matrix)[:2], 1.0)
+    middle = rotation @ np.append(0.5 * np.array(board.size_mm), 0.0)
     to_rig = camera.rotation.T
-    return np.column_stack([to_rig @ turn, to_rig @ (depth * ray - middle - camera.translation_mm)])
+    shift = to_rig @ (depth_mm * ray - middle - camera.translation_mm)
+    return np.column_stack([to_rig @ rotation, shift])

@@ -1,8 +1,9 @@
-"""The exact planar elastica: a rod clamped at its base, bent by one point force, however large the deflection.
+"""The exact planar elastica: a rod clamped at its base, bent by one point force of any size.
 
-One point force on a straight rod of round section bends it in the plane of clamped tangent and force, so this is all
-the bending that a whisker on a bar needs, in three dimensions too. Chebyshev collocation of the tangent angle and
-Newton's method; nothing marches in time.
+One point force on a straight rod of round section bends it in the plane of clamped tangent and
+force, so this is all the bending that a whisker on a bar needs, in three dimensions too. Chebyshev
+collocation of the tangent angle and Newton's method with exact derivatives; nothing marches in
+time.
 """
 
 from dataclasses import dataclass
@@ -10,54 +11,68 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from bench.rig import linear
 from bench.rig.elastic_rod import Rod
-from bench.rig.linear import solved
+
+# [1] Steps of Newton's method before it is given up. Stated.
+_MOST_STEPS = 40
+# [rad] Largest last step: the next one, by quadratic convergence, is below 1e-16. Derived.
+_LAST_STEP_RAD = 1e-9
+# [1] Least diameter over the base's: at a cone's very tip moment and rigidity vanish together and
+# the curvature is finite. Stated.
+_LEAST_WIDTH = 1e-3
 
 
+@dataclass(slots=True)
 class Bent:
-    """An equilibrium: where the loaded point went, how the rod points there, and how both answer to the load.
+    """An equilibrium in the plane of bending: along the clamped tangent (x) and across it (e).
 
-    In the plane of bending: along the clamped tangent (x) and across it (e). `angle` (n,) is the tangent's at the
-    nodes.
+    angle (n,): the tangent's at the nodes, rad. end_mm (2,), slope: position and angle of the
+    loaded point at arc_mm. end_by (2, 3), slope_by (3,): their derivatives by force x, force e and
+    arc.
     """
 
-    __slots__ = ("angle", "arc_mm", "end_by", "end_mm", "slope", "slope_by")
-
-    def __init__(self, angle, arc_mm, end_mm, end_by, slope, slope_by):
-        self.angle, self.arc_mm = angle, arc_mm
-        self.end_mm, self.end_by = end_mm, end_by  # (2,), (2, 3) by force x, force e, arc
-        self.slope, self.slope_by = slope, slope_by  # tangent's angle at the load, (3,)
+    angle: np.ndarray
+    arc_mm: float
+    end_mm: np.ndarray
+    end_by: np.ndarray
+    slope: float
+    slope_by: np.ndarray
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Chebyshev points on 0…1 with the integrals from 0 to each of them and from each of them to 1."""
+    """Chebyshev points on 0…1 and the matrices that integrate over them.
+
+    at (n,). values (n, n): the polynomials at the points. from_base, to_load (n, n): integrals
+    from 0 to each point and from each point to 1. weights (n,): the integral from 0 to 1.
+    """
 
     at: np.ndarray
+    values: np.ndarray
     from_base: np.ndarray
     to_load: np.ndarray
     weights: np.ndarray
 
     @classmethod
     def make(cls, count: int) -> "Nodes":
-        """So many Chebyshev points with the matrices that integrate over them."""
-        at = 0.5 * (1 - np.cos(np.pi * np.arange(count) / (count - 1)))
-        values = chebyshev.chebvander(2 * at - 1, count - 1)
-        integrals = np.stack([_integral(k, count, at) for k in range(count)], -1)
+        """Make `count` Chebyshev points with their matrices."""
+        on_circle = -np.cos(np.pi * np.arange(count) / (count - 1))  # (n,) from −1 to 1
+        values = chebyshev.chebvander(on_circle, count - 1)
+        antiderivatives = chebyshev.chebint(np.eye(count), lbnd=-1)  # (n + 1, n) coefficients
+        integrals = 0.5 * chebyshev.chebvander(on_circle, count) @ antiderivatives
         from_base = np.linalg.solve(values.T, integrals.T).T
-        return cls(at, from_base, from_base[-1] - from_base, from_base[-1])
-
-
-def _integral(k, count, at):
-    """Integral from 0 to `at` of the k-th Chebyshev polynomial shifted to 0…1."""
-    return 0.5 * chebyshev.chebval(2 * at - 1, chebyshev.chebint(np.eye(count)[k], lbnd=-1))
+        weights = from_base[-1]
+        return cls(0.5 * (1 + on_circle), values, from_base, weights - from_base, weights)
 
 
 class Elastica:
-    """Solves EI(u) dψ/du = (x_s − x_u) F_e − (e_s − e_u) F_x, ψ(0) = 0, for the tangent angle ψ along 0 ≤ u ≤ s.
+    """Solver of EI(u) dψ/du = (x_s − x_u) F_e − (e_s − e_u) F_x, ψ(0) = 0, for the tangent angle ψ
+    along 0 ≤ u ≤ s.
 
-    With u = s·x this reads ψ = K g, g = (F_e cos ψ − F_x sin ψ) s²/EI, where K integrates twice (the moment from the
-    load, then the curvature from the base). Beyond the load the rod is straight.
+    With u = s·x this reads ψ = K g, g = (F_e cos ψ − F_x sin ψ) s²/EI, where K integrates twice
+    (the moment from the load, then the curvature from the base). Beyond the load the rod is
+    straight.
     """
 
     def __init__(self, rod: Rod, nodes: int = 0):
@@ -68,67 +83,67 @@ class Elastica:
     def solve(
         self, force_x_N: float, force_e_N: float, arc_mm: float, guess: np.ndarray | None = None
     ) -> Bent:
-        """Equilibrium under a force (along the clamped tangent, across it) at arc length.
+        """Find the equilibrium under a force (along the clamped tangent, across it) at arc length.
 
-        Raises ArithmeticError where Newton's method does not settle (loads far past buckling with no guess nearby).
+        guess (n,): angles at the nodes to start from. Raises ArithmeticError where Newton's method
+        does not converge (loads far past buckling with no guess nearby).
         """
         scale = arc_mm**2 / self.rod.rigidity_Nmm2
         twice, twice_by_arc = self._double_integral(arc_mm)
         angle = np.zeros(len(self.nodes.at)) if guess is None else guess
-        for _ in range(40):
-            cos, sin = np.cos(angle), np.sin(angle)
+        identity = np.eye(len(angle))
+        for _ in range(_MOST_STEPS):
+            cos = np.cos(angle)
+            sin = np.sin(angle)
             load = scale * (force_e_N * cos - force_x_N * sin)
-            matrix = np.eye(len(angle)) + twice * (scale * (force_e_N * sin + force_x_N * cos))
-            step = solved(matrix, twice @ load - angle)
+            jacobian = identity + twice * (scale * (force_e_N * sin + force_x_N * cos))
+            step = linear.solve(jacobian, twice @ load - angle)
             angle = angle + step
-            if np.abs(step).max() < 1e-9:  # quadratic: the next step would be below 1e-16
-                return self._bent(
-                    angle, matrix, twice, twice_by_arc, scale, (force_x_N, force_e_N), arc_mm
-                )
-        raise ArithmeticError(
-            f"no equilibrium found for {force_x_N:.4g}, {force_e_N:.4g} N at {arc_mm:.4g} mm"
-        )
-
-    def _double_integral(self, arc_mm):
-        if self.rod.shape == "cylinder":
-            return self._uniform, None
-        at, base, load = self.nodes.at, self.nodes.from_base, self.nodes.to_load
-        per_mm = self.rod.lost / self.rod.length_mm
-        width = 1 - at * arc_mm * per_mm
-        width[-1] = max(
-            width[-1], 1e-3
-        )  # at the very tip both moment and rigidity vanish; the curvature is finite
-        softness = width**-4.0
-        by_arc = 4 * softness / width * at * per_mm
-        return (base * softness) @ load, (base * by_arc) @ load
-
-    def _bent(self, angle, matrix, twice, twice_by_arc, scale, force, arc_mm):
-        cos, sin = np.cos(angle), np.sin(angle)
-        load = scale * (force[1] * cos - force[0] * sin)
-        sources = np.stack(
-            [-scale * (twice @ sin), scale * (twice @ cos), 2 / arc_mm * (twice @ load)], -1
-        )
-        if twice_by_arc is not None:
-            sources[:, 2] += twice_by_arc @ load
-        angle_by = solved(matrix, sources)
-        unit_end = np.array([self.nodes.weights @ cos, self.nodes.weights @ sin])
-        end_by = arc_mm * np.stack(
-            [-(self.nodes.weights * sin) @ angle_by, (self.nodes.weights * cos) @ angle_by]
-        )
-        end_by[:, 2] += unit_end
-        return Bent(angle, arc_mm, arc_mm * unit_end, end_by, angle[-1], angle_by[-1])
+            if np.abs(step).max() < _LAST_STEP_RAD:
+                break
+        else:
+            raise ArithmeticError(
+                f"no equilibrium found for {force_x_N:.4g}, {force_e_N:.4g} N at {arc_mm:.4g} mm"
+            )
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        load = scale * (force_e_N * cos - force_x_N * sin)
+        residual_by = np.empty((len(angle), 3))  # of ψ by force x, force e, arc at fixed angles
+        residual_by[:, 0] = -scale * (twice @ sin)
+        residual_by[:, 1] = scale * (twice @ cos)
+        residual_by[:, 2] = (2 / arc_mm * twice + twice_by_arc) @ load
+        return self._bent(angle, arc_mm, linear.solve(jacobian, residual_by))
 
     def curve_mm(self, bent: Bent, arc_mm: np.ndarray) -> np.ndarray:
-        """Points (n, 2) of the bent rod at arc lengths (n,), straight beyond the load."""
+        """Return points (n, 2) of the bent rod at arc lengths (n,), straight beyond the load."""
         arc = np.asarray(arc_mm, float)
         within = np.clip(arc / bent.arc_mm, 0, 1)
-        points = bent.arc_mm * np.stack(
-            [self.nodes.from_base @ np.cos(bent.angle), self.nodes.from_base @ np.sin(bent.angle)],
-            -1,
-        )
-        curve = chebyshev.chebval(2 * within - 1, np.linalg.solve(self._values(), points)).T
+        directions = np.stack([np.cos(bent.angle), np.sin(bent.angle)], -1)
+        points = bent.arc_mm * self.nodes.from_base @ directions  # (nodes, 2)
+        coefficients = np.linalg.solve(self.nodes.values, points)
+        curve = chebyshev.chebval(2 * within - 1, coefficients).T
         beyond = np.maximum(arc - bent.arc_mm, 0)[:, None]
         return curve + beyond * np.array([np.cos(bent.slope), np.sin(bent.slope)])
 
-    def _values(self):
-        return chebyshev.chebvander(2 * self.nodes.at - 1, len(self.nodes.at) - 1)
+    def _double_integral(self, arc_mm):
+        """Return K (n, n) for a load at arc length, and its derivative by the arc."""
+        if self.rod.shape == "cylinder":
+            return self._uniform, 0.0
+        nodes = self.nodes
+        loss_per_mm = self.rod.diameter_loss / self.rod.length_mm
+        width = 1 - nodes.at * arc_mm * loss_per_mm
+        width[-1] = max(width[-1], _LEAST_WIDTH)
+        softness = width**-4.0
+        softness_by_arc = 4 * softness / width * nodes.at * loss_per_mm
+        by_arc = (nodes.from_base * softness_by_arc) @ nodes.to_load
+        return (nodes.from_base * softness) @ nodes.to_load, by_arc
+
+    def _bent(self, angle, arc_mm, angle_by):
+        """Return the equilibrium of converged angles (n,) and their derivatives (n, 3)."""
+        weights = self.nodes.weights
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        unit_end = np.array([weights @ cos, weights @ sin])
+        end_by = arc_mm * np.stack([-(weights * sin) @ angle_by, (weights * cos) @ angle_by])
+        end_by[:, 2] += unit_end
+        return Bent(angle, arc_mm, arc_mm * unit_end, end_by, angle[-1], angle_by[-1])

@@ -1,75 +1,103 @@
-"""What friction says of one contact: residuals in the plane that touches the bar, and their derivatives.
+"""The laws of friction at one contact: equations in the tangent plane, and their exact derivatives.
 
-Each law is called with the normal force and its derivatives (4,), the shear force (2,) and the motion of the
-whisker's material (2,) along the bar and round it with theirs (2, 4), and the unknowns beyond the four of the
-contact. It answers with residuals (n,) and their derivatives (n, 4 + beyond).
+A law's `equations(surface, beyond)` returns residuals (n,) and their derivatives (n, 4 + beyond),
+by the four unknowns of the contact and the law's own.
 """
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 GIVE_MM = 1e-5  # a held contact gives way by about this before it slides along the whisker
 
 
+class Surface(NamedTuple):
+    """What a law sees: the normal force, N, the shear force (2,), N, and the motion (2,), mm, of
+    the whisker's material, along the object's axis and round it.
+
+    press_by (4,), shear_by (2, 4), motion_by (2, 4): derivatives by force (3,) and arc length.
+    """
+
+    press: float
+    press_by: np.ndarray
+    shear: np.ndarray
+    shear_by: np.ndarray
+    motion: np.ndarray
+    motion_by: np.ndarray
+
+
 @dataclass(frozen=True)
 class Sliding:
-    """Shear force = −μ · normal force · unit vector at a heading, an unknown of its own; the motion has that heading
-    too.
+    """Shear force = −μ · normal force · unit vector at a heading, which the motion has, too.
+
+    The heading, rad, is an unknown of the law's own.
     """
 
     friction: float
     status = "sliding"
 
-    def __call__(self, press, press_by, shear, shear_by, motion, motion_by, heading):
-        ahead = np.array([math.cos(heading[0]), math.sin(heading[0])])
-        aside = np.array([-ahead[1], ahead[0]])
-        law_by = np.zeros((3, 5))
-        law_by[:2, :4] = shear_by + self.friction * np.outer(ahead, press_by)
-        law_by[:2, 4] = self.friction * press * aside
-        law_by[2, :4], law_by[2, 4] = aside @ motion_by, -ahead @ motion
-        return [*(shear + self.friction * press * ahead), aside @ motion], law_by
+    def equations(self, surface: Surface, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residuals (3,) of shear force and heading, and their derivatives (3, 5)."""
+        (heading,) = beyond
+        forward = np.array([math.cos(heading), math.sin(heading)])
+        sideways = np.array([-forward[1], forward[0]])
+        limit = self.friction * surface.press
+        residual = np.append(surface.shear + limit * forward, sideways @ surface.motion)
+        residual_by = np.empty((3, 5))
+        residual_by[:2, :4] = surface.shear_by + self.friction * np.outer(forward, surface.press_by)
+        residual_by[:2, 4] = limit * sideways
+        residual_by[2, :4] = sideways @ surface.motion_by
+        residual_by[2, 4] = -forward @ surface.motion
+        return residual, residual_by
 
 
 @dataclass(frozen=True)
 class Oiled:
-    """Shear force = −μ · normal force · v/√(v² + give²), v the motion: sliding, softened where the motion is small."""
+    """Shear force = −μ · normal force · v/√(v² + give²), v the motion: sliding, softened where the
+    motion is small."""
 
     friction: float
     give_mm: float
     status = "sliding"
 
-    def __call__(self, press, press_by, shear, shear_by, motion, motion_by, _):
-        soft = math.hypot(*motion, self.give_mm)
-        part = motion / soft
-        part_by = (motion_by - np.outer(part, part @ motion_by)) / soft
-        law = shear + self.friction * press * part
-        return [*law], shear_by + self.friction * (np.outer(part, press_by) + press * part_by)
+    def equations(self, surface: Surface, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residuals (2,) of the shear force, and their derivatives (2, 4)."""
+        length = math.hypot(*surface.motion, self.give_mm)
+        direction = surface.motion / length
+        along = direction @ surface.motion_by
+        direction_by = (surface.motion_by - np.outer(direction, along)) / length
+        residual = surface.shear + self.friction * surface.press * direction
+        friction_by = np.outer(direction, surface.press_by) + surface.press * direction_by
+        return residual, surface.shear_by + self.friction * friction_by
 
 
 @dataclass(frozen=True)
 class Held:
-    """No motion along the bar; round it (along the whisker) a friction μN(1 − x²), x = force along the bar / μN,
-    against the motion.
+    """No motion along the object; round it (along the whisker) a friction μN(1 − x²) against the
+    motion, x = force along the object / μN.
 
-    That is inside the cone, the whole of μN where nothing acts along the bar, and (unlike the cone's own circle)
-    smooth at its end.
+    That is inside the cone, the whole of μN where nothing acts along the object, and (unlike the
+    cone's own circle) smooth at its end.
     """
 
     friction: float
     status = "held"
 
-    def __call__(self, press, press_by, shear, shear_by, motion, motion_by, _):
-        cone = self.friction * press
-        x = shear[0] / cone if cone else 1.0
-        if abs(x) >= 1:
-            return [motion[0], shear[1]], np.stack([motion_by[0], shear_by[1]])
-        soft = math.hypot(motion[1], GIVE_MM)
-        way, way_by = motion[1] / soft, GIVE_MM**2 / soft**3 * motion_by[1]
-        left, left_by = (
-            cone * (1 - x**2),
-            (1 + x**2) * self.friction * press_by - 2 * x * shear_by[0],
-        )
-        law = [motion[0], shear[1] + way * left]
-        return law, np.stack([motion_by[0], shear_by[1] + way * left_by + left * way_by])
+    def equations(self, surface: Surface, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residuals (2,) of motion along and force round the object, and their
+        derivatives (2, 4)."""
+        limit = self.friction * surface.press
+        x = surface.shear[0] / limit if limit else 1.0
+        residual = np.array([surface.motion[0], surface.shear[1]])
+        residual_by = np.stack([surface.motion_by[0], surface.shear_by[1]])
+        if abs(x) < 1:
+            length = math.hypot(surface.motion[1], GIVE_MM)
+            direction = surface.motion[1] / length
+            direction_by = GIVE_MM**2 / length**3 * surface.motion_by[1]
+            left = limit * (1 - x**2)  # what the cone leaves for friction round the object
+            left_by = (1 + x**2) * self.friction * surface.press_by - 2 * x * surface.shear_by[0]
+            residual[1] += direction * left
+            residual_by[1] += direction * left_by + left * direction_by
+        return residual, residual_by

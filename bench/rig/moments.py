@@ -1,11 +1,11 @@
-"""What moves at the instants of one exposure: hubs and whiskers, as many instants as the blur of motion asks for."""
+"""Hubs and whiskers at the instants of one exposure, as many instants as motion blur requires."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from bench.rig.array_rig import ArrayRecording, Mounted
-from bench.rig.bar import unloaded
+from bench.rig.array_rig import ArrayRecording, MountedWhisker
+from bench.rig.bar import unloaded_curve
 from bench.rig.elastic_rod import Rod
 from bench.rig.light import Material
 from bench.rig.marched import MarchedWhisk
@@ -16,96 +16,97 @@ from bench.rig.studio import Moment, Studio
 from bench.rig.tube import Tube
 
 _STATIONS = 257  # of a whisker's axis
+_LEAST_RADIUS_MM = 0.01  # of a whisker in pictures
 
 
-def moments_of(
+def exposure_moments(
     protocol: Protocol,
     studio: Studio,
     recording: Recording,
     whisk: MarchedWhisk,
-    motor: float,
+    motor_rad: float,
     back: bool,
 ) -> list[Moment]:
-    """Instants of one exposure: as many as keep the whisker's tip within half a pixel from one to the next."""
-    turns = _turns(
-        protocol,
-        studio,
-        recording.run.speed_deg_s,
-        recording.rod.length_mm,
-        recording.touch.point_mm,
-    )
-    return [
-        Moment.alone(m, _whisker(whisk, m, back, studio.scene.appearance.wire))
-        for m in (motor + turns).tolist()
-    ]
+    """Return the instants of one exposure: as many as keep the whisker's tip within half a pixel
+    from one to the next."""
+    rod = recording.rod
+    speed_deg_s = recording.run.speed_deg_s
+    near_mm = recording.touch.point_mm
+    arc = _drawn_arcs_mm(rod)
+    moments = []
+    for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, rod.length_mm, near_mm):
+        state = whisk.way(back).state_between(motor_rad + turn)
+        points = whisk.centreline_mm(motor_rad + turn, state, arc)
+        tube = _tube(rod, arc, points, studio.scene.appearance.wire)
+        moments.append(Moment.alone(motor_rad + turn, tube))
+    return moments
 
 
-def moments_of_array(
+def array_exposure_moments(
     protocol: Protocol,
     studio: Studio,
     recording: ArrayRecording,
-    whiskers: Sequence[Mounted],
+    whiskers: Sequence[MountedWhisker],
     time_s: float,
     whisk: int,
 ) -> list[Moment]:
-    """The same of an array, about a time of one of its whisks; `whiskers`: those that were recorded."""
-    longest = max(whisker.rod.length_mm for whisker in whiskers)
-    turns = _turns(protocol, studio, recording.run.speed_deg_s, longest, recording.bar.point_mm)
-    motor = {name: float(stroke.angle_rad(time_s)) for name, stroke in recording.strokes.items()}
-    columns = dict(zip(motor, studio.scene.stands))
-    return [
-        Moment(
-            tuple(stand.hub(motor[name] + turn) for name, stand in columns.items()),
-            tuple(
-                _mounted(
-                    one,
-                    recording,
-                    whisk,
-                    motor[one.column.name] + turn,
-                    studio.scene.appearance.wire,
-                )
-                for one in whiskers
-            ),
-        )
-        for turn in turns.tolist()
-    ]
+    """Return the instants of one exposure of an array, about a time of one of its whisks."""
+    length_mm = max(whisker.rod.length_mm for whisker in whiskers)
+    near_mm = recording.bar.point_mm
+    speed_deg_s = recording.run.speed_deg_s
+    moments = []
+    for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, length_mm, near_mm):
+        motor = {}  # rad, by column
+        hubs = []
+        for stand, (name, stroke) in zip(studio.scene.stands, recording.strokes.items()):
+            motor[name] = float(stroke.angle_rad(time_s)) + turn
+            hubs.append(stand.hub(motor[name]))
+        tubes = []
+        for whisker in whiskers:
+            at_rad = motor[whisker.column.name]
+            tubes.append(
+                _array_tube(whisker, recording, whisk, at_rad, studio.scene.appearance.wire)
+            )
+        moments.append(Moment(tuple(hubs), tuple(tubes)))
+    return moments
 
 
-def _turns(protocol, studio, speed_deg_s, length_mm, near_mm) -> np.ndarray:
-    """By how much the motor has turned, rad, from the middle of an exposure."""
+def _exposure_turns_rad(protocol, studio, speed_deg_s, length_mm, near_mm) -> list[float]:
+    """Return by how much the motor has turned since the middle of the exposure, at each
+    instant."""
     pictures = protocol.pictures
     swept = np.radians(speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0
     near = np.linalg.norm(studio.camera.centre_mm - near_mm)
     count = 1 + int(2 * swept * length_mm * studio.camera.matrix[0, 0] / near)
-    return swept * ((np.arange(count) + 0.5) / count - 0.5)
+    return (swept * ((np.arange(count) + 0.5) / count - 0.5)).tolist()
 
 
-def _whisker(whisk: MarchedWhisk, motor: float, back: bool, material: Material) -> Tube:
-    arc = _arcs(whisk.rod)
-    return _tube(
-        whisk.rod,
-        arc,
-        whisk.centreline_mm(motor, whisk.way(back).state_between(motor), arc),
-        material,
-    )
-
-
-def _mounted(
-    whisker: Mounted, recording: ArrayRecording, whisk: int, motor: float, material: Material
+def _array_tube(
+    whisker: MountedWhisker,
+    recording: ArrayRecording,
+    whisk: int,
+    motor_rad: float,
+    material: Material,
 ) -> Tube:
-    """A whisker of an array in the rig frame; straight where it touches nothing in its trial."""
-    one, arc = recording.recordings[whisker.name], _arcs(whisker.rod)
-    if one is None:
-        points = unloaded(whisker.rod, motor, arc)[0]
+    """Return a whisker of an array in the rig frame; unloaded where it touches nothing in its
+    trial."""
+    arc = _drawn_arcs_mm(whisker.rod)
+    own = recording.recordings[whisker.name]
+    if own is None:
+        points, _ = unloaded_curve(whisker.rod, motor_rad, arc)
     else:
-        marched = one.whisks[whisk]
-        points = marched.centreline_mm(motor, marched.forward.state_between(motor), arc)
-    return _tube(whisker.rod, arc, points @ whisker.pose[:, :3].T + whisker.pose[:, 3], material)
+        marched = own.whisks[whisk]
+        state = marched.forward.state_between(motor_rad)
+        points = marched.centreline_mm(motor_rad, state, arc)
+    points = points @ whisker.pose[:, :3].T + whisker.pose[:, 3]
+    return _tube(whisker.rod, arc, points, material)
 
 
-def _arcs(rod: Rod) -> np.ndarray:
+def _drawn_arcs_mm(rod: Rod) -> np.ndarray:
+    """Return the arc lengths of a whisker that are drawn: those in front of the hub."""
     return np.linspace(HUB_FRONT_MM, rod.length_mm, _STATIONS)
 
 
 def _tube(rod: Rod, arc: np.ndarray, points: np.ndarray, material: Material) -> Tube:
-    return Tube(points, np.maximum(rod.radius_mm(arc), 0.01), material)
+    """Return the tube about points (n, 3) at arc lengths (n,)."""
+    return Tube(points, np.maximum(rod.radius_mm(arc), _LEAST_RADIUS_MM), material)

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from bench.rig.bar import Bar, turned
+from bench.rig.bar import Bar
 from bench.rig.box import Box
 from bench.rig.layer import Occluder, draw_layers
 from bench.rig.light import Light, Material
+from bench.rig.linear import rotate_about_z
 from bench.rig.pinhole import Camera
 from bench.rig.plate import Plate, Print
 from bench.rig.printed_board import Board, Ink, marker_print
 from bench.rig.rays import unit
-from bench.rig.round_objects import Ring
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
@@ -85,7 +85,7 @@ class Stand:
 
     def hub(self, motor_rad: float) -> Box:
         """Return the hub at a motor angle."""
-        axes = self.pose[:, :3] @ turned(np.eye(3), motor_rad).T
+        axes = self.pose[:, :3] @ rotate_about_z(np.eye(3), motor_rad).T
         return Box(self.low_mm, self.high_mm, axes, self.pose[:, 3], 0.05, self.has_marker)
 
     def posts(self, appearance: Appearance) -> list[Tube]:
@@ -153,7 +153,7 @@ class Scene:
         """
         light = self.appearance.light
         self._draw_posts(window, radiance)
-        held = held_mm(thing)
+        held = thing.support_mm()
         rod = Tube.straight(held, held + _ROD_MM * _AWAY, _ROD_RADIUS_MM, self.appearance.dark)
         board = self._board_plate(self.T_rig_board)
         layers = []
@@ -217,16 +217,6 @@ class Scene:
         px = [camera.project(hub.corners_mm()) for hub in hubs]
         px += [whisker.silhouette(camera).reshape(-1, 2) for whisker in whiskers]
         return np.concatenate(px)
-
-
-def held_mm(thing: Bar) -> np.ndarray:
-    """Return the point (3,) at which a rod holds an object.
-
-    It holds a ring at its farthest from the base along the rig's y, others in their middle.
-    """
-    if not isinstance(thing, Ring):
-        return thing.point_mm
-    return thing.point_mm + thing.ring_radius_mm * unit(_AWAY - thing.axis[1] * thing.axis)
 
 
 def _block(bar: Bar, middle_mm: np.ndarray) -> Box:

@@ -1,4 +1,4 @@
-"""The parts of a session: each a folder, made by itself from the protocol and a random stream of its own."""
+"""The parts of a session: folders, each made from the protocol and a random stream of its own."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from bench.rig import boards, build, papers
+from bench.rig import boards, build, papers, truth_files
 from bench.rig.album import write_frames, write_picture
-from bench.rig.array_rig import ArrayRecording, Mounted, mounted
-from bench.rig.moments import moments_of, moments_of_array
+from bench.rig.array_rig import ArrayRecording, MountedWhisker, mount_whiskers
+from bench.rig.moments import array_exposure_moments, exposure_moments
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 from bench.rig.studio import Studio
@@ -29,12 +29,18 @@ class Job:
     signals_only: bool
 
     def stream(self, *words: int) -> np.random.Generator:
-        """A generator of its own for each piece of work, so that the order of the work does not matter."""
+        """Return a generator of its own for each piece of work, so that the order of the work does
+        not matter."""
         return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
 
+    @property
+    def has_pictures(self) -> bool:
+        """Return whether cameras take pictures."""
+        return bool(self.protocol.cameras) and not self.signals_only
+
     def parts(self) -> Iterator["Part"]:
-        """Boards first, then trials."""
-        if not self.signals_only and self.protocol.cameras:
+        """Yield boards first, then trials."""
+        if self.has_pictures:
             yield Part("rig", 0, self.session / "boards" / "rig")
             for i, camera in enumerate(self.protocol.cameras):
                 yield Part("board", i, self.session / "boards" / camera.name)
@@ -42,27 +48,28 @@ class Job:
             yield Part("trial", i, self.session / "trials" / run.name)
 
     def papers(self) -> dict[str, str]:
-        """The session's own text files."""
+        """Return the session's own text files by name."""
         stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
         return {
             "session.toml": papers.session_toml(self.protocol, stated, self.whiskers),
-            "truth.json": papers.truth_json(self.protocol, self.seed, self.whiskers),
+            "truth.json": truth_files.truth_json(self.protocol, self.seed, self.whiskers),
         }
 
     @cached_property
-    def whiskers(self) -> list[Mounted]:
-        """Of an array; none where there is one whisker at the origin."""
-        return mounted(self.protocol, self.stream(_ARRAY)) if self.protocol.columns else []
+    def whiskers(self) -> list[MountedWhisker]:
+        """Return the whiskers of an array; none where there is one whisker at the origin."""
+        return mount_whiskers(self.protocol, self.stream(_ARRAY)) if self.protocol.columns else []
 
     @cached_property
     def studios(self) -> list[Studio]:
-        """The cameras with their backdrops, kept while a process works on one session."""
+        """Return the cameras with their backdrops, kept while a process works on one session."""
         return _studios(msgspec.json.encode(self.protocol))
 
 
 @dataclass(frozen=True)
 class Part:
-    """A "rig" picture a camera, the "board" views of one camera, or one "trial"; and the folder it fills."""
+    """A "rig" picture a camera, the "board" views of one camera, or one "trial"; and the folder it
+    fills."""
 
     kind: str
     number: int
@@ -70,116 +77,120 @@ class Part:
 
     def write(self, job: Job, folder: Path) -> None:
         """Fill a folder. Raises ArithmeticError where a trial's whisker cannot go on."""
-        trial = _array_trial if job.whiskers else _trial
-        {"rig": _rig_views, "board": _board_views, "trial": trial}[self.kind](
-            job, self.number, folder
-        )
+        if self.kind == "rig":
+            _write_rig_views(job, folder)
+        elif self.kind == "board":
+            _write_board_views(job, self.number, folder)
+        elif job.whiskers:
+            _write_array_trial(job, self.number, folder)
+        else:
+            _write_trial(job, self.number, folder)
 
 
 @lru_cache(maxsize=2)
 def _studios(protocol_json):
+    """Return the studio of each camera of a protocol."""
     protocol = msgspec.json.decode(protocol_json, type=Protocol)
-    scene, sensor = build.scene(protocol), build.sensor(protocol)
+    scene = build.scene(protocol)
+    sensor = build.sensor(protocol)
     return [Studio(camera, scene, sensor) for camera in build.cameras(protocol)]
 
 
-def _rig_views(job, _, folder):
+def _write_rig_views(job, folder):
+    """Write a picture of the board on the rig a camera."""
     for i, studio in enumerate(job.studios):
         picture = studio.sensor.expose(studio.rig_brightness(), job.stream(_RIG, i))
         write_picture(folder / f"{studio.camera.name}.png", picture)
 
 
-def _board_views(job, number, folder):
-    studio, board = job.studios[number], build.board(job.protocol)
-    poses = boards.poses(
-        board, studio.camera, job.protocol.board.views, job.stream(_BOARDS, number)
-    )
+def _write_board_views(job, number, folder):
+    """Write the views of the board for the lens of one camera."""
+    studio = job.studios[number]
+    count = job.protocol.board.views
+    kind = job.protocol.pictures.still
+    rng = job.stream(_BOARDS, number)
+    poses = boards.draw_poses(build.board(job.protocol), studio.camera, count, rng)
     for i, pose in enumerate(poses):
-        picture = studio.sensor.expose(
-            studio.board_brightness(pose), job.stream(_BOARDS, number, i + 1)
-        )
-        write_picture(folder / f"{i:02d}.{job.protocol.pictures.still}", picture)
+        brightness = studio.board_brightness(pose)
+        picture = studio.sensor.expose(brightness, job.stream(_BOARDS, number, i + 1))
+        write_picture(folder / f"{i:02d}.{kind}", picture)
 
 
-def _trial(job, number, folder):
-    run, pictures = job.protocol.runs()[number], job.protocol.pictures
+def _write_trial(job, number, folder):
+    """Write the files of a trial of one whisker."""
+    run = job.protocol.runs()[number]
     recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
+    clock_offset_s = job.protocol.pictures.clock_offset_s
     texts = {
         "trial.toml": papers.trial_toml(recording),
         "signals.csv": papers.signals_csv(recording),
-        "frames.csv": papers.frames_csv(recording.frames.time_s, pictures.clock_offset_s),
-        "truth.csv": papers.truth_csv(recording),
-        "truth.toml": papers.truth_toml(recording),
+        "frames.csv": papers.frames_csv(recording.frames.time_s, clock_offset_s),
+        "truth.csv": truth_files.truth_csv(recording),
+        "truth.toml": truth_files.truth_toml(recording),
     }
-    for name, text in texts.items():
-        papers.write(folder / name, text)
-    if job.signals_only or not job.protocol.cameras:
-        return
-    for i, studio in enumerate(job.studios):
-        write_frames(
-            folder, studio.camera.name, pictures.moving, frames_of(job, number, i, recording)
-        )
+    _write_files(job, folder, texts, lambda i: render_frames(job, number, i, recording))
 
 
-def _array_trial(job, number, folder):
-    run, streams = job.protocol.runs()[number], [job.stream(_TRIAL, number)]
+def _write_array_trial(job, number, folder):
+    """Write the files of a trial of an array."""
+    streams = [job.stream(_TRIAL, number)]
     streams += [job.stream(_ARRAY, number, whisker) for whisker in range(len(job.whiskers))]
+    run = job.protocol.runs()[number]
     recording = ArrayRecording.make(job.protocol, run, job.whiskers, streams)
-    seen, clock_offset_s = (
-        bool(job.protocol.cameras) and not job.signals_only,
-        job.protocol.pictures.clock_offset_s,
-    )
+    clock_offset_s = job.protocol.pictures.clock_offset_s
+    times_s = np.concatenate(recording.frame_times_s)
     texts = {
-        "trial.toml": papers.array_trial_toml(recording, says_where=not seen),
+        "trial.toml": papers.array_trial_toml(recording, says_where=not job.has_pictures),
         "signals.csv": papers.array_signals_csv(recording),
-        "frames.csv": papers.frames_csv(np.concatenate(recording.frame_times_s), clock_offset_s),
+        "frames.csv": papers.frames_csv(times_s, clock_offset_s),
     }
-    for name, one in recording.recordings.items():
-        if one is not None:
-            texts |= {
-                f"truth@{name}.csv": papers.truth_csv(one),
-                f"truth@{name}.toml": papers.truth_toml(one),
-            }
+    for name, own in recording.recordings.items():
+        if own is not None:
+            texts[f"truth@{name}.csv"] = truth_files.truth_csv(own)
+            texts[f"truth@{name}.toml"] = truth_files.truth_toml(own)
+    _write_files(job, folder, texts, lambda i: render_array_frames(job, number, i, recording))
+
+
+def _write_files(job, folder, texts, render):
+    """Write text files, and the frames that `render` yields of each camera."""
     for name, text in texts.items():
         papers.write(folder / name, text)
-    for i, studio in enumerate(job.studios if seen else ()):
-        frames = array_frames_of(job, number, i, recording)
-        write_frames(folder, studio.camera.name, job.protocol.pictures.moving, frames)
+    if job.has_pictures:
+        for i, studio in enumerate(job.studios):
+            write_frames(folder, studio.camera.name, job.protocol.pictures.moving, render(i))
 
 
-def frames_of(job: Job, trial: int, camera: int, recording: Recording) -> Iterator[np.ndarray]:
-    """Frames of one camera, over all whisks of a trial, as the sensor gives them."""
-    studio, frames, bar = job.studios[camera], recording.frames, recording.bar
+def render_frames(job: Job, trial: int, camera: int, recording: Recording) -> Iterator[np.ndarray]:
+    """Yield the frames of one camera, over all whisks of a trial, as the sensor gives them."""
+    studio = job.studios[camera]
+    bar = recording.bar
     middle = bar.foot_mm(recording.touch.point_mm)
     still = studio.setting(bar, middle) if bar.velocity_mm_rad is None else None
-    for number, (_, motor, which, back) in enumerate(frames):
+    for number, (_, motor_rad, which, back) in enumerate(recording.frames):
         whisk = recording.whisks[which]
-        moments, gave = (
-            moments_of(job.protocol, studio, recording, whisk, motor, back),
-            whisk.gave_mm(motor, back),
-        )
+        moments = exposure_moments(job.protocol, studio, recording, whisk, motor_rad, back)
+        gave = whisk.gave_mm(motor_rad, back)
         setting = still
         if still is None or gave.any():
-            moved = bar.moved_mm(motor) + gave
-            setting = studio.setting(bar.at(motor).given(gave), middle + moved)
-        yield studio.sensor.expose(
-            setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number)
-        )
+            moved = bar.moved_mm(motor_rad) + gave
+            setting = studio.setting(bar.shift(moved), middle + moved)
+        noise = job.stream(_TRIAL, trial, camera + 1, number)
+        yield studio.sensor.expose(setting.brightness(moments), noise)
 
 
-def array_frames_of(
+def render_array_frames(
     job: Job, trial: int, camera: int, recording: ArrayRecording
 ) -> Iterator[np.ndarray]:
-    """As `frames_of`, of an array's trial."""
+    """Yield the frames of one camera, over all whisks of an array's trial, as the sensor gives
+    them."""
     studio = job.studios[camera]
     setting = studio.setting(recording.bar, recording.bar.point_mm)
-    times = (
-        (time_s, whisk)
-        for whisk, times in enumerate(recording.frame_times_s)
-        for time_s in times.tolist()
-    )
-    for number, (time_s, whisk) in enumerate(times):
-        moments = moments_of_array(job.protocol, studio, recording, job.whiskers, time_s, whisk)
-        yield studio.sensor.expose(
-            setting.brightness(moments), job.stream(_TRIAL, trial, camera + 1, number)
-        )
+    number = 0
+    for whisk, times_s in enumerate(recording.frame_times_s):
+        for time_s in times_s.tolist():
+            moments = array_exposure_moments(
+                job.protocol, studio, recording, job.whiskers, time_s, whisk
+            )
+            noise = job.stream(_TRIAL, trial, camera + 1, number)
+            yield studio.sensor.expose(setting.brightness(moments), noise)
+            number += 1

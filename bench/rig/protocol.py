@@ -1,290 +1,72 @@
-"""A rig and what is to be recorded on it, as a TOML file describes them. Every key has a default; unknown keys are
-refused.
-"""
+"""A rig and what is to be recorded on it, as a TOML file describes them."""
 
 import hashlib
 import itertools
 import tomllib
+from collections import Counter
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
 from bench.base.errors import BadInput
 from bench.rig.feasible import check_protocol
+from bench.rig.protocol_tables import (
+    BoardTable,
+    CameraTable,
+    ColumnTable,
+    FrictionTable,
+    GaugesTable,
+    LightTable,
+    LoadCellTable,
+    MotorTable,
+    PicturesTable,
+    Positive,
+    ProtocolTable,
+    TrialTable,
+    WhiskerTable,
+)
 
-Three = tuple[float, float, float]
-Pair = tuple[float, float]
-Size = tuple[int, int]
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Zero = Annotated[float, msgspec.Meta(ge=0)]
-Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_.-]+$")]
 FOLDER = Path(__file__).with_name("protocols")
 
 
-class ProtocolTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One table of a protocol file."""
-
-
-class WhiskerTable(ProtocolTable):
-    """[whisker] of a protocol."""
-
-    shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
-    length_mm: Positive = 100.0
-    diameter_mm: Positive = 1.0
-    tip_diameter_mm: Positive | None = None  # of "tapered"
-    youngs_modulus_GPa: Positive = 60.0
-    density_kg_m3: Positive = 6450.0
-    sag_mm: float = 0.0  # the tip's drop under its own weight
-    set_y_mm: float = 0.0  # the tip's departure by the curvature that spool wire keeps
-    set_z_mm: float = 0.0
-
-
-class BoardTable(ProtocolTable):
-    """[board] of a protocol."""
-
-    squares: Size = (8, 6)
-    square_mm: Positive = 15.0
-    marker_mm: Positive = 11.0
-    dictionary: str = "DICT_5X5_100"
-    legacy: bool = False
-    inverted: bool = False
-    views: Annotated[int, msgspec.Meta(ge=1)] = 14  # pictures a camera for its lens
-    origin_mm: Three = (4.2, 38.9, -44.4)  # of the board on the rig
-    turn_deg: float = 4.0  # about the rig's z
-    tilt_deg: Pair = (0.15, 1.05)  # about the board's x and y
-    pose_sigma_mm: Zero = 0.0  # error of the T_rig_board that session.toml states
-    pose_sigma_deg: Zero = 0.0
-
-
-class CameraTable(ProtocolTable, kw_only=True):
-    """One [[cameras]] of a protocol."""
-
-    name: Name
-    position_mm: Three | None = None  # `plan` looks for a place where there is none
-    target_mm: Three = (55.0, 0.0, 0.0)
-    roll_deg: float = 0.0
-    focal_px: Positive = 2000.0
-    focal_mm: Positive | None = None  # instead of focal_px, with pixel_um
-    pixel_um: Positive | None = None
-    aspect: Positive = 1.0012
-    size_px: Size = (1280, 720)
-    centre_px: Pair | None = None
-    distortion: tuple[float, float, float, float, float] = (-0.1, 0.1, 0.0, 0.0, 0.0)
-
-    @property
-    def focal(self) -> float:
-        """Focal length, px."""
-        return (
-            1000.0 * self.focal_mm / self.pixel_um
-            if self.focal_mm and self.pixel_um
-            else self.focal_px
-        )
-
-
-class LightTable(ProtocolTable):
-    """[light] of a protocol."""
-
-    towards: Three = (-0.3, -0.5, 0.8)  # direction of the lamp
-    lamp: Zero = 0.55
-    soft: Zero = 0.35  # light from all round, in parts of full scale
-    paper: Zero = 0.75
-    ink: Zero = 0.04
-    floor: Zero = 0.2
-    wall: Zero = 0.36
-    wire_matt: Zero = 0.25
-    wire_shiny: Zero = 0.5
-    wire_gloss: Positive = 18.0
-    wire_rim: Zero = 0.3  # 0: no darkening towards the edges
-    bar_matt: Zero = 0.22
-    bar_shiny: Zero = 0.6
-    bar_gloss: Positive = 12.0
-    bar_rim: Zero = 0.5
-
-
-class PicturesTable(ProtocolTable):
-    """[pictures] of a protocol."""
-
-    format: Literal["jpg", "png", "mkv"] = "jpg"  # JPEG quality 95, PNG, lossless FFV1
-    bits: Literal[8, 12, 16] = 8
-    blur_px: Annotated[float, msgspec.Meta(ge=0.3, le=6)] = 0.9  # sigma of lens and defocus
-    vignetting: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.15
-    read_noise: Zero = 0.8  # grey levels of 255
-    shot_noise: Zero = 0.4  # of one level
-    grain: Zero = 0.055  # in parts of the level
-    exposure_s: Zero = 0.001
-    motion_blur: bool = True
-    before_deg: Zero = 1.6  # frames of a whisk: from before touch …
-    after_deg: Zero = 4.6  # … to after it
-    step_deg: Positive = 0.5
-    rate_Hz: Positive | None = None  # instead of step_deg
-    back_stroke: bool = False  # frames on the way back too
-    clock_offset_s: float = 0.0  # frames.csv runs behind the signals by this
-
-    @property
-    def moving(self) -> str:
-        """Kind of a trial's frames: PNG where JPEG and film cannot hold the bits."""
-        return "png" if self.bits > 8 else self.format
-
-    @property
-    def still(self) -> str:
-        """Kind of single pictures."""
-        return "png" if self.moving == "mkv" else self.moving
-
-    def frame_angles_deg(self, speed_deg_s: float) -> list[float]:
-        """Pushing angles of the frames of one stroke."""
-        step = speed_deg_s / self.rate_Hz if self.rate_Hz else self.step_deg
-        count = int((self.before_deg + self.after_deg) / step + 1e-9) + 1
-        return [i * step - self.before_deg for i in range(count)]
-
-    def frames_a_whisk(self, speed_deg_s: float) -> int:
-        """The furthest angle once, the others on both ways where the way back is seen."""
-        count = len(self.frame_angles_deg(speed_deg_s))
-        return 2 * count - 1 if self.back_stroke else count
-
-
-class MotorTable(ProtocolTable):
-    """[motor] of a protocol."""
-
-    before_deg: Zero = 1.605  # the stroke: from before touch …
-    after_deg: Zero = 4.6  # … to after it
-    ramp_s: Zero = 0.0  # to reach the speed and to lose it again
-    pause_s: Zero = 0.0  # at either end
-    back_stroke: bool = False  # recorded too; where there are several whisks it always is
-    encoder_step_deg: Zero = 0.005  # 0: no steps
-
-
-class FrictionTable(ProtocolTable):
-    """[friction] of a protocol."""
-
-    scatter: Zero = 0.0  # sigma of each whisk's coefficients, in parts of them
-    irregular: Zero = 0.0  # sigma (of a log-normal) of how much of its excess over motion each single rest reaches
-    finest_deg: Positive = 0.05  # teeth of stick–slip below this are not resolved
-
-
-class GaugesTable(ProtocolTable):
-    """[gauges] of a protocol."""
-
-    matrix_Nmm_per_V: tuple[Pair, Pair] = ((11.3, 0.32), (-0.25, 10.5))
-    offset_V: Pair = (-0.015, -0.026)
-    noise_V: Zero = 0.0064
-    hum_V: Zero = 0.0023
-    hum_Hz: Positive = 58.0
-    drift_V_per_s: float = 0.0
-    filter_Hz: Zero = 800.0  # 0: no filter
-    rate_Hz: Positive = 2000.0
-    adc_bits: Annotated[int, msgspec.Meta(ge=0, le=24)] = 16  # 0: no steps
-    range_V: Positive = 10.0
-    vibration: bool = False
-    damping: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 0.02
-    known: bool = False  # written into session.toml
-
-
-class LoadCellTable(ProtocolTable):
-    """[load_cell] of a protocol: the force at the base is recorded too. Sampled and filtered as the gauges."""
-
-    noise_N: Zero = 0.003  # of a six-axis cell of 17 mm: resolution as its maker states it, 1/320 N
-    hum_N: Zero = 0.0
-    hum_Hz: Positive = 58.0
-    drift_N_per_s: float = 0.0
-    step_N: Zero = 0.0  # of its converter; 0: none
-
-
-class ColumnTable(ProtocolTable, kw_only=True):
-    """One [[columns]] of a protocol: a motor and its whiskers, one a height along its axis, named <name>1, <name>2 …"""
-
-    name: Name = "w"
-    base_mm: Three = (0.0, 0.0, 0.0)  # of height 0, rig frame
-    base_deg: Three = (0.0, 0.0, 0.0)  # turned about the rig's x, then y, then z
-    heights_mm: Annotated[list[float], msgspec.Meta(min_length=1)]
-    length_mm: Positive | list[Positive] | None = (
-        None  # one of all, or one a height; by default [whisker]'s
-    )
-    diameter_mm: Positive | list[Positive] | None = None
-    gauge_scatter: Zero = 0.03  # sigma of each whisker's own coefficients, in parts of [gauges]'
-
-
-def _many(value):
-    return value if isinstance(value, list) else [value]
-
-
-class TrialTable(ProtocolTable):
-    """Trials with every combination of the listed values."""
-
-    surface: Name = "steel"
-    beta_deg: float | list[float] = 0.0
-    psi_deg: float | list[float] = 0.0
-    d_x_mm: float | list[float] = 60.0
-    speed_deg_s: float | list[float] = 10.0
-    friction: Zero = 0.185339  # kinetic
-    static_friction: Zero | None = None  # by default the kinetic one
-    bar_diameter_mm: Positive | None = None
-    before_deg: Positive | None = None  # the stroke's, where it is not the motor's
-    after_deg: Positive | None = None
-    whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
-    repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
-    stiffness_N_mm: Positive | None = (
-        None  # of the bar's surface, which gives way; by default it is rigid
-    )
-    # Absent where not given, so that protocols without them stay what they were:
-    object: Literal["ring", "sphere", "cone"] | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # by default a straight bar
-    ring_diameter_mm: Positive | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # of the circle that a ring's axis is
-    cone_half_angle_deg: Positive | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # between a cone's axis and its surface
-    both_ways: bool | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # the way back is recorded, and to be evaluated
-    object_velocity_mm_s: Three | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # of the bar, rig frame; by default it stands
-    object_velocity_sigma_mm_s: Zero | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # of what trial.toml states of it, each way
-    purpose: Literal["measure", "gauge"] = "measure"
-    follicle_roll_deg: float = 0.0
-    name: str = ""
-    # Sigmas of what the bench's people set against what they wanted:
-    beta_scatter_deg: Zero = 0.4
-    d_x_scatter_mm: Zero = 0.4
-    psi_scatter_deg: Zero = 0.0
-    touch_deg: float = 2.3
-    touch_scatter_deg: Zero = 0.07
-
-
 class Protocol(ProtocolTable, kw_only=True):
-    """A session to be simulated."""
+    """A session to be simulated.
+
+    load_cell: without it there are no channels of one. columns: of an array; without any there is
+    one whisker at the origin.
+    """
 
     name: str = "synthetic"
     whisker: WhiskerTable = WhiskerTable()
     bar_diameter_mm: Positive = 6.0
     board: BoardTable = BoardTable()
-    cameras: list[CameraTable] = []
+    cameras: list[CameraTable] = msgspec.field(default_factory=list)
     light: LightTable = LightTable()
     pictures: PicturesTable = PicturesTable()
     motor: MotorTable = MotorTable()
     friction: FrictionTable = FrictionTable()
     gauges: GaugesTable = GaugesTable()
-    load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET  # none, and no channels of it
-    columns: list[ColumnTable] | msgspec.UnsetType = (
-        msgspec.UNSET
-    )  # an array's; without any, one whisker at the origin
+    load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET
+    columns: list[ColumnTable] | msgspec.UnsetType = msgspec.UNSET
     trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
 
     def runs(self) -> list["Run"]:
-        """The trials one by one."""
-        runs = [run for table in self.trials for run in _runs(table, self.motor)]
-        return [
-            msgspec.structs.replace(run, name=name)
-            for run, name in zip(runs, _distinct([r.name for r in runs]))
-        ]
+        """Return the trials one by one, their names numbered where several are alike."""
+        runs = []
+        for table in self.trials:
+            runs += _table_runs(table, self.motor)
+        totals = Counter(run.name for run in runs)
+        counts = Counter()
+        named = []
+        for run in runs:
+            counts[run.name] += 1
+            number = f"_{counts[run.name]}" if totals[run.name] > 1 else ""
+            named.append(msgspec.structs.replace(run, name=run.name + number))
+        return named
 
     def goes_back(self, run: "Run") -> bool:
-        """Whether a trial's recording holds back strokes."""
+        """Return whether a trial's recording holds back strokes."""
         return (
             run.table.whisks > 1
             or bool(run.table.both_ways)
@@ -293,7 +75,7 @@ class Protocol(ProtocolTable, kw_only=True):
         )
 
     def fingerprint(self) -> str:
-        """Changes with any value."""
+        """Return a hash that changes with any value."""
         return hashlib.sha256(msgspec.json.encode(self)).hexdigest()
 
 
@@ -310,43 +92,42 @@ class Run(msgspec.Struct, frozen=True):
     table: TrialTable
 
 
-def _runs(table, motor):
-    combinations = itertools.product(
-        *map(_many, (table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm))
-    )
-    for (speed, beta, psi, d_x), _ in itertools.product(combinations, range(table.repeats)):
+def _table_runs(table, motor) -> list[Run]:
+    """Return the trials of one table."""
+    before_deg = table.before_deg or motor.before_deg
+    after_deg = table.after_deg or motor.after_deg
+    values = [table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm]
+    lists = [value if isinstance(value, list) else [value] for value in values]
+    runs = []
+    for speed, beta, psi, d_x, _ in itertools.product(*lists, range(table.repeats)):
         name = table.name or ("gauge" if table.purpose == "gauge" else table.surface)
         if table.purpose == "gauge":
-            name = f"{name}_roll{table.follicle_roll_deg:g}"
+            name += f"_roll{table.follicle_roll_deg:g}"
         else:
-            name += f"_b{beta:02g}" + (f"_psi{psi:g}" if psi else "") + f"_v{speed:g}"
-        before, after = table.before_deg or motor.before_deg, table.after_deg or motor.after_deg
-        yield Run(name, beta, psi, d_x, speed, before, after, table)
-
-
-def _distinct(names):
-    """The names, numbered where they are used more than once."""
-    counts = {}
-    for name in names:
-        counts[name] = counts.get(name, 0) + 1
-        yield name if names.count(name) == 1 else f"{name}_{counts[name]}"
+            tilt = f"_psi{psi:g}" if psi else ""
+            name += f"_b{beta:02g}{tilt}_v{speed:g}"
+        runs.append(Run(name, beta, psi, d_x, speed, before_deg, after_deg, table))
+    return runs
 
 
 def load(protocol: str | Path) -> Protocol:
-    """A protocol by its name ("quick", "paper") or from a file. Raises BadInput in one line where it is not one."""
+    """Load a protocol by its name ("quick", "paper") or from a file.
+
+    Raises BadInput in one line where it is not one.
+    """
     path = FOLDER / f"{protocol}.toml"
-    path = path if isinstance(protocol, str) and path.is_file() else Path(protocol)
+    if isinstance(protocol, Path) or not path.is_file():
+        path = Path(protocol)
     try:
         tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        found = msgspec.convert(tables, Protocol)
     except OSError as problem:
-        known = ", ".join(sorted(p.stem for p in FOLDER.glob("*.toml")))
+        known = ", ".join(sorted(built_in.stem for built_in in FOLDER.glob("*.toml")))
         raise BadInput(
             f"cannot be read ({problem.strerror}); the built-in protocols are {known}", file=path
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
         raise BadInput(f"is not TOML: {problem}", file=path) from None
-    try:
-        found = msgspec.convert(tables, Protocol)
     except msgspec.ValidationError as problem:
         raise BadInput(str(problem), file=path) from None
     check_protocol(found, path)

@@ -29,7 +29,7 @@ def to_camera_frame(thing: Bar, rotation: np.ndarray, translation_mm: np.ndarray
     turn = rotation.T
     kinds = {Ring: VisibleRing, Sphere: VisibleSphere, Cone: VisibleCone}
     pose = np.column_stack([turn, -turn @ translation_mm])
-    return kinds[type(thing)](thing.seen_from(pose))
+    return kinds[type(thing)](thing.in_frame(pose))
 
 
 @dataclass(frozen=True, eq=False)

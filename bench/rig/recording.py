@@ -1,42 +1,51 @@
-"""One trial as it is recorded: bar, whisks, frame times, signals. Its pictures are taken from it."""
+"""One trial as it is recorded: object, whisks, frame times and signals; pictures are made from it."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.rig import build
-from bench.rig.bar import Bar, Touch, first_touch, turned
+from bench.rig.bar import Bar, Touch, find_first_touch
 from bench.rig.elastic_rod import Rod
+from bench.rig.force_sensor import sample_forces_N
+from bench.rig.linear import rotate_about_z
 from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import Protocol, Run
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.protocol_tables import GaugesTable
+from bench.rig.round_objects import OBJECTS
 from bench.rig.stick_slip import Friction
-from bench.rig.strain_gauges import Gauges
+from bench.rig.strain_gauges import fine_times_s, sample_times_s, sample_volts
 from bench.rig.stroke import Stroke
+from bench.rig.touched_object import TouchedObject
 
-_STEP_RAD = math.radians(
-    0.1
-)  # rad: half of it changes nothing that is seen (tests/bench/rig/test_contact_march.py)
+# rad: half of it changes nothing that is seen (tests/bench/rig/test_contact_march.py)
+_STEP_RAD = math.radians(0.1)
 _RESTS = 500  # more than a stroke of 25° has teeth of 0.05°
 
 
 @dataclass(frozen=True, eq=False)
+class Whisker:
+    """A whisker with the gauges at its base."""
+
+    rod: Rod
+    gauges: GaugesTable
+
+
+@dataclass(frozen=True, eq=False)
 class Frames:
-    """The middles of the cameras' exposures, over all whisks: times, motor angles, number of the whisk, and whether on
-    its way back.
-    """
+    """The middles of the cameras' exposures, over all whisks, each (n,): times, motor angles,
+    number of the whisk, and whether on its way back."""
 
     time_s: np.ndarray
     motor_rad: np.ndarray
     whisk: np.ndarray
     back: np.ndarray
 
-    def __iter__(self):
-        """(time_s, motor_rad, number of the whisk, back) of each."""
+    def __iter__(self) -> Iterator[tuple[float, float, int, bool]]:
+        """Iterate over (time_s, motor_rad, number of the whisk, back) of each frame."""
         return zip(
             self.time_s.tolist(), self.motor_rad.tolist(), self.whisk.tolist(), self.back.tolist()
         )
@@ -44,12 +53,15 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A trial. `signals` (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too.
-    `stated_velocity_mm_s` (3,): of the bar, as trial.toml has it; None where it stands."""
+    """A trial of one whisker.
+
+    signals (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too.
+    stated_velocity_mm_s (3,): of the object, as trial.toml has it; None where it stands still.
+    """
 
     run: Run
     rod: Rod
-    bar: Bar
+    bar: TouchedObject
     touch: Touch
     stroke: Stroke
     whisks: tuple[MarchedWhisk, ...]
@@ -59,171 +71,170 @@ class Recording:
 
     @classmethod
     def make(cls, protocol: Protocol, run: Run, rng: np.random.Generator) -> "Recording":
-        """The trial that a seeded generator makes of a run. Raises ArithmeticError where the whisker cannot go on."""
-        rod = build.rod(protocol)
-        bar, *near = placed_bar(protocol, run, rod, rng)
-        touch = first_touch(rod, bar, *near)
-        if run.table.object_velocity_mm_s:
-            bar = bar.moving(
-                np.array(run.table.object_velocity_mm_s) / math.radians(run.speed_deg_s),
-                touch.motor_rad,
-            )
-        stroke = _stroke(protocol, run, touch)
-        frames = _frames(protocol, run, touch, stroke)
-        return cls.pushed(
-            protocol, run, rod, bar, touch, stroke, frames, build.gauges(protocol), rng
+        """Simulate a run, the chance in it drawn from `rng`.
+
+        Raises ArithmeticError where the whisker cannot go on.
+        """
+        whisker = Whisker(build.rod(protocol), protocol.gauges)
+        bar, *near = place_object(protocol, run, whisker.rod, rng)
+        touch = find_first_touch(whisker.rod, bar, *near)
+        velocity_mm_s = run.table.object_velocity_mm_s
+        if velocity_mm_s:
+            velocity_mm_rad = np.array(velocity_mm_s) / math.radians(run.speed_deg_s)
+            bar = replace(bar, velocity_mm_rad=velocity_mm_rad, touch_rad=touch.motor_rad)
+        before_rad = math.radians(run.before_deg)
+        after_rad = math.radians(run.after_deg)
+        stroke = plan_stroke(
+            protocol, run, touch.motor_rad - before_rad, touch.motor_rad + after_rad
         )
+        frames = _take_frames(protocol, run, touch, stroke)
+        return cls.record(protocol, run, whisker, bar, touch, stroke, frames, rng)
 
     @classmethod
-    def pushed(
+    def record(
         cls,
         protocol: Protocol,
         run: Run,
-        rod: Rod,
-        bar: Bar,
+        whisker: Whisker,
+        bar: TouchedObject,
         touch: Touch,
         stroke: Stroke,
         frames: Frames,
-        gauges: Gauges,
         rng: np.random.Generator,
     ) -> "Recording":
-        """What a whisker feels on a stroke that takes it to a bar. Raises ArithmeticError as `make`."""
-        frictions = _frictions(protocol, run.table, len(stroke.forward), rng)
-        end_rad, stops_rad = (
-            float(stroke.angles_rad.max()),
-            frames.motor_rad[(frames.whisk == 0) & ~frames.back],
-        )
-        march = partial(
-            MarchedWhisk.run,
-            rod,
-            bar,
-            touch=touch,
-            end_rad=end_rad,
-            step_rad=_STEP_RAD,
-            stops_rad=stops_rad,
-            back=bool(stroke.back),
-        )
-        made = {
-            friction: march(friction) for friction in dict.fromkeys(frictions)
-        }  # whisks of one friction are alike
-        whisks = tuple(made[friction] for friction in frictions)
-        recorded = signals(protocol, run, stroke, whisks, gauges, rng)
-        return cls(
-            run, rod, bar, touch, stroke, whisks, frames, recorded, _stated_velocity(run.table, rng)
-        )
+        """Simulate what a whisker senses on a stroke that takes it to an object.
+
+        Raises ArithmeticError where the whisker cannot go on.
+        """
+        frictions = _draw_frictions(protocol, run, len(stroke.forward), rng)
+        in_first = (frames.whisk == 0) & ~frames.back
+        marched = {}  # whisks of one friction are alike
+        for friction in dict.fromkeys(frictions):
+            marched[friction] = MarchedWhisk.run(
+                whisker.rod,
+                bar,
+                friction,
+                touch,
+                float(stroke.angles_rad.max()),
+                step_rad=_STEP_RAD,
+                stops_rad=frames.motor_rad[in_first],
+                back=bool(stroke.back),
+            )
+        whisks = tuple(marched[friction] for friction in frictions)
+        signals = sample_signals(protocol, run, stroke, whisks, whisker.gauges, rng)
+        velocity = _state_velocity(run, rng)
+        return cls(run, whisker.rod, bar, touch, stroke, whisks, frames, signals, velocity)
 
 
-def placed_bar(
+def place_object(
     protocol: Protocol, run: Run, rod: Rod, rng: np.random.Generator
-) -> tuple[Bar, float, float]:
-    """The bar as people set it, near what they wanted; about the motor angle (rad) and arc (mm) of first touch."""
+) -> tuple[TouchedObject, float, float]:
+    """Place the object as people set it, near what they wanted.
+
+    Returns it, and about the motor angle (rad) and arc (mm) of first touch.
+    """
     table = run.table
-    wanted = (run.beta_deg, run.psi_deg, run.d_x_mm, table.touch_deg)
-    scatter = (
-        table.beta_scatter_deg,
-        table.psi_scatter_deg,
-        table.d_x_scatter_mm,
-        table.touch_scatter_deg,
+    wanted = np.array([run.beta_deg, run.psi_deg, run.d_x_mm, table.touch_deg])
+    scatter = np.array(
+        [
+            table.beta_scatter_deg,
+            table.psi_scatter_deg,
+            table.d_x_scatter_mm,
+            table.touch_scatter_deg,
+        ]
     )
-    beta, psi, d_x, touch = np.array(wanted) + np.array(scatter) * rng.standard_normal(4)
-    whisker = float(rod.radius_mm(min(d_x, rod.length_mm)))
-    bar = Bar.placed(
-        d_x_mm=d_x,
-        beta_rad=math.radians(beta),
-        psi_rad=math.radians(psi),
-        touch_rad=math.radians(touch),
+    beta_deg, psi_deg, d_x_mm, touch_deg = wanted + scatter * rng.standard_normal(4)
+    touch_rad = math.radians(touch_deg)
+    bar = Bar.at_contact(
+        d_x_mm=d_x_mm,
+        beta_rad=math.radians(beta_deg),
+        psi_rad=math.radians(psi_deg),
+        touch_rad=touch_rad,
         radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2,
-        whisker_radius_mm=whisker,
+        whisker_radius_mm=float(rod.radius_mm(min(d_x_mm, rod.length_mm))),
         stiffness_N_mm=table.stiffness_N_mm or math.inf,
     )
-    return _rounded(table, bar, touch, d_x), math.radians(touch), d_x
+    touched_mm = rotate_about_z([d_x_mm, 0.0, 0.0], touch_rad)
+    placed = OBJECTS[table.object or Bar.shape].from_trial(bar, touched_mm, table)
+    return placed, touch_rad, d_x_mm
 
 
-def _rounded(table, bar: Bar, touch_deg: float, d_x_mm: float) -> Bar:
-    """What is touched in the bar's place, at the same point with the same slope."""
-    if table.object == "sphere":
-        return Sphere(bar.point_mm, bar.axis, bar.radius_mm, bar.stiffness_N_mm)
-    touched = turned(np.array([d_x_mm, 0.0, 0.0]), math.radians(touch_deg))
-    if table.object == "cone":
-        return Cone.narrowing(bar, touched, math.radians(table.cone_half_angle_deg))
-    if table.object == "ring":
-        return Ring.bent(bar, touched, 0.5 * table.ring_diameter_mm)
-    return bar
-
-
-def _stated_velocity(table, rng) -> np.ndarray | None:
-    """What people say of a bar that moves."""
-    if not table.object_velocity_mm_s:
-        return None
-    return np.array(table.object_velocity_mm_s) + (
-        table.object_velocity_sigma_mm_s or 0.0
-    ) * rng.standard_normal(3)
-
-
-def _stroke(protocol, run, touch):
-    motor = protocol.motor
-    low, high = (touch.motor_rad + math.radians(a) for a in (-run.before_deg, run.after_deg))
+def plan_stroke(protocol: Protocol, run: Run, low_rad: float, high_rad: float) -> Stroke:
+    """Plan a run's motion between two motor angles."""
     return Stroke.plan(
-        low,
-        high,
+        low_rad,
+        high_rad,
         math.radians(run.speed_deg_s),
         whisks=run.table.whisks,
-        ramp_s=motor.ramp_s,
-        pause_s=motor.pause_s,
+        ramp_s=protocol.motor.ramp_s,
+        pause_s=protocol.motor.pause_s,
         back=protocol.goes_back(run),
     )
 
 
-def _frames(protocol, run, touch, stroke):
-    """The camera is triggered anew in each whisk; on the way back, where that is wanted, at the same angles but the
-    furthest, where the motor may turn.
-    """
-    up = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
-    ways = [(up, False), (up[-2::-1], True)] if protocol.pictures.back_stroke else [(up, False)]
-    taken = [(w, angles, back) for w in range(len(stroke.forward)) for angles, back in ways]
-    return Frames(
-        np.concatenate([stroke.time_s(w, angles, back) for w, angles, back in taken]),
-        np.concatenate([angles for _, angles, _ in taken]),
-        np.concatenate([np.full(len(angles), w) for w, angles, _ in taken]),
-        np.concatenate([np.full(len(angles), back) for _, angles, back in taken]),
-    )
-
-
-def _frictions(protocol, table, count: int, rng) -> list[Friction]:
-    """Friction in each of the whisks."""
-    friction = protocol.friction
-    static = table.friction if table.static_friction is None else table.static_friction
-    factors = np.exp(friction.scatter * rng.standard_normal(count))
-    rests = [_rests(friction.irregular, rng) for _ in factors]
-    finest = math.radians(friction.finest_deg)
-    return [
-        Friction(static * f, table.friction * f, finest, reached)
-        for f, reached in zip(factors, rests)
-    ]
-
-
-def _rests(irregular: float, rng) -> tuple[float, ...]:
-    """How much of its excess each rest of a whisk reaches; nothing is drawn for regular ones."""
-    return tuple(np.exp(irregular * rng.standard_normal(_RESTS)).tolist()) if irregular else (1.0,)
-
-
-def signals(
+def sample_signals(
     protocol: Protocol,
     run: Run,
     stroke: Stroke,
     whisks: Sequence[MarchedWhisk],
-    gauges: Gauges,
+    gauges: GaugesTable,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """What the DAQ writes of a whisker's whisks, as `Recording.signals`; of one that touches nothing without any."""
-    step = protocol.motor.encoder_step_deg
-    fine = gauges.fine_times_s(stroke.end_s)
-    moments = quasi_static_Nmm(stroke, whisks, fine)
-    if protocol.gauges.vibration and whisks:
-        moments += ringing_Nmm(stroke, whisks, fine, protocol.gauges.damping)
-    volts = gauges.volts(moments, math.radians(run.table.follicle_roll_deg), rng)
-    times = gauges.times_s(stroke.end_s)
-    motor = np.degrees(stroke.angle_rad(times))
-    cell = build.load_cell(protocol)
-    forces = [] if cell is None else [cell.forces_N(base_force_N(stroke, whisks, fine), rng)]
-    return np.column_stack([times, np.rint(motor / step) * step if step else motor, volts, *forces])
+    """Return what the DAQ writes, as `Recording.signals`; without whisks, of a whisker that
+    touches nothing."""
+    fine_s = fine_times_s(gauges, stroke.end_s)
+    moments = quasi_static_Nmm(stroke, whisks, fine_s)
+    if gauges.vibration and whisks:
+        moments += ringing_Nmm(stroke, whisks, fine_s, gauges.damping)
+    times_s = sample_times_s(gauges, stroke.end_s)
+    motor_deg = np.degrees(stroke.angle_rad(times_s))
+    step_deg = protocol.motor.encoder_step_deg
+    if step_deg:
+        motor_deg = np.rint(motor_deg / step_deg) * step_deg
+    roll_rad = math.radians(run.table.follicle_roll_deg)
+    columns = [times_s, motor_deg, sample_volts(gauges, moments, roll_rad, rng)]
+    if protocol.load_cell:
+        force_N = base_force_N(stroke, whisks, fine_s)
+        columns.append(sample_forces_N(protocol.load_cell, gauges, force_N, rng))
+    return np.column_stack(columns)
+
+
+def _state_velocity(run, rng) -> np.ndarray | None:
+    """Draw what people say of the velocity (3,), mm/s, of an object that moves."""
+    table = run.table
+    if not table.object_velocity_mm_s:
+        return None
+    sigma = table.object_velocity_sigma_mm_s or 0.0
+    return np.array(table.object_velocity_mm_s) + sigma * rng.standard_normal(3)
+
+
+def _take_frames(protocol, run, touch, stroke) -> Frames:
+    """Trigger the camera anew in each whisk; on the way back, where that is wanted, at the same
+    angles but the furthest, where the motor may turn."""
+    up = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
+    passes = [(up, False)]
+    if protocol.pictures.back_stroke:
+        passes.append((up[-2::-1], True))
+    parts = []  # (4, n): the columns of frames of one way of one whisk
+    for whisk in range(len(stroke.forward)):
+        for angles, back in passes:
+            times = stroke.time_s(whisk, angles, back)
+            constant = np.ones(len(angles))
+            parts.append([times, angles, whisk * constant, back * constant])
+    times, angles, whisks, backs = np.concatenate(parts, axis=1)
+    return Frames(times, angles, whisks.astype(int), backs.astype(bool))
+
+
+def _draw_frictions(protocol, run, count: int, rng) -> list[Friction]:
+    """Draw the friction in each of the whisks; regular rests draw nothing."""
+    table = protocol.friction
+    kinetic = run.table.friction
+    static = kinetic if run.table.static_friction is None else run.table.static_friction
+    frictions = []
+    for factor in np.exp(table.scatter * rng.standard_normal(count)):
+        rests = (1.0,)
+        if table.irregular:
+            rests = tuple(np.exp(table.irregular * rng.standard_normal(_RESTS)).tolist())
+        finest_rad = math.radians(table.finest_deg)
+        frictions.append(Friction(static * factor, kinetic * factor, finest_rad, rests))
+    return frictions

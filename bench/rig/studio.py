@@ -72,7 +72,7 @@ class Studio:
         with a ring, sphere or cone."""
         radiance = self.backdrop.copy()
         occluder = None
-        if type(bar) is Bar:
+        if bar.is_straight:
             self.scene.draw_bar(self.window, radiance, bar, middle_mm)
         else:
             occluder = self.scene.draw_round_object(self.window, radiance, bar)

@@ -1,8 +1,7 @@
-"""The whisker's first bending mode: free, then propped at the bar; rung by the motor's ramps, by touch and by
-stick–slip.
+"""The whisker's first bending mode: free, or propped at the bar; rung by ramps, touch, stick–slip.
 
-Small and linear on top of the quasi-static whisk. What rings is the moment at the base; the pictures' whisker does
-not shake.
+Small and linear on top of the quasi-static whisk. What rings is the moment at the base; the
+whisker in the pictures does not shake.
 """
 
 import math
@@ -11,27 +10,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import eigh, null_space
 
 from bench.rig.elastic_rod import Rod
 
-# Each vanishes at the base with its slope; a unit of length is the whisker's.
+# Polynomials of a mode by parts of the length; each vanishes at the base together with its slope.
 _CLAMPED = [
-    Legendre.basis(k, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1])
-    for k in range(14)
+    Legendre.basis(degree, domain=[0, 1]).convert(kind=Polynomial) * Polynomial([0, 0, 1])
+    for degree in range(14)
 ]
-_BENT = [
-    shape.deriv(2) for shape in _CLAMPED
-]  # their curvatures, by which a vibrating rod bends at its clamp
+_CURVATURES = [shape.deriv(2) for shape in _CLAMPED]  # by which a rod bends at its clamp
 
 
 @dataclass(frozen=True)
 class Mode:
     """A first mode, of unit modal mass (kg m², so that its coordinate is √kg·m).
 
-    `moment_Nmm`: moment on the base for a unit of the mode, of the sign of a push's. `swing`: modal acceleration for a
-    unit of the hub's angular acceleration. `strike`: modal speed for a unit of angular speed that the prop stopped.
-    `push_Nmm`: the quasi-static moment for a radian pushed head-on against the prop. The last two are zero without one.
+    moment_Nmm: moment on the base for a unit of the mode, of the sign of a push's. swing: modal
+    acceleration for a unit of the hub's angular acceleration.
+    strike: modal speed for a unit of angular speed that the prop stopped. push_Nmm: quasi-static
+    moment for a radian pushed head-on against the prop. These two are zero without a prop.
     """
 
     frequency_rad_s: float
@@ -41,59 +40,62 @@ class Mode:
     push_Nmm: float = 0.0
 
     @classmethod
-    def of(cls, rod: Rod, prop_mm: float | None = None) -> "Mode":
-        """Rayleigh–Ritz with polynomials that are clamped at the base, and zero at the prop if there is one."""
+    def solve(cls, rod: Rod, prop_mm: float | None = None) -> "Mode":
+        """Find the mode by Rayleigh–Ritz, with polynomials that are clamped at the base, and zero
+        at the prop if there is one."""
         length = rod.length_mm * 1e-3
-        at, weights = leggauss(64)
-        at, weights = 0.5 * (at + 1), 0.5 * length * weights
+        nodes, weights = leggauss(64)
+        at = 0.5 * (nodes + 1)  # (64,): parts of the length
+        weights = 0.5 * length * weights
         width = rod.width(at * rod.length_mm)
-        mass, stiff = (
-            weights * rod.mass_kg_m * width**2,
-            weights * 1e-6 * rod.rigidity_Nmm2 * width**4,
-        )
-        shape, bend = _values(_CLAMPED, at), _values(_BENT, at) / length**2
-        free = (
-            np.eye(len(_CLAMPED))
-            if prop_mm is None
-            else null_space(_values(_CLAMPED, [prop_mm / rod.length_mm]))
-        )
-        squares, modes = eigh(
-            free.T @ (bend.T * stiff) @ bend @ free,
-            free.T @ (shape.T * mass) @ shape @ free,
-            subset_by_index=[0, 0],
-        )
-        mode = free @ modes[:, 0]
-        at_base = float(_values(_BENT, [0.0])[0] @ mode) / length**2
-        moment, moved = -1e-3 * rod.rigidity_Nmm2 * at_base, mass * (shape @ mode)
-        frequency, swing = math.sqrt(squares[0]), -float(moved @ at) * length
+        mass = weights * rod.mass_kg_m * width**2
+        stiffness = weights * 1e-6 * rod.rigidity_Nmm2 * width**4
+
+        shapes = _evaluate(_CLAMPED, at)  # (64, shapes)
+        curvatures = _evaluate(_CURVATURES, at) / length**2
+        allowed = np.eye(len(_CLAMPED))
+        if prop_mm is not None:
+            allowed = null_space(_evaluate(_CLAMPED, np.array([prop_mm / rod.length_mm])))
+        frequency, mode = _first_mode(shapes @ allowed, curvatures @ allowed, mass, stiffness)
+        mode = allowed @ mode  # (shapes,)
+        momentum = mass * (shapes @ mode)
+        curvature_at_base = float(_evaluate(_CURVATURES, np.zeros(1))[0] @ mode) / length**2
+        moment = -1e-3 * rod.rigidity_Nmm2 * curvature_at_base
+        swing = -float(momentum @ at) * length
         if prop_mm is None:
             return cls(frequency, moment, swing)
-        lag_mm, push = _pushed(rod, at * rod.length_mm, prop_mm)
-        return cls(frequency, moment, swing, 1e-3 * float(moved @ lag_mm), push)
+        lag_mm, push = _push_against_prop(rod, at * rod.length_mm, prop_mm)
+        return cls(frequency, moment, swing, 1e-3 * float(momentum @ lag_mm), push)
 
 
-def _values(shapes, at):
-    return np.stack([shape(np.asarray(at)) for shape in shapes], -1)
+def _first_mode(shapes, curvatures, mass, stiffness):
+    """Return the lowest frequency, rad/s, and its mode (k,) in shapes (n, k) at stations (n,)."""
+    squares, modes = eigh(
+        (curvatures.T * stiffness) @ curvatures,
+        (shapes.T * mass) @ shapes,
+        subset_by_index=[0, 0],
+    )
+    return math.sqrt(squares[0]), modes[:, 0]
 
 
-def _pushed(rod, at_mm, prop_mm):
-    """How far (mm) the rod lags behind the straight line when the hub turns a radian against the prop, and the
-    moment.
-    """
+def _evaluate(polynomials, at):
+    """Evaluate polynomials at parts (n,) of the length: (n, polynomials)."""
+    return np.stack([polynomial(at) for polynomial in polynomials], -1)
+
+
+def _push_against_prop(rod, at_mm, prop_mm):
+    """Return how far (n,), mm, the rod at arc lengths (n,) lags behind the straight line when the
+    hub turns a radian against the prop, and the moment, N·mm."""
     grid = np.linspace(0, prop_mm, 801)
     curvature = (prop_mm - grid) / np.maximum(rod.width(grid), 1e-3) ** 4
-    slope = _integral(curvature, grid[1])
-    lag = _integral(slope, grid[1])
+    slope = cumulative_trapezoid(curvature, dx=grid[1], initial=0)
+    lag = cumulative_trapezoid(slope, dx=grid[1], initial=0)
     beyond = lag[-1] + slope[-1] * (at_mm - prop_mm)
     whole = np.where(at_mm <= prop_mm, np.interp(at_mm, grid, lag), beyond)
     return whole * prop_mm / lag[-1], rod.rigidity_Nmm2 * prop_mm**2 / lag[-1]
 
 
-def _integral(values, step):
-    return np.concatenate([[0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
-
-
-def ring(
+def damped_oscillation(
     times_s: np.ndarray,
     start_s: float,
     end_s: float,
@@ -103,11 +105,12 @@ def ring(
     value: float = 0.0,
     rate: float = 0.0,
 ) -> np.ndarray:
-    """A damped oscillation from `start_s` with a first value and a first rate; zero before it and after `end_s`."""
-    t = np.asarray(times_s) - start_s
-    alive = (t >= 0) & (np.asarray(times_s) < end_s)
-    t = np.where(alive, t, 0)
-    damped = frequency_rad_s * math.sqrt(1 - damping**2)
-    swing = (rate + damping * frequency_rad_s * value) / damped
-    wave = value * np.cos(damped * t) + swing * np.sin(damped * t)
-    return np.where(alive, np.exp(-damping * frequency_rad_s * t) * wave, 0.0)
+    """Return a damped oscillation (n,) from `start_s` with a first value and a first rate; zero
+    before it and after `end_s`."""
+    times = np.asarray(times_s)
+    is_ringing = (times >= start_s) & (times < end_s)
+    t = np.where(is_ringing, times - start_s, 0)
+    damped_rad_s = frequency_rad_s * math.sqrt(1 - damping**2)
+    sine = (rate + damping * frequency_rad_s * value) / damped_rad_s
+    wave = value * np.cos(damped_rad_s * t) + sine * np.sin(damped_rad_s * t)
+    return np.where(is_ringing, np.exp(-damping * frequency_rad_s * t) * wave, 0.0)

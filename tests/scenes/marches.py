@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction, March
@@ -29,7 +29,7 @@ def whisk(
 ):
     """(march, touch, states) along pushing angles."""
     touch_rad = math.radians(touch_deg)
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x,
         beta_rad=math.radians(beta),
         psi_rad=math.radians(psi),
@@ -37,7 +37,7 @@ def whisk(
         radius_mm=radius,
         whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
-    touch = first_touch(rod, bar, touch_rad, d_x)
+    touch = find_first_touch(rod, bar, touch_rad, d_x)
     march = March(rod, bar, Friction(mu if static is None else static, mu, rests=rests), touch)
     _, states = march.along(touch.motor_rad + np.radians(thetas_deg))
     return march, touch, states

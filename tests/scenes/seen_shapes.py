@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rest, Rod
 from bench.rig.marched import MarchedWhisk
 from bench.rig.stick_slip import Friction
@@ -58,7 +58,7 @@ def shown(
         *np.radians([beta_deg, psi_deg, theta_deg]),
         np.tan(np.radians(alpha_deg)),
     )
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x_mm,
         beta_rad=beta,
         psi_rad=psi,
@@ -67,7 +67,7 @@ def shown(
         whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
         stiffness_N_mm=stiffness_N_mm,
     )
-    touch = first_touch(rod, bar, 0.05, d_x_mm)
+    touch = find_first_touch(rod, bar, 0.05, d_x_mm)
     wanted = touch.motor_rad + theta
     motor = np.append(np.linspace(touch.motor_rad - 0.05, wanted + 0.01, 23), wanted)
     motor.sort()

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Bar, first_touch, turned
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
+from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction, March
 from estimator.beam import Beam
@@ -47,7 +48,7 @@ def pushed(
         *np.radians([beta_deg, psi_deg, theta_deg]),
         np.tan(np.radians(alpha_deg)),
     )
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x_mm,
         beta_rad=beta,
         psi_rad=psi,
@@ -55,10 +56,10 @@ def pushed(
         radius_mm=radius_mm,
         whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
     )
-    touch = first_touch(rod, bar, 0.0, d_x_mm)
+    touch = find_first_touch(rod, bar, 0.0, d_x_mm)
     march = March(rod, bar, Friction(mu, mu), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, 7) / 6)[1]
     if state is None:
         raise ArithmeticError("no contact")
-    point = turned(state.point_mm, -state.motor_rad)
+    point = rotate_about_z(state.point_mm, -state.motor_rad)
     return Push(theta, touch.d_x_mm, moments_Nmm(state), -state.force_hub_N, point)

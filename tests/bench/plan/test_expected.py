@@ -40,7 +40,7 @@ def test_values_are_those_staged(bench):
     assert found.truth.d_x_mm.value == pytest.approx(staged.touch.d_x_mm, abs=1e-6)
     assert found.truth.touch_rad.value == pytest.approx(staged.touch.motor_rad, abs=1e-7)
     assert found.truth.beta_rad.value == pytest.approx(
-        bar.slope(staged.touch.motor_rad)[0], abs=1e-9
+        bar.slope(staged.touch.motor_rad, staged.touch.point_mm)[0], abs=1e-9
     )
     # the beam of the fit is one of small angles: within 0.3 µm of the exact rod, and of its contact (docs/truth.md)
     slip = float(staged.whisk.slip_at(THETA_RAD))

@@ -7,9 +7,10 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.rig import build
-from bench.rig.array_rig import ArrayRecording, mounted, touch_from_afar
-from bench.rig.bar import Bar, first_touch
-from bench.rig.protocol import ColumnTable, Protocol, TrialTable
+from bench.rig.array_rig import ArrayRecording, find_touch_from_afar, mount_whiskers
+from bench.rig.bar import Bar, find_first_touch
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import ColumnTable, TrialTable
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
@@ -28,7 +29,7 @@ def protocol(**column) -> Protocol:
 
 
 def recorded(made: Protocol) -> ArrayRecording:
-    whiskers = mounted(made, np.random.default_rng(0))
+    whiskers = mount_whiskers(made, np.random.default_rng(0))
     rngs = [np.random.default_rng(k) for k in range(1 + len(whiskers))]
     return ArrayRecording.make(made, *made.runs(), whiskers, rngs)
 
@@ -47,13 +48,13 @@ def test_one_whisker_at_the_origin_feels_what_it_feels_alone():
 @pytest.mark.parametrize("base_deg", [(0.0, 0.0, 25.0), (10.0, -20.0, 160.0)])
 def test_base_and_bar_moved_alike_leave_the_touch_as_it_is(base_deg):
     made = protocol(base_mm=(7.0, -11.0, 3.0), base_deg=base_deg)
-    (whisker,), rod = mounted(made, np.random.default_rng(0)), build.rod(made)
+    (whisker,), rod = mount_whiskers(made, np.random.default_rng(0)), build.rod(made)
     angles = {"beta_rad": 0.6, "psi_rad": 0.2, "touch_rad": 0.04}
-    bar = Bar.placed(d_x_mm=55.0, **angles, radius_mm=3.0, whisker_radius_mm=0.5)
+    bar = Bar.at_contact(d_x_mm=55.0, **angles, radius_mm=3.0, whisker_radius_mm=0.5)
     turn, shift = whisker.pose[:, :3], whisker.pose[:, 3]
     moved = Bar(turn @ bar.point_mm + shift, turn @ bar.axis, bar.radius_mm)
-    found = touch_from_afar(rod, moved.seen_from(whisker.pose), 0.0)
-    expected = first_touch(rod, bar, 0.04, 55.0)
+    found = find_touch_from_afar(rod, moved.in_frame(whisker.pose), 0.0)
+    expected = find_first_touch(rod, bar, 0.04, 55.0)
     assert found.motor_rad == pytest.approx(expected.motor_rad, abs=1e-9)
     np.testing.assert_allclose(found.point_mm, expected.point_mm, atol=1e-6)
 

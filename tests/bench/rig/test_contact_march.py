@@ -8,8 +8,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar, first_touch, turned
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rest, Rod
+from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction
 from tests.scenes.marches import MU_10, polar, slip_mm, small_angle, whisk
@@ -99,7 +100,7 @@ def test_force_lies_on_the_cone_against_the_motion():
     march, _, states = whisk(np.arange(0.1, 4.01, 0.1), beta=40.0, psi=10.0, mu=0.3)
     bar = march.contact.bar
     for before, state in itertools.pairwise(states):
-        force = turned(state.force_hub_N, state.motor_rad)
+        force = rotate_about_z(state.force_hub_N, state.motor_rad)
         apart = state.point_mm - bar.foot_mm(state.point_mm)
         normal = apart / np.linalg.norm(apart)
         shear = force - (force @ normal) * normal
@@ -152,10 +153,10 @@ def test_stick_slip_is_a_saw_tooth_between_the_two_cones():
     assert len(jumps) > 20
     slip = np.array([slip_mm(march, touch, s) for s in states])
     for i in jumps:
-        assert states[i].share == pytest.approx(0.25, rel=2e-4) and states[i].status == "held"
+        assert states[i].shear_ratio == pytest.approx(0.25, rel=2e-4) and states[i].status == "held"
         # The jump itself goes a few hundredths as far along the whisker: its cosine's share of the cone.
         assert (
-            states[i + 1].share == pytest.approx(0.18, rel=5e-3)
+            states[i + 1].shear_ratio == pytest.approx(0.18, rel=5e-3)
             and states[i + 1].status == "sliding"
         )
         assert slip[i + 1] > slip[i]
@@ -175,7 +176,7 @@ def test_each_rest_reaches_its_own_coefficient():
     """Rests that reach all of the excess and half of it in turn, round and round."""
     _, _, states = whisk(np.arange(0.1, 6.01, 0.1), mu=0.18, static=0.26, rests=(1.0, 0.5))
     angles = np.array([s.motor_rad for s in states])
-    shares = [states[i].share for i in np.nonzero(np.diff(angles) == 0)[0]]
+    shares = [states[i].shear_ratio for i in np.nonzero(np.diff(angles) == 0)[0]]
     assert len(shares) > 20
     expected = np.where(np.arange(len(shares)) % 2, 0.22, 0.26)
     assert shares == pytest.approx(expected, rel=1e-3)
@@ -200,7 +201,7 @@ def test_contact_that_reaches_the_tip_says_so_and_then_slides_off():
     statuses = [None if s is None else s.status for s in states]
     first = statuses.index("tip")
     assert states[first].arc_mm == 100.0 and states[first - 1].arc_mm < 100.0
-    assert statuses[-1] is None and march.passed
+    assert statuses[-1] is None and march.slid_off
 
 
 def test_a_bar_beyond_the_end_is_touched_by_the_tip():
@@ -237,7 +238,7 @@ def test_rest_shape_moves_touch_but_hardly_the_moments():
 
 def test_first_touch_is_where_the_distance_is_both_radii():
     rod = Rod("cone", 100.0, 1.0, 60.0, rest=Rest(100.0, sag_mm=0.2, set_y_mm=-0.4))
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=70.0,
         beta_rad=0.6,
         psi_rad=0.2,
@@ -245,7 +246,7 @@ def test_first_touch_is_where_the_distance_is_both_radii():
         radius_mm=3.0,
         whisker_radius_mm=0.15,
     )
-    touch = first_touch(rod, bar, 0.05, 70.0)
+    touch = find_first_touch(rod, bar, 0.05, 70.0)
     assert np.linalg.norm(touch.point_mm - bar.foot_mm(touch.point_mm)) == pytest.approx(
         3 + 0.5 * (1 - touch.arc_mm / 100)
     )

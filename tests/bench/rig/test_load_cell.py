@@ -4,8 +4,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from bench.rig.force_sensor import LoadCell
-from bench.rig.protocol import LoadCellTable, Protocol, TrialTable, load
+from bench.rig.force_sensor import sample_forces_N
+from bench.rig.protocol import Protocol, load
+from bench.rig.protocol_tables import GaugesTable, LoadCellTable, TrialTable
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
@@ -17,9 +18,8 @@ QUIET = {
     "hum_Hz": 50.0,
     "drift_N_per_s": 0.0,
     "step_N": 0.0,
-    "filter_Hz": 0.0,
-    "rate_Hz": 2000.0,
 }
+GAUGES = GaugesTable(filter_Hz=0.0, rate_Hz=2000.0)
 TRIAL = TrialTable(beta_deg=40.0, d_x_mm=55.0)
 
 
@@ -43,11 +43,13 @@ def test_a_load_cell_changes_nothing_of_the_gauges():
 
 def test_noise_drift_and_steps_are_of_their_size():
     none, rng = np.zeros((80_000, 3)), np.random.default_rng(1)
-    noisy = LoadCell(**QUIET | {"noise_N": 0.003}).forces_N(none, rng)
+    noisy = sample_forces_N(LoadCellTable(**QUIET | {"noise_N": 0.003}), GAUGES, none, rng)
     assert noisy.std(axis=0) == pytest.approx(np.full(3, 0.003), rel=0.03)
-    drifting = LoadCell(**QUIET | {"drift_N_per_s": 0.01}).forces_N(none, rng)
+    drifting = sample_forces_N(LoadCellTable(**QUIET | {"drift_N_per_s": 0.01}), GAUGES, none, rng)
     assert np.abs(drifting).max() <= 0.01 * len(drifting) / 2000
-    stepped = LoadCell(**QUIET | {"noise_N": 0.01, "step_N": 0.005}).forces_N(none, rng)
+    stepped = sample_forces_N(
+        LoadCellTable(**QUIET | {"noise_N": 0.01, "step_N": 0.005}), GAUGES, none, rng
+    )
     assert stepped / 0.005 == pytest.approx(np.rint(stepped / 0.005), abs=1e-9)
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.protocol import Protocol, TrialTable, load
+from bench.rig.protocol import Protocol, load
+from bench.rig.protocol_tables import TrialTable
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file

@@ -141,7 +141,7 @@ def test_vibration_at_touch(quiet, volts_with):
     ringing = volts_with(("vibration = false", "vibration = true")) - quiet.signals[:, 2:]
     times, touch_s = quiet.signals[:, 0], float(quiet.stroke.time_s(0, quiet.touch.motor_rad))
     assert not ringing[times < touch_s].any()
-    start, mode = int(np.searchsorted(times, touch_s)), Mode.of(quiet.rod, quiet.touch.arc_mm)
+    start, mode = int(np.searchsorted(times, touch_s)), Mode.solve(quiet.rod, quiet.touch.arc_mm)
     swings = np.diff(np.sign(ringing[start : start + 200, 1])).astype(bool).sum()  # in 0.1 s
     assert swings == pytest.approx(mode.frequency_rad_s / math.pi * 0.1, abs=2)
     assert np.abs(ringing[-100:]).max() < 0.05 * np.abs(ringing).max()

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from bench.rig import build
-from bench.rig.bar import Bar, unloaded
+from bench.rig.bar import Bar, unloaded_curve
 from bench.rig.elastic_rod import Rod
 from bench.rig.light import Light, Material
 from bench.rig.painted_scene import HUB_FRONT_MM
@@ -155,14 +155,16 @@ def test_the_print_is_opencvs(legacy, inverted):
 
 def moment(motor_rad, material=None):
     rod, arc = Rod("cylinder", 100.0, 1.0, 60.0), np.linspace(HUB_FRONT_MM, 100, 257)
-    tube = Tube(unloaded(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25))
+    tube = Tube(
+        unloaded_curve(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25)
+    )
     return Moment.alone(motor_rad, tube)
 
 
 @pytest.fixture(scope="module", params=[0, 1])
 def setting(request):
     camera = build.cameras(QUICK)[request.param]
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=60.0, beta_rad=0.5, psi_rad=0.1, touch_rad=0.04, radius_mm=3.0, whisker_radius_mm=0.5
     )
     return studio(camera).setting(bar, bar.foot_mm(np.array([60.0, 2.4, 0.0]))), camera, bar

@@ -5,14 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
 from bench.rig.marched import MarchedWhisk
+from bench.rig.protocol_tables import GaugesTable
 from bench.rig.stick_slip import Friction
-from bench.rig.strain_gauges import Gauges
+from bench.rig.strain_gauges import fine_times_s, sample_volts
 from bench.rig.stroke import Stroke
-from bench.rig.vibration import Mode, ring
+from bench.rig.vibration import Mode, damped_oscillation
 
 WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
@@ -32,7 +33,7 @@ def gauges(**changes):
         "adc_bits": 0,
         "range_V": 10.0,
     }
-    return Gauges(**(quiet | changes))
+    return GaugesTable(**(quiet | changes))
 
 
 def rng():
@@ -40,32 +41,32 @@ def rng():
 
 
 def ramp(seconds=1.0, top=(3.0, 6.0)):
-    times = gauges().fine_times_s(seconds)
+    times = fine_times_s(gauges(), seconds)
     return times[:, None] / seconds * np.array(top)
 
 
 def test_quiet_gauges_give_back_the_moments():
     moments = ramp()
-    volts = gauges().volts(moments, 0.0, rng())
+    volts = sample_volts(gauges(), moments, 0.0, rng())
     assert (volts - OFFSET) @ MATRIX.T == pytest.approx(moments[::4], abs=1e-12)
 
 
 def test_a_follicle_turned_by_90_degrees_senses_m_z_on_y_and_minus_m_y_on_z():
     moments = ramp()
-    volts = gauges().volts(moments, math.pi / 2, rng())
+    volts = sample_volts(gauges(), moments, math.pi / 2, rng())
     assert (volts - OFFSET) @ MATRIX.T == pytest.approx(
         moments[::4] @ np.array([[0, -1], [1, 0]]), abs=1e-12
     )
 
 
 def test_noise_is_white_and_of_its_size():
-    volts = gauges(noise_V=0.0064).volts(np.zeros((80_000, 2)), 0.0, rng()) - OFFSET
+    volts = sample_volts(gauges(noise_V=0.0064), np.zeros((80_000, 2)), 0.0, rng()) - OFFSET
     assert volts.std(0) == pytest.approx(0.0064, rel=0.02)  # of 20 000 samples: 0.5 %
     assert np.abs(np.mean(volts[1:] * volts[:-1], 0)).max() < 4 * 0.0064**2 / math.sqrt(20_000)
 
 
 def test_hum_stands_at_its_frequency():
-    volts = gauges(hum_V=0.01).volts(np.zeros((40_000, 2)), 0.0, rng()) - OFFSET
+    volts = sample_volts(gauges(hum_V=0.01), np.zeros((40_000, 2)), 0.0, rng()) - OFFSET
     spectrum = np.abs(np.fft.rfft(volts[:, 1])) * 2 / len(volts)
     assert np.argmax(spectrum) * 2000 / len(volts) == pytest.approx(50.0)
     assert 0.007 <= spectrum.max() <= 0.0101
@@ -73,13 +74,13 @@ def test_hum_stands_at_its_frequency():
 
 
 def test_drift_grows_with_time():
-    volts = gauges(drift_V_per_s=0.01).volts(np.zeros((80_000, 2)), 0.0, rng())
+    volts = sample_volts(gauges(drift_V_per_s=0.01), np.zeros((80_000, 2)), 0.0, rng())
     assert np.ptp(np.diff(volts, axis=0), axis=0).max() < 1e-12
     assert (np.abs(volts[-1] - volts[0]) <= 0.1).all() and np.abs(volts[-1] - volts[0]).max() > 1e-3
 
 
 def test_converter_rounds_to_its_steps_and_clips_at_its_rails():
-    volts = gauges(adc_bits=8, range_V=0.4).volts(ramp(), 0.0, rng())
+    volts = sample_volts(gauges(adc_bits=8, range_V=0.4), ramp(), 0.0, rng())
     step = 0.8 / 256
     assert volts / step == pytest.approx(np.rint(volts / step), abs=1e-9)
     assert volts.max() == pytest.approx(0.4 - step) and (volts[:, 1] == volts.max()).sum() >= 3
@@ -90,7 +91,7 @@ def test_filter_delays_a_ramp_by_its_group_delay_and_keeps_its_slope():
     bilinear map shortens it by tan(x)/x at x = π·800/8000, to 0.503 ms.
     """
     x = math.pi * 800 / 8000
-    plain, filtered = (gauges(filter_Hz=f).volts(ramp(), 0.0, rng()) for f in (0.0, 800.0))
+    plain, filtered = (sample_volts(gauges(filter_Hz=f), ramp(), 0.0, rng()) for f in (0.0, 800.0))
     slope = np.diff(plain, axis=0)[1000]
     late = (plain - filtered)[1000] / slope / 2000
     assert late == pytest.approx(2.6131 / (2 * math.pi * 800) * x / math.tan(x), rel=1e-4)
@@ -100,27 +101,27 @@ def test_filter_delays_a_ramp_by_its_group_delay_and_keeps_its_slope():
 def test_free_wire_rings_at_the_textbook_frequency():
     """1.8751²/2π·√(EI/ρA)/L² = 42.67 Hz; propped at the end 3.9266² in its place; a cone 8.7192/2π."""
     unit = math.sqrt(1e-6 * WIRE.rigidity_Nmm2 / WIRE.mass_kg_m) / 0.1**2 / (2 * math.pi)
-    assert Mode.of(WIRE).frequency_rad_s / (2 * math.pi) == pytest.approx(
+    assert Mode.solve(WIRE).frequency_rad_s / (2 * math.pi) == pytest.approx(
         1.8751041**2 * unit, rel=1e-6
     )
-    assert Mode.of(WIRE, 100.0).frequency_rad_s / (2 * math.pi) == pytest.approx(
+    assert Mode.solve(WIRE, 100.0).frequency_rad_s / (2 * math.pi) == pytest.approx(
         3.9266023**2 * unit, rel=1e-5
     )
-    cone = Mode.of(Rod("cone", 100.0, 1.0, 60.0))
+    cone = Mode.solve(Rod("cone", 100.0, 1.0, 60.0))
     assert cone.frequency_rad_s / (2 * math.pi) == pytest.approx(8.7192 * unit, rel=1e-3)
 
 
 def test_pushed_mode_knows_the_small_angle_moment():
-    assert Mode.of(WIRE, 60.0).push_Nmm == pytest.approx(3 * WIRE.rigidity_Nmm2 / 60, rel=1e-5)
+    assert Mode.solve(WIRE, 60.0).push_Nmm == pytest.approx(3 * WIRE.rigidity_Nmm2 / 60, rel=1e-5)
     cone = Rod("cone", 100.0, 1.0, 60.0)
-    assert Mode.of(cone, 60.0).push_Nmm == pytest.approx(
+    assert Mode.solve(cone, 60.0).push_Nmm == pytest.approx(
         3 * cone.rigidity_Nmm2 * (1 / 60 - 1 / 100), rel=1e-4
     )
 
 
 def test_ring_solves_its_equation():
     times, frequency, damping = np.arange(0, 0.1, 1e-5), 270.0, 0.03
-    wave = ring(times, 0.0, 1.0, frequency, damping, value=0.4, rate=-30.0)
+    wave = damped_oscillation(times, 0.0, 1.0, frequency, damping, value=0.4, rate=-30.0)
     speed, push = np.gradient(wave, times), np.gradient(np.gradient(wave, times), times)
     left = push + 2 * damping * frequency * speed + frequency**2 * wave
     assert wave[0] == 0.4 and speed[1] == pytest.approx(-30.0, rel=0.05)
@@ -130,7 +131,7 @@ def test_ring_solves_its_equation():
 
 
 def whisked(friction, back=False, beta_deg=60.0, whisks=1, ramp_s=0.0):
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=60.0,
         beta_rad=math.radians(beta_deg),
         psi_rad=0.0,
@@ -138,7 +139,7 @@ def whisked(friction, back=False, beta_deg=60.0, whisks=1, ramp_s=0.0):
         radius_mm=3.0,
         whisker_radius_mm=0.5,
     )
-    touch = first_touch(WIRE, bar, 0.04, 60.0)
+    touch = find_first_touch(WIRE, bar, 0.04, 60.0)
     stroke = Stroke.plan(
         touch.motor_rad - 0.05,
         touch.motor_rad + 0.07,
@@ -182,7 +183,7 @@ def test_touch_rings_the_propped_mode_and_dies_out():
     after = ringing[times > touch_s + 1e-3][:, 1]
     crossings = np.nonzero(np.diff(np.sign(after[:2000])))[0]
     assert len(crossings) / (2 * 0.2) == pytest.approx(
-        Mode.of(WIRE, 60.0).frequency_rad_s / (2 * math.pi), rel=0.05
+        Mode.solve(WIRE, 60.0).frequency_rad_s / (2 * math.pi), rel=0.05
     )
     assert not ringing[times < touch_s].any()
     assert (

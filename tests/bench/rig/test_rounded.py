@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.bar import Bar, first_touch, turned
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
+from bench.rig.linear import rotate_about_z
 from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import load
 from bench.rig.round_objects import Cone, Ring, Sphere
@@ -16,12 +17,12 @@ from bench.rig.stick_slip import Friction
 from tests.scenes.rig_sessions import protocol_file
 
 ROD = Rod("cylinder", 100.0, 1.0, 60.0)
-TOUCHED = turned(np.array([60.0, 0.0, 0.0]), 0.04)
+TOUCHED = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
 
 
 def placed(radius_mm: float = 3.0) -> Bar:
     angles = {"beta_rad": 0.6, "psi_rad": 0.0, "touch_rad": 0.04}
-    return Bar.placed(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+    return Bar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
 def sphere(radius_mm: float) -> Sphere:
@@ -30,27 +31,27 @@ def sphere(radius_mm: float) -> Sphere:
 
 
 def marched(bar: Bar, friction: Friction) -> MarchedWhisk:
-    touch, step = first_touch(ROD, bar, 0.04, 60.0), math.radians(0.2)
+    touch, step = find_first_touch(ROD, bar, 0.04, 60.0), math.radians(0.2)
     return MarchedWhisk.run(
         ROD, bar, friction, touch, touch.motor_rad + math.radians(3.0), step_rad=step
     )
 
 
 def cone(radius_mm: float = 20.0, half_angle_rad: float = 0.35) -> Cone:
-    return Cone.narrowing(placed(radius_mm), TOUCHED, half_angle_rad)
+    return Cone.from_bar(placed(radius_mm), TOUCHED, half_angle_rad)
 
 
-THINGS = [placed(), Ring.bent(placed(), TOUCHED, 20.0), sphere(20.0), cone()]
+THINGS = [placed(), Ring.from_bar(placed(), TOUCHED, 20.0), sphere(20.0), cone()]
 
 
 @pytest.mark.parametrize("thing", THINGS, ids=type)
 def test_what_a_contact_sees_has_these_derivatives(thing):
     """By central differences of 1e-6 mm, whose rounding is 1e-9; the way is that from the foot."""
     point = TOUCHED + np.array([0.3, 0.2, -0.4])
-    way, flat, axis, turning = thing.around(point)
+    way, flat, axis, turning = thing.local_bar(point)
     np.testing.assert_allclose(way, point - thing.foot_mm(point), atol=1e-12)
     assert abs(axis @ axis - 1) < 1e-12 and abs(axis @ way) < 1e-12
-    ends = [[thing.around(point + sign * h) for sign in (1, -1)] for h in 1e-6 * np.eye(3)]
+    ends = [[thing.local_bar(point + sign * h) for sign in (1, -1)] for h in 1e-6 * np.eye(3)]
     for made, number in ((flat, 0), (turning, 2)):
         differences = np.stack([(up[number] - down[number]) / 2e-6 for up, down in ends], -1)
         np.testing.assert_allclose(made, differences, atol=1e-8)
@@ -62,7 +63,7 @@ def test_what_a_contact_sees_has_these_derivatives(thing):
 def test_a_large_ring_is_a_straight_bar(friction):
     """Of a circle of 1e5 mm the axis turns by 2e-5 over 2 mm of slip: moments to some parts in 1e5."""
     straight, bent = (
-        marched(bar, friction) for bar in (placed(), Ring.bent(placed(), TOUCHED, 1e5))
+        marched(bar, friction) for bar in (placed(), Ring.from_bar(placed(), TOUCHED, 1e5))
     )
     at = straight.touch.motor_rad + np.radians([0.5, 1.5, 2.5])
     np.testing.assert_allclose(
@@ -82,7 +83,7 @@ def test_force_on_a_sphere_lies_on_the_cone_about_its_normal():
     whisk = marched(sphere(20.0), Friction(0.2, 0.2, 1e-3))
     for state in whisk.forward.states[2:]:
         normal = (state.point_mm - whisk.bar.point_mm) / 20.5
-        force = turned(state.force_hub_N, state.motor_rad)
+        force = rotate_about_z(state.force_hub_N, state.motor_rad)
         press = force @ normal
         assert np.linalg.norm(state.point_mm - whisk.bar.point_mm) == pytest.approx(20.5, abs=1e-9)
         assert np.linalg.norm(force - press * normal) == pytest.approx(0.2 * press, rel=1e-6)
@@ -90,9 +91,9 @@ def test_force_on_a_sphere_lies_on_the_cone_about_its_normal():
 
 def test_a_cone_is_touched_where_the_bar_is_and_ends_at_its_tip():
     bar, thing = placed(20.0), cone()
-    touch, same = (first_touch(ROD, one, 0.04, 60.0) for one in (bar, thing))
+    touch, same = (find_first_touch(ROD, one, 0.04, 60.0) for one in (bar, thing))
     assert same.motor_rad == pytest.approx(touch.motor_rad, abs=1e-9)
-    assert thing.slope(0.04, same.point_mm) == pytest.approx(bar.slope(0.04), abs=1e-9)
+    assert thing.slope(0.04, same.point_mm) == pytest.approx(bar.slope(0.04, TOUCHED), abs=1e-9)
     down = -thing.axis
     surface = thing.tip_mm + 30.0 * (
         np.cos(0.35) * down + np.sin(0.35) * np.cross(thing.axis, [1.0, 0.0, 0.0])
@@ -101,7 +102,7 @@ def test_a_cone_is_touched_where_the_bar_is_and_ends_at_its_tip():
         1
     ] == pytest.approx(3.0)
     with pytest.raises(ArithmeticError, match="past the cone's tip"):
-        thing.around(thing.tip_mm + thing.axis + [0.0, 1e-3, 0.0])
+        thing.local_bar(thing.tip_mm + thing.axis + [0.0, 1e-3, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from bench.rig.bar import Bar, first_touch, turned
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
+from bench.rig.linear import rotate_about_z
 from bench.rig.marched import MarchedWhisk
 from bench.rig.round_objects import Cone, Ring, Sphere
 from bench.rig.simulate import simulate
@@ -18,16 +19,16 @@ from bench.rig.surface_slip import slips_mm
 from tests.scenes.rig_sessions import protocol_file, rows
 
 ROD = Rod("cylinder", 100.0, 1.0, 60.0)
-TOUCHED = turned(np.array([60.0, 0.0, 0.0]), 0.04)
-BAR = Bar.placed(
+TOUCHED = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
+BAR = Bar.at_contact(
     d_x_mm=60.0, beta_rad=0.6, psi_rad=0.0, touch_rad=0.04, radius_mm=20.0, whisker_radius_mm=0.5
 )
 BALL = Sphere(BAR.point_mm, BAR.axis, 20.0)
-THINGS = [BAR, Ring.bent(BAR, TOUCHED, 20.0), BALL, Cone.narrowing(BAR, TOUCHED, 0.35)]
+THINGS = [BAR, Ring.from_bar(BAR, TOUCHED, 20.0), BALL, Cone.from_bar(BAR, TOUCHED, 0.35)]
 
 
 def marched(thing: Bar, mu: float, step_deg: float = 0.1, back: bool = False) -> MarchedWhisk:
-    touch = first_touch(ROD, thing, 0.04, 60.0)
+    touch = find_first_touch(ROD, thing, 0.04, 60.0)
     end, step = touch.motor_rad + math.radians(4.0), math.radians(step_deg)
     return MarchedWhisk.run(
         ROD, thing, Friction(mu, mu, 1e-3), touch, end, step_rad=step, back=back
@@ -38,8 +39,11 @@ def shears(whisk: MarchedWhisk) -> np.ndarray:
     """(n, 2) N: force of the object on the whisker along its axis and round it."""
     found = []
     for state in whisk.forward.states:
-        way, _, axis, _ = whisk.bar.around(state.point_mm)
-        force, normal = turned(state.force_hub_N, state.motor_rad), way / np.linalg.norm(way)
+        way, _, axis, _ = whisk.bar.local_bar(state.point_mm)
+        force, normal = (
+            rotate_about_z(state.force_hub_N, state.motor_rad),
+            way / np.linalg.norm(way),
+        )
         found.append([force @ axis, force @ np.cross(axis, normal)])
     return np.array(found)
 
@@ -120,13 +124,17 @@ def test_a_sphere_by_shooting(mu):
         )
 
     unknowns = np.concatenate(
-        [turned(states[0].force_hub_N, states[0].motor_rad), [states[0].arc_mm], states[0].point_mm]
+        [
+            rotate_about_z(states[0].force_hub_N, states[0].motor_rad),
+            [states[0].arc_mm],
+            states[0].point_mm,
+        ]
     )
     motor = states[0].motor_rad
     for state in states[1:]:
         before = centreline(unknowns, motor)
         guess = np.concatenate(
-            [turned(state.force_hub_N, state.motor_rad), [state.arc_mm], state.point_mm]
+            [rotate_about_z(state.force_hub_N, state.motor_rad), [state.arc_mm], state.point_mm]
         )
         motor = state.motor_rad
         unknowns = pushed_on(motor, guess + 1e-3, before, mu)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from bench.rig.papers import trial_toml, truth_csv
-from bench.rig.protocol import Protocol, TrialTable
+from bench.rig.papers import trial_toml
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import TrialTable
 from bench.rig.recording import Recording
+from bench.rig.truth_files import truth_csv
 
 EXACTLY = {"beta_scatter_deg": 0.0, "d_x_scatter_mm": 0.0, "touch_scatter_deg": 0.0}
 
@@ -25,7 +27,7 @@ def test_the_bar_is_painted_where_the_contact_is(beta_deg):
         if state is None:
             assert not gave.any()
             continue
-        there = made.bar.given(gave)
+        there = made.bar.shift(gave)
         assert np.linalg.norm(state.point_mm - there.foot_mm(state.point_mm)) == pytest.approx(
             3.5, abs=2e-4
         )

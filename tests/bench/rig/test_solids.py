@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.bar import Bar, turned
+from bench.rig.bar import Bar
 from bench.rig.layer import Occluder
 from bench.rig.light import Light, Material
+from bench.rig.linear import rotate_about_z
 from bench.rig.pinhole import Camera
 from bench.rig.round_objects import Cone, Ring, Sphere
 from bench.rig.simulate import simulate
@@ -40,11 +41,11 @@ def placed(beta_deg: float, radius_mm: float, psi_deg: float = 8.0) -> Bar:
         "psi_rad": math.radians(psi_deg),
         "touch_rad": 0.0,
     }
-    return Bar.placed(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+    return Bar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
 def ring(beta_deg: float, psi_deg: float = 8.0) -> Ring:
-    return Ring.bent(placed(beta_deg, 3.0, psi_deg), TOUCHED, 20.0)
+    return Ring.from_bar(placed(beta_deg, 3.0, psi_deg), TOUCHED, 20.0)
 
 
 def sphere(beta_deg: float) -> Sphere:
@@ -53,7 +54,7 @@ def sphere(beta_deg: float) -> Sphere:
 
 
 def cone(beta_deg: float, half_angle_deg: float = 20.0, radius_mm: float = 12.0) -> Cone:
-    return Cone.narrowing(placed(beta_deg, radius_mm), TOUCHED, math.radians(half_angle_deg))
+    return Cone.from_bar(placed(beta_deg, radius_mm), TOUCHED, math.radians(half_angle_deg))
 
 
 def height_and_far(thing, points):
@@ -184,7 +185,7 @@ def test_a_large_ring_looks_like_a_straight_bar():
     bar = placed(20, 3.0)
     window = Window.whole(CAMERA, 3, 0.2, 4)
     bent, straight = (np.full(window.shape, 0.3, np.float32) for _ in range(2))
-    layer = Solid(Ring.bent(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
+    layer = Solid(Ring.from_bar(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
     bent[layer.index] += (layer.cover * (layer.tone - bent[layer.index])).astype(np.float32)
     foot = bar.foot_mm(TOUCHED)
     Tube.straight(foot - 120 * bar.axis, foot + 120 * bar.axis, 3.0, METAL).draw(
@@ -259,7 +260,7 @@ def test_a_session_shows_it_and_says_what_it_is(session, name):
     empty = cv2.imread(str(session / "boards" / "rig" / "left.png"), 0).astype(float)
     first = cv2.imread(str(trial / "left" / "000000.jpg"), 0)
     assert (np.abs(first - empty) > 12).sum() > 400
-    touched = turned(np.array([truth["d_x_mm"], 0, 0]), math.radians(truth["touch_deg"]))
+    touched = rotate_about_z(np.array([truth["d_x_mm"], 0, 0]), math.radians(truth["touch_deg"]))
     point, radius_mm = np.array(truth["object"]["point_mm"]), truth["object"]["diameter_mm"] / 2
     axis = np.array(truth["object"].get("axis", [0, 0, 1.0]))
     height = (touched - point) @ axis

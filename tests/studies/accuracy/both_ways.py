@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.marched import MarchedWhisk
 from bench.rig.stick_slip import Friction
 from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD
@@ -48,7 +48,7 @@ def drawn(shape: str, rng: np.random.Generator):
         rng.uniform(0.4, 0.8),
         10.0 ** rng.uniform(-1.0, 0.5),
     )
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x,
         beta_rad=beta,
         psi_rad=TILT_SIGMA_RAD * rng.normal(),
@@ -56,7 +56,7 @@ def drawn(shape: str, rng: np.random.Generator):
         radius_mm=rng.uniform(0.05, 3.0),
         whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
-    touch, theta = first_touch(rod, bar, 0.0, d_x), share * end
+    touch, theta = find_first_touch(rod, bar, 0.0, d_x), share * end
     sigma_m, sigma_touch = MOMENT_SIGMA_NMM * noise, TOUCH_SIGMA_RAD * noise
     try:
         march = MarchedWhisk.run(

@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.protocol import WhiskerTable
+from bench.rig.protocol_tables import WhiskerTable
 from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.rows import all_rows
 from tests.studies.accuracy.scenes import (

@@ -26,8 +26,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.parts import Job, frames_of
-from bench.rig.protocol import WhiskerTable
+from bench.rig.parts import Job, render_frames
+from bench.rig.protocol_tables import WhiskerTable
 from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
 from tests.studies.accuracy.scenes import (
     Scene,
@@ -144,7 +144,7 @@ def drawn(scene: Scene, most_cameras: int | None) -> tuple[TrialPictures, Camera
     cameras, rods = calibrated(scene, rng), Rods(*given(scene, rng))
     job = Job(Path(), scene.protocol, scene.seed, False)
     frames = {
-        studio.camera.name: dict(enumerate(frames_of(job, 0, k, scene.recording)))
+        studio.camera.name: dict(enumerate(render_frames(job, 0, k, scene.recording)))
         for k, studio in enumerate(job.studios[:most_cameras])
     }
     background = {

@@ -22,11 +22,11 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import strokes_of
 from bench.gauges.matrix import GaugeMatrix
-from bench.rig.protocol import (
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import (
     GaugesTable,
     MotorTable,
     PicturesTable,
-    Protocol,
     TrialTable,
     WhiskerTable,
 )

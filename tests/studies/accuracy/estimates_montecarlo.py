@@ -20,7 +20,7 @@ from scipy.stats import truncnorm
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.records.trial_result import EstimateRow
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction, March
@@ -94,7 +94,7 @@ def push(
 ):
     """First touch, and the exact moments at θ; stiffness: of the bar, N/mm; per_rad_mm (3,): how it moves. Raises
     ArithmeticError without contact."""
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=d_x,
         beta_rad=beta,
         psi_rad=psi,
@@ -103,7 +103,7 @@ def push(
         whisker_radius_mm=float(rod.radius_mm(d_x)),
         stiffness_N_mm=stiffness,
     )
-    touch = first_touch(rod, bar, 0.0, d_x)
+    touch = find_first_touch(rod, bar, 0.0, d_x)
     bar = bar if per_rad_mm is None else bar.moving(per_rad_mm, touch.motor_rad)
     march = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, STEPS + 1) / STEPS)[1]

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.protocol import MotorTable, PicturesTable, WhiskerTable
+from bench.rig.protocol_tables import MotorTable, PicturesTable, WhiskerTable
 from tests.scenes.model_scenes import bar_middle
 from tests.studies.accuracy.scenes import (
     STEP_DEG,

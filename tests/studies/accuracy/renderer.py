@@ -113,7 +113,7 @@ def corner_errors_px(blur_px):
     board, scene = build.board(protocol), build.scene(protocol)
     for camera in build.cameras(protocol):
         studio = Studio(camera, scene, Sensor(blur_px, 0, 0, 0, 0))
-        pose = boards.poses(board, camera, 3, np.random.default_rng(3))[2]
+        pose = boards.draw_poses(board, camera, 3, np.random.default_rng(3))[2]
         for picture, T in (
             (studio.rig_brightness(), build.T_rig_board(protocol)),
             (studio.board_brightness(pose), pose),

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.curved import curved
 from bench.records.trial_result import FeltAt
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.marched import MarchedWhisk
 from bench.rig.round_objects import Cone, Ring, Sphere
@@ -49,7 +49,7 @@ OBJECTS = ("bar", "cone of 15 deg", "cone of 45 deg", "sphere", "ring")
 def placed(name: str, radius_mm: float, beta: float) -> tuple[Bar, float, float]:
     """The object where the whisker first touches it at d_x; its radii in the whisking plane and along the slip."""
     ring = name == "ring"
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=D_X_MM,
         beta_rad=beta,
         psi_rad=0.0,
@@ -59,12 +59,12 @@ def placed(name: str, radius_mm: float, beta: float) -> tuple[Bar, float, float]
     )
     touched = np.array([D_X_MM, 0.0, 0.0])
     if ring:
-        return Ring.bent(bar, touched, radius_mm), TUBE_MM, radius_mm + TUBE_MM
+        return Ring.from_bar(bar, touched, radius_mm), TUBE_MM, radius_mm + TUBE_MM
     if name == "sphere":
         return Sphere(bar.point_mm, bar.axis, radius_mm), radius_mm, radius_mm
     if name.startswith("cone"):
         return (
-            Cone.narrowing(bar, touched, math.radians(float(name.split()[2]))),
+            Cone.from_bar(bar, touched, math.radians(float(name.split()[2]))),
             radius_mm,
             math.inf,
         )
@@ -91,7 +91,7 @@ def row(name: str, radius_mm: float, beta: float) -> list[float]:
     """One push: errors as the script's head has them; NaN where nothing is told. Raises ArithmeticError where the
     whisker comes to no equilibrium."""
     thing, rolled, slipped = placed(name, radius_mm, beta)
-    touch = first_touch(ROD, thing, 0.0, D_X_MM)
+    touch = find_first_touch(ROD, thing, 0.0, D_X_MM)
     friction, stops = Friction(math.tan(ALPHA), math.tan(ALPHA), 1e-3), touch.motor_rad + THETAS
     whisk = MarchedWhisk.run(
         ROD, thing, friction, touch, float(stops[-1]) + 1e-3, step_rad=0.004, stops_rad=stops

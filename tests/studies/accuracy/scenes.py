@@ -17,12 +17,12 @@ import msgspec
 import numpy as np
 
 from bench.rig import build
-from bench.rig.protocol import (
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import (
     BoardTable,
     CameraTable,
     LightTable,
     PicturesTable,
-    Protocol,
     TrialTable,
     WhiskerTable,
 )
@@ -121,7 +121,7 @@ class Scene:
     @property
     def truth(self) -> Truth:
         touch, (whisk, *_) = self.recording.touch, self.recording.whisks
-        beta, _ = self.recording.bar.slope(touch.motor_rad)
+        beta, _ = self.recording.bar.slope(touch.motor_rad, touch.point_mm)
         points = [np.full(3, np.nan) if s is None else s.point_mm for s in self.states]
         return Truth(touch.motor_rad, touch.d_x_mm, beta, whisk.slip_mm(points, self.motor_rad))
 

@@ -28,12 +28,12 @@ from bench.gauges.drift import allow_drift, drift_rate
 from bench.gauges.felt import Stroke, strokes_of
 from bench.gauges.matrix import GaugeMatrix
 from bench.records.trial_result import EstimateRow
-from bench.rig.protocol import (
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import (
     GaugesTable,
     LoadCellTable,
     MotorTable,
     PicturesTable,
-    Protocol,
     TrialTable,
     WhiskerTable,
 )

@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.marched import MarchedWhisk
 from bench.rig.stick_slip import Friction
 from tests.studies.accuracy.estimates_montecarlo import rod_and_beam
@@ -36,7 +36,7 @@ SIGMAS, TOUCH_SIGMA_RAD = {"slip": 0.004, "phi": 0.001}, np.radians(0.02)
 def whisk(beta_deg: float, kinetic: float, static: float) -> dict[str, np.ndarray]:
     """Pushing angle, slip and φ along the way."""
     rod, _ = rod_and_beam("cylinder")
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=D_X_MM,
         beta_rad=np.radians(beta_deg),
         psi_rad=0.0,
@@ -44,7 +44,7 @@ def whisk(beta_deg: float, kinetic: float, static: float) -> dict[str, np.ndarra
         radius_mm=3.0,
         whisker_radius_mm=0.5,
     )
-    touch = first_touch(rod, bar, 0.0, D_X_MM)
+    touch = find_first_touch(rod, bar, 0.0, D_X_MM)
     marched = MarchedWhisk.run(
         rod,
         bar,

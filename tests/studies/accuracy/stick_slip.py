@@ -19,12 +19,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.settings import Settings
 from bench.gauges.felt import strokes_of
-from bench.rig.protocol import (
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import (
     FrictionTable,
     GaugesTable,
     MotorTable,
     PicturesTable,
-    Protocol,
     TrialTable,
 )
 from bench.rig.recording import Recording

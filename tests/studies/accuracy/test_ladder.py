@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bench.rig.protocol import PicturesTable, WhiskerTable
+from bench.rig.protocol_tables import PicturesTable, WhiskerTable
 from tests.studies.accuracy import estimates_montecarlo, path_traced, rounded, rounding
 from tests.studies.accuracy.coverage import (
     COLUMNS,

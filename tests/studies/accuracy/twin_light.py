@@ -18,8 +18,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.parts import Job, frames_of
-from bench.rig.protocol import TrialTable, load
+from bench.rig.parts import Job, render_frames
+from bench.rig.protocol import load
+from bench.rig.protocol_tables import TrialTable
 from bench.rig.recording import Recording
 
 TWIN, CAMERA, NAME = Path(__file__).with_name("twin.toml"), 1, "low"
@@ -86,7 +87,7 @@ def main() -> None:
         ]
         for name, seen in (
             ("recorded", pictures),
-            ("twin", list(frames_of(job, number, CAMERA, recording))),
+            ("twin", list(render_frames(job, number, CAMERA, recording))),
         ):
             place, amount = np.moveaxis(places(recording, job.studios[CAMERA].camera, seen), -1, 0)
             print(folder.name, name)

@@ -21,7 +21,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.drawing import style
-from bench.rig.protocol import CameraTable, PicturesTable, Protocol, TrialTable
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import CameraTable, PicturesTable, TrialTable
 from tests.studies.accuracy.coverage import QUANTITIES, row_of, see_points
 from tests.studies.accuracy.scenes import STEP_DEG, Sigmas, make_scene
 

@@ -24,7 +24,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.protocol import CameraTable, PicturesTable, Protocol, TrialTable, WhiskerTable
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import CameraTable, PicturesTable, TrialTable, WhiskerTable
 from bench.trials.seeing import PRESETS
 from tests.studies.accuracy.coverage import COLUMNS as OF_SCENE
 from tests.studies.accuracy.coverage import Seen, row_of, see_pictures, see_points

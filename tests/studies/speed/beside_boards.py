@@ -26,7 +26,7 @@ def board_pictures(protocol: Protocol, rng: np.random.Generator) -> np.ndarray:
     """Pictures (c, v, h, w) of 8 bits: the board held before one camera after the other, and on the rig (the last)."""
     scene, sensor, board = build.scene(protocol), build.sensor(protocol), build.board(protocol)
     cameras = build.cameras(protocol)
-    held = [boards.poses(board, camera, VIEWS // len(cameras), rng) for camera in cameras]
+    held = [boards.draw_poses(board, camera, VIEWS // len(cameras), rng) for camera in cameras]
     poses = [pose for of_camera in held for pose in of_camera]
     studios = [Studio(camera, scene, sensor) for camera in cameras]
     return np.array(

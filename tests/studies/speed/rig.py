@@ -19,13 +19,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 import cv2
 
 from bench.rig import build
-from bench.rig.bar import Bar, first_touch
+from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.marched import MarchedWhisk
-from bench.rig.parts import Job, Part, frames_of
+from bench.rig.parts import Job, Part, render_frames
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
-from bench.rig.simulate import make
+from bench.rig.simulate import make_part
 from bench.rig.stick_slip import Friction
 
 
@@ -42,7 +42,7 @@ def cpu_s(work, repeats: int = 5) -> float:
 def whisk_s(beta_deg: float, static: float, kinetic: float, back: bool) -> float:
     """Mechanics of 60 steps of 0.1°."""
     rod = Rod("cylinder", 100.0, 1.0, 60.0)
-    bar = Bar.placed(
+    bar = Bar.at_contact(
         d_x_mm=60.0,
         beta_rad=math.radians(beta_deg),
         psi_rad=0.0,
@@ -50,7 +50,7 @@ def whisk_s(beta_deg: float, static: float, kinetic: float, back: bool) -> float
         radius_mm=3.0,
         whisker_radius_mm=0.5,
     )
-    touch, step = first_touch(rod, bar, 0.04, 60.0), math.radians(0.1)
+    touch, step = find_first_touch(rod, bar, 0.04, 60.0), math.radians(0.1)
     end, friction = touch.motor_rad + 60 * step, Friction(static, kinetic)
     return cpu_s(lambda: MarchedWhisk.run(rod, bar, friction, touch, end, step_rad=step, back=back))
 
@@ -60,7 +60,7 @@ def frame_s(protocol_name: str, trial: int, camera: int) -> tuple[float, int]:
     with TemporaryDirectory() as folder:
         job = Job(Path(folder), load(protocol_name), 0, False)
         recording = Recording.make(job.protocol, job.protocol.runs()[trial], job.stream(2, trial))
-        frames, sizes = frames_of(job, trial, camera, recording), []
+        frames, sizes = render_frames(job, trial, camera, recording), []
 
         def encode():
             sizes.append(len(cv2.imencode(".jpg", next(frames), [cv2.IMWRITE_JPEG_QUALITY, 95])[1]))
@@ -86,7 +86,7 @@ def session_cost(protocol_name: str, every: int) -> tuple[float, float]:
 
 def _made(job: Job, part: Part) -> tuple[float, int]:
     begin = time.process_time()
-    make(job, part)
+    make_part(job, part)
     cost = time.process_time() - begin
     return cost, sum(f.stat().st_size for f in part.folder.rglob("*") if f.is_file())
 

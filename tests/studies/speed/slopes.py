@@ -20,7 +20,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.protocol import PicturesTable, Protocol
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import PicturesTable
 from bench.trials.seeing import PRESETS, STANDARD
 from tests.studies.accuracy.coverage import drawn
 from tests.studies.accuracy.scenes import Sigmas, make_scene

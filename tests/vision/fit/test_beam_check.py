@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.rig.protocol import WhiskerTable
+from bench.rig.protocol_tables import WhiskerTable
 from tests.studies.accuracy.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
 from tests.studies.accuracy.scenes import as_problem, draw_scene, line_points
 from vision.fit.beam_check import BeamCheck, Compared, _beside, _chance

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.cameras.cameras_toml import write_cameras
-from bench.rig.protocol import PicturesTable
+from bench.rig.protocol_tables import PicturesTable
 from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.scenes import (
     Sigmas,

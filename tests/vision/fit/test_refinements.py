@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
 
-from bench.rig.protocol import MotorTable, PicturesTable, TrialTable, WhiskerTable
+from bench.rig.protocol_tables import MotorTable, PicturesTable, TrialTable, WhiskerTable
 from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit import blocks, solve

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar, turned
+from bench.rig.bar import Bar
+from bench.rig.linear import rotate_about_z
 from bench.rig.round_objects import Cone, Ring, Sphere
 from tests.scenes.model_scenes import CAMERAS
 from vision.geometry.centreline import Curves
@@ -13,19 +14,19 @@ from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar as Thick
 from vision.geometry.rounded import Form, Rounded
 
-SPOT = turned(np.array([60.0, 0.0, 0.0]), 0.04)
+SPOT = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
 
 
 def placed(radius_mm):
     angles = {"beta_rad": 0.6, "psi_rad": 0.05, "touch_rad": 0.04}
-    return Bar.placed(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+    return Bar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
 RING, SPHERE = (
-    Ring.bent(placed(3.0), SPOT, 25.0),
+    Ring.from_bar(placed(3.0), SPOT, 25.0),
     Sphere(placed(15.0).point_mm, placed(15.0).axis, 15.0),
 )
-CONE = Cone.narrowing(placed(6.0), SPOT, 0.3)
+CONE = Cone.from_bar(placed(6.0), SPOT, 0.3)
 THINGS = [
     (RING, Rounded(RING.point_mm, RING.axis, Form("ring", 50.0), SPOT), 3.0),
     (SPHERE, Rounded(SPHERE.point_mm, SPHERE.axis, Form("sphere"), SPOT), 15.0),

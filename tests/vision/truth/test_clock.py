@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.rig.protocol import PicturesTable
+from bench.rig.protocol_tables import PicturesTable
 from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit.covariance import Uncertainty

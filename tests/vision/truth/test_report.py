@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.rig.protocol import PicturesTable
+from bench.rig.protocol_tables import PicturesTable
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit.covariance import Uncertainty
 from vision.fit.quantities import jacobians
