@@ -13,8 +13,9 @@ from vision.fit.blocks import BAR_MODES_PX, WIRE_MODES_PX, Blocks
 from vision.fit.motion import Motion, Yielding, between
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import Axis, axis_frame, closest_arc, shifted_axis
+from vision.geometry.contact import axis_frame, closest_arc
 from vision.geometry.rods import Rods, Wire
+from vision.geometry.touched import Axis
 from vision.wire.points import SHARED, Observed
 
 # [px] A line also wanders with what is behind it, by so much, over `WANDER_MM` of wire. Set by eye.
@@ -60,11 +61,6 @@ class Problem:
         """Return the whisker."""
         return self.rods.wire
 
-    @property
-    def is_rounded(self) -> bool:
-        """Return whether the object is no straight bar; it stands still then."""
-        return self.rods.bar.form is not None
-
     @cached_property
     def blocks(self) -> Blocks:
         """Return the blocks of the parameter vector."""
@@ -72,7 +68,7 @@ class Problem:
             reach_sigma_mm=self.rods.reach_sigma_mm,
             offset_sigma_px=self._offset_sigma_px(),
             motion_sigma=() if self.motion is None else self.motion.sigma,
-            is_rounded=self.is_rounded,
+            touched=self.rods.bar,
             bent_frames=int(np.sum(self.bent)),
         )
 
@@ -140,13 +136,12 @@ class State:
 
 
 def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
-    """Return the object's axis by parameters (…, size): shifted and tilted, and a rounded object
-    along itself, too.
+    """Return the object's axis by parameters (…, size): shifted and tilted, and shifted along
+    itself where the object has a parameter for that.
     """
-    axis = shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
-    if not problem.is_rounded:
-        return axis
-    along_mm = vector[..., problem.blocks.shift_along.slice]  # (…, 1)
+    axis = problem.axis.shifted(axis_frame(problem.axis.direction), vector)
+    own = vector[..., problem.blocks.shift_along.slice]  # (…, 1), or (…, 0) of a bar
+    along_mm = np.sum(own, axis=-1, keepdims=True)
     return replace(axis, point_mm=axis.point_mm + along_mm * problem.axis.direction)
 
 

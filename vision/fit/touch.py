@@ -8,8 +8,9 @@ import numpy as np
 
 from vision.fit.problem import Problem, bar_axis, rest_shape, shift_at_mm
 from vision.geometry.centreline import centrelines
-from vision.geometry.contact import Axis, clearance
+from vision.geometry.contact import clearance
 from vision.geometry.rods import Rods
+from vision.geometry.touched import Axis
 
 # [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
 FEWEST_FREE = 2
@@ -57,11 +58,7 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
         there = replace(axis, point_mm=axis.point_mm + shift_mm)
         return _gap(rest, motor_rad, there, wider_mm, problem.rods)
 
-    if problem.is_rounded:
-        first, last = _about_touch(problem, vector)
-    else:
-        first = np.min(problem.motor_rad)
-        last = np.max(problem.motor_rad)
+    first, last = _about_touch(problem, vector)
     low = np.full(vector.shape[:-1], first)
     high = np.full(vector.shape[:-1], last)
     gap_low, _, _ = gap(low)

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
-from vision.geometry.rounded import Rounded
+from vision.geometry.rounded import RoundedAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.edges import EDGE_PX, FORMAL_TO_TRUE
@@ -119,7 +119,7 @@ class _EdgePosterior:
 
 def measure_silhouette_edges(
     views: Sequence[View],
-    axis: Rounded,
+    axis: RoundedAxis,
     radius_mm: float,
     wires_px: Mapping[str, Sequence[np.ndarray]],
     settings: VisionSettings,
@@ -310,12 +310,12 @@ def _middle_stations(pieces: Pieces, segments: int) -> np.ndarray:
 
 
 def _predict_sides(
-    view: View, axis: Rounded, radius_mm: float, settings: VisionSettings
+    view: View, axis: RoundedAxis, radius_mm: float, settings: VisionSettings
 ) -> list[_OutlineSide]:
     """Predict both sides of the outline, a station every pixel or so; none where a part is not
     before the camera."""
     camera = view.camera
-    points, normals = axis.limb(camera.centre_mm, radius_mm, settings.bar_reach_mm, 400)
+    points, normals = axis.silhouette(camera.centre_mm, radius_mm, settings.bar_reach_mm, 400)
     px = camera.project(points.reshape(-1, 3)).reshape(2, -1, 2)
     if not np.all(np.isfinite(px)):
         return []

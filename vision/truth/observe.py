@@ -21,7 +21,6 @@ from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
-from vision.geometry.contact import drawn_as_bar
 from vision.geometry.counted import counted
 from vision.geometry.reasons import Reason, joined
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
@@ -30,7 +29,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.others import RodLines
 from vision.pictures.pyramid import shrunk_cameras
 from vision.pictures.view import View
-from vision.touched.search import SeenBar, see_bar
+from vision.touched.search import SeenBar, find_object
+from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
@@ -70,7 +70,8 @@ def observe_trial(
     except Refused as reason:
         return _nothing(whisks, reason.reason)
     rows = tuple(_see_whisk(whisk) for whisk in seen)
-    axis, light = drawn_as_bar(bar_seen.axis), [whisk.light for whisk in seen]
+    axis = bar_seen.axis.as_bar()
+    light = [whisk.light for whisk in seen]
     looks = measure_relative_widths(bar_seen)
     bars = {name: Value(*share) for name, share in looks.items()}
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
@@ -125,8 +126,8 @@ def _whisks_of(
     views = pictures.views(cameras)
     used = cameras.subset([view.camera.name for view in views])
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
-    told, stands = _told(pictures, strokes, views, rods.bar.form is not None)
-    bar_seen = see_bar(stands, used, rods, motor_rad, settings)
+    told, stands = _told(pictures, strokes, views, rods.bar.may_move)
+    bar_seen = find_object(SearchScene(stands, used, rods, motor_rad, settings))
     gives = Gives() if pictures.object_gives_way else None
     return (
         [
@@ -152,11 +153,12 @@ def _whisks_of(
 
 
 def _told(
-    pictures: TrialPictures, strokes, views: Sequence[View], is_rounded: bool
+    pictures: TrialPictures, strokes, views: Sequence[View], may_move: bool
 ) -> tuple[StatedVelocity | None, Sequence[View]]:
     """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
     stands: of that frame alone. Raises Refused for what is not told of it."""
-    if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):
+    moves = pictures.object_gives_way or pictures.object_velocity_mm_s is not None
+    if moves and not may_move:
         raise Refused(
             "an object that moves or gives way is seen where it is a straight bar; this one is none",
             code="moving_object_not_straight",

@@ -6,6 +6,7 @@ several on one side, the bar is as far away as it looks wide, and the wire touch
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import singledispatch
 
 import numpy as np
 
@@ -22,7 +23,8 @@ from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
-from vision.geometry.rounded import Rounded
+from vision.geometry.rounded import RoundedAxis
+from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edges import measure_edges
@@ -111,7 +113,7 @@ class Outline:
 
     def observed(
         self,
-        axis: Rounded,
+        axis: RoundedAxis,
         came_mm: np.ndarray,
         frames: Sequence[int],
         wires_px: Mapping[str, Sequence[np.ndarray]],
@@ -235,30 +237,53 @@ class TouchByOnset:
 Touch = TouchByClearance | TouchByOnset
 
 
-def ways_to_see(whisk: WhiskPictures) -> list[tuple[BarMiddles, Touch]]:
-    """How a whisk is seen; where the first way is refused, the next is taken.
+Reader = BarMiddles | Outline
 
-    The bar's edges are read where all cameras stand on one side of it, or a single one sees it. There the wire's
-    cameras may still tell touch by clearance, two at least.
+
+def ways_to_see(whisk: WhiskPictures) -> list[tuple[Reader, Touch]]:
+    """Return the ways to see a whisk; where the first is refused, the next is taken.
+
+    Raises Refused where the cameras cannot see such an object.
     """
-    cameras, radius_mm = whisk.cameras, whisk.rods.bar.radius_mm
-    if isinstance(whisk.bar.axis, Rounded):
-        if widest_sights_rad(cameras, whisk.bar.axis.spot_mm) < _LEAST_SIGHTS_RAD:
-            raise Refused(
-                "an object that is no straight bar is seen by two cameras or more, from different sides",
-                code="object_from_one_side",
-            )
-        return [
-            (Outline(whisk.views, radius_mm, whisk.settings), TouchByClearance(fewest_cameras=2))
-        ]
+    return _ways_to_see(whisk.bar.axis, whisk)
+
+
+@singledispatch
+def _ways_to_see(axis: Axis, whisk: WhiskPictures) -> list[tuple[Reader, Touch]]:
+    """Return the ways to see a whisk against what stands there."""
+    raise NotImplementedError(f"no way to see a {whisk.rods.bar.name}")
+
+
+@_ways_to_see.register
+def _ways_to_see_rounded(axis: RoundedAxis, whisk: WhiskPictures) -> list[tuple[Reader, Touch]]:
+    """Return the one way to see an object that is no straight bar: by its silhouette.
+
+    Raises Refused where all cameras are on one side of it.
+    """
+    if widest_sights_rad(whisk.cameras, axis.spot_mm) < _LEAST_SIGHTS_RAD:
+        raise Refused(
+            "an object that is no straight bar is seen by two cameras or more, from different sides",
+            code="object_from_one_side",
+        )
+    reader = Outline(whisk.views, whisk.rods.bar.radius_mm, whisk.settings)
+    return [(reader, TouchByClearance(fewest_cameras=2))]
+
+
+@_ways_to_see.register
+def _ways_to_see_bar(axis: BarAxis, whisk: WhiskPictures) -> list[tuple[Reader, Touch]]:
+    """Return the ways to see a straight bar: by its middle, or by its edges.
+
+    The edges are read where all cameras stand on one side of it, or a single one sees it. There the
+    wire's cameras may still determine touch by clearance, two at least.
+    """
+    radius_mm = whisk.rods.bar.radius_mm
     seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
-    if seen_from_one_side(cameras, whisk.bar.axis):
+    if seen_from_one_side(whisk.cameras, axis):
         return [(BarEdges(seeing or whisk.views, radius_mm, whisk.settings), TouchByOnset())]
     if len(seeing) == 1:
-        return [
-            (BarEdges(seeing, radius_mm, whisk.settings), touch)
-            for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())
-        ]
+        by_clearance = BarEdges(seeing, radius_mm, whisk.settings)
+        by_onset = BarEdges(seeing, radius_mm, whisk.settings)
+        return [(by_clearance, TouchByClearance(fewest_cameras=2)), (by_onset, TouchByOnset())]
     return [(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
 
 

@@ -1,15 +1,17 @@
 """From the fit to rows: values with sigmas, statuses, and lines to draw on the pictures."""
 
+from dataclasses import replace
+from functools import singledispatch
+
 import numpy as np
 
 from vision.fit.covariance import variance_by_cause
 from vision.fit.line_noise import line_noise
 from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.geometry.camera import Camera
-from vision.geometry.centreline import Curves
-from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import Reason, joined
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.rounded import Rounded
+from vision.geometry.touched import Axis, Touched
 from vision.pictures.pyramid import full_px
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, GaveWay, SeenObject, WhiskTruth, WireShape
@@ -30,6 +32,8 @@ _MOST_SLOPE_SIGMA_RAD = np.radians(20.0)
 _MOST_SLIP_SIGMA_MM = 1.0
 # [mm] Of the bar that overlays draw, to either side of its point: a layout. Stated.
 _DRAWN_MM = 40.0
+# [points] Of each of its edges. A layout.
+_DRAWN_POINTS = 81
 _VECTORS = ("x", "y", "z")
 
 
@@ -58,16 +62,31 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         shape=_shape(fitted),
         velocity_mm_s=_velocity(whisk, fitted),
         gave=_gave(fitted) if whisk.gives is not None and is_known else None,
-        rounded=_rounded(fitted) if fitted.problem.is_rounded and is_known else None,
+        rounded=_seen_object(fitted.problem.rods.bar, fitted) if is_known else None,
         problem=fitted.problem,
         **truth,
     )
 
 
-def _rounded(fitted: FittedWhisk) -> SeenObject:
-    bar, axis = fitted.problem.rods.bar, bar_axis(fitted.problem, fitted.state.vector)
-    sizes = bar.radius_mm, 0.5 * bar.form.ring_diameter_mm, bar.form.half_angle_rad
-    return SeenObject(bar.form.shape, axis.point_mm, axis.direction, *sizes)
+@singledispatch
+def _seen_object(touched: Touched, fitted: FittedWhisk) -> SeenObject | None:
+    """Return where the object is, of a form that has a record for it; None of a bar."""
+    return None
+
+
+@_seen_object.register
+def _seen_rounded(touched: Rounded, fitted: FittedWhisk) -> SeenObject:
+    """Return where an object that is no straight bar is, with its stated sizes."""
+    axis = bar_axis(fitted.problem, fitted.state.vector)
+    sizes = touched.sizes
+    return SeenObject(
+        touched.name,
+        axis.point_mm,
+        axis.direction,
+        touched.radius_mm,
+        0.5 * sizes.ring_diameter_mm,
+        sizes.half_angle_rad,
+    )
 
 
 def _velocity(whisk: WhiskPictures, fitted: FittedWhisk) -> Value | None:
@@ -249,66 +268,31 @@ def _budget(fitted: FittedWhisk) -> dict[str, float]:
 def _overlay(
     whisk: WhiskPictures, fitted: FittedWhisk
 ) -> dict[int, dict[str, dict[str, np.ndarray]]]:
-    """Per frame and camera: wire, the bar's two edges (m, 2) and the contact (2,) in pixels."""
+    """Return per frame and camera the wire, the object's two edges (m, 2) and the contact (2,) px."""
     curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    if fitted.problem.is_rounded:
-        return _overlay_of_rounded(whisk, fitted, curves)
     axes = bar_axes(fitted.problem, fitted.state.vector)
-    place = np.linspace(-_DRAWN_MM, _DRAWN_MM, 81)
-    drawn: dict = {}
-    for k, f in enumerate(fitted.frames):
-        one, number = curves.one(k), min(k, len(axes.point_mm) - 1)
-        axis = BarAxis(axes.point_mm[number], axes.direction[number])
-        along = axis.point_mm + place[:, None] * axis.direction
-        contact = np.array([[fitted.measured.frame[name][k] for name in _VECTORS]])
-        drawn[int(f)] = {
-            view.camera.name: _drawn(
-                view.camera,
-                one,
-                along,
-                axis,
-                contact,
-                whisk.rods.bar.radius_mm,
-                whisk.settings.picture_scale,
-            )
-            for view in whisk.views
-        }
-    return drawn
-
-
-def _overlay_of_rounded(whisk: WhiskPictures, fitted: FittedWhisk, curves: Curves) -> dict:
-    """The same, its outline's two sides in place of the bar's edges."""
-    axis = bar_axis(fitted.problem, fitted.state.vector)
     contacts = np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
+    scale = whisk.settings.picture_scale
     drawn: dict = {int(f): {} for f in fitted.frames}
     for view in whisk.views:
         camera = view.camera
-        sides, _ = axis.limb(camera.centre_mm, whisk.rods.bar.radius_mm, _DRAWN_MM, 81)
-        left, right = (camera.project(side) for side in sides)
+        edges_px = _edges_px(axes, camera, whisk.rods.bar.radius_mm)
         for k, f in enumerate(fitted.frames):
+            left, right = edges_px[min(k, len(edges_px) - 1)]
             lines = {
                 "wire": camera.project(curves.points_mm[k]),
                 "bar_left": left,
                 "bar_right": right,
                 "contact": camera.project(contacts[k : k + 1])[0],
             }
-            drawn[int(f)][camera.name] = {
-                name: full_px(px, whisk.settings.picture_scale) for name, px in lines.items()
-            }
+            drawn[int(f)][camera.name] = {name: full_px(px, scale) for name, px in lines.items()}
     return drawn
 
 
-def _drawn(
-    camera: Camera, curve: Curves, along, axis: BarAxis, contact, bar_radius_mm: float, scale: int
-) -> dict[str, np.ndarray]:
-    middle, half = outline(
-        camera, along, np.broadcast_to(axis.direction, along.shape), bar_radius_mm
-    )
-    aside = half[:, None] * normals(middle)
-    lines = {
-        "wire": camera.project(curve.points_mm),
-        "bar_left": middle - aside,
-        "bar_right": middle + aside,
-        "contact": camera.project(contact)[0],
-    }
-    return {name: full_px(px, scale) for name, px in lines.items()}
+def _edges_px(axes: Axis, camera: Camera, radius_mm: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return both edges (m, 2) px in each frame, once of an object that stands still."""
+    edges_px = []
+    for point_mm, direction in zip(axes.point_mm, axes.direction):
+        axis = replace(axes, point_mm=point_mm, direction=direction)
+        edges_px.append(axis.edges_px(camera, radius_mm, _DRAWN_MM, _DRAWN_POINTS))
+    return edges_px

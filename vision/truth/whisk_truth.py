@@ -19,8 +19,9 @@ from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import begins_free
 from vision.geometry.centreline import Curves, one_curve
-from vision.geometry.contact import Axis, clearance, outline_of_bar, upward
+from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
+from vision.geometry.touched import Axis
 from vision.pictures.view import SATURATED, View
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.moving_bar import BarInFrames
@@ -108,7 +109,7 @@ def _fitted_by(
         whisk = whisk.yielding_as(problem, state)
         _check_scatter(problem, state)
         look = _Look(
-            upward(bar_axis(problem, state.vector)),
+            bar_axis(problem, state.vector).upward(),
             shifts_mm(problem, state.vector),
             rest_shape(problem, state.vector),
             bends(problem, state.vector),
@@ -317,7 +318,7 @@ def clear_pieces(
     if view.others:
         pieces = pieces.select(pieces.show_rod(_EDGE_PX))
     pieces = pieces.below(SATURATED * view.full_scale)
-    outline = outline_of_bar(view.camera, axis, whisk.bar_swept_mm)
+    outline = axis.covering_discs(view.camera, whisk.bar_swept_mm)
     return pieces.select(
         clear_of_bar(pieces, *outline, BESIDE_BAR_PX) & (pieces.place > NEAR_CLAMP_MM)
     )
