@@ -104,25 +104,39 @@ class Problem:
     def _offset_sigma_px(self) -> np.ndarray:
         """Return sigmas (cameras, 12) in px by which a camera's lines of wire and bar are off as a
         whole.
-
-        As the wire turns before the light, an offset changes by as much over a radian. Of a bar
-        they are what its points share, where these say so.
         """
-        usual = np.concatenate([WIRE_MODES_PX, np.ones(SHARED), BAR_MODES_PX])
-        sigma = np.tile(usual, (len(self.cameras), 1))
+        rows = []
+        for camera in range(len(self.cameras)):
+            own = [one for one in self.seen if one.camera == camera]
+            wire = [one.points.shared_px for one in own if one.frame >= 0]
+            bar = [one.points.shared_px for one in own if one.frame < 0]
+            rows.append([*self._wire_sigma_px(wire), *np.ones(SHARED), *_bar_sigma_px(bar)])
+        return np.array(rows)
+
+    def _wire_sigma_px(self, shared_px: Sequence[np.ndarray]) -> np.ndarray:
+        """Return sigmas (6,) in px by which one camera's lines of the wire are off as a whole.
+
+        As the wire turns before the light, an offset changes by as much over a radian. shared_px:
+        of each line (n, SHARED).
+        """
+        sigma = WIRE_MODES_PX.copy()
         half_swing_rad = 0.5 * float(np.ptp(self.motor_rad))
-        for camera, own in enumerate(sigma):
-            wire = [one.points for one in self.seen if one.camera == camera and one.frame >= 0]
-            shared = [row for points in wire for row in points.shared_px]
-            common = np.linalg.norm(np.mean(shared, axis=0)) if shared else 0.0
-            still = np.hypot(own[:2], [common, 0.0])
-            own[2:4] = np.hypot(own[2:4], half_swing_rad * still)
-            own[4:6] = np.hypot(own[4:6], 0.5 * half_swing_rad**2 * still)
-            bar = [one.points for one in self.seen if one.camera == camera and one.frame < 0]
-            bar_shared = [points.shared_px for points in bar]
-            if bar_shared and np.any(np.concatenate(bar_shared)):
-                own[-2:] = np.sqrt(np.mean(np.concatenate(bar_shared)[:, :2] ** 2, axis=0))
+        points = [row for line in shared_px for row in line]
+        common = np.linalg.norm(np.mean(points, axis=0)) if points else 0.0
+        still = np.hypot(sigma[:2], [common, 0.0])
+        sigma[2:4] = np.hypot(sigma[2:4], half_swing_rad * still)
+        sigma[4:6] = np.hypot(sigma[4:6], 0.5 * half_swing_rad**2 * still)
         return sigma
+
+
+def _bar_sigma_px(shared_px: Sequence[np.ndarray]) -> np.ndarray:
+    """Return sigmas (2,) in px by which one camera's lines of the bar are off as a whole.
+
+    They are what points share, where these say so. shared_px: of each line (n, SHARED).
+    """
+    if not shared_px or not np.any(np.concatenate(shared_px)):
+        return BAR_MODES_PX
+    return np.sqrt(np.mean(np.concatenate(shared_px)[:, :2] ** 2, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
