@@ -94,7 +94,7 @@ class Ring(Rounded):
     def hides_itself(
         self, at: RoundedAxis, centre_mm: np.ndarray, points_mm: np.ndarray, radius_mm: float
     ) -> np.ndarray:
-        """Return whether (...) a sight through points (..., 3) beside the ring meets it elsewhere.
+        """Return whether (...) a sight through points (..., 3) near the ring meets it elsewhere.
 
         The distances of points along each sight are compared with the tube's radius.
         """

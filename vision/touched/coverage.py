@@ -1,6 +1,6 @@
 """Where a ring may be in space, before any wire is known: by what it covers in all cameras.
 
-The edges beside the contact determine neither the ring's plane nor its centre, and a tube has
+The edges near the contact determine neither the ring's plane nor its centre, and a tube has
 highlights and rims whose edges are as strong as its own. So the whole ring is used: a map of each
 camera says how surely every pixel differs from the picture without rods. Just within the ring's
 outer silhouette, which no part of it hides, the picture must differ, and just beyond it must not.

@@ -1,6 +1,6 @@
-"""Fit a ring, sphere or cone to the edges beside its silhouette, from a place nearby.
+"""Fit a ring, sphere or cone to the edges near its silhouette, from a place nearby.
 
-The edges beside the predicted silhouette are measured in every camera, the object is moved so that
+The edges near the predicted silhouette are measured in every camera, the object is moved so that
 its silhouette passes through them, and both are repeated within ever shorter reach until the object
 moves no more. The detection score of a place is how much more probable edges are on its silhouette
 than anywhere near it.

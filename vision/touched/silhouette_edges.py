@@ -1,4 +1,4 @@
-"""The silhouette edges of a rounded object in one camera: line points beside a predicted outline.
+"""The silhouette edges of a rounded object in one camera: line points near a predicted outline.
 
 The outline (occluding contour) of a ring, sphere or cone has two sides. Each side is divided into
 segments of some 60 px, and the edge of each segment is measured by itself, with the model of
@@ -58,7 +58,7 @@ _LEAST_EVIDENCE = 6.0
 
 @dataclass(frozen=True)
 class SilhouetteEdges:
-    """The edges beside an outline in one camera.
+    """The edges near an outline in one camera.
 
     points: line points, their `place` is the distance at which the sight grazes, mm. segments: how
     many were tried.
@@ -97,7 +97,7 @@ def measure_silhouette_edges(
     *,
     coarse: bool = False,
 ) -> dict[str, SilhouetteEdges]:
-    """Measure by camera the edges beside a predicted outline that is at most reach_px off.
+    """Measure by camera the edges near a predicted outline that is at most reach_px off.
 
     before: of an earlier pass, whose blurs allow a fine one. coarse: by one quick pass. wires_px:
     by camera lines (m, 2) where the wire lies in some frame.
@@ -196,7 +196,7 @@ def _fit_outline(
     before: SilhouetteEdges | None,
     coarse: bool,
 ) -> _OutlinePosterior:
-    """Return the posteriors of the edges beside predicted sides in one camera, as of
+    """Return the posteriors of the edges near predicted sides in one camera, as of
     `measure_silhouette_edges`."""
     is_fine = before is not None
     reach_px = _FINE_REACH_PX if is_fine else reach_px

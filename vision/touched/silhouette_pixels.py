@@ -1,4 +1,4 @@
-"""The pixels beside a predicted silhouette: its two sides, and pieces of them as rows of pixels.
+"""The pixels near a predicted silhouette: its two sides, and pieces of them as rows of pixels.
 
 Only those parts count outside of which nothing else of the object lies, and that are clear of the
 wire.
@@ -20,7 +20,7 @@ from vision.wire.bands import Pieces
 _INSIDE_PX = 9.0
 # [px] Least half width: what is thinner has both edges in one. Stated.
 _LEAST_HALF_PX = 5.0
-# [px] Largest half width in the model: the light of what is wider changes no faster beside its
+# [px] Largest half width in the model: the light of what is wider changes no faster near its
 # edge, and profiles grow no longer. Stated.
 _LARGEST_HALF_PX = 40.0
 # [px] Distance outside an edge within which nothing else of the object may lie: where the
@@ -87,7 +87,7 @@ def predict_sides(
 
 @dataclass(frozen=True)
 class _SidePixels:
-    """Pixels beside one side of a silhouette.
+    """Pixels near one side of a silhouette.
 
     pixels (n, 2): whole, x and y. station (n,): the nearest one. offset_px, along_px (n,): across
     the side outwards, and along it.
@@ -100,7 +100,7 @@ class _SidePixels:
 
     @classmethod
     def of(cls, side: OutlineSide, pixels: np.ndarray) -> "_SidePixels":
-        """Return pixels (n, 2) with their places beside a side."""
+        """Return pixels (n, 2) with their places near a side."""
         _, nearest = cKDTree(side.px).query(pixels)
         displacement = pixels - side.px[nearest]
         offset_px = np.sum(displacement * side.normal[nearest], axis=1)
@@ -124,7 +124,7 @@ def read_pieces(
     settings: VisionSettings,
     reach_px: float,
 ) -> Pieces:
-    """Read the pixels beside one side that lie clear of the wires, as pieces along it."""
+    """Read the pixels near one side that lie clear of the wires, as pieces along it."""
     inside_px = reach_px + _INSIDE_PX
     outside_px = reach_px + OUTSIDE_PX + 1.0
     pixels = _pixels_near(view.mean.shape, side, inside_px, outside_px)

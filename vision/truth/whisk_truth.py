@@ -303,7 +303,7 @@ def trace_wire(
     *,
     last: bool = True,
 ) -> list[Observed]:
-    """Trace the wire in one of a whisk's cameras beside its curves by frame.
+    """Trace the wire in one of a whisk's cameras near its curves by frame.
 
     seen_blur_px: by camera, of the pass that gave the curves. Fills whisk.light with how the camera
     sees the wire.
@@ -323,7 +323,7 @@ def trace_wire(
 def clear_pieces(
     whisk: WhiskPictures, view: View, axis: Axis, curves: Mapping[int, Curves]
 ) -> Pieces:
-    """Cut out the wire beside its curves, clear of clamp and object, in one of a whisk's cameras."""
+    """Cut out the wire near its curves, clear of clamp and object, in one of a whisk's cameras."""
     settings = whisk.settings
     pieces = wire_pieces(
         view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px
